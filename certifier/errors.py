@@ -1,0 +1,36 @@
+"""Errors a user can act on: what is wrong, where, and what to do."""
+
+
+class CirisError(Exception):
+    """A problem the user can mend.
+
+    Attributes:
+        code: stable machine-readable name, e.g. ``"seed_in_collision"``.
+        field: where in the user's input, e.g. ``"seed.q[3]"``; None when the input as a whole is meant.
+        hint: what to do about it; may be empty.
+    """
+
+    def __init__(self, code: str, message: str, *, field: str | None = None, hint: str = "") -> None:
+        super().__init__(message)
+        self.code, self.message, self.field, self.hint = code, message, field, hint
+
+    def __str__(self) -> str:
+        where = f"{self.field}: " if self.field else ""
+        return f"{where}{self.message}" + (f" ({self.hint})" if self.hint else "")
+
+    def to_document(self) -> dict[str, str | None]:
+        """The error as a JSON-able dict with the keys code, message, field, hint."""
+        return {"code": self.code, "message": self.message, "field": self.field, "hint": self.hint}
+
+    @classmethod
+    def from_document(cls, document: dict[str, str | None]) -> "CirisError":
+        """Inverse of :meth:`to_document`; the result is a plain CirisError."""
+        return cls(document["code"] or "error", document["message"] or "", field=document["field"], hint=document["hint"] or "")
+
+
+class SceneError(CirisError):
+    """The scene cannot be used: broken file, unsupported joint or shape, unknown name."""
+
+
+class RegionError(CirisError):
+    """The polytope or the seed cannot be used: empty, unbounded, in collision, outside the limits, wrong length."""

@@ -1,0 +1,304 @@
+"""The scene as numbers: joints, bodies, convex geometries, pairs.
+
+A :class:`Scene` is self-contained: it needs no robot file, no mesh and no Drake to be used, and it is what the content
+hash, the kinematics, the proofs and the verifier refer to. Drake's parsed doubles are taken as exact numbers.
+
+Monogram notation: X_PF is the pose of frame F measured in frame P, p_BV the position of point V in frame B.
+Tangent configuration space (C-IRIS, eq. 4): s_i = tan((q_i - q*_i) / 2) for a revolute joint, q_i - q*_i for a prismatic one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from certifier.errors import RegionError, SceneError
+
+Array = NDArray[np.float64]
+
+SCHEMA_VERSION = 1
+WORLD = "world"
+
+
+class JointKind(StrEnum):
+    REVOLUTE = "revolute"
+    PRISMATIC = "prismatic"
+    WELD = "weld"
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One edge of the kinematic tree: X_PB(q) = X_PF X_FM(q) X_BM^-1.
+
+    Attributes:
+        name: ``model/joint``.
+        parent, child: body names.
+        axis: (3,) unit axis in F (zeros for a weld).
+        X_PF, X_BM: (4, 4) fixed frames on parent and child, metres. A weld's own offset is folded into X_PF.
+        index: position index in q and s; None for a weld.
+        lower, upper: limits of q in radians or metres; None for a weld.
+    """
+
+    name: str
+    kind: JointKind
+    parent: str
+    child: str
+    axis: Array
+    X_PF: Array
+    X_BM: Array
+    index: int | None = None
+    lower: float | None = None
+    upper: float | None = None
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A convex body fixed to a link: conv(vertices) + ball(radius), in the frame of its body.
+
+    Attributes:
+        name: ``model/body/geometry``.
+        body: ``model/body``, or ``world``.
+        vertices: (v, 3) metres in the body's frame. A sphere has one, a capsule two.
+        radius: metres, 0 for a polytope. The scene's padding is *not* included.
+        shape: what the file said, JSON-able: ``{"kind": "box", "size": [x, y, z], "X_BG": 4x4 list}`` and so on.
+        substitution: None when vertices and radius describe the shape exactly, else a sentence naming the conservative
+            replacement (mesh -> hull with V vertices, cylinder -> prism ...).
+        inflation: upper bound in metres on how far the replacement reaches outside the shape.
+    """
+
+    name: str
+    body: str
+    vertices: Array
+    radius: float
+    shape: dict[str, Any]
+    substitution: str | None = None
+    inflation: float = 0.0
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two geometries, by name, that must not touch; a < b in string order."""
+
+    a: str
+    b: str
+
+
+@dataclass(frozen=True)
+class Ignored:
+    """A pair of geometries that is not certified, and why."""
+
+    a: str
+    b: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A kinematic tree with convex geometries and the pairs to certify.
+
+    Attributes:
+        joints: every joint of the tree, welds included; each body but ``world`` is the child of exactly one.
+        q_star: (n,) centre of the parametrisation.
+        padding: metres added around every geometry of every pair (both sides).
+        warnings: lint findings, sentences for people.
+        provenance: how the scene was made (directives, package roots, Drake's version); not part of the hash.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    bodies: tuple[str, ...]
+    geometries: tuple[Geometry, ...]
+    pairs: tuple[Pair, ...]
+    ignored: tuple[Ignored, ...]
+    q_star: Array
+    padding: float = 0.0
+    warnings: tuple[str, ...] = ()
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def n(self) -> int:
+        """Number of joint positions."""
+        return len(self.q_star)
+
+    @cached_property
+    def moving(self) -> tuple[Joint, ...]:
+        """The n joints that have a position, in position order."""
+        return tuple(sorted((j for j in self.joints if j.index is not None), key=lambda j: j.index or 0))
+
+    @cached_property
+    def revolute(self) -> NDArray[np.bool_]:
+        """(n,) True where the joint is revolute."""
+        return np.array([j.kind is JointKind.REVOLUTE for j in self.moving], dtype=bool)
+
+    @cached_property
+    def q_lower(self) -> Array:
+        return np.array([j.lower for j in self.moving], dtype=float)
+
+    @cached_property
+    def q_upper(self) -> Array:
+        return np.array([j.upper for j in self.moving], dtype=float)
+
+    @cached_property
+    def s_lower(self) -> Array:
+        return self.to_s(self.q_lower)
+
+    @cached_property
+    def s_upper(self) -> Array:
+        return self.to_s(self.q_upper)
+
+    def to_s(self, q: ArrayLike) -> Array:
+        """Tangent-space coordinates of positions q, (..., n) -> (..., n)."""
+        delta = np.asarray(q, dtype=float) - self.q_star
+        return np.where(self.revolute, np.tan(delta / 2), delta)
+
+    def to_q(self, s: ArrayLike) -> Array:
+        """Joint positions of tangent-space coordinates s, (..., n) -> (..., n)."""
+        s = np.asarray(s, dtype=float)
+        return self.q_star + np.where(self.revolute, 2 * np.arctan(s), s)
+
+    @cached_property
+    def _geometry(self) -> dict[str, Geometry]:
+        return {g.name: g for g in self.geometries}
+
+    def geometry(self, name: str) -> Geometry:
+        """The geometry called ``name``.
+
+        Raises:
+            SceneError: no geometry has that name.
+        """
+        try:
+            return self._geometry[name]
+        except KeyError:
+            raise SceneError("unknown_geometry", f"no geometry is called {name!r}", hint="names are model/body/geometry") from None
+
+    def polytope(self, C: ArrayLike, d: ArrayLike) -> Polytope:
+        """The polytope {C s <= d} with the joint limits added as its last 2n rows (upper, then lower)."""
+        C, d = np.asarray(C, dtype=float).reshape(-1, self.n), np.asarray(d, dtype=float).reshape(-1)
+        eye = np.eye(self.n)
+        return Polytope(np.concatenate([C, eye, -eye]), np.concatenate([d, self.s_upper, -self.s_lower]))
+
+    def to_document(self) -> dict[str, Any]:
+        """The scene as JSON-able data (keys are stable; see docs/architecture.md)."""
+        return {**self._content(), "name": self.name, "hash": self.hash, "warnings": list(self.warnings), "provenance": self.provenance}
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 over everything a proof depends on: not the scene's name, not its provenance."""
+        text = json.dumps(self._content(), sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def _content(self) -> dict[str, Any]:
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "joints": [
+                {
+                    "name": j.name,
+                    "kind": j.kind.value,
+                    "parent": j.parent,
+                    "child": j.child,
+                    "axis": j.axis.tolist(),
+                    "X_PF": j.X_PF.tolist(),
+                    "X_BM": j.X_BM.tolist(),
+                    "index": j.index,
+                    "lower": j.lower,
+                    "upper": j.upper,
+                }
+                for j in self.joints
+            ],
+            "bodies": list(self.bodies),
+            "geometries": [
+                {
+                    "name": g.name,
+                    "body": g.body,
+                    "vertices": g.vertices.tolist(),
+                    "radius": g.radius,
+                    "shape": g.shape,
+                    "substitution": g.substitution,
+                    "inflation": g.inflation,
+                }
+                for g in self.geometries
+            ],
+            "pairs": [[p.a, p.b] for p in self.pairs],
+            "ignored": [{"pair": [i.a, i.b], "reason": i.reason} for i in self.ignored],
+            "q_star": self.q_star.tolist(),
+            "padding": self.padding,
+        }
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any]) -> Scene:
+        """Inverse of :meth:`to_document`.
+
+        Raises:
+            SceneError: the schema version is unknown or the stored hash does not match the content.
+        """
+        if document.get("schema_version") != SCHEMA_VERSION:
+            raise SceneError("scene_schema", f"scene schema version {document.get('schema_version')!r} is not {SCHEMA_VERSION}")
+        scene = cls(
+            name=document["name"],
+            joints=tuple(
+                Joint(
+                    name=j["name"],
+                    kind=JointKind(j["kind"]),
+                    parent=j["parent"],
+                    child=j["child"],
+                    axis=np.array(j["axis"], dtype=float),
+                    X_PF=np.array(j["X_PF"], dtype=float),
+                    X_BM=np.array(j["X_BM"], dtype=float),
+                    index=j["index"],
+                    lower=j["lower"],
+                    upper=j["upper"],
+                )
+                for j in document["joints"]
+            ),
+            bodies=tuple(document["bodies"]),
+            geometries=tuple(
+                Geometry(
+                    name=g["name"],
+                    body=g["body"],
+                    vertices=np.array(g["vertices"], dtype=float).reshape(-1, 3),
+                    radius=float(g["radius"]),
+                    shape=g["shape"],
+                    substitution=g["substitution"],
+                    inflation=float(g["inflation"]),
+                )
+                for g in document["geometries"]
+            ),
+            pairs=tuple(Pair(a, b) for a, b in document["pairs"]),
+            ignored=tuple(Ignored(*i["pair"], i["reason"]) for i in document["ignored"]),
+            q_star=np.array(document["q_star"], dtype=float),
+            padding=float(document["padding"]),
+            warnings=tuple(document.get("warnings", ())),
+            provenance=document.get("provenance", {}),
+        )
+        if "hash" in document and document["hash"] != scene.hash:
+            raise SceneError("scene_hash", "the scene's stored hash does not match its content")
+        return scene
+
+
+@dataclass(frozen=True)
+class Polytope:
+    """{s : C s <= d}; C is (m, n), d is (m,). Plain rows: whether the joint limits are among them is up to the maker.
+
+    Raises:
+        RegionError: shapes do not fit or a number is not finite.
+    """
+
+    C: Array
+    d: Array
+
+    def __post_init__(self) -> None:
+        if self.C.ndim != 2 or self.d.shape != (len(self.C),):
+            raise RegionError("polytope_shape", f"C is {self.C.shape} and d is {self.d.shape}; they must be (m, n) and (m,)", field="polytope")
+        if not (np.isfinite(self.C).all() and np.isfinite(self.d).all()):
+            raise RegionError("polytope_not_finite", "C and d must be finite numbers", field="polytope")
+
+    def contains(self, s: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
+        """Which of the points s, (..., n), satisfy C s <= d + tolerance."""
+        return np.all(np.asarray(s) @ self.C.T <= self.d + tolerance, axis=-1)
