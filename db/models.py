@@ -1,0 +1,215 @@
+"""The tables. The database is the truth about every job; messages carry only ids."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, ClassVar
+
+from sqlalchemy import JSON, ForeignKey, Index, LargeBinary, MetaData, String, Text, UniqueConstraint
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+from db import states
+from db.types import Arrays, Npz, Utc, utcnow
+
+Document = dict[str, Any]
+
+
+class Base(DeclarativeBase):
+    metadata = MetaData(
+        naming_convention={
+            "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+            "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+            "ck": "ck_%(table_name)s_%(constraint_name)s",
+            "fk": "fk_%(table_name)s_%(column_0_N_name)s",
+            "pk": "pk_%(table_name)s",
+        }
+    )
+    type_annotation_map: ClassVar[dict[Any, Any]] = {datetime: Utc, Document: JSON, Arrays: Npz, bytes: LargeBinary, str: Text}
+
+
+class SceneRow(Base):
+    """A scene, immutable. ``id`` is the first 16 hexadecimal digits of ``hash``, or all of it where those are taken."""
+
+    __tablename__ = "scenes"
+
+    id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    name: Mapped[str]
+    hash: Mapped[str] = mapped_column(String(64), unique=True)
+    document: Mapped[Document]
+    """certifier.model.Scene.to_document()"""
+    created_at: Mapped[datetime] = mapped_column(default=utcnow)
+
+
+class Leased:
+    """What a worker must claim before it works on it: one holder at a time, for a limited time, a limited number of times."""
+
+    attempts: Mapped[int] = mapped_column(default=0)
+    """How often it was begun."""
+    worker: Mapped[str | None]
+    """Who holds or last held it: ``host:pid``."""
+    task_id: Mapped[str | None] = mapped_column(String(36))
+    """The message under which it is held."""
+    lease_token: Mapped[str | None] = mapped_column(String(36))
+    """Proof of being the holder; new with every claim."""
+    lease_until: Mapped[datetime | None]
+    sent_at: Mapped[datetime | None]
+    """When a message for it was last sent."""
+
+
+class JobRow(Base):
+    """One request to grow a region or to certify a polytope."""
+
+    __tablename__ = "jobs"
+    __table_args__ = (Index(None, "state"), Index(None, "created_at", "id"))
+    transitions: ClassVar[states.Table] = states.JOB
+
+    id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    kind: Mapped[str] = mapped_column(String(16))
+    """JobKind."""
+    scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), index=True)
+    state: Mapped[str] = mapped_column(String(16), default=states.JobState.QUEUED)
+    outcome: Mapped[str | None] = mapped_column(String(16))
+    """certifier.outcome.Outcome, once the job has ended."""
+    reason: Mapped[str | None]
+    """Why it ended, a sentence."""
+    error: Mapped[Document | None]
+    """CirisError.to_document() when it failed."""
+    options: Mapped[Document]
+    """certifier.growth.GrowthOptions.to_document()"""
+    growth: Mapped[Document | None]
+    """The state of certifier.growth after the last transition."""
+    action: Mapped[Document | None]
+    """The action that this state waits for."""
+    idempotency_key: Mapped[str | None] = mapped_column(String(255), unique=True)
+    request_digest: Mapped[str | None] = mapped_column(String(64))
+    """SHA-256 of the request, to tell a repetition from a different request under the same key."""
+    retry_of: Mapped[str | None] = mapped_column(ForeignKey("jobs.id"))
+    attempt: Mapped[int] = mapped_column(default=1)
+    """1, or one more than the attempt of ``retry_of``."""
+    region_id: Mapped[str | None] = mapped_column(String(36))
+    """The last region accepted."""
+    event_seq: Mapped[int] = mapped_column(default=0)
+    """``seq`` of the last event."""
+    coordinator_token: Mapped[str | None] = mapped_column(String(36))
+    """Held by the one coordinator that is computing the next transition."""
+    coordinator_until: Mapped[datetime | None]
+    coordinator_attempts: Mapped[int] = mapped_column(default=0)
+    """How often the next transition was begun; 0 again once it is saved."""
+    created_at: Mapped[datetime] = mapped_column(default=utcnow)
+    started_at: Mapped[datetime | None]
+    finished_at: Mapped[datetime | None]
+    deadline_at: Mapped[datetime | None]
+
+
+class IterationRow(Base):
+    """A polytope whose pairs are certified together."""
+
+    __tablename__ = "iterations"
+    transitions: ClassVar[states.Table] = states.ITERATION
+
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
+    index: Mapped[int] = mapped_column(primary_key=True)
+    label: Mapped[str]
+    """What this polytope is, for people."""
+    arrays: Mapped[Arrays]
+    """C (m, n), d (m,) with the joint limits, center (n,)."""
+    state: Mapped[str] = mapped_column(String(16), default=states.IterationState.RUNNING)
+    stop_at_first_failure: Mapped[bool]
+    reuse: Mapped[Document]
+    """Pair index (as a string) -> the iteration whose proof serves here too."""
+    ellipsoid_volume: Mapped[float | None]
+    started_at: Mapped[datetime] = mapped_column(default=utcnow)
+    finished_at: Mapped[datetime | None]
+
+
+class PairRow(Leased, Base):
+    """One pair of geometries on one iteration's polytope."""
+
+    __tablename__ = "pairs"
+    __table_args__ = (UniqueConstraint("job_id", "iteration", "pair_index"), Index(None, "state", "lease_until"))
+    transitions: ClassVar[states.Table] = states.PAIR
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"))
+    iteration: Mapped[int]
+    pair_index: Mapped[int]
+    """Position in Scene.pairs."""
+    a: Mapped[str]
+    b: Mapped[str]
+    state: Mapped[str] = mapped_column(String(16), default=states.PairState.OPEN)
+    forecast_seconds: Mapped[float] = mapped_column(default=0.0)
+    stage: Mapped[str | None] = mapped_column(String(16))
+    """certifier.outcome.Stage"""
+    margin: Mapped[float | None]
+    seconds: Mapped[float | None]
+    detail: Mapped[str | None]
+    witness_s: Mapped[list[float] | None] = mapped_column(JSON(none_as_null=True))
+    weak_points: Mapped[list[list[float]] | None] = mapped_column(JSON(none_as_null=True))
+    proof_digest: Mapped[str | None] = mapped_column(ForeignKey("proofs.digest"))
+
+
+class StepRow(Leased, Base):
+    """A piece of a job that is not a pair: seeding, the polytope step, accepting a region."""
+
+    __tablename__ = "steps"
+    __table_args__ = (UniqueConstraint("job_id", "index"), Index(None, "state", "lease_until"))
+    transitions: ClassVar[states.Table] = states.STEP
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"))
+    index: Mapped[int]
+    kind: Mapped[str] = mapped_column(String(16))
+    """StepKind."""
+    state: Mapped[str] = mapped_column(String(16), default=states.StepState.OPEN)
+    input: Mapped[Document]
+    """What it works on: the action, or the accepted polytope."""
+    report: Mapped[Document | None]
+    """What it found, as certifier.growth takes it."""
+    detail: Mapped[str | None]
+    seconds: Mapped[float | None]
+
+
+class ProofRow(Base):
+    """A proof file, addressed by its content."""
+
+    __tablename__ = "proofs"
+
+    digest: Mapped[str] = mapped_column(String(64), primary_key=True)
+    """SHA-256 of ``data``."""
+    data: Mapped[bytes]
+    created_at: Mapped[datetime] = mapped_column(default=utcnow)
+
+
+class RegionRow(Base):
+    """A polytope all of whose pairs are certified, with the proof of it."""
+
+    __tablename__ = "regions"
+    __table_args__ = (UniqueConstraint("job_id", "iteration"),)
+
+    id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id"))
+    scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), index=True)
+    iteration: Mapped[int]
+    guarantee: Mapped[str] = mapped_column(String(16))
+    """certifier.outcome.Guarantee"""
+    manifest: Mapped[Document]
+    arrays: Mapped[Arrays]
+    """C (m, n), d (m,) with the joint limits, in s."""
+    proof_digest: Mapped[str] = mapped_column(ForeignKey("proofs.digest"))
+    ellipsoid_volume: Mapped[float]
+    created_at: Mapped[datetime] = mapped_column(default=utcnow, index=True)
+
+
+class EventRow(Base):
+    """What happened to a job, in order."""
+
+    __tablename__ = "events"
+    __table_args__ = (UniqueConstraint("job_id", "seq"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"))
+    seq: Mapped[int]
+    """1, 2, 3 ... within the job."""
+    kind: Mapped[str] = mapped_column(String(32))
+    data: Mapped[Document]
+    created_at: Mapped[datetime] = mapped_column(default=utcnow)

@@ -1,0 +1,76 @@
+"""Engines and transactions on SQLite and PostgreSQL.
+
+SQLite runs in WAL mode, and a transaction that will write begins with ``BEGIN IMMEDIATE``: one that begins by reading and writes
+later would fail, or lose an update, whenever another process wrote in between. A committed transaction outlives the process; with
+``synchronous=NORMAL`` a power cut may take back the last ones, never leave half of one.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, Engine, create_engine, event
+from sqlalchemy.engine import make_url
+from sqlalchemy.orm import Session
+
+from db.settings import settings
+
+BUSY_SECONDS = 30.0
+
+
+class Database:
+    """One database: an engine and the two kinds of transaction."""
+
+    def __init__(self, url: str) -> None:
+        parsed = make_url(url)
+        self.sqlite = parsed.get_backend_name() == "sqlite"
+        options: dict[str, Any] = {"json_serializer": _strict_json, "pool_pre_ping": not self.sqlite}
+        if self.sqlite:
+            if parsed.database:
+                Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+            options["connect_args"] = {"timeout": BUSY_SECONDS}
+        self.engine: Engine = create_engine(parsed, **options)
+        if self.sqlite:
+            event.listen(self.engine, "connect", _configure_sqlite)
+            event.listen(self.engine, "begin", _begin_sqlite)
+        self._writer = self.engine.execution_options(sqlite_begin="BEGIN IMMEDIATE")
+
+    @contextmanager
+    def read(self) -> Iterator[Session]:
+        """A transaction that only reads; rows stay usable after it."""
+        with Session(self.engine, expire_on_commit=False) as session:
+            yield session
+
+    @contextmanager
+    def write(self) -> Iterator[Session]:
+        """A transaction that may write: committed at the end, rolled back when an exception leaves the block."""
+        with Session(self._writer, expire_on_commit=False) as session, session.begin():
+            yield session
+
+    def close(self) -> None:
+        self.engine.dispose()
+
+
+@cache
+def database() -> Database:
+    """The database of the settings, one for the process (a forked child must ``database.cache_clear()`` first)."""
+    return Database(settings().database)
+
+
+def _strict_json(value: Any) -> str:
+    return json.dumps(value, allow_nan=False)
+
+
+def _configure_sqlite(connection: Any, _record: Any) -> None:
+    connection.isolation_level = None
+    for pragma in ("journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON"):
+        connection.execute(f"PRAGMA {pragma}")
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    connection.exec_driver_sql(connection.get_execution_options().get("sqlite_begin", "BEGIN"))

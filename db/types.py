@@ -1,0 +1,52 @@
+"""Column types: times that keep their zone, and named arrays."""
+
+from __future__ import annotations
+
+import io
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import DateTime, Dialect, LargeBinary
+from sqlalchemy.types import TypeDecorator
+
+Arrays = dict[str, NDArray[np.float64]]
+
+
+def utcnow() -> datetime:
+    """The time now, with its zone."""
+    return datetime.now(UTC)
+
+
+class Utc(TypeDecorator[datetime]):
+    """A time with its zone. Databases without zones (SQLite) hold it in UTC."""
+
+    impl = DateTime(timezone=True)
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        return value and value.astimezone(UTC)
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        return value and (value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC))
+
+
+class Npz(TypeDecorator[Arrays]):
+    """Named arrays of doubles, kept as the bytes of an npz file."""
+
+    impl = LargeBinary
+    cache_ok = True
+
+    def process_bind_param(self, value: Arrays | None, dialect: Dialect) -> bytes | None:
+        if value is None:
+            return None
+        buffer = io.BytesIO()
+        np.savez(buffer, **{name: np.asarray(array, dtype=float) for name, array in value.items()})
+        return buffer.getvalue()
+
+    def process_result_value(self, value: Any, dialect: Dialect) -> Arrays | None:
+        if value is None:
+            return None
+        with np.load(io.BytesIO(value), allow_pickle=False) as arrays:
+            return dict(arrays)
