@@ -1,0 +1,188 @@
+"""Weighted sums of squares in the sampled basis: one cone for all rationals of one side of a pair.
+
+    K = { v : v(u) = sum_j g_j(u) rho(u)' Q_j rho(u), Q_j psd },   g_j(u) = gA_j(u_A) + sum_l e_jl u_l,   g_0 = 1
+    dual cone: x with Lambda_j(x) = sum_i (g_j x)_i rho_i rho_i' psd for every j
+    barrier F(x) = -sum_j log det Lambda_j(x), Hessian with weights Q_j = Lambda_j^-1 in :meth:`Cone.schur`.
+
+Because rho_i rho_i' has rank one, the Schur complement is a sum of Hadamard products
+H = sum_j (g_j g_j') o (rho Q_j rho') o (rho S_j rho'), formed over the chain's points only (basis.py) and expanded by the
+slopes e_jl (Papp and Yildiz 2019; Loefberg and Parrilo 2004).
+Shapes: R rationals, K weights, L = 2^k, N_A chain points, M = 3^k of them the grid, o outside joints, N = N_A + o M.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from scipy.linalg import blas, lapack
+
+from certifier.basis import Basis
+from certifier.model import Array
+
+
+class Cone:
+    """The cone of one side.
+
+    Args:
+        rho: (N_A, L) values of rho at the chain's points.
+        grid: M, how many leading points carry the outside joints.
+        weights: (K, N_A) chain part of every g_j at the points; row 0 is 1 for a pair's side.
+        slopes: (K, o) coefficient of every outside coordinate in every g_j.
+    """
+
+    def __init__(self, rho: Array, grid: int, weights: Array, slopes: Array) -> None:
+        self.rho, self.grid, self.weights, self.slopes = rho, grid, weights, slopes
+        self.N = len(rho) + slopes.shape[1] * grid
+        self.K, self.L = len(weights), rho.shape[1]
+        self._products = (rho[:, :, None] * rho[:, None, :]).reshape(len(rho), -1)
+
+    @classmethod
+    def of_faces(cls, basis: Basis, constant: Array, chain: Array, outside: Array) -> Cone:
+        """The cone of 1 and the faces g_j = constant_j + chain_j' u_A + outside_j' u_out, (m,), (m, k), (m, o)."""
+        weights = np.concatenate([np.ones((1, len(basis.points))), constant[:, None] + chain @ basis.points.T])
+        slopes = np.concatenate([np.zeros((1, outside.shape[1])), outside])
+        return cls(basis.rho, basis.grid, weights, slopes)
+
+    @property
+    def degree(self) -> int:
+        """Barrier parameter of one rational."""
+        return self.K * self.L
+
+    def adjoint(self, x: Array) -> Array:
+        """Lambda_j(x): (R, N) -> (R, K, L, L)."""
+        NA, M = len(self.rho), self.grid
+        scaled = self.weights * x[:, None, :NA]
+        if self.slopes.shape[1]:
+            scaled[:, :, :M] += np.matmul(self.slopes, x[:, NA:].reshape(len(x), -1, M))
+        return (scaled.reshape(-1, NA) @ self._products).reshape(len(x), self.K, self.L, self.L)
+
+    def values(self, Q: Array) -> Array:
+        """Coordinates of sum_j g_j rho' Q_j rho: (R, K, L, L) -> (R, N)."""
+        R = len(Q)
+        squares = (Q.reshape(R * self.K, -1) @ self._products.T).reshape(R, self.K, -1)
+        first = np.einsum("kn,rkn->rn", self.weights, squares)
+        rest = np.matmul(self.slopes.T, squares[:, :, : self.grid]).reshape(R, -1)
+        return np.concatenate([first, rest], axis=1)
+
+    def schur(self, Q: Array, S: Array) -> Array:
+        """H of x -> values(Q Lambda(x) S), symmetrised: (R, K, L, L) twice -> (R, N, N), lower triangles only."""
+        H = np.zeros((len(Q), self.N, self.N))
+        _schur(self.rho, self.weights, self.slopes, self.grid, Q, S, H)
+        return H
+
+
+@njit(cache=True, fastmath=True)
+def _schur(rho, weights, slopes, grid, Q, S, H):  # type: ignore[no-untyped-def]
+    R, K = Q.shape[0], Q.shape[1]
+    NA, outside = rho.shape[0], slopes.shape[1]
+    rho_t = np.ascontiguousarray(rho.T)
+    for r in range(R):
+        for k in range(K):
+            A = np.dot(np.dot(rho, Q[r, k]), rho_t)
+            B = np.dot(np.dot(rho, S[r, k]), rho_t)
+            for i in range(NA):
+                gi = weights[k, i]
+                for j in range(i + 1):
+                    A[i, j] *= B[i, j]
+                    H[r, i, j] += gi * weights[k, j] * A[i, j]
+            for a in range(outside):
+                ea = slopes[k, a]
+                if ea == 0.0:
+                    continue
+                row = NA + a * grid
+                for i in range(grid):
+                    for j in range(i + 1):
+                        H[r, row + i, j] += ea * weights[k, j] * A[i, j]
+                    for j in range(i + 1, NA):
+                        H[r, row + i, j] += ea * weights[k, j] * A[j, i]
+                for b in range(a + 1):
+                    eb = ea * slopes[k, b]
+                    if eb == 0.0:
+                        continue
+                    column = NA + b * grid
+                    for i in range(grid):
+                        for j in range(i + 1):
+                            H[r, row + i, column + j] += eb * A[i, j]
+                        if b < a:
+                            for j in range(i + 1, grid):
+                                H[r, row + i, column + j] += eb * A[j, i]
+
+
+class Factor:
+    """Cholesky factors U'U of a stack of Schur complements (R, N, N), given by their lower triangles and overwritten.
+
+    Raises:
+        np.linalg.LinAlgError: a matrix is not numerically positive definite.
+    """
+
+    def __init__(self, H: Array) -> None:
+        self._upper = []
+        for matrix in H:
+            upper, info = lapack.dpotrf(matrix.T, lower=0, clean=0, overwrite_a=1)
+            if info != 0:
+                raise np.linalg.LinAlgError("Schur complement is not positive definite")
+            self._upper.append(upper)
+
+    def forward(self, right: Array) -> Array:
+        """U'^-1 right: (R, N, p) -> (R, N, p)."""
+        return np.stack([blas.dtrsm(1.0, U, b, trans_a=1) for U, b in zip(self._upper, right, strict=True)])
+
+    def backward(self, right: Array) -> Array:
+        """U^-1 right: (R, N, p) -> (R, N, p)."""
+        return np.stack([blas.dtrsm(1.0, U, b) for U, b in zip(self._upper, right, strict=True)])
+
+    def solve(self, right: Array) -> Array:
+        """(U'U)^-1 right: (R, N, p) -> (R, N, p)."""
+        return self.backward(self.forward(right))
+
+
+def symmetrise(X: Array) -> Array:
+    """(X + X')/2 over the last two axes."""
+    return 0.5 * (X + np.swapaxes(X, -1, -2))
+
+
+class Centre:
+    """The point x of the dual cone with -grad F(x) = w, for an interior w of the cone: Newton's method with exact line search.
+
+    Attributes:
+        x: (N,).
+        Q: (K, L, L) = Lambda(x)^-1, so that values(Q) = w to rounding.
+        factor: Cholesky factor of the Hessian at x.
+
+    Raises:
+        np.linalg.LinAlgError: Newton's method did not converge; w is not interior or the cone is degenerate.
+    """
+
+    def __init__(self, cone: Cone, w: Array, start: Array, max_iterations: int = 50) -> None:
+        x = start * (cone.degree / (w @ start))
+        for _ in range(max_iterations):
+            inverse_chol = np.linalg.inv(np.linalg.cholesky(cone.adjoint(x[None])))
+            Q = np.swapaxes(inverse_chol, -1, -2) @ inverse_chol
+            residual = cone.values(Q)[0] - w
+            factor = Factor(cone.schur(Q, Q))
+            step = factor.solve(residual[None, :, None])[0, :, 0]
+            decrement = float(np.sqrt(max(residual @ step, 0.0)))
+            if decrement < 1e-6:
+                self.x, self.Q, self.factor = x, Q[0], factor
+                return
+            if decrement < 0.1:
+                x = x + step
+            else:
+                curvature = np.linalg.eigvalsh(inverse_chol @ cone.adjoint(step[None]) @ np.swapaxes(inverse_chol, -1, -2)).ravel()
+                x = x + _line_search(curvature, float(w @ step)) * step
+        raise np.linalg.LinAlgError("centring did not converge")
+
+
+def _line_search(eigenvalues: Array, slope: float) -> float:
+    """The minimiser over a of a slope - sum log(1 + a eigenvalue), by safeguarded Newton from 0."""
+    lowest = float(eigenvalues.min())
+    upper = 0.99 * (-1 / lowest) if lowest < 0 else 1e3
+    a = 0.0
+    for _ in range(30):
+        terms = eigenvalues / (1 + a * eigenvalues)
+        change = (float(terms.sum()) - slope) / float(terms @ terms)
+        following = min(max(a + change, 0.0), a + 0.9 * (upper - a))
+        if abs(following - a) < 1e-3 * max(following, 1e-3):
+            return following
+        a = following
+    return a

@@ -1,0 +1,211 @@
+"""Primal-dual path-following method for the pair program (HKM direction, Mehrotra predictor-corrector).
+
+    maximise t  over y = (z, t), Q :   A_r z - t w_r = sum_j g_j rho' Q_rj rho  for every rational r,   l'z = 1,   Q_rj psd
+    dual:       minimise lam over x :  sum_r A_r' x_r = lam l,   sum_r w_r' x_r = 1,   Lambda_j(x_r) psd
+
+A weak-duality pair: t <= lam. So t > 0 with the residual absorbed is a certificate, and a dual point with lam < 0 proves that
+no certificate of this form exists; both are looked for in every iteration, and the first one found ends the search.
+Helmberg, Rendl, Vanderbei, Wolkowicz (1996); Kojima, Shindoh, Hara (1997); Mehrotra (1992). Symbols as in certifier.cone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+
+from certifier.cone import Centre, Cone, Factor, symmetrise
+from certifier.model import Array
+
+DUAL_TOLERANCE = 1e-9
+GAP_TOLERANCE = 1e-9
+START_MARGIN = 2.0
+
+
+class Status(StrEnum):
+    """How the method ended."""
+
+    FEASIBLE = "feasible"
+    """t > 0, every Q psd, the identities hold to rounding."""
+    INFEASIBLE = "infeasible"
+    """A dual feasible point with lam < 0 was found."""
+    BOUNDARY = "boundary"
+    """The optimal margin is zero to working accuracy: neither answer can be had."""
+    ITERATION_LIMIT = "iteration_limit"
+    """The iteration limit was reached first."""
+    NUMERICAL = "numerical"
+    """A factorisation failed before either answer."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """R rationals that share a cone.
+
+    Attributes:
+        cone: the cone of all R.
+        columns: (R, N, p) the linear map y -> A_r z - t w_r; the last column is -w.
+        centre: the centre of the cone for w.
+    """
+
+    cone: Cone
+    columns: Array
+    centre: Centre
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What the method ended with; Q, x are lists over blocks of (R, K, L, L) and (R, N)."""
+
+    status: Status
+    y: Array
+    lam: float
+    Q: list[Array]
+    x: list[Array]
+    iterations: int
+
+    @property
+    def t(self) -> float:
+        return float(self.y[-1])
+
+
+def solve(blocks: list[Block], normal: Array, z0: Array, max_iterations: int = 60) -> Solution:
+    """Solve the program over ``blocks``.
+
+    Args:
+        normal: (p - 1,) the l of the normalisation l'z = 1.
+        z0: (p - 1,) a start with l'z0 = 1.
+    """
+    method = _Method(blocks, normal, z0)
+    for iteration in range(max_iterations):
+        try:
+            status = method.iterate()
+        except np.linalg.LinAlgError:
+            status = Status.NUMERICAL
+        if status is not None:
+            return method.solution(status, iteration)
+    return method.solution(Status.ITERATION_LIMIT, max_iterations)
+
+
+class _Method:
+    def __init__(self, blocks: list[Block], normal: Array, z0: Array) -> None:
+        self.blocks, self.p = blocks, len(normal) + 1
+        self.a = np.append(normal, 0.0)
+        self.target = np.append(np.zeros(len(normal)), -1.0)
+        images = [_preimage(b, b.columns[:, :, :-1] @ z0) for b in blocks]
+        T = max(START_MARGIN * max(-float(relative.min()) for _, relative in images), 1e-6)
+        self.y, self.lam = np.append(z0, -T), 0.0
+        self.Q = [T * b.centre.Q + dQ for b, (dQ, _) in zip(blocks, images, strict=True)]
+        scale = 1 / sum(len(b.columns) * float(-b.columns[0, :, -1] @ b.centre.x) for b in blocks)
+        self.x = [np.tile(scale * b.centre.x, (len(b.columns), 1)) for b in blocks]
+        self.Z = [b.cone.adjoint(x) for b, x in zip(blocks, self.x, strict=True)]
+        self.degree = sum(len(b.columns) * b.cone.degree for b in blocks)
+
+    def solution(self, status: Status, iterations: int) -> Solution:
+        return Solution(status, self.y, self.lam, self.Q, self.x, iterations)
+
+    def iterate(self) -> Status | None:
+        """Test for an answer, then take one predictor-corrector step."""
+        blocks = self.blocks
+        primal = [b.columns @ self.y - b.cone.values(Q) for b, Q in zip(blocks, self.Q, strict=True)]
+        dual = self.target + self.lam * self.a - sum(np.einsum("rnp,rn->p", b.columns, x) for b, x in zip(blocks, self.x, strict=True))
+        gap = self._inner(self.Q, self.Z)
+        if self.y[-1] > 0 and (repaired := self._absorb(primal)) is not None:
+            self.Q, self.y = repaired, np.append(self.y[:-1], self.y[-1] / 2)
+            return Status.FEASIBLE
+        if self.lam < 0 and np.abs(dual).max() < DUAL_TOLERANCE * max(1.0, abs(self.lam)):
+            return Status.INFEASIBLE
+        if gap < GAP_TOLERANCE:
+            return Status.BOUNDARY
+
+        chol_Q = [np.linalg.cholesky(Q) for Q in self.Q]
+        inverse_chol_Z = [np.linalg.inv(np.linalg.cholesky(Z)) for Z in self.Z]
+        S = [np.swapaxes(Li, -1, -2) @ Li for Li in inverse_chol_Z]
+        factors, images, M = [], [], np.zeros((self.p, self.p))
+        for b, Q, Si in zip(blocks, self.Q, S, strict=True):
+            factor = Factor(b.cone.schur(Q, Si))
+            image = factor.forward(b.columns)
+            flat = image.reshape(-1, self.p)
+            M += flat.T @ flat
+            factors.append(factor)
+            images.append(image)
+        border = np.zeros((self.p + 1, self.p + 1))
+        border[: self.p, : self.p], border[: self.p, -1], border[-1, : self.p] = M, self.a, self.a
+        lu = lu_factor(border, check_finite=False)
+
+        def direction(centres: list[Array]) -> tuple[Array, float, list[Array], list[Array], list[Array]]:
+            """Newton step for Q Z = centre: values(dQ) - B dy = primal, dZ = Lambda(dx)."""
+            forwards, right = [], np.zeros(self.p)
+            for b, C, r, factor, image in zip(blocks, centres, primal, factors, images, strict=True):
+                v = factor.forward((b.cone.values(C) - r)[:, :, None])
+                right += np.einsum("rnp,rnq->p", image, v)
+                forwards.append(v)
+            solution = lu_solve(lu, np.append(right - dual, 0.0), check_finite=False)
+            dy, dlam = solution[:-1], float(solution[-1])
+            dx = [f.backward(v - (image @ dy)[:, :, None])[:, :, 0] for f, v, image in zip(factors, forwards, images, strict=True)]
+            dZ = [b.cone.adjoint(d) for b, d in zip(blocks, dx, strict=True)]
+            dQ = [C - symmetrise(Q @ d @ Si) for C, Q, d, Si in zip(centres, self.Q, dZ, S, strict=True)]
+            return dy, dlam, dx, dZ, dQ
+
+        mu = gap / self.degree
+        _, _, _, dZ, dQ = direction([-Q for Q in self.Q])
+        step_Q, step_Z = self._steps(chol_Q, inverse_chol_Z, dQ, dZ, 0.99)
+        predicted = self._inner(
+            [Q + step_Q * d for Q, d in zip(self.Q, dQ, strict=True)], [Z + step_Z * d for Z, d in zip(self.Z, dZ, strict=True)]
+        )
+        sigma = min(1.0, max(1e-3, (max(predicted, 0.0) / gap) ** 2))
+        if min(step_Q, step_Z) < 0.2:
+            sigma = max(sigma, 0.3)
+        centres = [sigma * mu * Si - Q - symmetrise(a @ b @ Si) for Q, Si, a, b in zip(self.Q, S, dQ, dZ, strict=True)]
+        dy, dlam, dx, dZ, dQ = direction(centres)
+        step_Q, step_Z = self._steps(chol_Q, inverse_chol_Z, dQ, dZ, 0.95)
+        self.y = self.y + step_Q * dy
+        self.Q = [symmetrise(Q + step_Q * d) for Q, d in zip(self.Q, dQ, strict=True)]
+        self.lam += step_Z * dlam
+        self.x = [x + step_Z * d for x, d in zip(self.x, dx, strict=True)]
+        self.Z = [b.cone.adjoint(x) for b, x in zip(blocks, self.x, strict=True)]
+        return None
+
+    def _absorb(self, primal: list[Array]) -> list[Array] | None:
+        """Gram matrices that meet the identities at margin t/2, if the residuals fit into the other half.
+
+        Q + (t/2) Q_w + dQ with values(dQ) = residual; None when it is not psd.
+        """
+        repaired = []
+        for b, Q, residual in zip(self.blocks, self.Q, primal, strict=True):
+            candidate = symmetrise(Q + 0.5 * self.y[-1] * b.centre.Q + _preimage(b, residual)[0])
+            try:
+                np.linalg.cholesky(candidate)
+            except np.linalg.LinAlgError:
+                return None
+            repaired.append(candidate)
+        return repaired
+
+    @staticmethod
+    def _inner(Q: list[Array], Z: list[Array]) -> float:
+        return float(sum(np.vdot(a, b) for a, b in zip(Q, Z, strict=True)))
+
+    @staticmethod
+    def _steps(chol_Q: list[Array], inverse_chol_Z: list[Array], dQ: list[Array], dZ: list[Array], fraction: float) -> tuple[float, float]:
+        """The fractions of the longest primal and dual steps that stay psd, at most 1."""
+        step_Q = min(_longest(np.linalg.inv(L), d) for L, d in zip(chol_Q, dQ, strict=True))
+        step_Z = min(_longest(Li, d) for Li, d in zip(inverse_chol_Z, dZ, strict=True))
+        return min(1.0, fraction * step_Q), min(1.0, fraction * step_Z)
+
+
+def _preimage(block: Block, v: Array) -> tuple[Array, Array]:
+    """The smallest dQ in the metric of the centre with values(dQ) = v, (R, K, L, L), and its eigenvalues relative to Q_w.
+
+    dQ = Q_w Lambda(H(x_w)^-1 v) Q_w.
+    """
+    Q_w = block.centre.Q
+    inner = block.cone.adjoint(block.centre.factor.solve(v.T[None])[0].T)
+    chol = np.linalg.cholesky(Q_w)
+    return Q_w @ inner @ Q_w, np.linalg.eigvalsh(np.swapaxes(chol, -1, -2) @ inner @ chol)
+
+
+def _longest(inverse_chol: Array, direction: Array) -> float:
+    """Largest a with L L' + a D psd, over a stack."""
+    lowest = float(np.linalg.eigvalsh(inverse_chol @ direction @ np.swapaxes(inverse_chol, -1, -2)).min())
+    return np.inf if lowest >= 0 else -1 / lowest

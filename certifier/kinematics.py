@@ -1,0 +1,134 @@
+"""Rational forward kinematics, evaluated at sample points.
+
+    prod_i (1 + s_i^2) X_FA(s) = product over the joints from F to A of  X_left (T0 + T1 s_i + T2 s_i^2) X_right
+
+For a revolute joint with axis u, R* = R(q*) and the half-angle substitution s = tan((q - q*)/2):
+T0 = diag(R*, 1), T1 = diag(2 R*[u], 0), T2 = diag(R*(I + 2[u]^2), 1). For a prismatic joint T0 = [I, u q*; 0, 1],
+T1 = [0, u; 0, 0], and there is no denominator. Going up the tree the inverse joint is used: u -> -u, R* -> R*',
+outer transforms inverted and swapped; a weld contributes its fixed transform. C-IRIS eq. (4)-(6); nothing is symbolic.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from certifier.model import WORLD, Array, Joint, JointKind, Scene
+
+
+@dataclass(frozen=True)
+class Factor:
+    """One joint on a path: X = left (T[0] + T[1] s + T[2] s^2) right, already multiplied out.
+
+    Attributes:
+        index: position index, None for a weld (then only T[0] is set).
+        terms: (3, 4, 4), left and right included.
+        revolute: whether the factor carries the denominator 1 + s^2.
+    """
+
+    index: int | None
+    terms: Array
+    revolute: bool
+
+
+class Kinematics:
+    """Paths and numerators of one scene."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+
+    @cached_property
+    def _joint_above(self) -> dict[str, Joint]:
+        return {joint.child: joint for joint in self.scene.joints}
+
+    def ancestors(self, body: str) -> list[str]:
+        """The bodies from ``body`` up to the world, both included."""
+        bodies = [body]
+        while bodies[-1] != WORLD:
+            bodies.append(self._joint_above[bodies[-1]].parent)
+        return bodies
+
+    def bodies_between(self, a: str, b: str) -> list[str]:
+        """The bodies on the path from a to b, both included."""
+        up_a, up_b = self.ancestors(a), self.ancestors(b)
+        common = next(body for body in up_a if body in up_b)
+        return up_a[: up_a.index(common) + 1] + up_b[: up_b.index(common)][::-1]
+
+    def path(self, frame: str, body: str) -> list[Factor]:
+        """The factors of X_FB from frame body F to body B."""
+        bodies = self.bodies_between(frame, body)
+        factors = []
+        for here, there in zip(bodies, bodies[1:], strict=False):
+            inverse = self._joint_above.get(here) is not None and self._joint_above[here].parent == there
+            factors.append(_factor(self._joint_above[here if inverse else there], self.scene.q_star, inverse))
+        return factors
+
+    def chain(self, frame: str, body: str) -> list[int]:
+        """Position indices of the joints between F and B, in path order."""
+        return [f.index for f in self.path(frame, body) if f.index is not None]
+
+    def numerators(self, frame: str, body: str, s: Array) -> Array:
+        """prod(1 + s_i^2) X_FB at the rows of s.
+
+        Args:
+            s: (N, n) points of tangent space.
+
+        Returns:
+            (N, 4, 4); the entry [3, 3] is the denominator.
+        """
+        X = np.broadcast_to(np.eye(4), (len(s), 4, 4))
+        for factor in self.path(frame, body):
+            if factor.index is None:
+                X = X @ factor.terms[0]
+            else:
+                si = s[:, factor.index, None, None]
+                X = X @ (factor.terms[0] + si * (factor.terms[1] + si * factor.terms[2]))
+        return X
+
+    def points(self, frame: str, body: str, vertices: Array, s: Array) -> Array:
+        """Positions in F, metres, of vertices (V, 3) of B at the rows of s: (N, V, 3)."""
+        X = self.numerators(frame, body, s)
+        return (np.einsum("nij,vj->nvi", X[:, :3, :3], vertices) + X[:, None, :3, 3]) / X[:, 3, 3, None, None]
+
+
+def skew(u: Array) -> Array:
+    """[u], (3, 3), with [u] v = u x v."""
+    return np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
+
+
+def rotation(axis: Array, angle: float) -> Array:
+    """R(angle) about a unit axis, (3, 3) (Rodrigues)."""
+    K = skew(axis)
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
+
+
+def rigid_inverse(X: Array) -> Array:
+    """Inverse of a rigid transform, (4, 4)."""
+    inverse = np.eye(4)
+    inverse[:3, :3] = X[:3, :3].T
+    inverse[:3, 3] = -X[:3, :3].T @ X[:3, 3]
+    return inverse
+
+
+def _homogeneous(R: Array, p: Array, scale: float) -> Array:
+    X = np.zeros((4, 4))
+    X[:3, :3], X[:3, 3], X[3, 3] = R, p, scale
+    return X
+
+
+def _factor(joint: Joint, q_star: Array, inverse: bool) -> Factor:
+    left, right = joint.X_PF, rigid_inverse(joint.X_BM)
+    if inverse:
+        left, right = joint.X_BM, rigid_inverse(joint.X_PF)
+    zero = np.zeros(3)
+    if joint.index is None:
+        return Factor(None, np.array([left @ right, np.zeros((4, 4)), np.zeros((4, 4))]), False)
+    axis = -joint.axis if inverse else joint.axis
+    if joint.kind is JointKind.PRISMATIC:
+        terms = [_homogeneous(np.eye(3), axis * q_star[joint.index], 1), _homogeneous(np.zeros((3, 3)), axis, 0), np.zeros((4, 4))]
+    else:
+        R, K = rotation(axis, q_star[joint.index]), skew(axis)
+        terms = [_homogeneous(R, zero, 1), _homogeneous(2 * R @ K, zero, 0), _homogeneous(R @ (np.eye(3) + 2 * K @ K), zero, 1)]
+    return Factor(joint.index, np.array([left @ T @ right for T in terms]), joint.kind is JointKind.REVOLUTE)
