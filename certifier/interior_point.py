@@ -172,9 +172,12 @@ class _Method:
 
         Q + (t/2) Q_w + dQ with values(dQ) = residual; None when it is not psd.
         """
+        y = np.append(self.y[:-1], self.y[-1] / 2)
         repaired = []
         for b, Q, residual in zip(self.blocks, self.Q, primal, strict=True):
-            candidate = symmetrise(Q + 0.5 * self.y[-1] * b.centre.Q + _preimage(b, residual)[0])
+            candidate = symmetrise(Q + y[-1] * b.centre.Q + _preimage(b, residual)[0])
+            # One step of refinement: the first correction is only as exact as the centre.
+            candidate = symmetrise(candidate + _preimage(b, b.columns @ y - b.cone.values(candidate))[0])
             try:
                 np.linalg.cholesky(candidate)
             except np.linalg.LinAlgError:

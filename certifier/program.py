@@ -52,69 +52,103 @@ class Program:
 
     Attributes:
         normal, start: (p - 1,) normalisation and a point that meets it.
-        scales: (m,) g_j(u_c) of the faces as given; the cones use g_j divided by it.
-        points: per side, (N, n) tangent-space points of the coordinates that are values at points, for pseudo-moments.
     """
 
     blocks: list[Block]
     normal: Array
     start: Array
-    scales: Array
 
 
-def build(
-    kinematics: Kinematics, pair: Pair, frame: Frame, polytope: Polytope, box: Box, center: Array, samples: Array, contact: Closest
-) -> Program:
-    """The program of one pair on P.
+class Sides:
+    """The cones of all chains on one polytope, made on demand and shared by the pairs.
 
     Args:
         polytope: the faces used, (m, n); P must be bounded.
-        center: (n,) interior point of P.
-        samples: (S, n) points inside P, S > 2^k for the longer chain.
+        center: (n,) interior point of P; samples: (S, n) points inside P, S > 2^k for the longest chain.
+    """
+
+    def __init__(self, kinematics: Kinematics, polytope: Polytope, box: Box, center: Array, samples: Array) -> None:
+        self.kinematics, self.box, self.center = kinematics, box, center
+        self.u_c = box.to_u(center)
+        self.slack = polytope.d - polytope.C @ center
+        self._constant = (polytope.d - polytope.C @ box.mid) / self.slack
+        self._slopes = -(polytope.C * box.half) / self.slack[:, None]
+        self._u = box.to_u(samples)
+        self._centres: dict[tuple[int, ...], tuple[Cone, Centre]] = {}
+
+    def points(self, chain: tuple[int, ...]) -> Array:
+        """(N_A, n) points u of the chain's basis, 0 outside the chain."""
+        space = basis(len(chain))
+        u = np.zeros((len(space.points), self.kinematics.scene.n))
+        u[:, list(chain)] = space.points
+        return u
+
+    def outside(self, chain: tuple[int, ...]) -> list[int]:
+        """Joints that are not on the chain, in the order of the cone's outside coordinates."""
+        return [i for i in range(self.kinematics.scene.n) if i not in chain]
+
+    def cone(self, chain: tuple[int, ...]) -> tuple[Cone, Centre]:
+        """The chain's cone and its centre for w = den.
+
+        Raises:
+            np.linalg.LinAlgError: the cone is numerically degenerate.
+        """
+        if chain not in self._centres:
+            space, inside, outside = basis(len(chain)), list(chain), self.outside(chain)
+            cone = Cone.of_faces(space, self._constant, self._slopes[:, inside], self._slopes[:, outside])
+            revolute = self.kinematics.scene.revolute[inside]
+            s = self.box.mid[inside] + self.box.half[inside] * space.points
+            w = np.zeros(cone.N)
+            w[: len(s)] = np.prod(np.where(revolute, 1 + s**2, 1.0), axis=1)
+            functional, grid = space.functional(self._u[:, inside])
+            start = np.concatenate([functional.mean(axis=0), *((self._u[:, [i]] * grid).mean(axis=0) for i in outside)])
+            self._centres[chain] = cone, Centre(cone, w, start)
+        return self._centres[chain]
+
+    def means(self, chain: tuple[int, ...], x: Array) -> tuple[Array, Array]:
+        """Means of s under pseudo-moments x, (R, N) -> (R, n), and their masses x(1), (R,)."""
+        space, outside = basis(len(chain)), self.outside(chain)
+        first, rest = x[:, : len(space.points)], x[:, len(space.points) :].reshape(len(x), len(outside), -1)
+        mass = first.sum(axis=1)
+        u = np.zeros((len(x), self.kinematics.scene.n))
+        u[:, list(chain)] = first @ space.points / mass[:, None]
+        u[:, outside] = rest.sum(axis=2) / mass[:, None]
+        return self.box.mid + self.box.half * u, mass
+
+
+def build(sides: Sides, pair: Pair, frame: Frame, contact: Closest) -> Program:
+    """The program of one pair.
+
+    Args:
         contact: closest points at the centre, in F, with a positive gap beyond the radii.
 
     Raises:
-        np.linalg.LinAlgError: the cone is numerically degenerate.
+        np.linalg.LinAlgError: a cone is numerically degenerate.
     """
-    scene = kinematics.scene
-    u_c = box.to_u(center)
-    slack = polytope.d - polytope.C @ center
-    constant = (polytope.d - polytope.C @ box.mid) / slack
-    slopes = -(polytope.C * box.half) / slack[:, None]
-    n = scene.n
+    scene, n = sides.kinematics.scene, sides.kinematics.scene.n
     a, b = scene.geometry(pair.a), scene.geometry(pair.b)
-    rounded = a.radius + scene.padding > 0 or b.radius + scene.padding > 0
+    radii = [g.radius + scene.padding for g in (a, b)]
+    rounded = max(radii) > 0
     columns = 4 * (n + 1) + (1 + n if rounded else 0) + 1
     blocks = []
-    for geometry, chain, sign in ((a, frame.chain_a, 1.0), (b, frame.chain_b, -1.0)):
-        k, outside = len(chain), [i for i in range(n) if i not in chain]
-        space = basis(k)
-        cone = Cone.of_faces(space, constant, slopes[:, list(chain)], slopes[:, outside])
-        u = np.zeros((len(space.points), n))
-        u[:, list(chain)] = space.points
-        X = kinematics.numerators(frame.body, geometry.body, box.mid + box.half * u)
-        p = np.einsum("nij,vj->vni", X, np.column_stack([geometry.vertices, np.ones(len(geometry.vertices))]))
+    for geometry, chain, radius, sign in ((a, frame.chain_a, radii[0], 1.0), (b, frame.chain_b, radii[1], -1.0)):
+        cone, centre = sides.cone(chain)
+        space, outside, u = basis(len(chain)), sides.outside(chain), sides.points(chain)
+        X = sides.kinematics.numerators(frame.body, geometry.body, sides.box.mid + sides.box.half * u)
+        p = sign * np.einsum("nij,vj->vin", X, np.column_stack([geometry.vertices, np.ones(len(geometry.vertices))]))
         B = np.zeros((len(p), cone.N, columns))
-        for component in range(4):
-            for e in range(n + 1):
-                column = B[:, :, component * (n + 1) + e]
-                value = sign * p[:, :, component]
-                if e == 0:
-                    column[:, : len(u)] = value
-                elif e - 1 in chain:
-                    column[:, : len(u)] = value * (u[:, e - 1] - u_c[e - 1])
-                else:
-                    column[:, : len(u)] = -u_c[e - 1] * value
-                    first = len(u) + outside.index(e - 1) * space.grid
-                    column[:, first : first + space.grid] = value[:, : space.grid]
-        den = X[:, 3, 3]
+        plane = B[:, :, : 4 * (n + 1)].reshape(len(p), cone.N, 4, n + 1)
+        first = np.swapaxes(plane[:, : len(u)], 1, 2)
+        first[..., 0] = p
+        first[..., 1:] = p[..., None] * (np.where(np.isin(np.arange(n), chain), u, 0.0) - sides.u_c)
+        for position, joint in enumerate(outside):
+            start = len(u) + position * space.grid
+            np.swapaxes(plane[:, start : start + space.grid], 1, 2)[..., 1 + joint] = p[:, :, : space.grid]
+        B[:, :, : 4 * (n + 1)] = plane.reshape(len(p), cone.N, -1)
         if rounded:
-            B[:, : len(u), 4 * (n + 1)] = -(geometry.radius + scene.padding) * den
-        B[:, : len(u), -1] = -den
-        functional, grid_functional = space.functional(box.to_u(samples)[:, list(chain)])
-        outer = [(box.to_u(samples)[:, [i]] * grid_functional).mean(axis=0) for i in outside]
-        start = np.concatenate([functional.mean(axis=0), *outer])
-        blocks.append(Block(cone, B, Centre(cone, -B[0, :, -1], start)))
+            B[:, : len(u), 4 * (n + 1)] = -radius * X[:, 3, 3]
+        B[:, : len(u), -1] = -X[:, 3, 3]
+        blocks.append(Block(cone, B, centre))
     normal, start = np.zeros(columns - 1), np.zeros(columns - 1)
     normal[0 : 3 * (n + 1) : n + 1] = contact.p_a - contact.p_b
     start[0 : 3 * (n + 1) : n + 1] = contact.normal / contact.distance
@@ -122,8 +156,8 @@ def build(
     if rounded:
         start[4 * (n + 1)] = 1.1 / contact.distance
         start[4 * (n + 1) + 1 :] = 0.1 / contact.distance / n
-        blocks += _norm_blocks(n, u_c, columns)
-    return Program(blocks, normal, start, slack)
+        blocks += _norm_blocks(n, sides.u_c, columns)
+    return Program(blocks, normal, start)
 
 
 def _norm_blocks(n: int, u_c: Array, columns: int) -> list[Block]:

@@ -1,0 +1,161 @@
+"""Certification of a polytope, pair by pair: screens, the program (11), the proof and its verification.
+
+    centre or a sample in contact                        -> refuted, with the configuration
+    program (11) feasible, proof verified exactly        -> certified, with the proof
+    program (11) infeasible by a dual point              -> not_certifiable, with the points where no plane of this degree works
+    anything else                                        -> inconclusive, with the reason
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from certifier.basis import subsets
+from certifier.closest import Closest, closest
+from certifier.frames import Frame, choose_frame
+from certifier.interior_point import Solution, Status, solve
+from certifier.kinematics import Kinematics
+from certifier.model import Array, Geometry, Pair, Polytope, Scene
+from certifier.outcome import Outcome, Stage
+from certifier.polytope import bound_multipliers, chebyshev_center, check, drop_redundant
+from certifier.program import Box, Sides, build
+from certifier.proof import BITS, Ground, PairProof, ProofError, Side
+from certifier.sampling import hit_and_run
+from certifier.verify.pair import PairCheck, check_ground
+
+SCREEN_SAMPLES = 64
+CONE_SAMPLES = 300
+
+
+@dataclass(frozen=True)
+class PairResult:
+    """What is known about one pair on the polytope.
+
+    Attributes:
+        margin: certified lower bound in metres of the distance between the padded bodies; None unless certified.
+        detail: a sentence for people; empty when the outcome says it all.
+        witness_s: (n,) a configuration in contact, when refuted.
+        proof: a verified :class:`certifier.proof.PairProof` as bytes, when certified.
+        weak_points: (w, n) configurations near which no plane of this degree works, when not certifiable.
+    """
+
+    outcome: Outcome
+    stage: Stage
+    seconds: float
+    margin: float | None = None
+    detail: str = ""
+    witness_s: Array | None = None
+    proof: bytes | None = None
+    weak_points: Array | None = None
+
+
+class Certification:
+    """Everything the pairs of one polytope share: faces, box, samples, cones.
+
+    Args:
+        polytope: joint limits included.
+        center: (n,) interior point; default the Chebyshev centre.
+        seed: seeds the samples.
+
+    Raises:
+        RegionError: the polytope is empty or unbounded, or the centre is not inside.
+    """
+
+    def __init__(self, scene: Scene, polytope: Polytope, center: Array | None = None, seed: int = 0) -> None:
+        check(polytope, tuple(joint.name for joint in scene.moving))
+        self.scene = scene
+        self.center = chebyshev_center(polytope)[0] if center is None else center
+        kept = drop_redundant(polytope)
+        faces = Polytope(polytope.C[kept], polytope.d[kept])
+        lower, upper, Y_lower, Y_upper = bound_multipliers(scene.polytope(faces.C, faces.d))
+        box = Box.around(lower, upper)
+        self.ground = Ground(faces.C, faces.d, box.mid, box.half, Y_lower, Y_upper)
+        check_ground(scene, self.ground)
+        self._check = PairCheck(scene, self.ground)
+        samples = hit_and_run(faces, self.center, CONE_SAMPLES, seed)
+        self._screen = np.concatenate([self.center[None], samples[:SCREEN_SAMPLES]])
+        self._kinematics = Kinematics(scene)
+        self._sides = Sides(self._kinematics, faces, box, self.center, samples)
+
+    def certify(self, index: int, max_iterations: int = 60) -> PairResult:
+        """Certify pair ``scene.pairs[index]``."""
+        start = time.perf_counter()
+        pair = self.scene.pairs[index]
+        frame = choose_frame(self._kinematics, pair)
+        contact = self._contact(pair, frame, self._screen)
+        if isinstance(contact, _Witness):
+            return PairResult(Outcome.REFUTED, Stage.SCREEN, time.perf_counter() - start, witness_s=contact.s)
+        try:
+            program = build(self._sides, pair, frame, contact)
+            solution = solve(program.blocks, program.normal, program.start, max_iterations)
+        except np.linalg.LinAlgError as error:
+            return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, time.perf_counter() - start, detail=f"numerical trouble: {error}")
+        if solution.status is Status.FEASIBLE:
+            for kind in BITS:
+                proof = self._proof(pair, frame, solution, kind)
+                try:
+                    statement = self._check.verify(proof)
+                except ProofError as error:
+                    failure = error
+                else:
+                    return PairResult(Outcome.CERTIFIED, Stage.SOS, time.perf_counter() - start, statement.gap, proof=proof.to_bytes())
+            return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, time.perf_counter() - start, detail=f"the proof found does not hold: {failure}")
+        weak = self._weak_points(frame, solution)
+        inside = weak[self._inside(weak)]
+        witness = self._contact(pair, frame, np.concatenate([self.center[None], inside]))
+        if isinstance(witness, _Witness):
+            return PairResult(Outcome.REFUTED, Stage.SOS, time.perf_counter() - start, witness_s=witness.s)
+        seconds = time.perf_counter() - start
+        if solution.status is Status.INFEASIBLE:
+            return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, seconds, detail=f"no affine plane in the frame of {frame.body}", weak_points=weak)
+        return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, seconds, detail=f"{solution.status.value} after {solution.iterations} iterations", weak_points=weak)
+
+    def _inside(self, s: Array) -> np.ndarray:
+        return Polytope(self.ground.C, self.ground.d).contains(s)
+
+    def _points(self, geometry: Geometry, frame: Frame, s: Array) -> Array:
+        return self._kinematics.points(frame.body, geometry.body, geometry.vertices, s)
+
+    def _contact(self, pair: Pair, frame: Frame, s: Array) -> Closest | _Witness:
+        """A configuration among s (S, n), the centre first, at which the padded bodies touch; else the closest points at the centre."""
+        a, b = self.scene.geometry(pair.a), self.scene.geometry(pair.b)
+        reach = a.radius + b.radius + 2 * self.scene.padding
+        A, B = self._points(a, frame, s), self._points(b, frame, s)
+        first = closest(A[0], B[0])
+        gaps = (A @ first.normal).min(axis=1) - (B @ first.normal).max(axis=1)
+        for i in np.flatnonzero(gaps <= reach):
+            found = closest(A[i], B[i])
+            if found.gap <= reach:
+                return _Witness(s[i])
+        return first
+
+    def _proof(self, pair: Pair, frame: Frame, solution: Solution, kind: str) -> PairProof:
+        n, u_c = self.scene.n, self._sides.u_c
+        plane = solution.y[: 4 * (n + 1)].reshape(4, n + 1).copy()
+        plane[:, 0] -= plane[:, 1:] @ u_c
+        kappa = float(solution.y[4 * (n + 1)]) if len(solution.y) > 4 * (n + 1) + 1 else 0.0
+        scale = np.concatenate([[1.0], self._sides.slack])
+        sides = []
+        for chain, Q in zip((frame.chain_a, frame.chain_b), solution.Q[:2], strict=True):
+            monomial = np.sqrt(3.0) ** subsets(len(chain)).sum(axis=1)
+            sides.append(Side.from_gram(chain, Q * (monomial[:, None] * monomial) / scale[:, None, None], kind))
+        return PairProof(self.scene.hash, pair.a, pair.b, frame.body, self.ground, plane, solution.t, kappa, (sides[0], sides[1]))
+
+    def _weak_points(self, frame: Frame, solution: Solution) -> Array:
+        """Means of the pseudo-moments that carry weight, (w, n)."""
+        found = [self._sides.means(chain, x) for chain, x in zip((frame.chain_a, frame.chain_b), solution.x[:2], strict=True)]
+        means, mass = np.concatenate([m for m, _ in found]), np.concatenate([w for _, w in found])
+        return means[mass > 0.15 * mass.max()]
+
+
+@dataclass(frozen=True)
+class _Witness:
+    s: Array
+
+
+def certify_pair(scene: Scene, index: int, polytope: Polytope, center: Array | None = None, seed: int = 0) -> PairResult:
+    """Certify one pair on one polytope; :class:`Certification` shares the preparation between pairs."""
+    return Certification(scene, polytope, center, seed).certify(index)
