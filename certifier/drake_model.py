@@ -1,0 +1,84 @@
+"""A Drake model built from a Scene's numbers alone: no user file is read, so nothing here can meet a broken one."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.geometry import Capsule, CollisionFilterDeclaration, Convex, GeometryId, GeometrySet, SceneGraphInspector, Shape, Sphere
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, PrismaticJoint, RevoluteJoint, SpatialInertia, WeldJoint
+from pydrake.planning import RobotDiagram, RobotDiagramBuilder
+
+from certifier.errors import SceneError
+from certifier.model import WORLD, Array, Geometry, Joint, JointKind, Scene
+
+_INSTANCE = "scene"
+
+
+def build_diagram(scene: Scene) -> RobotDiagram:
+    """The scene as a Drake diagram with the same joint positions in the same order, in which only ``scene.pairs`` can collide.
+
+    Geometries are the scene's conv(vertices) + ball(radius); ``scene.padding`` is not in them: a configuration is free when the signed
+    distance of every pair is more than twice the padding. :func:`geometry_name` gives the scene's name of a geometry.
+
+    Raises:
+        SceneError: ``unsupported_shape`` for more than two vertices with a radius; ``joint_order`` if Drake numbers the joints otherwise.
+    """
+    builder = RobotDiagramBuilder(time_step=0.0)
+    plant, scene_graph = builder.plant(), builder.scene_graph()
+    instance = plant.AddModelInstance(_INSTANCE)
+    bodies = {WORLD: plant.world_body()}
+    for name in scene.bodies:
+        if name != WORLD:
+            bodies[name] = plant.AddRigidBody(name, instance, SpatialInertia.SolidSphereWithMass(1.0, 1.0))
+    for joint in scene.joints:
+        _add_joint(plant, joint, bodies)
+    ids = {g.name: _add_geometry(plant, g, bodies) for g in scene.geometries}
+    plant.Finalize()
+    for joint in scene.moving:
+        if plant.GetJointByName(joint.name).position_start() != joint.index:
+            raise SceneError("joint_order", f"joint {joint.name} is not number {joint.index} in a depth-first walk of the tree")
+    only = CollisionFilterDeclaration().ExcludeWithin(GeometrySet(list(ids.values())))
+    for pair in scene.pairs:
+        only.AllowBetween(GeometrySet(ids[pair.a]), GeometrySet(ids[pair.b]))
+    scene_graph.collision_filter_manager().Apply(only)
+    return builder.Build()
+
+
+def geometry_name(inspector: SceneGraphInspector, geometry_id: GeometryId) -> str:
+    """The scene's name of a geometry of :func:`build_diagram`."""
+    return inspector.GetName(geometry_id).removeprefix(f"{_INSTANCE}::")
+
+
+def _add_joint(plant: MultibodyPlant, joint: Joint, bodies: dict) -> None:
+    parent, child = bodies[joint.parent], bodies[joint.child]
+    X_PF, X_BM = _transform(joint.X_PF), _transform(joint.X_BM)
+    if joint.kind is JointKind.WELD:
+        plant.AddJoint(WeldJoint(joint.name, parent.body_frame(), child.body_frame(), X_PF @ X_BM.inverse()))
+        return
+    F = plant.AddFrame(FixedOffsetFrame(f"{joint.name}/F", parent.body_frame(), X_PF, child.model_instance()))
+    M = plant.AddFrame(FixedOffsetFrame(f"{joint.name}/M", child.body_frame(), X_BM, child.model_instance()))
+    kind = RevoluteJoint if joint.kind is JointKind.REVOLUTE else PrismaticJoint
+    plant.AddJoint(kind(joint.name, F, M, joint.axis, joint.lower, joint.upper))
+
+
+def _add_geometry(plant: MultibodyPlant, geometry: Geometry, bodies: dict) -> GeometryId:
+    X_BG, shape = _shape(geometry)
+    return plant.RegisterCollisionGeometry(bodies[geometry.body], X_BG, shape, geometry.name, CoulombFriction())
+
+
+def _shape(geometry: Geometry) -> tuple[RigidTransform, Shape]:
+    vertices, radius = geometry.vertices, geometry.radius
+    if radius == 0:
+        return RigidTransform(), Convex(vertices.T, geometry.name)
+    if len(vertices) == 1:
+        return RigidTransform(vertices[0]), Sphere(radius)
+    if len(vertices) == 2:
+        along = vertices[1] - vertices[0]
+        length = float(np.linalg.norm(along))
+        return RigidTransform(RotationMatrix.MakeFromOneVector(along / length, 2), vertices.mean(axis=0)), Capsule(radius, length)
+    raise SceneError("unsupported_shape", f"geometry {geometry.name} has a radius and {len(vertices)} vertices; at most two can be rounded")
+
+
+def _transform(X: Array) -> RigidTransform:
+    return RigidTransform(RotationMatrix.ProjectToRotationMatrix(X[:3, :3]), X[:3, 3])

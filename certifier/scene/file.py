@@ -1,0 +1,271 @@
+"""The scene file: its schema, and errors that name the field.
+
+The file is composed into YAML nodes, not loaded, so that ``directives`` reach Drake as they were written, tags and all, at the same
+line numbers. Only their relative ``file`` paths are made absolute, because Drake has no place to start from in a string.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from certifier.errors import SceneError
+
+MAX_BYTES = 2**20
+MIN_HULL_VERTICES = 8
+
+
+@dataclass(frozen=True)
+class IgnoreEntry:
+    """Two bodies or geometries whose pairs are not certified; ``field`` is where the file says so."""
+
+    a: str
+    b: str
+    reason: str
+    field: str
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """A scene file that passed the schema.
+
+    Attributes:
+        path: the file itself.
+        packages: absolute roots for package:// URIs.
+        directives: Drake Model Directives, verbatim.
+        resolved_directives: a document for Drake, the same with absolute paths, at the line numbers of the file.
+        models: every ``file`` of the directives, as written.
+        q_star: centre of the parametrisation; None for the middle of the joint limits.
+        padding: metres.
+        max_vertices: a mesh's hull has at most this many.
+    """
+
+    path: Path
+    name: str
+    packages: dict[str, Path]
+    directives: str
+    resolved_directives: str
+    models: tuple[str, ...]
+    q_star: tuple[float, ...] | None = None
+    padding: float = 0.0
+    ignore: tuple[IgnoreEntry, ...] = field(default=())
+    max_vertices: int = 32
+    cylinder_sides: int = 12
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML's safe loader that also reads ``1e-3`` as a number."""
+
+
+_Loader.yaml_implicit_resolvers = {k: list(v) for k, v in yaml.SafeLoader.yaml_implicit_resolvers.items()}
+_Loader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9][0-9]*(\.[0-9]*)?[eE][-+]?[0-9]+$"), list("-+0123456789"))
+
+
+def read_scene_file(path: Path) -> SceneFile:
+    """Read and check a scene file.
+
+    Raises:
+        SceneError: ``scene_not_found``, ``scene_yaml`` (not YAML, with the line) or ``scene_field`` (with the field).
+    """
+    text = _text(path)
+    root = _compose(text, path)
+    keys = ("name", "packages", "directives", "q_star", "padding", "ignore", "mesh", "cylinder_sides")
+    nodes = _mapping(root, "", keys)
+    if "directives" not in nodes:
+        raise _wrong("directives", "is missing", hint="a list of Drake Model Directives that adds the robot and its surroundings")
+    values = {key: _construct(node, key) for key, node in nodes.items() if key != "directives"}
+    mesh = _section(values.get("mesh", {}), "mesh", ("mode", "max_vertices"))
+    if mesh.get("mode", "hull") != "hull":
+        raise _wrong("mesh.mode", f"must be hull, not {mesh['mode']!r}")
+    directives = nodes["directives"]
+    _check_directives(directives)
+    return SceneFile(
+        path=path,
+        name=_string(values.get("name", path.parent.name if path.stem == "scene" else path.stem), "name"),
+        packages=_packages(values.get("packages", {}), path.parent),
+        directives=text[directives.start_mark.index : directives.end_mark.index].rstrip(),
+        resolved_directives=_resolved(text, directives, path.parent),
+        models=tuple(node.value for node in _file_nodes(directives)),
+        q_star=_q_star(values.get("q_star")),
+        padding=_number(values.get("padding", 0.0), "padding", minimum=0.0),
+        ignore=_ignore(values.get("ignore", [])),
+        max_vertices=_integer(mesh.get("max_vertices", 32), "mesh.max_vertices", minimum=MIN_HULL_VERTICES),
+        cylinder_sides=_integer(values.get("cylinder_sides", 12), "cylinder_sides", minimum=3),
+    )
+
+
+def close_matches(name: str, known: list[str]) -> str:
+    """A hint naming the known names most like ``name``; empty when none is."""
+    tails = {k.rsplit("/", 1)[-1]: k for k in known}
+    matches = difflib.get_close_matches(name, known, n=3) or [
+        tails[t] for t in difflib.get_close_matches(name.rsplit("/", 1)[-1], list(tails), n=3)
+    ]
+    return f"did you mean {' or '.join(matches)}?" if matches else ""
+
+
+def _text(path: Path) -> str:
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise SceneError("scene_not_found", f"there is no scene file {path}") from None
+    except OSError as error:
+        raise SceneError("scene_not_found", f"{path} cannot be read: {error.strerror}") from None
+    if len(data) > MAX_BYTES:
+        raise SceneError("scene_yaml", f"{path.name} has {len(data)} bytes; a scene file may have {MAX_BYTES}")
+    try:
+        return data.decode()
+    except UnicodeDecodeError as error:
+        raise SceneError("scene_yaml", f"{path.name} is not UTF-8 text: {error.reason} at byte {error.start}") from None
+
+
+def _compose(text: str, path: Path) -> yaml.Node | None:
+    try:
+        for event in yaml.parse(text, Loader=_Loader):
+            if isinstance(event, yaml.AliasEvent):
+                raise SceneError(
+                    "scene_yaml", f"{path.name}, line {event.start_mark.line + 1}: aliases (*{event.anchor}) are not supported"
+                )
+        return yaml.compose(text, Loader=_Loader)
+    except yaml.MarkedYAMLError as error:
+        line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
+        raise SceneError("scene_yaml", f"{path.name}{line}: {error.problem}") from None
+    except (yaml.YAMLError, RecursionError) as error:
+        raise SceneError("scene_yaml", f"{path.name} is not YAML: {error}") from None
+
+
+def _construct(node: yaml.Node, where: str) -> Any:
+    try:
+        return yaml.constructor.SafeConstructor().construct_document(node)
+    except (yaml.YAMLError, ValueError) as error:
+        problem = error.problem if isinstance(error, yaml.MarkedYAMLError) else str(error)
+        raise _wrong(where, f"line {node.start_mark.line + 1}: {problem}") from None
+
+
+def _wrong(where: str, message: str, hint: str = "") -> SceneError:
+    return SceneError("scene_field", message, field=where or None, hint=hint)
+
+
+def _mapping(node: yaml.Node | None, where: str, known: tuple[str, ...]) -> dict[str, yaml.Node]:
+    if not isinstance(node, yaml.MappingNode):
+        raise _wrong(where, "a scene file is a mapping of name, directives and so on")
+    found: dict[str, yaml.Node] = {}
+    for key, value in node.value:
+        if not isinstance(key, yaml.ScalarNode):
+            raise _wrong(where, f"line {key.start_mark.line + 1}: a key must be text")
+        if key.value in found:
+            raise _wrong(str(key.value), f"is given twice, again in line {key.start_mark.line + 1}")
+        found[key.value] = value
+    _known(found, where, known)
+    return found
+
+
+def _known(found: dict[str, Any], where: str, known: tuple[str, ...]) -> None:
+    for key in found:
+        if key not in known:
+            hint = close_matches(str(key), list(known)) or f"known keys: {', '.join(known)}"
+            raise _wrong(f"{where}.{key}" if where else str(key), "is not a key of a scene file", hint=hint)
+
+
+def _section(value: Any, where: str, known: tuple[str, ...]) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise _wrong(where, f"must be a mapping with the keys {', '.join(known)}")
+    _known(value, where, known)
+    return value
+
+
+def _string(value: Any, where: str) -> str:
+    if not isinstance(value, str) or not value:
+        raise _wrong(where, f"must be text, not {value!r}")
+    return value
+
+
+def _number(value: Any, where: str, minimum: float = -math.inf) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise _wrong(where, f"must be a finite number, not {value!r}")
+    if value < minimum:
+        raise _wrong(where, f"must be at least {minimum:g}, not {value!r}")
+    return float(value)
+
+
+def _integer(value: Any, where: str, minimum: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise _wrong(where, f"must be a whole number, not {value!r}")
+    return int(_number(value, where, minimum))
+
+
+def _packages(value: Any, directory: Path) -> dict[str, Path]:
+    if not isinstance(value, dict):
+        raise _wrong("packages", "must map package names to directories")
+    roots = {}
+    for name, root in value.items():
+        path = (directory / _string(root, f"packages.{name}")).resolve()
+        if not path.is_dir():
+            raise _wrong(f"packages.{name}", f"there is no directory {root}")
+        roots[_string(name, "packages")] = path
+    return roots
+
+
+def _q_star(value: Any) -> tuple[float, ...] | None:
+    if value is None:
+        return None
+    if not isinstance(value, list):
+        raise _wrong("q_star", "must be a list of numbers, one per joint")
+    return tuple(_number(x, f"q_star[{i}]") for i, x in enumerate(value))
+
+
+def _ignore(value: Any) -> tuple[IgnoreEntry, ...]:
+    if not isinstance(value, list):
+        raise _wrong("ignore", "must be a list of pairs of names")
+    entries = []
+    for i, entry in enumerate(value):
+        where = f"ignore[{i}]"
+        reason = "ignored by the scene file"
+        if isinstance(entry, dict):
+            _known(entry, where, ("pair", "reason"))
+            reason = _string(entry.get("reason", reason), f"{where}.reason")
+            where, entry = f"{where}.pair", entry.get("pair")
+        if not isinstance(entry, list) or len(entry) != 2:
+            raise _wrong(where, "must be two names, [a, b] or {pair: [a, b], reason: ...}")
+        a, b = (_string(name, f"{where}[{k}]") for k, name in enumerate(entry))
+        entries.append(IgnoreEntry(a, b, reason, where))
+    return tuple(entries)
+
+
+def _check_directives(node: yaml.Node) -> None:
+    if not isinstance(node, yaml.SequenceNode) or not node.value:
+        raise _wrong("directives", "must be a list of Drake Model Directives with at least one entry")
+    for i, entry in enumerate(node.value):
+        if not isinstance(entry, yaml.MappingNode) or len(entry.value) != 1:
+            raise _wrong(f"directives[{i}]", "must be a mapping with one key, the kind of directive, such as add_model")
+
+
+def _file_nodes(directives: yaml.Node) -> list[yaml.ScalarNode]:
+    return [
+        value
+        for entry in directives.value
+        for kind, body in entry.value
+        if kind.value in ("add_model", "add_directives") and isinstance(body, yaml.MappingNode)
+        for key, value in body.value
+        if key.value == "file" and isinstance(value, yaml.ScalarNode)
+    ]
+
+
+def _resolved(text: str, directives: yaml.Node, directory: Path) -> str:
+    start, end = directives.start_mark.index, directives.end_mark.index
+    pieces, last = [], start
+    for node in _file_nodes(directives):
+        if "://" not in node.value:
+            pieces += [text[last : node.start_mark.index], json.dumps(f"file://{(directory / node.value).resolve()}", ensure_ascii=False)]
+            last = node.end_mark.index
+    pieces.append(text[last:end])
+    line, column = directives.start_mark.line, directives.start_mark.column
+    if line == 0:
+        return "directives: " + "".join(pieces)
+    return "\n" * (line - 1) + "directives:\n" + " " * column + "".join(pieces)

@@ -1,0 +1,107 @@
+"""Convex hulls and their outer approximation by few vertices.
+
+``outer`` cuts a bounding box down to the hull: take the vertex farthest from the hull, cut it off with the supporting plane of the
+hull across the way from its nearest point, and go on while the vertices are few enough. Every cut is a supporting
+half-space, so the hull stays inside, and the distance from the hull is a convex function, so its greatest value over the
+approximation is taken at a vertex and the inflation is known.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
+
+from certifier.model import Array
+
+_FLAT = 1e-9
+"""A hull thinner than this fraction of its size has no volume for qhull's purposes."""
+_THICKNESS = 1e-6
+"""Half the thickness in metres that a flat point set is given."""
+_SAFETY = 1e-9
+"""Relative growth that puts rounding errors on the safe side."""
+
+
+def hull_vertices(points: Array) -> Array:
+    """The extreme points, (v, 3), of the convex hull of points (k, 3); all points where the hull has no volume."""
+    try:
+        return points[ConvexHull(points).vertices]
+    except QhullError:
+        return np.unique(points, axis=0)
+
+
+def outer(points: Array, max_vertices: int) -> tuple[Array, float]:
+    """At most ``max_vertices`` >= 8 vertices whose convex hull contains every one of points (k, 3), metres.
+
+    Returns:
+        vertices (v, 3), and the inflation: an upper bound in metres on the distance of any point of their hull from the hull of
+        ``points`` (0.0 when the vertices are the points' own).
+    """
+    extreme = hull_vertices(np.asarray(points, dtype=float))
+    if len(extreme) <= max_vertices:
+        return extreme, 0.0
+    solid = hull_vertices(_thickened(extreme))
+    center = solid.mean(axis=0)
+    vertices = _contain(_cut_down(solid - center, max_vertices), solid - center)
+    inflation = max(_nearest(v, extreme - center)[1] for v in vertices)
+    return vertices + center, inflation * (1 + _SAFETY)
+
+
+def contains(vertices: Array, points: Array, tolerance: float = 0.0) -> bool:
+    """Whether every one of points (k, 3) satisfies all half-spaces of the hull of vertices (v, 3), up to a tolerance in metres."""
+    equations = ConvexHull(vertices).equations
+    return bool(np.all(points @ equations[:, :3].T + equations[:, 3] <= tolerance))
+
+
+def _thickened(points: Array) -> Array:
+    """The points, or two copies of them on either side of their plane when they are flat."""
+    axes = np.linalg.svd(points - points.mean(axis=0))[2]
+    extent = np.ptp(points @ axes.T, axis=0)
+    if extent[2] > _FLAT * extent[0]:
+        return points
+    offset = max(_THICKNESS, _FLAT * extent[0]) * axes[2]
+    return np.concatenate([points - offset, points + offset])
+
+
+def _cut_down(points: Array, max_vertices: int) -> Array:
+    """Vertices of the last intersection of half-spaces that has at most max_vertices; the origin is inside points' hull."""
+    axes = np.linalg.svd(points)[2]
+    normals = np.concatenate([axes, -axes])
+    vertices = _intersection(normals, points)
+    distances: dict[bytes, tuple[Array, float]] = {}
+    while True:
+        for v in vertices:
+            if v.tobytes() not in distances:
+                distances[v.tobytes()] = _nearest(v, points)
+        worst = max(vertices, key=lambda v: distances[v.tobytes()][1])
+        nearest, distance = distances[worst.tobytes()]
+        if distance <= _SAFETY:
+            return vertices
+        normals = np.concatenate([normals, [(worst - nearest) / distance]])
+        refined = _intersection(normals, points)
+        if len(refined) > max_vertices:
+            return vertices
+        vertices = refined
+
+
+def _intersection(normals: Array, points: Array) -> Array:
+    """Vertices of {x : n'x <= max over points of n'p, for every n}, near-duplicates merged."""
+    offsets = (points @ normals.T).max(axis=0)
+    vertices = HalfspaceIntersection(np.column_stack([normals, -offsets]), np.zeros(3)).intersections
+    scale = np.abs(vertices).max()
+    return vertices[np.unique(np.round(vertices / (1e-7 * scale)), axis=0, return_index=True)[1]]
+
+
+def _contain(vertices: Array, points: Array) -> Array:
+    """The vertices, scaled about the origin by the little that makes their hull contain every point in spite of rounding."""
+    equations = ConvexHull(vertices).equations
+    excess = (points @ equations[:, :3].T / -equations[:, 3]).max()
+    return vertices * max(1.0, excess) * (1 + _SAFETY)
+
+
+def _nearest(x: Array, points: Array) -> tuple[Array, float]:
+    """A point of the hull of points near x, (3,), and its distance: nonnegative least squares with a heavy row for the sum of weights."""
+    scale = np.abs(points).max()
+    weights, _ = nnls(np.vstack([points.T / scale, np.full(len(points), 1e3)]), np.append(x / scale, 1e3))
+    nearest = weights @ points / weights.sum()
+    return nearest, float(np.linalg.norm(x - nearest))

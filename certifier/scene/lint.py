@@ -1,0 +1,94 @@
+"""Findings about a scene that loads but may not mean what its author thinks: sentences for people."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from certifier.drake_model import build_diagram, geometry_name
+from certifier.model import Pair, Scene
+from certifier.scene.tree import Tree
+
+_SAMPLES = 40
+_STEEP = 50.0
+_HUGE = 10.0
+
+
+def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn: set[str]) -> list[str]:
+    """What a careful colleague would remark on.
+
+    Args:
+        candidates: the pairs of geometries that the model files' collision filters leave.
+        drawn: bodies that have a visual geometry.
+    """
+    return [
+        *(f"{g.name}: {g.substitution}, inflated by up to {1000 * g.inflation:.3g} mm" for g in scene.geometries if g.substitution),
+        *_filtered(scene, tree, candidates),
+        *_unguarded(scene, tree, drawn),
+        *_steep(scene),
+        *_huge(scene),
+        *_always_touching(scene),
+        *([] if scene.pairs else ["no pair of geometries can collide: there is nothing to certify"]),
+    ]
+
+
+def _filtered(scene: Scene, tree: Tree, candidates: list[tuple[str, str]]) -> list[str]:
+    """Pairs that a collision filter hides although more than one joint lies between their bodies."""
+    kept = {frozenset(c) for c in candidates}
+    neighbours = {frozenset((tree.group[j.parent], tree.group[j.child])) for j in tree.joints}
+    hidden = [
+        f"{a.name} and {b.name}"
+        for i, a in enumerate(scene.geometries)
+        for b in scene.geometries[i + 1 :]
+        if (groups := frozenset((tree.group[a.body], tree.group[b.body]))) not in neighbours
+        and len(groups) == 2
+        and frozenset((a.name, b.name)) not in kept
+    ]
+    if not hidden:
+        return []
+    more = f" and {len(hidden) - 1} more" if len(hidden) > 1 else ""
+    return [f"the models' collision filters hide {hidden[0]}{more}: nothing is certified about them"]
+
+
+def _unguarded(scene: Scene, tree: Tree, drawn: set[str]) -> list[str]:
+    solid = {g.body for g in scene.geometries}
+    return [f"body {body} has a visual but no collision geometry: nothing is certified about it" for body in sorted(drawn - solid)]
+
+
+def _steep(scene: Scene) -> list[str]:
+    reach = np.maximum(np.abs(scene.s_lower), np.abs(scene.s_upper))
+    return [
+        f"joint {j.name} comes close to q* +- pi, where s reaches {s:.3g}: narrower limits would condition the programs better"
+        for j, s, revolute in zip(scene.moving, reach, scene.revolute, strict=True)
+        if revolute and s > _STEEP
+    ]
+
+
+def _huge(scene: Scene) -> list[str]:
+    return [
+        f"geometry {g.name} is {size:.3g} m long: are its units metres?"
+        for g in scene.geometries
+        if g.shape["kind"] != "half_space" and (size := float(np.ptp(g.vertices, axis=0).max()) + 2 * g.radius) > _HUGE
+    ]
+
+
+def _always_touching(scene: Scene) -> list[str]:
+    """Pairs that overlap at every one of a few random configurations, which no region can be certified for."""
+    diagram = build_diagram(scene)
+    context = diagram.CreateDefaultContext()
+    plant, scene_graph = diagram.plant(), diagram.scene_graph()
+    plant_context = plant.GetMyContextFromRoot(context)
+    query_port, inspector = scene_graph.get_query_output_port(), scene_graph.model_inspector()
+    rng = np.random.default_rng(0)
+    touching = set(scene.pairs)
+    for q in [scene.q_star.clip(scene.q_lower, scene.q_upper), *rng.uniform(scene.q_lower, scene.q_upper, (_SAMPLES, scene.n))]:
+        plant.SetPositions(plant_context, q)
+        query = query_port.Eval(scene_graph.GetMyContextFromRoot(context))
+        touching &= {
+            Pair(*sorted((geometry_name(inspector, p.id_A), geometry_name(inspector, p.id_B)))) for p in query.ComputePointPairPenetration()
+        }
+        if not touching:
+            break
+    return [
+        f"{p.a} and {p.b} overlap in every configuration tried: mend the geometry, or ignore the pair with a reason"
+        for p in sorted(touching, key=lambda p: (p.a, p.b))
+    ]

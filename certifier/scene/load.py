@@ -1,0 +1,31 @@
+"""From a scene file to a Scene, with Drake at arm's length."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from certifier.child import run_in_child
+from certifier.errors import CirisError, SceneError
+from certifier.model import Scene
+
+
+def load_scene(path: str | Path, *, timeout_s: float = 60, memory_bytes: int = 4 * 2**30) -> Scene:
+    """The scene that a scene file describes, read by a child process that may die without harm.
+
+    Args:
+        path: the scene file (docs/architecture.md); relative paths in it start at its directory.
+        timeout_s: wall-clock limit of the child, seconds.
+        memory_bytes: memory limit of the child.
+
+    Raises:
+        SceneError: what is wrong and where; ``scene_model_crash`` when reading the models ended the child.
+    """
+    path = Path(path).absolute()
+    try:
+        document = run_in_child("certifier.scene.parse:parse", {"path": str(path)}, timeout_s=timeout_s, memory_bytes=memory_bytes)
+    except SceneError:
+        raise
+    except CirisError as death:
+        message = f"reading the models of {path.name} failed: {death.message}"
+        raise SceneError("scene_model_crash", message, field="directives", hint="look for broken shapes, meshes or limits") from None
+    return Scene.from_document(document)

@@ -1,0 +1,45 @@
+"""Which pairs of geometries must be certified, and which are ignored by request."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from certifier.errors import SceneError
+from certifier.model import WORLD, Geometry, Ignored, Pair
+from certifier.scene.file import IgnoreEntry, close_matches
+from certifier.scene.tree import Tree
+
+
+def pairs(
+    candidates: Iterable[tuple[str, str]], geometries: tuple[Geometry, ...], tree: Tree, ignore: tuple[IgnoreEntry, ...]
+) -> tuple[tuple[Pair, ...], tuple[Ignored, ...], list[str]]:
+    """The candidates with a moving joint between their bodies, split into those to certify and those ignored, each sorted.
+
+    Returns:
+        pairs, ignored pairs, and a warning for every ignore entry that concerns no pair.
+
+    Raises:
+        SceneError: an ignore entry names neither a body nor a geometry.
+    """
+    body = {g.name: g.body for g in geometries}
+    known = [name for name in tree.bodies if name != WORLD] + list(body)
+    for entry in ignore:
+        for k, name in enumerate((entry.a, entry.b)):
+            if name != WORLD and name not in known:
+                message = f"{name!r} is neither a body nor a geometry of the scene"
+                raise SceneError("unknown_name", message, field=f"{entry.field}[{k}]", hint=close_matches(name, known))
+    wanted: list[Pair] = []
+    ignored: list[Ignored] = []
+    used: set[IgnoreEntry] = set()
+    for a, b in sorted(tuple(sorted(c)) for c in candidates):
+        if tree.group[body[a]] == tree.group[body[b]]:
+            continue
+        names_a, names_b = {a, body[a]}, {b, body[b]}
+        entry = next((e for e in ignore if (e.a in names_a and e.b in names_b) or (e.a in names_b and e.b in names_a)), None)
+        if entry is None:
+            wanted.append(Pair(a, b))
+        else:
+            used.add(entry)
+            ignored.append(Ignored(a, b, entry.reason))
+    unused = [f"{e.field}: {e.a} and {e.b} have no pair to ignore" for e in ignore if e not in used]
+    return tuple(wanted), tuple(ignored), unused

@@ -1,0 +1,261 @@
+"""The child's side of scene loading: Drake reads the models, this module turns the plant into a Scene.
+
+Only here do user files meet Drake, which ends the process on some of them; run it through ``certifier.scene.load``.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    Convex,
+    Cylinder,
+    Ellipsoid,
+    GeometryId,
+    HalfSpace,
+    Mesh,
+    Role,
+    SceneGraphInspector,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.inverse_kinematics import AddMultibodyPlantConstraints
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.tree import Joint as DrakeJoint
+from pydrake.multibody.tree import BodyIndex, PrismaticJoint, QuaternionFloatingJoint, RevoluteJoint, RigidBody, RpyFloatingJoint, WeldJoint
+from pydrake.solvers import MathematicalProgram
+from pydrake.systems.framework import DiagramBuilder
+
+from certifier.errors import SceneError
+from certifier.model import WORLD, Array, Geometry, Joint, JointKind, Scene
+from certifier.scene import shapes
+from certifier.scene.file import SceneFile, read_scene_file
+from certifier.scene.lint import findings
+from certifier.scene.pairs import pairs
+from certifier.scene.tree import Tree, floating
+
+_IGNORED_SHAPE = "Ignoring unsupported SDFormat element in geometry"
+
+
+def parse(payload: dict[str, Any]) -> dict[str, Any]:
+    """The document of the Scene described by the file ``payload["path"]``.
+
+    Raises:
+        SceneError: whatever is wrong with the file, the models it names or the scene they make.
+    """
+    scene_file = read_scene_file(Path(payload["path"]))
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    warnings = _read_models(scene_file, plant)
+    inspector = scene_graph.model_inspector()
+    tree = Tree(*_joints(plant))
+    q_star = _center(scene_file, tree)
+    by_id = _geometries(scene_file, plant, inspector, tree)
+    candidates = [(by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()]
+    geometries = tuple(by_id.values())
+    wanted, ignored, unused = pairs(candidates, geometries, tree, scene_file.ignore)
+    scene = Scene(
+        name=scene_file.name,
+        joints=tree.joints,
+        bodies=tree.bodies,
+        geometries=geometries,
+        pairs=wanted,
+        ignored=ignored,
+        q_star=q_star,
+        padding=scene_file.padding,
+        provenance={
+            "directives": scene_file.directives,
+            "packages": {name: root.name for name, root in scene_file.packages.items()},
+            "drake": importlib.metadata.version("drake"),
+        },
+    )
+    drawn = {_body_name(plant, plant.GetBodyFromFrameId(inspector.GetFrameId(i))) for i in inspector.GetAllGeometryIds(Role.kIllustration)}
+    document = scene.to_document()
+    document["warnings"] = warnings + unused + findings(scene, tree, candidates, drawn)
+    return document
+
+
+def _read_models(scene_file: SceneFile, plant: MultibodyPlant) -> list[str]:
+    """Add the directives' models to the plant and finalise it; Drake's warnings."""
+    parser = Parser(plant)
+    packages = parser.package_map()
+    for name in packages.GetPackageNames():
+        packages.Remove(name)
+    for name, root in scene_file.packages.items():
+        packages.Add(name, str(root))
+    with _DrakeLog() as log:
+        try:
+            parser.AddModelsFromString(scene_file.resolved_directives, "dmd.yaml")
+            plant.Finalize()
+        except (Exception, SystemExit) as error:
+            raise _model_error(scene_file, error) from None
+    for warning in log.messages:
+        if _IGNORED_SHAPE in warning:
+            raise SceneError("unsupported_shape", _one_line(scene_file, warning), field="directives", hint="use a primitive or a mesh")
+    return [_one_line(scene_file, warning) for warning in log.messages]
+
+
+class _DrakeLog(logging.Handler):
+    """Collects what Drake says at level warning and above."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.messages: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.messages.append(record.getMessage())
+
+    def __enter__(self) -> _DrakeLog:
+        logging.getLogger("drake").addHandler(self)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        logging.getLogger("drake").removeHandler(self)
+
+
+def _model_error(scene_file: SceneFile, error: BaseException) -> SceneError:
+    """What Drake raised, as an error for people; a failed assertion (SystemExit in pydrake) names every model it may come from."""
+    message = _one_line(scene_file, str(error))
+    if not isinstance(error, RuntimeError):
+        message = f"Drake cannot use a model ({', '.join(scene_file.models)}): {message}"
+    return SceneError("scene_model", message, field="directives")
+
+
+def _one_line(scene_file: SceneFile, message: str) -> str:
+    message = message.replace("<string>", scene_file.path.name).replace(f"{scene_file.path.parent.resolve()}/", "")
+    return " ".join(message.removeprefix("error: ").split())
+
+
+def _body_name(plant: MultibodyPlant, body: RigidBody) -> str:
+    if body.index() == plant.world_body().index():
+        return WORLD
+    return f"{plant.GetModelInstanceName(body.model_instance())}/{body.name()}"
+
+
+def _joints(plant: MultibodyPlant) -> tuple[list[Joint], list[str]]:
+    joints = [_joint(plant, plant.get_joint(index)) for index in plant.GetJointIndices()]
+    if plant.num_constraints():
+        raise _coupled(plant, joints)
+    bodies = [_body_name(plant, plant.get_body(BodyIndex(i))) for i in range(plant.num_bodies())]
+    return joints, bodies
+
+
+def _joint(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
+    parent, child = _body_name(plant, joint.parent_body()), _body_name(plant, joint.child_body())
+    name = f"{plant.GetModelInstanceName(joint.model_instance())}/{joint.name()}"
+    X_PF = joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4()
+    X_BM = joint.frame_on_child().GetFixedPoseInBodyFrame().GetAsMatrix4()
+    match joint:
+        case WeldJoint():
+            X_FM = joint.X_FM().GetAsMatrix4()
+            return Joint(name, JointKind.WELD, parent, child, np.zeros(3), X_PF @ X_FM, X_BM)
+        case RevoluteJoint():
+            kind, axis = JointKind.REVOLUTE, joint.revolute_axis()
+        case PrismaticJoint():
+            kind, axis = JointKind.PRISMATIC, joint.translation_axis()
+        case QuaternionFloatingJoint() | RpyFloatingJoint():
+            raise floating(child)
+        case _:
+            message = f"joint {name} is a {joint.type_name()} joint; revolute, prismatic and fixed joints are supported"
+            raise SceneError("unsupported_joint", message, field="directives")
+    lower, upper = float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])
+    return Joint(name, kind, parent, child, np.array(axis), X_PF, X_BM, joint.position_start(), lower, upper)
+
+
+def _coupled(plant: MultibodyPlant, joints: list[Joint]) -> SceneError:
+    program = MathematicalProgram()
+    q = program.NewContinuousVariables(plant.num_positions(), "q")
+    AddMultibodyPlantConstraints(plant=plant, q=q, prog=program, plant_context=plant.CreateDefaultContext())
+    position = {v.get_id(): i for i, v in enumerate(q)}
+    coupled = {position[v.get_id()] for c in program.linear_equality_constraints() for v in c.variables()}
+    names = [j.name for j in joints if j.index in coupled]
+    what = f"joints {' and '.join(names)} are coupled (mimic)" if names else "the models close a loop by a constraint"
+    return SceneError("unsupported_joint", f"{what}; only independent joints are supported", field="directives")
+
+
+def _center(scene_file: SceneFile, tree: Tree) -> Array:
+    """q*, checked: every joint has an interior range, and no revolute joint's range reaches q* +- pi."""
+    moving = sorted((j for j in tree.joints if j.index is not None), key=lambda j: j.index or 0)
+    if not moving:
+        raise SceneError("no_joints", "no joint of the scene can move, so there is no configuration space", field="directives")
+    if scene_file.q_star is not None and len(scene_file.q_star) != len(moving):
+        names = ", ".join(j.name for j in moving)
+        raise SceneError("scene_field", f"has {len(scene_file.q_star)} numbers for {len(moving)} joints: {names}", field="q_star")
+    limits = np.array([[j.lower, j.upper] for j in moving], dtype=float)
+    for j, (lower, upper) in zip(moving, limits, strict=True):
+        if not (np.isfinite(lower) and np.isfinite(upper)):
+            hint = "give it limits in the model file" + (" less than 2 pi apart" if j.kind is JointKind.REVOLUTE else "")
+            raise SceneError("joint_range", f"joint {j.name} has no finite limits", field="directives", hint=hint)
+        if lower >= upper:
+            message = f"joint {j.name} cannot move: its limits are {lower:g} and {upper:g}"
+            raise SceneError("joint_range", message, field="directives", hint="make it a fixed joint")
+    q_star = limits.mean(axis=1) if scene_file.q_star is None else np.array(scene_file.q_star)
+    for j, (lower, upper), center in zip(moving, limits, q_star, strict=True):
+        if j.kind is JointKind.REVOLUTE and not center - np.pi < lower < upper < center + np.pi:
+            message = f"joint {j.name} turns from {lower:.6g} to {upper:.6g} rad, which reaches q* +- pi with q* = {center:.6g}"
+            raise SceneError("joint_range", message, field="q_star", hint="narrow the joint's limits or move q_star")
+    return q_star
+
+
+def _geometries(scene_file: SceneFile, plant: MultibodyPlant, inspector: SceneGraphInspector, tree: Tree) -> dict[GeometryId, Geometry]:
+    """Every geometry of the proximity role, half-spaces last because their size depends on the reach of the others."""
+    found: dict[GeometryId, Geometry] = {}
+    names: set[str] = set()
+    half_spaces = []
+    for index, i in enumerate(inspector.GetAllGeometryIds(Role.kProximity)):
+        body = plant.GetBodyFromFrameId(inspector.GetFrameId(i))
+        body_name = _body_name(plant, body)
+        short = inspector.GetName(i).removeprefix(f"{plant.GetModelInstanceName(body.model_instance())}::")
+        name = f"{body_name}/{short}"
+        name = f"{name}_{index}" if name in names else name
+        names.add(name)
+        if isinstance(inspector.GetShape(i), HalfSpace):
+            half_spaces.append((i, name, body_name))
+        else:
+            X_BG = inspector.GetPoseInFrame(i)
+            found[i] = _placed(name, body_name, _convex(inspector.GetShape(i), name, scene_file), X_BG)
+    reach = tree.reach(list(found.values()), scene_file.padding)
+    for i, name, body_name in half_spaces:
+        if body_name not in tree.anchored:
+            raise SceneError(
+                "unsupported_shape", f"geometry {name} is a half-space that moves; only fixed ones are supported", field="directives"
+            )
+        X_BG = inspector.GetPoseInFrame(i)
+        center = (RigidTransform(tree.anchored[body_name]) @ X_BG).inverse().translation()
+        found[i] = _placed(name, body_name, shapes.half_space(center, reach), X_BG)
+    return found
+
+
+def _placed(name: str, body: str, convex: shapes.Body, X_BG: RigidTransform) -> Geometry:
+    vertices = np.ascontiguousarray((X_BG @ convex.vertices.T).T)
+    shape = {**convex.shape, "X_BG": X_BG.GetAsMatrix4().tolist()}
+    return Geometry(name, body, vertices, convex.radius, shape, convex.substitution, convex.inflation)
+
+
+def _convex(shape: Shape, name: str, scene_file: SceneFile) -> shapes.Body:
+    match shape:
+        case Box():
+            return shapes.box((shape.width(), shape.depth(), shape.height()))
+        case Sphere():
+            return shapes.sphere(shape.radius())
+        case Capsule():
+            return shapes.capsule(shape.radius(), shape.length())
+        case Cylinder():
+            return shapes.cylinder(shape.radius(), shape.length(), scene_file.cylinder_sides)
+        case Ellipsoid():
+            return shapes.ellipsoid((shape.a(), shape.b(), shape.c()), scene_file.max_vertices)
+        case Convex() | Mesh():
+            hull = shape.GetConvexHull()
+            points = np.array([hull.vertex(k) for k in range(hull.num_vertices())])
+            return shapes.polytope("convex" if isinstance(shape, Convex) else "mesh", points, scene_file.max_vertices)
+        case _:
+            message = f"geometry {name} is a {type(shape).__name__}, which is not supported"
+            raise SceneError("unsupported_shape", message, field="directives")

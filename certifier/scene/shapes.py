@@ -1,0 +1,95 @@
+"""Shapes as conv(vertices) + ball(radius), the only kind of geometry the certifier knows.
+
+Boxes, convex polytopes of few vertices, spheres and capsules are exact. The others are replaced by something larger: a mesh by its
+hull or by fewer vertices outside it, a cylinder by a circumscribed prism, an ellipsoid by a circumscribed polytope, a
+half-space by the box of it within reach.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from certifier.model import Array
+from certifier.scene.hull import outer
+
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A convex body in its geometry frame G: vertices (v, 3) and radius in metres.
+
+    Attributes:
+        shape: the original, JSON-able.
+        substitution: what replaced the original, None when it is exact.
+        inflation: upper bound in metres on how far the replacement reaches outside the original.
+    """
+
+    vertices: Array
+    radius: float
+    shape: dict[str, Any]
+    substitution: str | None = None
+    inflation: float = 0.0
+
+
+def box(size: tuple[float, float, float]) -> Body:
+    """A box with edges ``size``, centred on G."""
+    return Body(CORNERS * np.array(size) / 2, 0.0, {"kind": "box", "size": list(size)})
+
+
+def sphere(radius: float) -> Body:
+    return Body(np.zeros((1, 3)), radius, {"kind": "sphere", "radius": radius})
+
+
+def capsule(radius: float, length: float) -> Body:
+    """A capsule along z; ``length`` is between the centres of its caps."""
+    return Body(np.array([[0, 0, -length / 2], [0, 0, length / 2]]), radius, {"kind": "capsule", "radius": radius, "length": length})
+
+
+def cylinder(radius: float, length: float, sides: int) -> Body:
+    """The regular prism circumscribed about a cylinder along z."""
+    angle = 2 * np.pi * (np.arange(sides) + 0.5) / sides
+    reach = radius / np.cos(np.pi / sides)
+    ring = reach * np.column_stack([np.cos(angle), np.sin(angle)])
+    vertices = np.concatenate([np.column_stack([ring, np.full(sides, z)]) for z in (-length / 2, length / 2)])
+    shape = {"kind": "cylinder", "radius": radius, "length": length}
+    return Body(vertices, 0.0, shape, f"cylinder -> circumscribed prism with {sides} sides", reach - radius)
+
+
+def ellipsoid(semi_axes: tuple[float, float, float], max_vertices: int) -> Body:
+    """The affine image of a polytope circumscribed about the unit sphere."""
+    points = _spread(max_vertices)
+    scale = float(1 / -ConvexHull(points).equations[:, 3].max())
+    shape = {"kind": "ellipsoid", "semi_axes": list(semi_axes)}
+    substitution = f"ellipsoid -> circumscribed polytope with {len(points)} vertices"
+    return Body(scale * points * np.array(semi_axes), 0.0, shape, substitution, (scale - 1) * max(semi_axes))
+
+
+def polytope(kind: str, points: Array, max_vertices: int) -> Body:
+    """The hull of points (k, 3), or a polytope of at most max_vertices around it; ``kind`` is "convex" or "mesh"."""
+    vertices, inflation = outer(points, max_vertices)
+    hull = f"hull with {len(vertices)} vertices"
+    if inflation > 0:
+        hull = f"hull reduced from {len(points)} to {len(vertices)} vertices, outside the original"
+    exact = kind == "convex" and inflation == 0
+    return Body(vertices, 0.0, {"kind": kind, "vertices": points.tolist()}, None if exact else f"{kind} -> {hull}", inflation)
+
+
+def half_space(center: Array, reach: float) -> Body:
+    """The box of the half-space z <= 0 that contains its part within ``reach`` of ``center`` (3,), both in G and metres."""
+    depth = max(reach - center[2], 0.01 * reach)
+    lower, upper = np.append(center[:2] - reach, -depth), np.append(center[:2] + reach, 0.0)
+    vertices = (lower + upper) / 2 + CORNERS * (upper - lower) / 2
+    return Body(vertices, 0.0, {"kind": "half_space"}, f"half-space -> the box of it within the robot's reach of {reach:.3g} m")
+
+
+def _spread(count: int) -> Array:
+    """Points (count, 3) spread evenly over the unit sphere (Fibonacci lattice)."""
+    k = np.arange(count) + 0.5
+    z, angle = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
+    r = np.sqrt(1 - z**2)
+    return np.column_stack([r * np.cos(angle), r * np.sin(angle), z])
