@@ -11,13 +11,13 @@ seed, and end in a tiny polytope that is certifiable whenever the seed is free.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal
 
 import numpy as np
 
-from certifier.errors import RegionError
-from certifier.model import Array, Polytope, Scene
+from certifier.errors import CirisError, RegionError
+from certifier.model import Array, Scene
 from certifier.outcome import Outcome, combine
 
 SEED_RADIUS = 1e-3
@@ -88,6 +88,7 @@ class Certify:
     Attributes:
         iteration: number of this certification within the job, from 0.
         label: what it is for: ``given``, ``contract`` or ``round``.
+        center: interior point, (n,); None for the Chebyshev centre.
         pairs: indices into ``scene.pairs`` to certify, most likely failures first.
         reuse: pair index -> earlier iteration whose proof, on a superset, serves here too.
         stop_at_first_failure: end early (B.3); pairs not reached are reported as absent.
@@ -97,7 +98,7 @@ class Certify:
     label: str
     C: list[list[float]]
     d: list[float]
-    center: list[float]
+    center: list[float] | None
     pairs: list[int]
     reuse: dict[int, int]
     stop_at_first_failure: bool
@@ -163,11 +164,16 @@ class Certification:
 
 @dataclass(frozen=True)
 class Stepped:
-    """The new polytope (faces and joint limits, the same number of rows) and what the step has to say of itself."""
+    """The new polytope, joint limits included, and what the step has to say of itself.
+
+    Attributes:
+        growth: relative growth of the inscribed ellipsoid's volume.
+    """
 
     C: list[list[float]]
     d: list[float]
     center: list[float]
+    growth: float
     info: dict[str, Any]
 
 
@@ -191,7 +197,7 @@ class Accepted:
     iteration: int
     C: list[list[float]]
     d: list[float]
-    center: list[float]
+    center: list[float] | None
     proofs: dict[int, int]
 
 
@@ -202,3 +208,160 @@ class Transition:
     state: dict[str, Any]
     action: Action
     accepted: Accepted | None = None
+
+
+def begin(scene: Scene, options: GrowthOptions) -> Transition:
+    """The first action of a job.
+
+    Raises:
+        RegionError: a ``certify`` job without C and d, or with the wrong number of columns.
+    """
+    state: dict[str, Any] = {"options": options.to_document(), "next": 0, "best": None}
+    if options.kind == "grow":
+        return Transition(state | {"phase": "propose"}, Propose(options.seed))
+    if "C" not in options.seed or "d" not in options.seed:
+        raise RegionError("polytope_missing", "a polytope needs C and d", field="polytope")
+    C, d = given_rows(scene, options.seed["C"], options.seed["d"])
+    limited = scene.polytope(C, d)
+    return _certify(scene, state, "given", limited.C, limited.d, options.seed.get("center"), stop=False)
+
+
+def given_rows(scene: Scene, C: Any, d: Any) -> tuple[Array, Array]:
+    """A user's C, (m, n), and d, (m,), as arrays.
+
+    Raises:
+        RegionError: not numbers, wrong shape, or not finite.
+    """
+    try:
+        rows, offsets = np.array(C, dtype=float), np.array(d, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise RegionError("polytope_shape", f"C and d must be arrays of numbers: {error}", field="polytope") from None
+    if rows.size == 0:
+        rows = rows.reshape(0, scene.n)
+    if rows.ndim != 2 or rows.shape[1] != scene.n or offsets.shape != (len(rows),):
+        hint = f"C is m x {scene.n}, one column a joint in the scene's order, and d has m numbers"
+        raise RegionError("polytope_shape", f"C is {rows.shape} and d is {offsets.shape}", field="polytope", hint=hint)
+    if not (np.isfinite(rows).all() and np.isfinite(offsets).all()):
+        raise RegionError("polytope_not_finite", "C and d must be finite numbers", field="polytope")
+    return rows, offsets
+
+
+def advance(scene: Scene, state: dict[str, Any], report: Report) -> Transition:
+    """What follows a report; the state is the one of the last transition and is not changed."""
+    state = dict(state)
+    if isinstance(report, Certification):
+        return _certified(scene, state, report)
+    if isinstance(report, Proposed):
+        return _proposed(scene, state, report)
+    if isinstance(report, Stepped):
+        state |= {"target": {"C": report.C, "d": report.d, "center": report.center}, "growth": report.growth, "halvings": 0}
+        return _certify(scene, state, "round", np.array(report.C), np.array(report.d), report.center)
+    error = CirisError.from_document(report.error)
+    if state["best"] is not None:
+        return Transition(state, Finish(Outcome.CERTIFIED, f"certified; growth ended early: {error}"))
+    return Transition(state, Finish(Outcome.ERROR, str(error)))
+
+
+def _certify(
+    scene: Scene, state: dict[str, Any], label: str, C: Array, d: Array, center: list[float] | None, reuse: dict[int, int] | None = None, stop: bool = True
+) -> Transition:
+    """Certify {C s <= d}, the pairs that failed last first."""
+    reuse = reuse or {}
+    suspects = [i for i in state.get("suspects", []) if i not in reuse]
+    pairs = suspects + [i for i in range(len(scene.pairs)) if i not in reuse and i not in set(suspects)]
+    action = Certify(state["next"], label, C.tolist(), d.tolist(), center, pairs, reuse, stop)
+    state = {**state, "phase": label, "next": action.iteration + 1, "current": action_to_document(action)}
+    return Transition(state, action)
+
+
+def _proposed(scene: Scene, state: dict[str, Any], report: Proposed) -> Transition:
+    """Rows to contract: the proposal's faces and the joint limits, all scaled to |c| = 1."""
+    limited = scene.polytope(report.C, report.d)
+    norms = np.linalg.norm(limited.C, axis=1)
+    state |= {
+        "rows": {"C": (limited.C / norms[:, None]).tolist(), "d": (limited.d / norms).tolist(), "seed": report.center},
+        "proposal": report.info,
+        "holds": {},
+        "steps": state["options"]["bisection_steps"],
+    }
+    return _contract(scene, state, 0.0)
+
+
+def _contract(scene: Scene, state: dict[str, Any], delta: float) -> Transition:
+    """Certify trial delta; a pair certified on a larger trial is certified on this one."""
+    C, d, seed = (np.array(state["rows"][name]) for name in ("C", "d", "seed"))
+    inner = np.minimum(d, C @ seed + SEED_RADIUS)
+    limited = scene.polytope(C, np.maximum(d - delta, inner))
+    reuse = {int(index): iteration for index, (iteration, held) in state["holds"].items() if held <= delta}
+    return _certify(scene, {**state, "delta": delta}, "contract", limited.C, limited.d, state["rows"]["seed"], reuse)
+
+
+def _certified(scene: Scene, state: dict[str, Any], report: Certification) -> Transition:
+    action = action_from_document(state["current"])
+    assert isinstance(action, Certify)
+    failures = {index: outcome for index, outcome in report.outcomes.items() if outcome is not Outcome.CERTIFIED}
+    state["suspects"] = [*failures, *(i for i in state.get("suspects", []) if i not in failures)]
+    complete = not failures and len(report.outcomes) == len(action.pairs)
+    accepted = None
+    if complete:
+        proofs = {**dict.fromkeys(action.pairs, action.iteration), **action.reuse}
+        accepted = Accepted(action.iteration, action.C, action.d, action.center, proofs)
+        state["best"] = {"iteration": action.iteration, "C": action.C, "d": action.d, "center": action.center}
+    if action.label == "given":
+        transition = Transition(state, Finish(combine(list(report.outcomes.values())), "the given polytope, every pair"))
+    elif action.label == "contract":
+        transition = _bisect(scene, state, action, report, complete)
+    else:
+        transition = _alternate(scene, state, complete)
+    return Transition(transition.state, transition.action, accepted)
+
+
+def _bisect(scene: Scene, state: dict[str, Any], action: Certify, report: Certification, complete: bool) -> Transition:
+    """B.4: smallest delta that certifies, by bisection between the largest that failed and the smallest that did not."""
+    delta = state["delta"]
+    holds = dict(state["holds"])
+    for index, outcome in report.outcomes.items():
+        if outcome is Outcome.CERTIFIED and (str(index) not in holds or holds[str(index)][1] > delta):
+            holds[str(index)] = [action.iteration, delta]
+    state["holds"] = holds
+    if complete:
+        state["high"] = delta
+        if delta == 0:
+            return _step(state)
+    else:
+        state["low"] = delta
+    if "high" not in state:
+        C, d, seed = (np.array(state["rows"][name]) for name in ("C", "d", "seed"))
+        largest = float((d - C @ seed).max())
+        if delta >= largest:
+            pair = scene.pairs[next(i for i, outcome in report.outcomes.items() if outcome is not Outcome.CERTIFIED)]
+            reason = f"not even the smallest region around the seed can be certified: {pair.a} and {pair.b} are too close there"
+            return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
+        return _contract(scene, state, largest)
+    if state["steps"] == 0:
+        return _step(state)
+    state["steps"] -= 1
+    return _contract(scene, state, (state["low"] + state["high"]) / 2)
+
+
+def _step(state: dict[str, Any]) -> Transition:
+    """The next round of (12) on the best region, or the end."""
+    rounds = state.get("rounds", 0)
+    if rounds >= state["options"]["max_rounds"]:
+        return Transition(state, Finish(Outcome.CERTIFIED, "certified; the limit of rounds was reached" if rounds else "certified"))
+    best = state["best"]
+    return Transition({**state, "phase": "step", "rounds": rounds + 1}, Step(best["iteration"], best["C"], best["d"], best["center"]))
+
+
+def _alternate(scene: Scene, state: dict[str, Any], complete: bool) -> Transition:
+    """Algorithm 1: accept and go on, stop when the growth is small, or back off towards the last certified polytope."""
+    if complete:
+        if state["growth"] < state["options"]["tolerance"]:
+            return Transition(state, Finish(Outcome.CERTIFIED, "certified; growth is under the tolerance"))
+        return _step(state)
+    if state["halvings"] == state["options"]["backoff"]:
+        return Transition(state, Finish(Outcome.CERTIFIED, "certified; the last step could not be certified"))
+    best, target = state["best"], state["target"]
+    share = 0.5 ** (state["halvings"] + 1)
+    C, d, center = ((1 - share) * np.array(best[name]) + share * np.array(target[name]) for name in ("C", "d", "center"))
+    return _certify(scene, {**state, "halvings": state["halvings"] + 1}, "round", C, d, center.tolist())
