@@ -15,7 +15,7 @@ from certifier.model import Pair
 
 @dataclass(frozen=True)
 class Frame:
-    """The frame body F of a pair and the chains to both sides (position indices, path order)."""
+    """The frame body F of a pair and the chains to both sides (position indices, ascending)."""
 
     body: str
     chain_a: tuple[int, ...]
@@ -28,10 +28,14 @@ def choose_frame(kinematics: Kinematics, pair: Pair) -> Frame:
     a, b = scene.geometry(pair.a), scene.geometry(pair.b)
     best: tuple[float, Frame] | None = None
     for body in kinematics.bodies_between(a.body, b.body):
-        frame = Frame(body, tuple(kinematics.chain(body, a.body)), tuple(kinematics.chain(body, b.body)))
+        frame = Frame(body, _chain(kinematics, body, a.body), _chain(kinematics, body, b.body))
         sides = ((a, frame.chain_a), (b, frame.chain_b))
         cost = sum(len(g.vertices) * dimension(len(chain), scene.n) ** 2 for g, chain in sides)
         if best is None or cost < best[0]:
             best = cost, frame
     assert best is not None, "a path has at least one body"
     return best[1]
+
+
+def _chain(kinematics: Kinematics, frame: str, body: str) -> tuple[int, ...]:
+    return tuple(sorted(kinematics.chain(frame, body)))

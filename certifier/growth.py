@@ -60,7 +60,9 @@ class GrowthOptions:
         known = {f.name for f in fields(cls)}
         for name in document:
             if name not in known:
-                raise RegionError("unknown_option", f"there is no option {name!r}", field=f"options.{name}", hint=f"options: {', '.join(sorted(known))}")
+                raise RegionError(
+                    "unknown_option", f"there is no option {name!r}", field=f"options.{name}", hint=f"options: {', '.join(sorted(known))}"
+                )
         options = cls(**document)
         if options.kind not in ("grow", "certify"):
             raise RegionError("option_value", "kind is 'grow' or 'certify'", field="options.kind")
@@ -167,12 +169,15 @@ class Stepped:
     """The new polytope, joint limits included, and what the step has to say of itself.
 
     Attributes:
+        base_C, base_d: the rows it came from, one for one; backing off moves between the two.
         growth: relative growth of the inscribed ellipsoid's volume.
     """
 
     C: list[list[float]]
     d: list[float]
     center: list[float]
+    base_C: list[list[float]]
+    base_d: list[float]
     growth: float
     info: dict[str, Any]
 
@@ -254,7 +259,9 @@ def advance(scene: Scene, state: dict[str, Any], report: Report) -> Transition:
     if isinstance(report, Proposed):
         return _proposed(scene, state, report)
     if isinstance(report, Stepped):
-        state |= {"target": {"C": report.C, "d": report.d, "center": report.center}, "growth": report.growth, "halvings": 0}
+        base = {"C": report.base_C, "d": report.base_d, "center": state["best"]["center"]}
+        target = {"C": report.C, "d": report.d, "center": report.center}
+        state |= {"base": base, "target": target, "growth": report.growth, "halvings": 0}
         return _certify(scene, state, "round", np.array(report.C), np.array(report.d), report.center)
     error = CirisError.from_document(report.error)
     if state["best"] is not None:
@@ -263,7 +270,14 @@ def advance(scene: Scene, state: dict[str, Any], report: Report) -> Transition:
 
 
 def _certify(
-    scene: Scene, state: dict[str, Any], label: str, C: Array, d: Array, center: list[float] | None, reuse: dict[int, int] | None = None, stop: bool = True
+    scene: Scene,
+    state: dict[str, Any],
+    label: str,
+    C: Array,
+    d: Array,
+    center: list[float] | None,
+    reuse: dict[int, int] | None = None,
+    stop: bool = True,
 ) -> Transition:
     """Certify {C s <= d}, the pairs that failed last first."""
     reuse = reuse or {}
@@ -361,7 +375,7 @@ def _alternate(scene: Scene, state: dict[str, Any], complete: bool) -> Transitio
         return _step(state)
     if state["halvings"] == state["options"]["backoff"]:
         return Transition(state, Finish(Outcome.CERTIFIED, "certified; the last step could not be certified"))
-    best, target = state["best"], state["target"]
+    base, target = state["base"], state["target"]
     share = 0.5 ** (state["halvings"] + 1)
-    C, d, center = ((1 - share) * np.array(best[name]) + share * np.array(target[name]) for name in ("C", "d", "center"))
+    C, d, center = ((1 - share) * np.array(base[name]) + share * np.array(target[name]) for name in ("C", "d", "center"))
     return _certify(scene, {**state, "halvings": state["halvings"] + 1}, "round", C, d, center.tolist())

@@ -10,6 +10,7 @@ outer transforms inverted and swapped; a weld contributes its fixed transform. C
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -60,7 +61,7 @@ class Kinematics:
         """The factors of X_FB from frame body F to body B."""
         bodies = self.bodies_between(frame, body)
         factors = []
-        for here, there in zip(bodies, bodies[1:], strict=False):
+        for here, there in itertools.pairwise(bodies):
             inverse = self._joint_above.get(here) is not None and self._joint_above[here].parent == there
             factors.append(_factor(self._joint_above[here if inverse else there], self.scene.q_star, inverse))
         return factors

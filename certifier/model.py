@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from certifier.errors import RegionError, SceneError
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 SCHEMA_VERSION = 1
 WORLD = "world"
@@ -271,7 +271,7 @@ class Scene:
                 for g in document["geometries"]
             ),
             pairs=tuple(Pair(a, b) for a, b in document["pairs"]),
-            ignored=tuple(Ignored(*i["pair"], i["reason"]) for i in document["ignored"]),
+            ignored=tuple(Ignored(i["pair"][0], i["pair"][1], i["reason"]) for i in document["ignored"]),
             q_star=np.array(document["q_star"], dtype=float),
             padding=float(document["padding"]),
             warnings=tuple(document.get("warnings", ())),
@@ -295,7 +295,9 @@ class Polytope:
 
     def __post_init__(self) -> None:
         if self.C.ndim != 2 or self.d.shape != (len(self.C),):
-            raise RegionError("polytope_shape", f"C is {self.C.shape} and d is {self.d.shape}; they must be (m, n) and (m,)", field="polytope")
+            raise RegionError(
+                "polytope_shape", f"C is {self.C.shape} and d is {self.d.shape}; they must be (m, n) and (m,)", field="polytope"
+            )
         if not (np.isfinite(self.C).all() and np.isfinite(self.d).all()):
             raise RegionError("polytope_not_finite", "C and d must be finite numbers", field="polytope")
 

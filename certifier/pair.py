@@ -1,15 +1,15 @@
 """Certification of a polytope, pair by pair: screens, the program (11), the proof and its verification.
 
-    centre or a sample in contact                        -> refuted, with the configuration
-    program (11) feasible, proof verified exactly        -> certified, with the proof
-    program (11) infeasible by a dual point              -> not_certifiable, with the points where no plane of this degree works
-    anything else                                        -> inconclusive, with the reason
+centre or a sample in contact                        -> refuted, with the configuration
+program (11) feasible, proof verified exactly        -> certified, with the proof
+program (11) infeasible by a dual point              -> not_certifiable, with the points where no plane of this degree works
+anything else                                        -> inconclusive, with the reason
 """
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,7 +44,7 @@ class PairResult:
 
     outcome: Outcome
     stage: Stage
-    seconds: float
+    seconds: float = 0.0
     margin: float | None = None
     detail: str = ""
     witness_s: Array | None = None
@@ -69,7 +69,7 @@ class Certification:
         self.scene = scene
         self.center = chebyshev_center(polytope)[0] if center is None else center
         kept = drop_redundant(polytope)
-        faces = Polytope(polytope.C[kept], polytope.d[kept])
+        self._faces = faces = Polytope(polytope.C[kept], polytope.d[kept])
         lower, upper, Y_lower, Y_upper = bound_multipliers(scene.polytope(faces.C, faces.d))
         box = Box.around(lower, upper)
         self.ground = Ground(faces.C, faces.d, box.mid, box.half, Y_lower, Y_upper)
@@ -83,38 +83,43 @@ class Certification:
     def certify(self, index: int, max_iterations: int = 60) -> PairResult:
         """Certify pair ``scene.pairs[index]``."""
         start = time.perf_counter()
-        pair = self.scene.pairs[index]
+        result = self._certify(self.scene.pairs[index], max_iterations)
+        return replace(result, seconds=time.perf_counter() - start)
+
+    def _certify(self, pair: Pair, max_iterations: int) -> PairResult:
         frame = choose_frame(self._kinematics, pair)
         contact = self._contact(pair, frame, self._screen)
         if isinstance(contact, _Witness):
-            return PairResult(Outcome.REFUTED, Stage.SCREEN, time.perf_counter() - start, witness_s=contact.s)
+            return PairResult(Outcome.REFUTED, Stage.SCREEN, witness_s=contact.s)
         try:
             program = build(self._sides, pair, frame, contact)
             solution = solve(program.blocks, program.normal, program.start, max_iterations)
         except np.linalg.LinAlgError as error:
-            return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, time.perf_counter() - start, detail=f"numerical trouble: {error}")
+            return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"numerical trouble: {error}")
         if solution.status is Status.FEASIBLE:
-            for kind in BITS:
-                proof = self._proof(pair, frame, solution, kind)
-                try:
-                    statement = self._check.verify(proof)
-                except ProofError as error:
-                    failure = error
-                else:
-                    return PairResult(Outcome.CERTIFIED, Stage.SOS, time.perf_counter() - start, statement.gap, proof=proof.to_bytes())
-            return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, time.perf_counter() - start, detail=f"the proof found does not hold: {failure}")
+            return self._prove(pair, frame, solution)
         weak = self._weak_points(frame, solution)
-        inside = weak[self._inside(weak)]
-        witness = self._contact(pair, frame, np.concatenate([self.center[None], inside]))
+        witness = self._contact(pair, frame, np.concatenate([self.center[None], weak[self._faces.contains(weak)]]))
         if isinstance(witness, _Witness):
-            return PairResult(Outcome.REFUTED, Stage.SOS, time.perf_counter() - start, witness_s=witness.s)
-        seconds = time.perf_counter() - start
+            return PairResult(Outcome.REFUTED, Stage.SOS, witness_s=witness.s)
         if solution.status is Status.INFEASIBLE:
-            return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, seconds, detail=f"no affine plane in the frame of {frame.body}", weak_points=weak)
-        return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, seconds, detail=f"{solution.status.value} after {solution.iterations} iterations", weak_points=weak)
+            detail = f"no plane affine in s, in the frame of {frame.body}"
+            return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, weak_points=weak)
+        detail = f"{solution.status.value} after {solution.iterations} iterations"
+        return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak)
 
-    def _inside(self, s: Array) -> np.ndarray:
-        return Polytope(self.ground.C, self.ground.d).contains(s)
+    def _prove(self, pair: Pair, frame: Frame, solution: Solution) -> PairResult:
+        """The proof in as few bits as hold."""
+        failure = ""
+        for kind in BITS:
+            proof = self._proof(pair, frame, solution, kind)
+            try:
+                statement = self._check.verify(proof)
+            except ProofError as error:
+                failure = str(error)
+                continue
+            return PairResult(Outcome.CERTIFIED, Stage.SOS, margin=statement.gap, proof=proof.to_bytes())
+        return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"the proof found does not hold: {failure}")
 
     def _points(self, geometry: Geometry, frame: Frame, s: Array) -> Array:
         return self._kinematics.points(frame.body, geometry.body, geometry.vertices, s)

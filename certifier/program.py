@@ -149,15 +149,15 @@ def build(sides: Sides, pair: Pair, frame: Frame, contact: Closest) -> Program:
             B[:, : len(u), 4 * (n + 1)] = -radius * X[:, 3, 3]
         B[:, : len(u), -1] = -X[:, 3, 3]
         blocks.append(Block(cone, B, centre))
-    normal, start = np.zeros(columns - 1), np.zeros(columns - 1)
+    normal, initial = np.zeros(columns - 1), np.zeros(columns - 1)
     normal[0 : 3 * (n + 1) : n + 1] = contact.p_a - contact.p_b
-    start[0 : 3 * (n + 1) : n + 1] = contact.normal / contact.distance
-    start[3 * (n + 1)] = -contact.normal @ (contact.p_a + contact.p_b) / 2 / contact.distance
+    initial[0 : 3 * (n + 1) : n + 1] = contact.normal / contact.distance
+    initial[3 * (n + 1)] = -contact.normal @ (contact.p_a + contact.p_b) / 2 / contact.distance
     if rounded:
-        start[4 * (n + 1)] = 1.1 / contact.distance
-        start[4 * (n + 1) + 1 :] = 0.1 / contact.distance / n
+        initial[4 * (n + 1)] = 1.1 / contact.distance
+        initial[4 * (n + 1) + 1 :] = 0.1 / contact.distance / n
         blocks += _norm_blocks(n, sides.u_c, columns)
-    return Program(blocks, normal, start)
+    return Program(blocks, normal, initial)
 
 
 def _norm_blocks(n: int, u_c: Array, columns: int) -> list[Block]:
@@ -180,7 +180,9 @@ def _norm_blocks(n: int, u_c: Array, columns: int) -> list[Block]:
     matrices[-1] = -np.eye(size)
     lmi = Cone(points, len(points), np.ones((1, len(points))), np.zeros((1, 0)))
     B = np.einsum("ni,pij,nj->np", points, matrices, points)[None]
-    x_identity = np.linalg.solve((points[:, :, None] * points[:, None, :]).reshape(len(points), -1)[:, rows * size + cols].T, np.eye(size)[rows, cols])
+    x_identity = np.linalg.solve(
+        (points[:, :, None] * points[:, None, :]).reshape(len(points), -1)[:, rows * size + cols].T, np.eye(size)[rows, cols]
+    )
     line = Cone(np.ones((1, 1)), 1, np.ones((1, 1)), np.zeros((1, 0)))
     signs = np.zeros((n, 1, columns))
     signs[np.arange(n), 0, 4 * (n + 1) + 1 + np.arange(n)] = 1.0

@@ -16,9 +16,9 @@ import hashlib
 import io
 import json
 import zipfile
-from zlib import error as zlib_error
 from dataclasses import dataclass, field
 from typing import Any
+from zlib import error as zlib_error
 
 import numpy as np
 
@@ -182,7 +182,7 @@ class RegionProof:
                 C=_floats(arrays["region/C"]),
                 d=_floats(arrays["region/d"]),
                 interior=_floats(arrays["region/interior"]),
-                archimedean=Archimedean(float(values.pop("N")), **values),
+                archimedean=Archimedean(values.pop("N").item(), **values),
                 pairs=tuple(_pair(scene.hash, h, grounds, f"pair/{i}", arrays) for i, h in enumerate(header["pairs"])),
             )
 
@@ -199,7 +199,9 @@ class _malformed:
         return None
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        if isinstance(error, (KeyError, IndexError, TypeError, ValueError, AttributeError, CirisError)) and not isinstance(error, ProofError):
+        if isinstance(error, (KeyError, IndexError, TypeError, ValueError, AttributeError, CirisError)) and not isinstance(
+            error, ProofError
+        ):
             raise ProofError("proof_malformed", f"the proof file is malformed: {type(error).__name__}: {error}") from error
 
 
@@ -231,13 +233,18 @@ def _pair(scene_hash: str, header: dict[str, Any], grounds: list[Ground], prefix
         for i, chain in enumerate((chain_a, chain_b))
     )
     plane = _floats(arrays[f"{prefix}/plane"])
-    return PairProof(scene_hash, header["a"], header["b"], header["frame"], grounds[header["ground"]], plane, float(t), float(kappa), (side_a, side_b))
+    return PairProof(
+        scene_hash, header["a"], header["b"], header["frame"], grounds[header["ground"]], plane, float(t), float(kappa), (side_a, side_b)
+    )
 
 
 def _pack(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> bytes:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in [("header.json", json.dumps(header, sort_keys=True).encode()), *((f"{n}.npy", _npy(a)) for n, a in arrays.items())]:
+        for name, content in [
+            ("header.json", json.dumps(header, sort_keys=True).encode()),
+            *((f"{n}.npy", _npy(a)) for n, a in arrays.items()),
+        ]:
             archive.writestr(zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), content, zipfile.ZIP_DEFLATED)
     return buffer.getvalue()
 
@@ -259,7 +266,17 @@ def _unpack(data: bytes, kind: str) -> tuple[dict[str, Any], dict[str, np.ndarra
                 for name in archive.namelist()
                 if name.endswith(".npy")
             }
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, KeyError, ValueError, EOFError, OSError, NotImplementedError, RuntimeError, zlib_error) as error:
+    except (
+        zipfile.BadZipFile,
+        zipfile.LargeZipFile,
+        KeyError,
+        ValueError,
+        EOFError,
+        OSError,
+        NotImplementedError,
+        RuntimeError,
+        zlib_error,
+    ) as error:
         raise ProofError("proof_malformed", f"not a proof file: {error}") from error
     if not isinstance(header, dict) or header.get("format") != FORMAT or header.get("kind") != kind:
         raise ProofError("proof_malformed", f"not a {kind}'s proof of format {FORMAT}")

@@ -69,7 +69,10 @@ def check_ground(scene: Scene, ground: Ground) -> None:
     # Doubles just inside the exact corners mid -+ half imply the corners.
     lower, upper = np.nextafter(ground.mid - ground.half, np.inf), np.nextafter(ground.mid + ground.half, -np.inf)
     for i in range(n):
-        if not (exact(lower[i]) >= exact(ground.mid[i]) - exact(ground.half[i]) and exact(upper[i]) <= exact(ground.mid[i]) + exact(ground.half[i])):
+        if not (
+            exact(lower[i]) >= exact(ground.mid[i]) - exact(ground.half[i])
+            and exact(upper[i]) <= exact(ground.mid[i]) + exact(ground.half[i])
+        ):
             raise ProofError("proof_box", "the box of a polytope cannot be represented")
     if not check_box(limited.C, limited.d, lower, upper, ground.Y_lower, ground.Y_upper):
         raise ProofError("proof_box", "the multipliers do not prove the box around the polytope")
@@ -148,7 +151,12 @@ class PairCheck:
         joints = [joint.index for joint, _ in self._kinematics.path(frame, geometry.body) if joint.index is not None]
         length = 2 ** len(side.chain)
         shape = (len(geometry.vertices), len(self._faces))
-        if len(joints) > MAX_CHAIN or sorted(joints) != sorted(side.chain) or side.exponent.shape != shape or side.mantissa.shape != (*shape, length * (length + 1) // 2):
+        if (
+            len(joints) > MAX_CHAIN
+            or sorted(joints) != sorted(side.chain)
+            or side.exponent.shape != shape
+            or side.mantissa.shape != (*shape, length * (length + 1) // 2)
+        ):
             raise ProofError("proof_malformed", f"the Gram factors of {geometry.name} do not fit")
         X = self._kinematics.pose(frame, geometry.body)
         sigma = self._kinematics.scale(frame, geometry.body)
@@ -199,4 +207,3 @@ def _monomials(chain: tuple[int, ...], n: int) -> tuple[np.ndarray, list[tuple[i
             exponents[joint] = code // 3**position % 3
         powers.append(tuple(exponents))
     return index, powers
-

@@ -1,0 +1,170 @@
+"""Jobs carried out in this process, without the service: the state machine of certifier.growth driven by plain calls."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from certifier.errors import CirisError
+from certifier.growth import (
+    Accepted,
+    Certification,
+    Certify,
+    Failed,
+    Finish,
+    GrowthOptions,
+    Propose,
+    Proposed,
+    Report,
+    Step,
+    Stepped,
+    advance,
+    begin,
+)
+from certifier.model import Array, Polytope, Scene
+from certifier.outcome import Guarantee, Outcome, combine
+from certifier.pair import Certification as PairCertification
+from certifier.pair import PairResult
+from certifier.polytope_step import Step as PolytopeStep
+from certifier.polytope_step import step
+from certifier.region import Region, certified_region
+from certifier.seeding import SeedOptions, propose
+
+Progress = Callable[[str], None]
+
+
+@dataclass
+class _Run:
+    """Results of a job so far: iteration -> pair index -> result, and the last accepted region's data."""
+
+    scene: Scene
+    seed: int
+    progress: Progress
+    results: dict[int, dict[int, PairResult]] = field(default_factory=dict)
+    accepted: Accepted | None = None
+
+    def certify(self, action: Certify) -> Certification:
+        center = None if action.center is None else np.array(action.center)
+        shared = PairCertification(self.scene, Polytope(np.array(action.C), np.array(action.d)), center, self.seed)
+        found = self.results.setdefault(action.iteration, {})
+        for index in action.pairs:
+            found[index] = shared.certify(index)
+            pair = self.scene.pairs[index]
+            self.progress(
+                f"{action.label} {action.iteration}: {len(found)}/{len(action.pairs)} {pair.a} - {pair.b}: {found[index].outcome}"
+            )
+            if action.stop_at_first_failure and found[index].outcome is not Outcome.CERTIFIED:
+                break
+        return Certification(action.iteration, {index: result.outcome for index, result in found.items()})
+
+    def proofs(self, accepted: Accepted) -> dict[int, bytes]:
+        return {index: self.results[iteration][index].proof or b"" for index, iteration in accepted.proofs.items()}
+
+    def carry_out(self, action: Propose | Certify | Step) -> Report:
+        if isinstance(action, Certify):
+            return self.certify(action)
+        if isinstance(action, Propose):
+            self.progress("seeding")
+            proposal = propose(self.scene, SeedOptions.from_document(action.seed))
+            return Proposed(proposal.C.tolist(), proposal.d.tolist(), proposal.center.tolist(), proposal.info)
+        assert self.accepted is not None, "a step follows an accepted region"
+        self.progress("polytope step")
+        found = step(self.scene, Polytope(np.array(action.C), np.array(action.d)), self.proofs(self.accepted))
+        return stepped(found)
+
+
+def stepped(found: PolytopeStep) -> Stepped:
+    """The report of a polytope step."""
+    C, d, center, base_C, base_d = (a.tolist() for a in (found.C, found.d, found.center, found.base_C, found.base_d))
+    return Stepped(C, d, center, base_C, base_d, found.growth, found.info)
+
+
+def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: None) -> Region:
+    """Grow a certified region in this process.
+
+    Raises:
+        CirisError: no region could be certified; code ``not_grown``, or the error of the seeding.
+    """
+    start = time.perf_counter()
+    run = _Run(scene, options.random_seed, progress)
+    transition = begin(scene, options)
+    curve: list[dict[str, Any]] = []
+    while not isinstance(transition.action, Finish):
+        failure: CirisError | None = None
+        try:
+            report = run.carry_out(transition.action)
+        except CirisError as error:
+            failure, report = error, Failed(error.to_document())
+        transition = advance(scene, transition.state, report)
+        if failure and run.accepted is None:
+            raise failure
+        if transition.accepted:
+            run.accepted = transition.accepted
+            curve.append({"iteration": run.accepted.iteration, "seconds": time.perf_counter() - start})
+    if run.accepted is None:
+        raise CirisError("not_grown", transition.action.reason, hint="try another seed, or look at the pair named")
+    provenance = {
+        "options": options.to_document(),
+        "versions": versions(scene),
+        "reason": transition.action.reason,
+        "growth_curve": curve,
+        "seconds": time.perf_counter() - start,
+    }
+    accepted = run.accepted
+    center = None if accepted.center is None else np.array(accepted.center)
+    return certified_region(scene, np.array(accepted.C), np.array(accepted.d), center, run.proofs(accepted), provenance)
+
+
+def certify(scene: Scene, C: Array, d: Array, center: Array | None = None, progress: Progress = lambda _: None) -> dict[str, Any]:
+    """Certify every pair on {C s <= d} and the joint limits; the document of ``ciris certify --json``.
+
+    Raises:
+        RegionError: the polytope is malformed, empty or unbounded.
+    """
+    start = time.perf_counter()
+    options = GrowthOptions(kind="certify", seed={"C": C.tolist(), "d": d.tolist(), "center": None if center is None else center.tolist()})
+    action = begin(scene, options).action
+    assert isinstance(action, Certify)
+    run = _Run(scene, options.random_seed, progress)
+    run.certify(action)
+    results = run.results[action.iteration]
+    outcome = combine([result.outcome for result in results.values()])
+    return {
+        "scene": {"name": scene.name, "hash": scene.hash},
+        "outcome": outcome.value,
+        "guarantee": (Guarantee.EXACT if outcome is Outcome.CERTIFIED else Guarantee.NONE).value,
+        "seconds": time.perf_counter() - start,
+        "pairs": [pair_document(scene, index, results[index]) for index in sorted(results)],
+    }
+
+
+def pair_document(scene: Scene, index: int, result: PairResult) -> dict[str, Any]:
+    """One pair's outcome with stable keys."""
+    pair = scene.pairs[index]
+    return {
+        "a": pair.a,
+        "b": pair.b,
+        "outcome": result.outcome.value,
+        "margin": result.margin,
+        "seconds": result.seconds,
+        "stage": result.stage.value,
+        "witness_q": None if result.witness_s is None else scene.to_q(result.witness_s).tolist(),
+        "detail": result.detail,
+    }
+
+
+def versions(scene: Scene) -> dict[str, Any]:
+    """Versions that a region's provenance names."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    def of(package: str) -> str | None:
+        try:
+            return version(package)
+        except PackageNotFoundError:
+            return None
+
+    return {"ciris": of("ciris"), "drake": scene.provenance.get("drake") or of("drake"), "python-flint": of("python-flint")}

@@ -1,0 +1,84 @@
+"""A certified region: its proof file and its manifest (docs/architecture.md, "Manifest")."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from certifier.archimedean import archimedean
+from certifier.model import SCHEMA_VERSION, Array, Polytope, Scene
+from certifier.outcome import Guarantee
+from certifier.polytope import chebyshev_center, inscribed_ellipsoid, volume
+from certifier.proof import PairProof, RegionProof, digest
+from certifier.verify.region import RegionStatement, verify_region
+
+
+@dataclass(frozen=True)
+class Region:
+    """A region whose proof has been verified.
+
+    Attributes:
+        manifest: JSON-able, without ``seconds`` and the proof's path, which are the caller's.
+        proof: the portable proof file.
+        statement: what the verifier says it proves.
+    """
+
+    manifest: dict[str, Any]
+    proof: bytes
+    statement: RegionStatement
+
+
+def certified_region(
+    scene: Scene, C: Array, d: Array, center: Array | None, proofs: dict[int, bytes], provenance: dict[str, Any]
+) -> Region:
+    """Assemble a region from its pairs' proofs, verify the whole, and describe it.
+
+    Args:
+        C, d: (m, n), (m,) half-spaces with the joint limits among them.
+        center: (n,) the seed, or None for the Chebyshev centre.
+        proofs: pair index -> proof file, for every pair of the scene.
+        provenance: options, seeds, versions, seconds, growth curve.
+
+    Raises:
+        ProofError: the proof does not hold; nothing may be served as certified then.
+        RegionError: the polytope is empty or unbounded.
+    """
+    polytope = Polytope(C, d)
+    interior = chebyshev_center(polytope)[0] if center is None else center
+    bound = archimedean(polytope)
+    parts = [PairProof.from_bytes(proofs[index]) for index in range(len(scene.pairs))]
+    data = RegionProof(scene, C, d, interior, bound, tuple(parts)).to_bytes()
+    statement = verify_region(data)
+    ellipsoid = inscribed_ellipsoid(polytope)
+    size, error = volume(polytope, seed=0)
+    manifest = {
+        "schema_version": SCHEMA_VERSION,
+        "scene": {"name": scene.name, "hash": scene.hash, "directives": scene.provenance.get("directives")},
+        "space": {
+            "kind": "tangent",
+            "joints": [joint.name for joint in scene.moving],
+            "q_star": scene.q_star.tolist(),
+            "q_lower": scene.q_lower.tolist(),
+            "q_upper": scene.q_upper.tolist(),
+            "s_lower": scene.s_lower.tolist(),
+            "s_upper": scene.s_upper.tolist(),
+        },
+        "halfspace_normals": C.tolist(),
+        "halfspace_offsets": d.tolist(),
+        "interior_point": interior.tolist(),
+        "inscribed_ellipsoid": {"center": ellipsoid.center.tolist(), "shape": ellipsoid.shape.tolist()},
+        "volume": {"ellipsoid": ellipsoid.volume, "polytope": size, "polytope_stderr": error},
+        "seed": None if center is None else scene.to_q(np.asarray(center)).tolist(),
+        "pairs": [
+            {"a": s.a, "b": s.b, "outcome": "certified", "margin": s.gap, "proof_digest": digest(proofs[index])}
+            for index, s in enumerate(statement.pairs)
+        ],
+        "ignored": [{"a": i.a, "b": i.b, "reason": i.reason} for i in scene.ignored],
+        "padding": scene.padding,
+        "archimedean": {"N": bound.N},
+        "guarantee": Guarantee.EXACT.value,
+        "provenance": provenance,
+    }
+    return Region(manifest, data, statement)

@@ -1,0 +1,113 @@
+"""Exact check of a region's proof: every pair of the scene is separated on the whole region, or ProofError says why not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from certifier.model import Scene
+from certifier.proof import Ground, ProofError, RegionProof
+from certifier.verify.archimedean import check_archimedean
+from certifier.verify.kinematics import exact
+from certifier.verify.pair import PairCheck, PairStatement, check_ground
+
+
+@dataclass(frozen=True)
+class RegionStatement:
+    """What a valid proof proves.
+
+    Attributes:
+        faces: number of half-spaces, joint limits included.
+        pairs: one statement for every pair of the scene.
+        N: |s|^2 <= N on the region (Archimedean, appendix A).
+    """
+
+    scene: Scene
+    faces: int
+    pairs: tuple[PairStatement, ...]
+    N: float
+
+    @property
+    def gap(self) -> float:
+        """Least certified distance in metres over all pairs (0 when there is no pair)."""
+        return min((pair.gap for pair in self.pairs), default=0.0)
+
+    def lines(self) -> list[str]:
+        """The statement in plain words."""
+        scene = self.scene
+        joints = [
+            f"  {j.name}: {j.lower:g} to {j.upper:g} {'rad' if r else 'm'} (centre {q:g})"
+            for j, r, q in zip(scene.moving, scene.revolute, scene.q_star, strict=True)
+        ]
+        closest = min(self.pairs, key=lambda pair: pair.gap, default=None)
+        return [
+            f"scene {scene.name}, hash {scene.hash}",
+            f"{scene.n} joints, within their limits:",
+            *joints,
+            f"a bounded, non-empty polytope of {self.faces} half-spaces in tangent space; |s|^2 <= {self.N:.6g}",
+            f"{len(self.pairs)} pairs of bodies separated at every configuration of it; padding {scene.padding:g} m around every body",
+            *([f"least distance at least {closest.gap:.3g} m: {closest.a} and {closest.b}"] if closest else []),
+            *(f"not covered: {i.a} and {i.b} ({i.reason})" for i in scene.ignored),
+            "guarantee: exact (rational arithmetic; the parsed model's numbers taken as they are)",
+        ]
+
+
+def verify_region(data: bytes) -> RegionStatement:
+    """Check a region's proof file.
+
+    Raises:
+        ProofError: the file is malformed or the proof does not hold.
+    """
+    proof = RegionProof.from_bytes(data)
+    scene = proof.scene
+    _check_polytope(proof)
+    stated = {frozenset((p.a, p.b)) for p in scene.pairs}
+    proved = {frozenset((p.a, p.b)) for p in proof.pairs}
+    if stated != proved:
+        missing = next(iter(stated - proved), None)
+        raise ProofError(
+            "proof_pairs", f"no proof for the pair {' and '.join(sorted(missing))}" if missing else "a proof is of no pair of the scene"
+        )
+    checks: dict[int, PairCheck] = {}
+    statements = []
+    for pair in proof.pairs:
+        if id(pair.ground) not in checks:
+            check_ground(scene, pair.ground)
+            _check_inside(proof, pair.ground)
+            checks[id(pair.ground)] = PairCheck(scene, pair.ground)
+        statements.append(checks[id(pair.ground)].verify(pair))
+    return RegionStatement(scene, len(proof.d), tuple(statements), proof.archimedean.N)
+
+
+def _check_polytope(proof: RegionProof) -> None:
+    """The region has the joint limits among its rows, a point strictly inside, and is Archimedean, hence bounded."""
+    scene, n = proof.scene, proof.scene.n
+    if proof.C.ndim != 2 or proof.C.shape[1] != n or proof.d.shape != (len(proof.C),) or proof.interior.shape != (n,):
+        raise ProofError("proof_malformed", "the region's arrays do not fit the scene")
+    limits = scene.polytope(np.zeros((0, n)), np.zeros(0))
+    if not _implied(proof, limits.C, limits.d):
+        raise ProofError("proof_limits", "the joint limits are not among the region's half-spaces")
+    point = [exact(x) for x in proof.interior]
+    for c, d in zip(proof.C, proof.d, strict=True):
+        if not sum(exact(x) * s for x, s in zip(c, point, strict=True)) < exact(d):
+            raise ProofError("proof_interior", "the interior point is not strictly inside the region")
+    try:
+        archimedean = check_archimedean(proof.C, proof.d, proof.archimedean)
+    except (ValueError, IndexError) as error:
+        raise ProofError("proof_malformed", f"the Archimedean multipliers do not fit: {error}") from error
+    if not archimedean:
+        raise ProofError("proof_archimedean", "the multipliers do not prove the region Archimedean")
+
+
+def _check_inside(proof: RegionProof, ground: Ground) -> None:
+    """Every face of the ground is a half-space of the region, or one moved outwards."""
+    if not _implied(proof, ground.C, ground.d):
+        raise ProofError("proof_ground", "a pair's proof is about a polytope that does not contain the region")
+
+
+def _implied(proof: RegionProof, C: np.ndarray, d: np.ndarray) -> bool:
+    least: dict[bytes, float] = {}
+    for c, offset in zip(proof.C + 0.0, proof.d, strict=True):
+        least[c.tobytes()] = min(offset, least.get(c.tobytes(), np.inf))
+    return all(least.get(c.tobytes(), np.inf) <= offset for c, offset in zip(C + 0.0, d, strict=True))
