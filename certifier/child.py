@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from certifier.errors import CirisError, RegionError, SceneError
 _ERRORS = {cls.__name__: cls for cls in (CirisError, SceneError, RegionError)}
 _TAIL_BYTES = 2000
 _PR_SET_PDEATHSIG = 1
-_ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes: int) -> Any:
@@ -56,7 +56,7 @@ def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes:
                 answer, _ = process.communicate(request, timeout=timeout_s)
             except subprocess.TimeoutExpired:
                 process.kill()
-                raise CirisError("child_timeout", f"it took more than {timeout_s:g} s and was stopped") from None
+                raise CirisError("child_timeout", f"it took more than {timeout_s:g} s and was stopped{_tail(log)}") from None
             except BaseException:
                 process.kill()
                 raise
@@ -73,16 +73,17 @@ def _result(answer: dict[str, Any]) -> Any:
 
 def _death(returncode: int, tail: str, memory_bytes: int) -> CirisError:
     if "MemoryError" in tail or "bad_alloc" in tail:
-        return CirisError("child_memory", f"it needed more than {memory_bytes / 2**30:.3g} GiB of memory")
+        return CirisError("child_memory", f"it needed more than {memory_bytes / 2**30:.3g} GiB of memory{tail}")
     how = f"signal {signal.Signals(-returncode).name}" if returncode < 0 else f"exit status {returncode}"
-    return CirisError("child_died", f"the process died ({how})" + (f": {tail}" if tail else ""))
+    return CirisError("child_died", f"the process died ({how}){tail}")
 
 
-def _tail(log: Any) -> str:
-    """The last lines of a log, without the frames of a traceback, as one line."""
+def _tail(log: IO[bytes]) -> str:
+    """The last lines of a log in one, without the frames of a traceback, after a colon; empty for an empty log."""
     log.seek(max(0, log.seek(0, os.SEEK_END) - _TAIL_BYTES))
     lines = log.read().decode(errors="replace").splitlines()
-    return " ".join(line.strip() for line in lines if line and not line.startswith((" ", "Traceback")))
+    text = " ".join(line.strip() for line in lines if line.strip() and not line.startswith((" ", "Traceback")))
+    return f": {text}" if text else ""
 
 
 def _encode(value: Any) -> bytes:

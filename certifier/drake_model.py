@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.geometry import Capsule, CollisionFilterDeclaration, Convex, GeometryId, GeometrySet, SceneGraphInspector, Shape, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, PrismaticJoint, RevoluteJoint, SpatialInertia, WeldJoint
+from pydrake.multibody.tree import FixedOffsetFrame, PrismaticJoint, RevoluteJoint, RigidBody, SpatialInertia, WeldJoint
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 
 from certifier.errors import SceneError
@@ -50,7 +50,7 @@ def geometry_name(inspector: SceneGraphInspector, geometry_id: GeometryId) -> st
     return inspector.GetName(geometry_id).removeprefix(f"{_INSTANCE}::")
 
 
-def _add_joint(plant: MultibodyPlant, joint: Joint, bodies: dict) -> None:
+def _add_joint(plant: MultibodyPlant, joint: Joint, bodies: dict[str, RigidBody]) -> None:
     parent, child = bodies[joint.parent], bodies[joint.child]
     X_PF, X_BM = _transform(joint.X_PF), _transform(joint.X_BM)
     if joint.kind is JointKind.WELD:
@@ -62,7 +62,7 @@ def _add_joint(plant: MultibodyPlant, joint: Joint, bodies: dict) -> None:
     plant.AddJoint(kind(joint.name, F, M, joint.axis, joint.lower, joint.upper))
 
 
-def _add_geometry(plant: MultibodyPlant, geometry: Geometry, bodies: dict) -> GeometryId:
+def _add_geometry(plant: MultibodyPlant, geometry: Geometry, bodies: dict[str, RigidBody]) -> GeometryId:
     X_BG, shape = _shape(geometry)
     return plant.RegisterCollisionGeometry(bodies[geometry.body], X_BG, shape, geometry.name, CoulombFriction())
 

@@ -1,5 +1,6 @@
 """Scene files and bundles -> Scene."""
 
+from certifier.scene.bundle import BundleLimits, load_bundle, pack_bundle
 from certifier.scene.load import load_scene
 
-__all__ = ["load_scene"]
+__all__ = ["BundleLimits", "load_bundle", "load_scene", "pack_bundle"]

@@ -129,9 +129,7 @@ def _compose(text: str, path: Path) -> yaml.Node | None:
     try:
         for event in yaml.parse(text, Loader=_Loader):
             if isinstance(event, yaml.AliasEvent):
-                raise SceneError(
-                    "scene_yaml", f"{path.name}, line {event.start_mark.line + 1}: aliases (*{event.anchor}) are not supported"
-                )
+                raise SceneError("scene_yaml", f"{path.name} uses the alias *{event.anchor}; aliases are not supported")
         return yaml.compose(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""

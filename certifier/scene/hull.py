@@ -12,6 +12,7 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
+from certifier.errors import SceneError
 from certifier.model import Array
 
 _FLAT = 1e-9
@@ -36,6 +37,9 @@ def outer(points: Array, max_vertices: int) -> tuple[Array, float]:
     Returns:
         vertices (v, 3), and the inflation: an upper bound in metres on the distance of any point of their hull from the hull of
         ``points`` (0.0 when the vertices are the points' own).
+
+    Raises:
+        SceneError: rounding errors got the better of it; never a polytope that leaves a point out.
     """
     extreme = hull_vertices(np.asarray(points, dtype=float))
     if len(extreme) <= max_vertices:
@@ -44,6 +48,8 @@ def outer(points: Array, max_vertices: int) -> tuple[Array, float]:
     center = solid.mean(axis=0)
     vertices = _contain(_cut_down(solid - center, max_vertices), solid - center)
     inflation = max(_nearest(v, extreme - center)[1] for v in vertices)
+    if not contains(vertices + center, extreme):
+        raise SceneError("hull", f"no polytope of {max_vertices} vertices was found around a mesh of {len(points)} points")
     return vertices + center, inflation * (1 + _SAFETY)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from certifier.drake_model import build_diagram, geometry_name
-from certifier.model import Pair, Scene
+from certifier.model import Geometry, Pair, Scene
 from certifier.scene.tree import Tree
 
 _SAMPLES = 40
@@ -21,7 +21,7 @@ def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn:
         drawn: bodies that have a visual geometry.
     """
     return [
-        *(f"{g.name}: {g.substitution}, inflated by up to {1000 * g.inflation:.3g} mm" for g in scene.geometries if g.substitution),
+        *(_substituted(g) for g in scene.geometries if g.substitution),
         *_filtered(scene, tree, candidates),
         *_unguarded(scene, tree, drawn),
         *_steep(scene),
@@ -29,6 +29,10 @@ def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn:
         *_always_touching(scene),
         *([] if scene.pairs else ["no pair of geometries can collide: there is nothing to certify"]),
     ]
+
+
+def _substituted(g: Geometry) -> str:
+    return f"{g.name}: {g.substitution}" + (f", reaching up to {1000 * g.inflation:.3g} mm outside" if g.inflation else "")
 
 
 def _filtered(scene: Scene, tree: Tree, candidates: list[tuple[str, str]]) -> list[str]:

@@ -9,11 +9,12 @@ from certifier.errors import CirisError, SceneError
 from certifier.model import Scene
 
 
-def load_scene(path: str | Path, *, timeout_s: float = 60, memory_bytes: int = 4 * 2**30) -> Scene:
+def load_scene(path: str | Path, *, bundle_root: Path | None = None, timeout_s: float = 60, memory_bytes: int = 4 * 2**30) -> Scene:
     """The scene that a scene file describes, read by a child process that may die without harm.
 
     Args:
         path: the scene file (docs/architecture.md); relative paths in it start at its directory.
+        bundle_root: the directory that no file may refer out of, when the files come from a stranger.
         timeout_s: wall-clock limit of the child, seconds.
         memory_bytes: memory limit of the child.
 
@@ -21,11 +22,14 @@ def load_scene(path: str | Path, *, timeout_s: float = 60, memory_bytes: int = 4
         SceneError: what is wrong and where; ``scene_model_crash`` when reading the models ended the child.
     """
     path = Path(path).absolute()
+    payload = {"path": str(path), "bundle_root": None if bundle_root is None else str(bundle_root)}
     try:
-        document = run_in_child("certifier.scene.parse:parse", {"path": str(path)}, timeout_s=timeout_s, memory_bytes=memory_bytes)
+        document = run_in_child("certifier.scene.parse:parse", payload, timeout_s=timeout_s, memory_bytes=memory_bytes)
     except SceneError:
         raise
     except CirisError as death:
         message = f"reading the models of {path.name} failed: {death.message}"
-        raise SceneError("scene_model_crash", message, field="directives", hint="look for broken shapes, meshes or limits") from None
+        raise SceneError(
+            "scene_model_crash", message, field="directives", hint="look for files that include themselves, broken shapes or meshes"
+        ) from None
     return Scene.from_document(document)

@@ -35,11 +35,11 @@ def pairs(
         if tree.group[body[a]] == tree.group[body[b]]:
             continue
         names_a, names_b = {a, body[a]}, {b, body[b]}
-        entry = next((e for e in ignore if (e.a in names_a and e.b in names_b) or (e.a in names_b and e.b in names_a)), None)
-        if entry is None:
+        match = next((e for e in ignore if (e.a in names_a and e.b in names_b) or (e.a in names_b and e.b in names_a)), None)
+        if match is None:
             wanted.append(Pair(a, b))
         else:
-            used.add(entry)
-            ignored.append(Ignored(a, b, entry.reason))
+            used.add(match)
+            ignored.append(Ignored(a, b, match.reason))
     unused = [f"{e.field}: {e.a} and {e.b} have no pair to ignore" for e in ignore if e not in used]
     return tuple(wanted), tuple(ignored), unused

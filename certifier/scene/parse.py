@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import importlib.metadata
 import logging
+import re
+import sys
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -29,29 +32,34 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.inverse_kinematics import AddMultibodyPlantConstraints
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.multibody.tree import Joint as DrakeJoint
 from pydrake.multibody.tree import BodyIndex, PrismaticJoint, QuaternionFloatingJoint, RevoluteJoint, RigidBody, RpyFloatingJoint, WeldJoint
+from pydrake.multibody.tree import Joint as DrakeJoint
 from pydrake.solvers import MathematicalProgram
 from pydrake.systems.framework import DiagramBuilder
 
 from certifier.errors import SceneError
 from certifier.model import WORLD, Array, Geometry, Joint, JointKind, Scene
 from certifier.scene import shapes
+from certifier.scene.bundle import check_bundle
 from certifier.scene.file import SceneFile, read_scene_file
 from certifier.scene.lint import findings
 from certifier.scene.pairs import pairs
 from certifier.scene.tree import Tree, floating
 
+_MESSAGE_LENGTH = 600
 _IGNORED_SHAPE = "Ignoring unsupported SDFormat element in geometry"
 
 
 def parse(payload: dict[str, Any]) -> dict[str, Any]:
-    """The document of the Scene described by the file ``payload["path"]``.
+    """The document of the Scene described by the file ``payload["path"]``; with a ``bundle_root``, its files are checked first.
 
     Raises:
         SceneError: whatever is wrong with the file, the models it names or the scene they make.
     """
-    scene_file = read_scene_file(Path(payload["path"]))
+    path = Path(payload["path"])
+    if payload["bundle_root"]:
+        check_bundle(Path(payload["bundle_root"]), path)
+    scene_file = read_scene_file(path)
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
     warnings = _read_models(scene_file, plant)
@@ -84,23 +92,29 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
 
 
 def _read_models(scene_file: SceneFile, plant: MultibodyPlant) -> list[str]:
-    """Add the directives' models to the plant and finalise it; Drake's warnings."""
+    """Add the directives' models to the plant and finalise it; Drake's warnings.
+
+    What is printed first is what remains if Drake ends the process.
+    """
     parser = Parser(plant)
     packages = parser.package_map()
     for name in packages.GetPackageNames():
         packages.Remove(name)
     for name, root in scene_file.packages.items():
         packages.Add(name, str(root))
+    print(f"reading {', '.join(scene_file.models)}", file=sys.stderr, flush=True)
     with _DrakeLog() as log:
         try:
             parser.AddModelsFromString(scene_file.resolved_directives, "dmd.yaml")
             plant.Finalize()
+        except MemoryError:
+            raise
         except (Exception, SystemExit) as error:
             raise _model_error(scene_file, error) from None
     for warning in log.messages:
         if _IGNORED_SHAPE in warning:
             raise SceneError("unsupported_shape", _one_line(scene_file, warning), field="directives", hint="use a primitive or a mesh")
-    return [_one_line(scene_file, warning) for warning in log.messages]
+    return list(dict.fromkeys(_one_line(scene_file, warning) for warning in log.messages))
 
 
 class _DrakeLog(logging.Handler):
@@ -126,12 +140,15 @@ def _model_error(scene_file: SceneFile, error: BaseException) -> SceneError:
     message = _one_line(scene_file, str(error))
     if not isinstance(error, RuntimeError):
         message = f"Drake cannot use a model ({', '.join(scene_file.models)}): {message}"
-    return SceneError("scene_model", message, field="directives")
+    where = re.search(r"directives\[\d+\]", message)
+    return SceneError("scene_model", message.split(" while accepting")[0], field=where[0] if where else "directives")
 
 
 def _one_line(scene_file: SceneFile, message: str) -> str:
-    message = message.replace("<string>", scene_file.path.name).replace(f"{scene_file.path.parent.resolve()}/", "")
-    return " ".join(message.removeprefix("error: ").split())
+    """A message of Drake's in one line, with paths relative to the scene file."""
+    message = message.replace("<string>", scene_file.path.name)
+    message = re.sub(rf"(file:)?/*{re.escape(str(scene_file.path.parent.resolve()))}/", "", message)
+    return textwrap.shorten(message.removeprefix("error: "), _MESSAGE_LENGTH, placeholder=" ...")
 
 
 def _body_name(plant: MultibodyPlant, body: RigidBody) -> str:
@@ -225,9 +242,7 @@ def _geometries(scene_file: SceneFile, plant: MultibodyPlant, inspector: SceneGr
     reach = tree.reach(list(found.values()), scene_file.padding)
     for i, name, body_name in half_spaces:
         if body_name not in tree.anchored:
-            raise SceneError(
-                "unsupported_shape", f"geometry {name} is a half-space that moves; only fixed ones are supported", field="directives"
-            )
+            raise SceneError("unsupported_shape", f"geometry {name} is a half-space on a body that moves", field="directives")
         X_BG = inspector.GetPoseInFrame(i)
         center = (RigidTransform(tree.anchored[body_name]) @ X_BG).inverse().translation()
         found[i] = _placed(name, body_name, shapes.half_space(center, reach), X_BG)
@@ -255,7 +270,8 @@ def _convex(shape: Shape, name: str, scene_file: SceneFile) -> shapes.Body:
         case Convex() | Mesh():
             hull = shape.GetConvexHull()
             points = np.array([hull.vertex(k) for k in range(hull.num_vertices())])
-            return shapes.polytope("convex" if isinstance(shape, Convex) else "mesh", points, scene_file.max_vertices)
+            said = {"kind": type(shape).__name__.lower(), "file": Path(shape.source().description()).name, "scale": shape.scale3().tolist()}
+            return shapes.polytope(said, points, scene_file.max_vertices)
         case _:
             message = f"geometry {name} is a {type(shape).__name__}, which is not supported"
             raise SceneError("unsupported_shape", message, field="directives")

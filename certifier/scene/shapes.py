@@ -69,14 +69,15 @@ def ellipsoid(semi_axes: tuple[float, float, float], max_vertices: int) -> Body:
     return Body(scale * points * np.array(semi_axes), 0.0, shape, substitution, (scale - 1) * max(semi_axes))
 
 
-def polytope(kind: str, points: Array, max_vertices: int) -> Body:
-    """The hull of points (k, 3), or a polytope of at most max_vertices around it; ``kind`` is "convex" or "mesh"."""
+def polytope(shape: dict[str, Any], points: Array, max_vertices: int) -> Body:
+    """The hull of points (k, 3), or a polytope of at most max_vertices around it; the shape's ``kind`` is "convex" or "mesh"."""
     vertices, inflation = outer(points, max_vertices)
-    hull = f"hull with {len(vertices)} vertices"
     if inflation > 0:
-        hull = f"hull reduced from {len(points)} to {len(vertices)} vertices, outside the original"
-    exact = kind == "convex" and inflation == 0
-    return Body(vertices, 0.0, {"kind": kind, "vertices": points.tolist()}, None if exact else f"{kind} -> {hull}", inflation)
+        hull = f"polytope of {len(vertices)} vertices around its hull of {len(points)}"
+    else:
+        hull = f"convex hull with {len(vertices)} vertices"
+    exact = shape["kind"] == "convex" and inflation == 0
+    return Body(vertices, 0.0, shape, None if exact else f"{shape['kind']} -> {hull}", inflation)
 
 
 def half_space(center: Array, reach: float) -> Body:

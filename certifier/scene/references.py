@@ -1,0 +1,137 @@
+"""Which other files a scene's files refer to, and where those are.
+
+One reader per kind of file finds the references that Drake would follow; the same readers serve to pack a bundle and to check one
+that came from a stranger. XML is read by expat, with document types refused: they are what entity bombs are made of.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from xml.parsers import expat
+
+import yaml
+
+from certifier.errors import SceneError
+
+_ATTRIBUTES = {"file", "filename", "uri", "url"}
+_PLUGIN = "plugin"
+_DIRECTORIES = {"meshdir", "texturedir", "assetdir"}
+_SCHEME = re.compile(r"^([a-zA-Z][\w+.-]*):(//)?")
+
+
+def references(path: Path) -> list[str]:
+    """The references in one file, as written; none for a kind of file that refers to nothing.
+
+    Raises:
+        SceneError: ``bundle_file`` for a kind of file that has no place in a scene, ``bundle_xml`` for XML that is broken or declares a
+            document type, ``bundle_text`` for a text file that is not what its name says.
+    """
+    try:
+        read = _READERS[path.suffix.lower()]
+    except KeyError:
+        kinds = ", ".join(sorted(_READERS))
+        raise SceneError("bundle_file", f"{path.name}: files of this kind are not part of a scene", hint=f"known kinds: {kinds}") from None
+    try:
+        return read(path)
+    except (UnicodeDecodeError, json.JSONDecodeError, yaml.YAMLError, RecursionError) as error:
+        reason = str(error).splitlines()[0]
+        raise SceneError("bundle_text", f"{path.name} cannot be read: {reason}") from None
+
+
+def resolve(reference: str, directory: Path, packages: dict[str, Path]) -> Path:
+    """The path that a reference in a file of ``directory`` means.
+
+    Raises:
+        SceneError: ``bundle_uri`` for an absolute path, a scheme other than package:// and model://, or an unknown package.
+    """
+    scheme = _SCHEME.match(reference)
+    if scheme is None:
+        if reference.startswith(("/", "~")) or "\\" in reference or "\0" in reference:
+            raise SceneError("bundle_uri", f"{reference!r} is not a relative path", hint="keep every file below one directory")
+        return (directory / reference).resolve()
+    if scheme[1] not in ("package", "model") or not scheme[2]:
+        raise SceneError("bundle_uri", f"{reference!r}: only relative paths and package:// URIs are accepted")
+    name, _, rest = reference[scheme.end() :].partition("/")
+    if name not in packages:
+        hint = f"known packages: {', '.join(packages)}" if packages else "name its root under packages"
+        raise SceneError("bundle_uri", f"{reference!r} names the unknown package {name!r}", hint=hint)
+    return (packages[name] / rest).resolve()
+
+
+def _xml(path: Path) -> list[str]:
+    found: list[str] = []
+    directories: list[str] = []
+    stack: list[str] = []
+    text: list[str] = []
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        stack.append(name)
+        text.clear()
+        directories.extend(value for key, value in attributes.items() if key in _DIRECTORIES)
+        if name != _PLUGIN:
+            found.extend(value for key, value in attributes.items() if key in _ATTRIBUTES)
+
+    def end(name: str) -> None:
+        stack.pop()
+        if name in _ATTRIBUTES:
+            found.append("".join(text).strip())
+        text.clear()
+
+    def refuse(*_: object) -> None:
+        raise SceneError("bundle_xml", f"{path.name} declares a document type or entity, which is not accepted")
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.CharacterDataHandler = text.append
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
+    try:
+        parser.Parse(path.read_bytes(), True)
+    except expat.ExpatError as error:
+        raise SceneError("bundle_xml", f"{path.name} is not XML: {error}") from None
+    if any(".." in Path(value).parts for value in directories):
+        raise SceneError("bundle_uri", f"{path.name}: .. is not accepted in {', '.join(sorted(_DIRECTORIES))}")
+    return [value for value in found if value] + [f"{d}/{value}" for d in directories for value in found if value]
+
+
+def _yaml(path: Path) -> list[str]:
+    text = path.read_text(encoding="utf-8")
+    if any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(text, Loader=yaml.SafeLoader)):
+        raise SceneError("bundle_text", f"{path.name} uses aliases, which are not accepted")
+    found: list[str] = []
+    waiting = [yaml.compose(text, Loader=yaml.SafeLoader)]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, yaml.MappingNode):
+            found += [value.value for key, value in node.value if isinstance(value, yaml.ScalarNode) and str(key.value) in _ATTRIBUTES]
+            waiting += [part for item in node.value for part in item]
+        elif isinstance(node, yaml.SequenceNode):
+            waiting += node.value
+    return found
+
+
+def _obj(path: Path) -> list[str]:
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return [name for line in lines if line.lstrip().startswith("mtllib") for name in line.split()[1:]]
+
+
+def _gltf(path: Path) -> list[str]:
+    document = json.loads(path.read_text(encoding="utf-8"))
+    parts = [part for key in ("buffers", "images") for part in document.get(key, [])]
+    return [part["uri"] for part in parts if "uri" in part and not part["uri"].startswith("data:")]
+
+
+def _nothing(_: Path) -> list[str]:
+    return []
+
+
+_READERS: dict[str, Callable[[Path], list[str]]] = {
+    **dict.fromkeys((".urdf", ".sdf", ".xml", ".mjcf"), _xml),
+    **dict.fromkeys((".yaml", ".yml"), _yaml),
+    ".obj": _obj,
+    ".gltf": _gltf,
+    **dict.fromkeys((".vtk", ".bin", ".mtl", ".stl", ".dae", ".glb", ".png", ".jpg", ".jpeg"), _nothing),
+}
