@@ -1,0 +1,26 @@
+# One image for every role: migrate, api, control worker, solve worker (docker-compose.yml says which command is which).
+FROM python:3.12-slim-bookworm AS build
+WORKDIR /src
+RUN python -m venv /venv
+COPY requirements/runtime.lock requirements/
+RUN /venv/bin/pip install --no-cache-dir --no-deps --require-hashes --requirement requirements/runtime.lock
+COPY pyproject.toml README.md ./
+COPY certifier certifier
+COPY db db
+COPY planner planner
+COPY workers workers
+COPY dashboard dashboard
+COPY api api
+COPY client client
+RUN /venv/bin/pip install --no-cache-dir --no-deps --no-build-isolation .
+
+FROM python:3.12-slim-bookworm
+# Drake needs glib. A worker must not be process 1: its children take an init as their parent for a dead worker.
+RUN apt-get update && apt-get install --yes --no-install-recommends libglib2.0-0 tini && rm -rf /var/lib/apt/lists/*
+RUN useradd --create-home --uid 10001 ciris
+COPY --from=build /venv /venv
+ENV PATH=/venv/bin:$PATH PYTHONUNBUFFERED=1
+USER ciris
+WORKDIR /home/ciris
+ENTRYPOINT ["tini", "--"]
+CMD ["python", "-m", "api"]

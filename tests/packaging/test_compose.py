@@ -1,0 +1,51 @@
+"""The production shape: the services it must have, and that it speaks of commands and settings that exist."""
+
+from importlib.util import find_spec
+from pathlib import Path
+
+import yaml
+
+from db.settings import Settings
+
+ROOT = Path(__file__).parents[2]
+SERVICES = yaml.safe_load((ROOT / "docker-compose.yml").read_text())["services"]
+OURS = ["migrate", "api", "control", "solve"]
+
+
+def test_the_services() -> None:
+    assert set(SERVICES) == {"postgres", "valkey", *OURS}
+    for name in ("postgres", "valkey", "api"):
+        assert "healthcheck" in SERVICES[name]
+    for name in ("api", "control", "solve"):
+        assert SERVICES[name]["depends_on"] == {
+            "migrate": {"condition": "service_completed_successfully"},
+            "valkey": {"condition": "service_healthy"},
+        }
+    assert SERVICES["migrate"]["depends_on"] == {"postgres": {"condition": "service_healthy"}}
+
+
+def test_the_commands_exist() -> None:
+    for name in OURS:
+        python, option, module, *_ = SERVICES[name]["command"]
+        assert (python, option) == ("python", "-m")
+        spec = find_spec(module)
+        assert spec is not None
+        assert not spec.submodule_search_locations or find_spec(f"{module}.__main__") is not None
+
+
+def test_the_settings_exist() -> None:
+    names = {f"CIRIS_{name.upper()}" for name in Settings.model_fields}
+    assert {name for service in OURS for name in SERVICES[service]["environment"]} <= names
+
+
+def test_nothing_is_published_beyond_this_machine() -> None:
+    ports = [port for service in SERVICES.values() for port in service.get("ports", [])]
+    assert len(ports) == 1
+    assert ports[0].startswith("127.0.0.1:")
+
+
+def test_the_image_copies_every_package() -> None:
+    dockerfile, ignored = (ROOT / "Dockerfile").read_text(), (ROOT / ".dockerignore").read_text().split()
+    for room in ("certifier", "db", "planner", "workers", "api", "client", "dashboard"):
+        assert f"COPY {room} {room}\n" in dockerfile
+        assert f"!{room}" in ignored

@@ -1,0 +1,66 @@
+"""What each room may import from outside: import-linter holds the rooms apart, this holds them to their third parties."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import grimp
+import pytest
+
+ROOT = Path(__file__).parents[2]
+THIRD_PARTIES = {
+    "certifier": {"flint", "numba", "numpy", "pydrake", "scipy", "yaml"},
+    "certifier.verify": {"flint", "numpy"},
+    "db": {"alembic", "numpy", "pydantic", "pydantic_settings", "sqlalchemy"},
+    "planner": {"numpy", "pydrake", "scipy"},
+    "client": {"httpx2", "numpy", "yaml"},
+    "dashboard": set(),
+}
+ROOMS = ["certifier", "db", "planner", "workers", "api", "client", "dashboard"]
+
+
+@pytest.fixture(scope="module")
+def graph() -> grimp.ImportGraph:
+    return grimp.build_graph(*ROOMS, include_external_packages=True, cache_dir=None)
+
+
+@pytest.mark.parametrize("room", THIRD_PARTIES)
+def test_a_room_imports_only_its_third_parties(graph: grimp.ImportGraph, room: str) -> None:
+    modules = {room} | graph.find_descendants(room)
+    imported = {name for module in modules for name in graph.find_modules_directly_imported_by(module)}
+    outside = {name for name in imported if name.partition(".")[0] not in {*ROOMS, *sys.stdlib_module_names}}
+    assert outside <= THIRD_PARTIES[room]
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_importing_a_module_has_no_side_effects(graph: grimp.ImportGraph, room: str, tmp_path: Path) -> None:
+    """No output, no file, no thread, no child process, whatever is imported."""
+    modules = sorted({room} | graph.find_descendants(room) - {name for name in graph.modules if name.endswith((".env", ".__main__"))})
+    modules = [name for name in modules if ".versions" not in name]
+    script = f"import importlib, threading\nfor name in {modules!r}: importlib.import_module(name)\nassert threading.active_count() == 1"
+    environment = {"HOME": str(tmp_path), "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1", "MPLCONFIGDIR": str(tmp_path / "ignored")}
+    done = subprocess.run([sys.executable, "-c", script], env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert {path.name for path in tmp_path.iterdir()} <= {"ignored", ".cache"}
+
+
+def test_the_verifier_runs_where_only_numpy_and_flint_are_installed() -> None:
+    script = """
+import sys
+
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        allowed = {"numpy", "flint", "certifier", "client", *sys.stdlib_module_names}
+        if name.partition(".")[0] not in allowed:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Absent())
+import certifier.verify
+from client.cli import main
+
+sys.exit(main(["verify", "absent.proof"]))
+"""
+    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode not in (0, None)
+    assert "absent.proof" in done.stderr
+    assert "Traceback" not in done.stderr, done.stderr
