@@ -1,0 +1,60 @@
+"""Exact check that P = {s : C s <= d} is Archimedean (C-IRIS, appendix A, definition 1).
+
+With a box l_i <= s_i <= u_i around P, the identity
+
+    (s_i - l_i)(u_i - s_i) = [(u_i - s_i)^2 (s_i - l_i) + (s_i - l_i)^2 (u_i - s_i)] / (u_i - l_i)
+
+makes the left-hand side a combination of bounds with squares as multipliers, and
+
+    N - sum_i s_i^2 = sum_i (s_i - l_i)(u_i - s_i) + [N + sum_i l_i u_i - sum_i (l_i + u_i) s_i].
+
+Every bound, and the affine remainder in brackets, is a nonnegative combination of faces plus a nonnegative constant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from certifier.model import Array
+from certifier.verify.box import check_box, upper_bound
+
+
+@dataclass(frozen=True)
+class Archimedean:
+    """Numbers that show P to be Archimedean.
+
+    Attributes:
+        N: |s|^2 <= N on P.
+        lower, upper: (n,) l and u, the box.
+        Y_lower, Y_upper: (n, m) multipliers of the faces that prove the box.
+        y: (m,) multipliers that prove the remainder.
+    """
+
+    N: float
+    lower: Array
+    upper: Array
+    Y_lower: Array
+    Y_upper: Array
+    y: Array
+
+
+def check_archimedean(C: Array, d: Array, proof: Archimedean) -> bool:
+    """True when the numbers prove, in exact arithmetic, that {C s <= d} is Archimedean with the constant N.
+
+    The slope l + u of the remainder is not a double in general. It is split into its double c and the rest e, and e's
+    is bounded over the box.
+    """
+    if not check_box(C, d, proof.lower, proof.upper, proof.Y_lower, proof.Y_upper) or not np.all(proof.lower < proof.upper):
+        return False
+    c = proof.lower + proof.upper
+    bound = upper_bound(C, d, c, proof.y)
+    if bound is None or not np.isfinite(proof.N):
+        return False
+    for lower, upper, rounded in zip(proof.lower, proof.upper, c, strict=True):
+        low, high = Fraction(float(lower)), Fraction(float(upper))
+        rest = low + high - Fraction(float(rounded))
+        bound += rest * (high if rest > 0 else low) - low * high
+    return bound <= Fraction(proof.N)
