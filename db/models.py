@@ -24,7 +24,13 @@ class Base(DeclarativeBase):
             "pk": "pk_%(table_name)s",
         }
     )
-    type_annotation_map: ClassVar[dict[Any, Any]] = {datetime: Utc, Document: JSON, Arrays: Npz, bytes: LargeBinary, str: Text}
+    type_annotation_map: ClassVar[dict[Any, Any]] = {
+        datetime: Utc,
+        Document: JSON(none_as_null=True),
+        Arrays: Npz,
+        bytes: LargeBinary,
+        str: Text,
+    }
 
 
 class SceneRow(Base):
@@ -46,7 +52,7 @@ class Leased:
     attempts: Mapped[int] = mapped_column(default=0)
     """How often it was begun."""
     worker: Mapped[str | None]
-    """Who holds or last held it: ``host:pid``."""
+    """Who holds or last held it: ``host:pid:start``."""
     task_id: Mapped[str | None] = mapped_column(String(36))
     """The message under which it is held."""
     lease_token: Mapped[str | None] = mapped_column(String(36))
@@ -90,11 +96,14 @@ class JobRow(Base):
     """The last region accepted."""
     event_seq: Mapped[int] = mapped_column(default=0)
     """``seq`` of the last event."""
-    coordinator_token: Mapped[str | None] = mapped_column(String(36))
-    """Held by the one coordinator that is computing the next transition."""
+    turn: Mapped[int] = mapped_column(default=0)
+    """How many transitions of the growth have been saved; a coordinator saves only onto the turn it started from."""
+    coordinator: Mapped[str | None]
+    """Who is computing the next transition (``host:pid:start``) ..."""
     coordinator_until: Mapped[datetime | None]
+    """... and until when that is believed."""
     coordinator_attempts: Mapped[int] = mapped_column(default=0)
-    """How often the next transition was begun; 0 again once it is saved."""
+    """How often the next transition was begun."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
@@ -112,7 +121,7 @@ class IterationRow(Base):
     label: Mapped[str]
     """What this polytope is, for people."""
     arrays: Mapped[Arrays]
-    """C (m, n), d (m,) with the joint limits, center (n,)."""
+    """C (m, n), d (m,) with the joint limits, and center (n,) where one was given."""
     state: Mapped[str] = mapped_column(String(16), default=states.IterationState.RUNNING)
     stop_at_first_failure: Mapped[bool]
     reuse: Mapped[Document]
@@ -152,20 +161,20 @@ class StepRow(Leased, Base):
     """A piece of a job that is not a pair: seeding, the polytope step, accepting a region."""
 
     __tablename__ = "steps"
-    __table_args__ = (UniqueConstraint("job_id", "index"), Index(None, "state", "lease_until"))
+    __table_args__ = (UniqueConstraint("job_id", "turn", "kind"), Index(None, "state", "lease_until"))
     transitions: ClassVar[states.Table] = states.STEP
 
     id: Mapped[int] = mapped_column(primary_key=True)
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"))
-    index: Mapped[int]
+    turn: Mapped[int]
+    """The job's turn that asked for it."""
     kind: Mapped[str] = mapped_column(String(16))
     """StepKind."""
     state: Mapped[str] = mapped_column(String(16), default=states.StepState.OPEN)
     input: Mapped[Document]
     """What it works on: the action, or the accepted polytope."""
     report: Mapped[Document | None]
-    """What it found, as certifier.growth takes it."""
-    detail: Mapped[str | None]
+    """What it found, or the CirisError document of why it failed."""
     seconds: Mapped[float | None]
 
 

@@ -15,6 +15,10 @@ def _data_dir() -> Path:
     return (Path(home) if home else Path.home() / ".local" / "share") / "ciris"
 
 
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 class Settings(BaseSettings):
     """Every setting of the service; ``CIRIS_DATA_DIR=/srv/ciris`` sets ``data_dir``, and so on."""
 
@@ -29,23 +33,27 @@ class Settings(BaseSettings):
 
     host: str = "127.0.0.1"
     """Address the API binds to."""
+    allow_remote: bool = False
+    """Let the API bind to an address that others can reach, though it asks nobody for a key (inside a container, behind a proxy)."""
     port: int = 8643
     """Port the API binds to; the embedded stack takes a free one when it is taken and was not asked for."""
-    solve_processes: int = Field(default_factory=lambda: len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
+    solve_processes: int = Field(default_factory=_cores, ge=1)
     """Processes that solve pairs, one thread each."""
 
     batch_seconds: float = 0.5
     """Pairs are sent together until their forecasts sum to this many seconds."""
-    lease_seconds: float = 120.0
-    """How long a claim lasts beyond ten times the forecast of what it holds."""
+    lease_seconds: float = 60.0
+    """How long a claim lasts without being renewed; its holder renews it four times as often."""
     max_attempts: int = 3
     """How often a pair or step is begun before it counts as poison and ends as an error."""
     sweep_seconds: float = 2.0
     """Pause between two rounds of the sweeper."""
-    seeding_timeout_seconds: float = 600.0
-    """Limit of one seeding."""
-    child_memory_bytes: int = 8 << 30
-    """Address space of a child that runs a seeding."""
+    resend_seconds: float = 10.0
+    """Work that nobody has claimed this long after it was sent, with the queue empty, is sent again."""
+    step_timeout_seconds: float = 3600.0
+    """Limit of one seeding or polytope step."""
+    child_memory_bytes: int = 16 << 30
+    """Limit of the address space of the process that runs a seeding or polytope step."""
 
     @property
     def database(self) -> str:

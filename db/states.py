@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
-from sqlalchemy import ColumnElement, update
+from sqlalchemy import ColumnElement, CursorResult, update
 from sqlalchemy.orm import Session
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class StepState(StrEnum):
     DONE = "done"
     """Has its report."""
     FAILED = "failed"
-    """``detail`` says why; for an ``accept`` the region's proof was refused and the region is not served."""
+    """``report`` says why; for an ``accept`` the region's proof was refused and the region is not served."""
     SKIPPED = "skipped"
     """Not needed any more: the job ended."""
 
@@ -145,7 +145,7 @@ def unfinished(table: Table) -> frozenset[str]:
 
 def transition(
     session: Session,
-    model: type[JobRow] | type[PairRow] | type[StepRow] | type[IterationRow],
+    model: type[JobRow | PairRow | StepRow | IterationRow],
     target: str,
     *where: ColumnElement[bool],
     **values: Any,
@@ -159,4 +159,4 @@ def transition(
         How many rows moved. Rows in a state that does not lead to ``target`` stay as they are.
     """
     moved = update(model).where(*where, model.state.in_(sources(model.transitions, target))).values(state=target, **values)
-    return session.execute(moved).rowcount
+    return cast("CursorResult[Any]", session.execute(moved)).rowcount

@@ -42,7 +42,8 @@ class Npz(TypeDecorator[Arrays]):
         if value is None:
             return None
         buffer = io.BytesIO()
-        np.savez(buffer, **{name: np.asarray(array, dtype=float) for name, array in value.items()})
+        doubles: dict[str, Any] = {name: np.asarray(array, dtype=float) for name, array in value.items()}
+        np.savez(buffer, **doubles)
         return buffer.getvalue()
 
     def process_result_value(self, value: Any, dialect: Dialect) -> Arrays | None:

@@ -9,3 +9,5 @@ from hypothesis import settings  # noqa: E402
 
 settings.register_profile("ciris", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("ciris")
+
+pytest_plugins = ["tests.services"]

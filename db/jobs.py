@@ -1,0 +1,183 @@
+"""Jobs: idempotent creation, lists, cancelling, ending. Every transaction that changes anything of a job begins with :func:`lock`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+from uuid import uuid4
+
+from sqlalchemy import exists, or_, select, tuple_
+from sqlalchemy.orm import Session
+
+from certifier.errors import CirisError
+from db import events
+from db.models import JobRow, PairRow, StepRow
+from db.session import insert_new
+from db.states import JOB, PAIR, STEP, JobState, StepKind, transition, unfinished
+from db.types import utcnow
+
+
+def create(
+    session: Session,
+    *,
+    kind: str,
+    scene_id: str,
+    options: dict[str, Any],
+    deadline_at: datetime | None = None,
+    idempotency_key: str | None = None,
+    request_digest: str | None = None,
+    retry_of: str | None = None,
+    attempt: int = 1,
+) -> tuple[JobRow, bool]:
+    """A new queued job and True, or the job that was made under the same idempotency key and False.
+
+    Commit, then send ``coordinate`` for it; if that fails, the sweeper sends it later.
+
+    Raises:
+        CirisError: idempotency_conflict, when the key was used for a different request.
+    """
+    job_id = str(uuid4())
+    made = insert_new(
+        session,
+        JobRow,
+        id=job_id,
+        kind=kind,
+        scene_id=scene_id,
+        options=options,
+        deadline_at=deadline_at,
+        idempotency_key=idempotency_key,
+        request_digest=request_digest,
+        retry_of=retry_of,
+        attempt=attempt,
+    )
+    if made:
+        job = lock(session, job_id)
+        events.emit(session, job, "job", {"state": job.state})
+        return job, True
+    job = session.scalars(select(JobRow).where(JobRow.idempotency_key == idempotency_key)).one()
+    if job.request_digest != request_digest:
+        raise CirisError(
+            "idempotency_conflict",
+            "this idempotency key was used for a different request",
+            field="Idempotency-Key",
+            hint="use a new key for a new request",
+        )
+    return job, False
+
+
+def retry(session: Session, job_id: str) -> JobRow:
+    """A new job with the same scene, options and time to its deadline as one that failed or was cancelled.
+
+    A job is retried once: doing it again returns the same new job.
+
+    Raises:
+        CirisError: job_not_found, or job_not_retryable when it has not ended or has succeeded.
+    """
+    job = lock(session, job_id)
+    if job.state not in (JobState.FAILED, JobState.CANCELLED):
+        raise CirisError("job_not_retryable", f"the job is {job.state}; only a failed or cancelled one can be retried", field="job")
+    again, _ = create(
+        session,
+        kind=job.kind,
+        scene_id=job.scene_id,
+        options=job.options,
+        deadline_at=job.deadline_at and utcnow() + (job.deadline_at - job.created_at),
+        idempotency_key=f"retry:{job.id}",
+        retry_of=job.id,
+        attempt=job.attempt + 1,
+    )
+    return again
+
+
+def get(session: Session, job_id: str) -> JobRow:
+    """The job with this id.
+
+    Raises:
+        CirisError: job_not_found.
+    """
+    return _found(session.get(JobRow, job_id), job_id)
+
+
+def lock(session: Session, job_id: str) -> JobRow:
+    """The job with this id, as it is now, locked until the transaction ends (SQLite's writing transactions exclude each other anyway).
+
+    Raises:
+        CirisError: job_not_found.
+    """
+    return _found(session.get(JobRow, job_id, with_for_update=True, populate_existing=True), job_id)
+
+
+def _found(job: JobRow | None, job_id: str) -> JobRow:
+    if job is None:
+        raise CirisError("job_not_found", f"there is no job {job_id!r}", field="job")
+    return job
+
+
+@dataclass(frozen=True)
+class Page:
+    """Jobs, newest first, and the id to pass as ``after`` for the next page (None on the last)."""
+
+    jobs: Sequence[JobRow]
+    next: str | None
+
+
+def page(
+    session: Session,
+    *,
+    state: str | None = None,
+    kind: str | None = None,
+    scene_id: str | None = None,
+    after: str | None = None,
+    limit: int = 50,
+) -> Page:
+    """One page of the jobs that fit the filters.
+
+    Raises:
+        CirisError: job_not_found, when ``after`` is no job's id.
+    """
+    query = select(JobRow).order_by(JobRow.created_at.desc(), JobRow.id.desc()).limit(limit + 1)
+    filters = {JobRow.state: state, JobRow.kind: kind, JobRow.scene_id: scene_id}
+    query = query.where(*(column == value for column, value in filters.items() if value is not None))
+    if after is not None:
+        last = get(session, after)
+        query = query.where(tuple_(JobRow.created_at, JobRow.id) < tuple_(last.created_at, last.id))
+    rows = session.scalars(query).all()
+    return Page(rows[:limit], rows[limit - 1].id if len(rows) > limit else None)
+
+
+def cancel(session: Session, job_id: str) -> JobRow:
+    """Cancels a queued job at once; a running one becomes ``cancelling``, and ``coordinate`` (to be sent after the commit) ends it.
+
+    Cancelling a job that has ended, or is being cancelled, changes nothing.
+    """
+    job = lock(session, job_id)
+    if job.state == JobState.QUEUED:
+        finish(session, job, JobState.CANCELLED, reason="cancelled before it started")
+    elif transition(session, JobRow, JobState.CANCELLING, JobRow.id == job_id):
+        events.emit(session, job, "job", {"state": JobState.CANCELLING})
+    return job
+
+
+def start(session: Session, job: JobRow) -> None:
+    """Moves a queued job to running; the caller holds its lock."""
+    if transition(session, JobRow, JobState.RUNNING, JobRow.id == job.id, started_at=utcnow()):
+        events.emit(session, job, "job", {"state": JobState.RUNNING})
+
+
+def finish(
+    session: Session, job: JobRow, state: JobState, *, reason: str, outcome: str | None = None, error: dict[str, Any] | None = None
+) -> None:
+    """Ends a job; the caller holds its lock and has seen to its work."""
+    if transition(session, JobRow, state, JobRow.id == job.id, outcome=outcome, reason=reason, error=error, finished_at=utcnow()):
+        events.emit(session, job, "job", {"state": state, "outcome": outcome, "reason": reason, "region_id": job.region_id})
+
+
+def awaiting_coordination(session: Session, now: datetime) -> Sequence[str]:
+    """Unfinished jobs for which a coordination is due: nobody coordinates them, and no pair or step is being waited for (or no longer)."""
+    nobody = or_(JobRow.coordinator_until.is_(None), JobRow.coordinator_until < now)
+    pair = exists().where(PairRow.job_id == JobRow.id, PairRow.state.in_(unfinished(PAIR)))
+    step = exists().where(StepRow.job_id == JobRow.id, StepRow.state.in_(unfinished(STEP)), StepRow.kind != StepKind.ACCEPT)
+    due = or_(JobRow.state == JobState.CANCELLING, JobRow.deadline_at <= now, ~pair & ~step)
+    return session.scalars(select(JobRow.id).where(JobRow.state.in_(unfinished(JOB)), nobody, due).order_by(JobRow.created_at)).all()

@@ -1,0 +1,67 @@
+"""Bringing a database to a version of the schema; ``python -m db.migrate`` brings the one of the settings to the newest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from alembic import command
+from alembic.autogenerate import compare_metadata
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from sqlalchemy import Connection, event
+
+from db.models import Base
+from db.session import Database
+from db.settings import settings
+
+_ADVISORY_LOCK = 0x43495249  # "CIRI": whoever migrates a PostgreSQL database holds it
+
+
+@contextmanager
+def connection_for_migrations(url: str) -> Iterator[Connection]:
+    """A connection in a transaction that excludes other migrations.
+
+    SQLite's foreign keys are off in it: changing a table there means to make it anew and to drop the old one, which would delete
+    the rows of other tables that refer to it.
+    """
+    database = Database(url)
+    if database.sqlite:
+        event.listen(database.engine, "connect", lambda connection, _record: connection.execute("PRAGMA foreign_keys=OFF"))
+    try:
+        with database.writer.begin() as connection:
+            if not database.sqlite:
+                connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({_ADVISORY_LOCK})")
+            yield connection
+    finally:
+        database.close()
+
+
+def upgrade(url: str, revision: str = "head") -> None:
+    """Migrates up to ``revision``; nothing happens when the database is there already."""
+    with connection_for_migrations(url) as connection:
+        command.upgrade(_config(connection), revision)
+
+
+def downgrade(url: str, revision: str) -> None:
+    """Migrates down to ``revision``; ``base`` is the empty database."""
+    with connection_for_migrations(url) as connection:
+        command.downgrade(_config(connection), revision)
+
+
+def drift(url: str) -> list[Any]:
+    """What differs between the database and the models; empty when nothing does."""
+    with connection_for_migrations(url) as connection:
+        return list(compare_metadata(MigrationContext.configure(connection), Base.metadata))
+
+
+def _config(connection: Connection) -> Config:
+    config = Config(str(Path(__file__).parent / "alembic.ini"))
+    config.attributes["connection"] = connection
+    return config
+
+
+if __name__ == "__main__":
+    upgrade(settings().database)

@@ -1,0 +1,30 @@
+"""Run by Alembic: all migrations of one call in one transaction, on SQLite too (db.migrate gives the connection)."""
+
+from __future__ import annotations
+
+from alembic import context
+from sqlalchemy import Connection
+
+from db.migrate import connection_for_migrations
+from db.models import Base
+from db.settings import settings
+
+
+def run(connection: Connection) -> None:
+    context.configure(
+        connection=connection,
+        target_metadata=Base.metadata,
+        render_as_batch=True,
+        transactional_ddl=True,
+        user_module_prefix="db.types.",
+    )
+    with context.begin_transaction():
+        context.run_migrations()
+
+
+given: Connection | None = context.config.attributes.get("connection")
+if given is not None:
+    run(given)
+else:
+    with connection_for_migrations(settings().database) as connection:
+        run(connection)

@@ -1,0 +1,95 @@
+"""Regions: certified polytopes, stored as they are reached."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+from uuid import uuid4
+
+import numpy as np
+from sqlalchemy import Select, select
+from sqlalchemy.orm import Session
+
+from certifier.errors import CirisError
+from certifier.model import Array
+from db import events, jobs, proofs
+from db.models import IterationRow, JobRow, ProofRow, RegionRow
+
+
+def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any], proof: bytes) -> RegionRow:
+    """Stores a region whose proof has been verified; the caller holds the job's lock."""
+    volume = manifest["volume"]["ellipsoid"]
+    region = RegionRow(
+        id=str(uuid4()),
+        job_id=job.id,
+        scene_id=job.scene_id,
+        iteration=iteration,
+        guarantee=manifest["guarantee"],
+        manifest=manifest,
+        arrays={"C": np.array(manifest["halfspace_normals"]), "d": np.array(manifest["halfspace_offsets"])},
+        proof_digest=proofs.put(session, proof),
+        ellipsoid_volume=volume,
+    )
+    session.add(region)
+    session.get_one(IterationRow, (job.id, iteration)).ellipsoid_volume = volume
+    session.flush()
+    job.region_id = session.scalar(_latest(job.id))
+    data = {"region_id": region.id, "iteration": iteration, "guarantee": region.guarantee, "ellipsoid_volume": volume}
+    events.emit(session, job, "region", data)
+    return region
+
+
+def get(session: Session, region_id: str) -> RegionRow:
+    """The region with this id.
+
+    Raises:
+        CirisError: region_not_found.
+    """
+    row = session.get(RegionRow, region_id)
+    if row is None:
+        raise CirisError("region_not_found", f"there is no region {region_id!r}", field="region")
+    return row
+
+
+def newest(session: Session, *, scene_id: str | None = None, job_id: str | None = None, limit: int = 100) -> Sequence[RegionRow]:
+    """Regions, newest first: of one scene, of one job, or all."""
+    wanted = {RegionRow.scene_id: scene_id, RegionRow.job_id: job_id}
+    query = select(RegionRow).where(*(column == value for column, value in wanted.items() if value is not None))
+    return session.scalars(query.order_by(RegionRow.created_at.desc(), RegionRow.id).limit(limit)).all()
+
+
+@dataclass(frozen=True)
+class StoredPolytope:
+    """A region's half-spaces in s: C (m, n), d (m,), joint limits included."""
+
+    id: str
+    guarantee: str
+    C: Array
+    d: Array
+
+
+def polytopes(session: Session, scene_id: str) -> list[StoredPolytope]:
+    """The half-spaces of every region of a scene, without their manifests."""
+    query = select(RegionRow.id, RegionRow.guarantee, RegionRow.arrays).where(RegionRow.scene_id == scene_id)
+    rows = session.execute(query.order_by(RegionRow.created_at, RegionRow.id))
+    return [StoredPolytope(row.id, row.guarantee, row.arrays["C"], row.arrays["d"]) for row in rows]
+
+
+def delete(session: Session, region_id: str) -> None:
+    """Deletes a region and its proof file; its job then names its latest region that is left, if any.
+
+    Raises:
+        CirisError: region_not_found.
+    """
+    region = get(session, region_id)
+    job = jobs.lock(session, region.job_id)
+    session.delete(region)
+    session.flush()
+    if not session.scalar(select(RegionRow.id).where(RegionRow.proof_digest == region.proof_digest).limit(1)):
+        session.delete(session.get_one(ProofRow, region.proof_digest))
+    job.region_id = session.scalar(_latest(job.id))
+
+
+def _latest(job_id: str) -> Select[str]:
+    return select(RegionRow.id).where(RegionRow.job_id == job_id).order_by(RegionRow.iteration.desc()).limit(1)

@@ -1,0 +1,41 @@
+"""Rows to start from."""
+
+from __future__ import annotations
+
+from sqlalchemy.orm import Session
+
+from db import jobs, pairs, scenes
+from db.models import JobRow, SceneRow
+from tests.scenes import slider
+
+
+def a_scene(session: Session, name: str = "slider", posts: int = 2) -> SceneRow:
+    return scenes.add(session, slider(name, posts))
+
+
+def a_job(session: Session, **values: object) -> JobRow:
+    job, _ = jobs.create(session, kind="grow", scene_id=a_scene(session).id, options={"random_seed": 0}, **values)  # type: ignore[arg-type]
+    return job
+
+
+def a_running_job(session: Session, pair_count: int = 4, *, stop_at_first_failure: bool = True) -> JobRow:
+    """A running job whose iteration 0 has ``pair_count`` open pairs of 1 s each."""
+    job = a_job(session)
+    jobs.start(session, job)
+    pairs.add_iteration(
+        session,
+        job,
+        index=0,
+        label="contract",
+        C=[[1.0], [-1.0]],
+        d=[1.0, 1.0],
+        center=[0.0],
+        pairs=[pairs.NewPair(i, f"a{i}", f"b{i}", 1.0) for i in range(pair_count)],
+        reuse={},
+        stop_at_first_failure=stop_at_first_failure,
+    )
+    return job
+
+
+def certified(index: int, proof: bytes = b"proof") -> pairs.Result:
+    return pairs.Result(index, pairs.PairState.CERTIFIED, seconds=0.1, stage="sos", margin=0.01, proof=proof)

@@ -1,0 +1,47 @@
+"""The migrations lead to the tables of the models, and back, on SQLite and on PostgreSQL."""
+
+from __future__ import annotations
+
+from sqlalchemy import inspect
+
+from db import migrate, scenes
+from db.session import Database
+from tests.scenes import slider
+
+
+def tables(url: str) -> set[str]:
+    database = Database(url)
+    try:
+        return set(inspect(database.engine).get_table_names())
+    finally:
+        database.close()
+
+
+def test_an_empty_database_drifts(empty_database_url: str) -> None:
+    assert migrate.drift(empty_database_url)
+
+
+def test_upgrade_makes_the_models_tables_and_may_be_repeated(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    assert migrate.drift(empty_database_url) == []
+    migrate.upgrade(empty_database_url)
+    assert migrate.drift(empty_database_url) == []
+
+
+def test_downgrade_leaves_nothing_and_upgrade_comes_back(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    migrate.downgrade(empty_database_url, "base")
+    assert tables(empty_database_url) == {"alembic_version"}
+    migrate.upgrade(empty_database_url)
+    assert migrate.drift(empty_database_url) == []
+
+
+def test_rows_survive_a_second_upgrade(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.write() as session:
+        scene_id = scenes.add(session, slider()).id
+    migrate.upgrade(empty_database_url)
+    with database.read() as session:
+        assert scenes.get(session, scene_id).hash == slider().hash
+    database.close()

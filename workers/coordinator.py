@@ -1,0 +1,79 @@
+"""What happens next in a job, as pure functions: from what the database holds to what it shall hold.
+
+:mod:`certifier.growth` decides about the mathematics (which polytope is certified next); this module turns its actions into rows
+and the rows' outcomes into its reports, and says how a job ends. Nothing here reads or writes anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from certifier.growth import Certification, Failed, GrowthOptions, Proposed, Report, Stepped, Transition, advance, begin
+from certifier.model import Scene
+from certifier.outcome import Outcome
+from db.states import JobKind, JobState, PairState, StepKind, StepState
+
+SETTLED = {state.value: Outcome(state.value) for state in PairState if state.value in set(Outcome)}
+
+
+def next_transition(scene: Scene, options: dict[str, Any], state: dict[str, Any] | None, report: Report | None) -> Transition:
+    """The first transition of a job (no state yet), or the one that follows a report."""
+    parsed = GrowthOptions.from_document(options)
+    if state is None:
+        return begin(scene, parsed)
+    if report is None:
+        raise ValueError("a job that has begun advances with a report")
+    return advance(scene, state, report)
+
+
+def certification_report(iteration: int, states: dict[int, str]) -> Certification:
+    """The report of a certification from its pairs' final states; skipped pairs are left out."""
+    return Certification(iteration, {index: SETTLED[state] for index, state in states.items() if state in SETTLED})
+
+
+def step_report(kind: StepKind, state: StepState, report: dict[str, Any]) -> Report:
+    """The report of a seeding or a polytope step from its row."""
+    if state == StepState.FAILED:
+        return Failed(report)
+    return Proposed(**report) if kind == StepKind.PROPOSE else Stepped(**report)
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a job ends."""
+
+    state: JobState
+    outcome: Outcome
+    reason: str
+    error: dict[str, Any] | None = None
+
+
+def ending(kind: str, outcome: Outcome, reason: str, error: dict[str, Any] | None) -> Ending:
+    """How a job ends whose growth has finished.
+
+    A ``certify`` job succeeds with any verdict, a ``grow`` job only with a certified region; ``error`` is what went wrong on the way,
+    if something did.
+    """
+    if outcome == Outcome.CERTIFIED or (kind == JobKind.CERTIFY and outcome != Outcome.ERROR):
+        return Ending(JobState.SUCCEEDED, outcome, reason)
+    return Ending(JobState.FAILED, outcome, reason, error or {"code": "not_grown", "message": reason, "field": None, "hint": ""})
+
+
+def batches(pairs: Sequence[tuple[int, float]], seconds: float) -> list[list[int]]:
+    """Groups (pair index, forecast in seconds) into messages.
+
+    Pairs expected to take ``seconds`` or more travel alone, longest first; the others keep their order and travel together until
+    they fill that time.
+    """
+    big = sorted((pair for pair in pairs if pair[1] >= seconds), key=lambda pair: -pair[1])
+    groups = [[index] for index, _ in big]
+    filled = seconds
+    for index, forecast in (pair for pair in pairs if pair[1] < seconds):
+        if filled + forecast > seconds:
+            groups.append([])
+            filled = 0.0
+        groups[-1].append(index)
+        filled += forecast
+    return groups

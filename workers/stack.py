@@ -1,0 +1,235 @@
+"""The embedded stack of ``ciris up``: queue, API and workers as supervised child processes on one machine.
+
+Data directory: ``ciris.sqlite3`` (unless a database is given), ``queue/`` (the queue's append-only file), ``logs/``, ``stack.json`` (where
+the API is, while the stack runs) and ``stack.lock`` (held while it runs).
+"""
+
+from __future__ import annotations
+
+import argparse
+import fcntl
+import json
+import logging
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from types import FrameType
+
+from certifier.errors import CirisError
+from db import migrate
+from db.settings import Settings
+from workers.processes import die_with_parent, queue_server_command, queue_url
+
+log = logging.getLogger(__name__)
+
+POLL_SECONDS = 0.2
+MAX_BACKOFF_SECONDS = 30.0
+HEALTHY_SECONDS = 30.0
+"""A child that has run this long is started anew without waiting when it dies."""
+START_SECONDS = 60.0
+STOP_SECONDS = 8.0
+
+
+@dataclass
+class Child:
+    """One supervised process, in a process group of its own, so that Ctrl-C reaches only the supervisor."""
+
+    name: str
+    command: list[str]
+    stop_signal: int
+    process: subprocess.Popen[bytes] | None = None
+    started: float = 0.0
+    backoff: float = 0.0
+
+    def start(self, environment: dict[str, str], logs: Path) -> None:
+        with (logs / f"{self.name}.log").open("ab") as output:
+            self.process = subprocess.Popen(
+                self.command,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                env=environment,
+                start_new_session=True,
+                preexec_fn=partial(die_with_parent, self.stop_signal),
+            )
+        self.started = time.monotonic()
+
+    @property
+    def dead(self) -> bool:
+        return self.process is None or self.process.poll() is not None
+
+    def wait_longer(self) -> bool:
+        """Whether it is too early to start the dead child again; the waits double while it keeps dying young."""
+        ran = time.monotonic() - self.started
+        if self.process is not None:
+            log.warning("%s ended with status %s", self.name, self.process.returncode)
+            self.backoff = 0.0 if ran > HEALTHY_SECONDS else min(MAX_BACKOFF_SECONDS, max(1.0, 2 * self.backoff))
+            self.process = None
+        return ran < self.backoff
+
+    def stop(self) -> None:
+        """Asks the child to end, waits, and kills what is left of its group."""
+        if self.process is None:
+            return
+        with suppress(ProcessLookupError):
+            self.process.send_signal(self.stop_signal)
+        with suppress(subprocess.TimeoutExpired):
+            self.process.wait(STOP_SECONDS)
+        with suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.wait()
+
+
+def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[str], None] = lambda url: None) -> None:
+    """Runs the stack until SIGINT or SIGTERM; must be called in the main thread.
+
+    Args:
+        port: the API's port; None takes the setting's, or any free one when that is taken.
+        ready: called once with the API's URL, when it answers.
+
+    Raises:
+        CirisError: stack_running, port_taken, or stack_failed when the API does not come up.
+    """
+    data = settings.data_dir.expanduser().absolute()
+    (data / "logs").mkdir(parents=True, exist_ok=True)
+    with _only_one(data), _stop_signals() as stopping, tempfile.TemporaryDirectory(prefix="ciris-", dir="/tmp") as sockets:
+        bound = _choose_port(settings, port)
+        url = f"http://{settings.host}:{bound}"
+        children = _children(settings, data, Path(sockets) / "queue")
+        environment = _environment(settings, data, Path(sockets) / "queue", bound)
+        migrate.upgrade(settings.database)
+        try:
+            for child in children:
+                child.start(environment, data / "logs")
+            _describe(data, url, children)
+            if _wait_until_healthy(url, stopping, data):
+                ready(url)
+            _supervise(children, environment, data, url, stopping)
+        finally:
+            for child in reversed(children):
+                child.stop()
+            (data / "stack.json").unlink(missing_ok=True)
+
+
+def _children(settings: Settings, data: Path, queue_socket: Path) -> list[Child]:
+    """The processes, in the order of starting; they are stopped in the opposite one."""
+    children = [
+        Child("control", [sys.executable, "-m", "workers", "control"], signal.SIGQUIT),
+        Child("solve", [sys.executable, "-m", "workers", "solve"], signal.SIGQUIT),
+        Child("api", [sys.executable, "-m", "api"], signal.SIGTERM),
+    ]
+    if not settings.redis_url:
+        children.insert(0, Child("queue", queue_server_command(data / "queue", queue_socket), signal.SIGTERM))
+    return children
+
+
+def _environment(settings: Settings, data: Path, queue_socket: Path, port: int) -> dict[str, str]:
+    return {
+        **os.environ,
+        "CIRIS_DATA_DIR": str(data),
+        "CIRIS_PORT": str(port),
+        "CIRIS_DATABASE_URL": settings.database,
+        "CIRIS_REDIS_URL": settings.redis_url or queue_url(queue_socket),
+    }
+
+
+def _supervise(children: list[Child], environment: dict[str, str], data: Path, url: str, stopping: Callable[[], bool]) -> None:
+    while not stopping():
+        for child in children:
+            if child.dead and not child.wait_longer():
+                log.warning("starting %s again", child.name)
+                child.start(environment, data / "logs")
+                _describe(data, url, children)
+        time.sleep(POLL_SECONDS)
+
+
+def _describe(data: Path, url: str, children: list[Child]) -> None:
+    """Writes stack.json, so that clients find the API."""
+    pids = {child.name: child.process.pid for child in children if child.process is not None}
+    document = {"url": url, "pid": os.getpid(), "pids": pids, "started_at": datetime.now(UTC).isoformat()}
+    partial_file = data / "stack.json.partial"
+    partial_file.write_text(json.dumps(document))
+    partial_file.replace(data / "stack.json")
+
+
+def _wait_until_healthy(url: str, stopping: Callable[[], bool], data: Path) -> bool:
+    """True once the API answers, False when the stack is to stop before."""
+    until = time.monotonic() + START_SECONDS
+    while not stopping():
+        try:
+            with urllib.request.urlopen(f"{url}/healthz", timeout=2):
+                return True
+        except (urllib.error.URLError, ConnectionError, TimeoutError) as error:
+            if time.monotonic() > until:
+                raise CirisError("stack_failed", f"the API does not answer: {error}", hint=f"see {data / 'logs'}") from None
+        time.sleep(POLL_SECONDS)
+    return False
+
+
+def _choose_port(settings: Settings, asked: int | None) -> int:
+    for port in (asked,) if asked is not None else (settings.port, 0):
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            with suppress(OSError):
+                probe.bind((settings.host, port))
+                return int(probe.getsockname()[1])
+    raise CirisError("port_taken", f"port {asked} of {settings.host} cannot be bound", field="port", hint="choose another, or none")
+
+
+@contextmanager
+def _only_one(data: Path) -> Iterator[None]:
+    """Holds the data directory's lock."""
+    with (data / "stack.lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise CirisError(
+                "stack_running", f"a stack with the data directory {data} is running already", hint="see its stack.json"
+            ) from None
+        yield
+
+
+@contextmanager
+def _stop_signals() -> Iterator[Callable[[], bool]]:
+    """Turns SIGINT and SIGTERM into a question that can be asked: shall we stop?"""
+    received: list[int] = []
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        received.append(number)
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(received)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def main() -> None:
+    """``python -m workers.stack``: the stack with the settings of the environment; says where it is, then runs until it is told to stop."""
+    parser = argparse.ArgumentParser(prog="python -m workers.stack", description="Runs ciris on this machine until Ctrl-C.")
+    parser.add_argument("--port", type=int, help="the API's port; default: CIRIS_PORT, or any free one when that is taken")
+    parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
+    arguments = parser.parse_args()
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s")
+    chosen = Settings() if arguments.data is None else Settings(data_dir=arguments.data)
+    try:
+        run_stack(chosen, port=arguments.port, ready=lambda url: print(f"ciris is up at {url}", flush=True))
+    except CirisError as error:
+        sys.exit(f"error: {error}")
+
+
+if __name__ == "__main__":
+    main()
