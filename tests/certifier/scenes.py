@@ -1,0 +1,75 @@
+"""Small scenes built from numbers, for tests of the mathematics: no robot files, no Drake."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from certifier.kinematics import rotation
+from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
+
+
+def pose(translation=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), angle=0.0):
+    X = np.eye(4)
+    X[:3, :3], X[:3, 3] = rotation(np.array(axis, dtype=float) / np.linalg.norm(axis), angle), translation
+    return X
+
+
+def box(name, body, size, center=(0.0, 0.0, 0.0)):
+    corners = np.array(list(itertools.product(*((-x / 2, x / 2) for x in size)))) + np.array(center)
+    return Geometry(name, body, corners, 0.0, {"kind": "box"})
+
+
+def ball(name, body, radius, center=(0.0, 0.0, 0.0)):
+    return Geometry(name, body, np.array([center], dtype=float), radius, {"kind": "sphere"})
+
+
+def planar_arm(links=2, obstacle=None, q_star=None, limit=2.0, kind=JointKind.REVOLUTE, padding=0.0):
+    """Links of length 1 in the xy-plane, a bar on each, and one obstacle in the world; pairs obstacle - bar for every link."""
+    joints, bodies, geometries = [], [WORLD], []
+    for i in range(links):
+        parent = WORLD if i == 0 else f"arm/link{i}"
+        body = f"arm/link{i + 1}"
+        X_PF = pose((0.0 if i == 0 else 1.0, 0.0, 0.0))
+        joints.append(Joint(f"arm/joint{i + 1}", kind, parent, body, np.array([0.0, 0.0, 1.0]), X_PF, np.eye(4), i, -limit, limit))
+        bodies.append(body)
+        geometries.append(box(f"{body}/bar", body, (1.0, 0.1, 0.1), (0.5, 0.0, 0.0)))
+    obstacle = obstacle or box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (1.5, 1.0, 0.0))
+    pairs = tuple(Pair(*sorted((g.name, obstacle.name))) for g in geometries)
+    center = np.zeros(links) if q_star is None else np.array(q_star, dtype=float)
+    return Scene("planar", tuple(joints), tuple(bodies), (*geometries, obstacle), pairs, (), center, padding)
+
+
+def random_tree(seed, kinds=(JointKind.REVOLUTE, JointKind.PRISMATIC, JointKind.WELD), bodies=6):
+    """A random tree with offset frames and every joint kind; no geometry."""
+    rng = np.random.default_rng(seed)
+    names, joints, position = [WORLD], [], 0
+    for i in range(bodies):
+        kind = kinds[i % len(kinds)]
+        axis = rng.normal(size=3)
+        frames = [pose(rng.normal(size=3), rng.normal(size=3), rng.uniform(-3, 3)) for _ in range(2)]
+        moving = kind is not JointKind.WELD
+        joints.append(
+            Joint(
+                f"tree/joint{i}",
+                kind,
+                names[rng.integers(len(names))],
+                f"tree/body{i}",
+                axis / np.linalg.norm(axis) if moving else np.zeros(3),
+                *frames,
+                position if moving else None,
+                -1.5 if moving else None,
+                1.5 if moving else None,
+            )
+        )
+        names.append(f"tree/body{i}")
+        position += moving
+    return Scene("tree", tuple(joints), tuple(names), (), (), (), rng.uniform(-0.5, 0.5, position))
+
+
+def cube(scene, center, half):
+    """The polytope |s - center|_inf <= half with the joint limits."""
+    eye = np.eye(scene.n)
+    center = np.broadcast_to(np.asarray(center, dtype=float), (scene.n,))
+    return scene.polytope(np.concatenate([eye, -eye]), np.concatenate([center + half, half - center]))

@@ -1,0 +1,185 @@
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from certifier.errors import CirisError, RegionError
+from certifier.growth import (
+    Certification,
+    Certify,
+    Failed,
+    Finish,
+    GrowthOptions,
+    Propose,
+    Proposed,
+    Step,
+    Stepped,
+    action_from_document,
+    action_to_document,
+    advance,
+    begin,
+)
+from certifier.model import WORLD
+from certifier.outcome import Outcome
+from certifier.pair import Certification as PairCertification
+from certifier.polytope import inscribed_ellipsoid
+from certifier.polytope_step import step
+from tests.certifier.scenes import box, cube, planar_arm
+
+SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
+PROPOSAL = Proposed([[1.0, 0.0], [-1.0, 0.0], [0.0, 2.0], [0.0, -2.0]], [1.0, 1.0, 2.0, 2.0], [0.0, 0.0], {})
+
+
+def drive(scene, options, verdict, limit=100):
+    """Run the machine against an oracle for pairs; returns the certifications made and the last transition."""
+    made, accepted = [], []
+    transition = begin(scene, options)
+    for _ in range(limit):
+        action = action_from_document(json.loads(json.dumps(action_to_document(transition.action))))
+        assert action == transition.action, "actions survive JSON"
+        state = json.loads(json.dumps(transition.state))
+        if transition.accepted:
+            accepted.append(transition.accepted)
+        if isinstance(action, Finish):
+            return made, accepted, action
+        if isinstance(action, Propose):
+            report = PROPOSAL
+        elif isinstance(action, Step):
+            moved = [x * 1.1 for x in action.d]
+            report = Stepped(action.C, moved, [0.0, 0.0], action.C, action.d, 0.2, {})
+        else:
+            assert isinstance(action, Certify)
+            made.append(action)
+            outcomes = {}
+            for index in action.pairs:
+                outcomes[index] = verdict(index, np.array(action.d))
+                if action.stop_at_first_failure and outcomes[index] is not Outcome.CERTIFIED:
+                    break
+            report = Certification(action.iteration, outcomes)
+        transition = advance(scene, state, report)
+    raise AssertionError("the machine does not end")
+
+
+def certified_if(limit):
+    return lambda index, d: Outcome.CERTIFIED if d[0] <= limit else Outcome.NOT_CERTIFIABLE
+
+
+def test_a_proposal_that_certifies_is_taken_whole():
+    made, accepted, end = drive(SCENE, GrowthOptions(seed={}, max_rounds=0), certified_if(5.0))
+    assert [action.label for action in made] == ["contract"]
+    assert accepted[-1].d[:4] == [1.0, 1.0, 1.0, 1.0]
+    assert end.outcome is Outcome.CERTIFIED
+
+
+@pytest.mark.parametrize("limit", [0.02, 0.3, 0.77])
+def test_bisection_finds_the_largest_trial_and_never_loses_an_accepted_region(limit):
+    made, accepted, end = drive(SCENE, GrowthOptions(seed={}, max_rounds=0, bisection_steps=12), certified_if(limit))
+    sizes = [region.d[0] for region in accepted]
+    assert sizes == sorted(sizes)
+    assert limit - 1.0 / 2**11 <= sizes[-1] <= limit
+    assert len(made) == 14
+    assert end.outcome is Outcome.CERTIFIED
+
+
+def test_a_pair_certified_on_a_larger_trial_is_not_certified_again():
+    def verdict(index, d):
+        return Outcome.CERTIFIED if index == 0 or d[0] <= 0.1 else Outcome.INCONCLUSIVE
+
+    made, accepted, _ = drive(SCENE, GrowthOptions(seed={}, max_rounds=0, bisection_steps=4), verdict)
+    assert made[0].pairs == [0, 1]
+    assert all(action.reuse == {0: 0} and action.pairs == [1] for action in made[1:])
+    assert accepted[-1].proofs[0] == 0
+    assert set(accepted[-1].proofs) == {0, 1}
+
+
+def test_pairs_that_failed_last_come_first():
+    made, _, _ = drive(
+        SCENE, GrowthOptions(seed={}, max_rounds=0, bisection_steps=3), lambda i, d: certified_if(0.3)(i, d) if i else Outcome.CERTIFIED
+    )
+    assert made[1].pairs[0] == 1
+
+
+def test_a_seed_that_cannot_be_certified_ends_with_the_pair_named():
+    made, accepted, end = drive(SCENE, GrowthOptions(seed={}), lambda index, d: Outcome.REFUTED)
+    assert not accepted
+    assert end.outcome is Outcome.REFUTED
+    assert SCENE.pairs[0].a in end.reason
+    assert len(made) == 2
+
+
+def test_alternation_accepts_rounds_and_backs_off():
+    made, accepted, end = drive(SCENE, GrowthOptions(seed={}, max_rounds=3, bisection_steps=3, backoff=2), certified_if(1.15))
+    assert [action.label for action in made] == ["contract"] + 7 * ["round"]
+    assert [round(region.d[0], 6) for region in accepted] == [1.0, 1.1, 1.1275]
+    assert end.outcome is Outcome.CERTIFIED
+
+
+def test_a_failed_step_keeps_the_certified_region_and_a_failed_seeding_ends():
+    options = GrowthOptions(seed={})
+    first = begin(SCENE, options)
+    assert isinstance(first.action, Propose)
+    error = CirisError("seed_in_collision", "a and b touch").to_document()
+    assert advance(SCENE, first.state, Failed(error)).action == Finish(Outcome.ERROR, "a and b touch")
+    certify = advance(SCENE, first.state, PROPOSAL)
+    stepping = advance(SCENE, certify.state, Certification(0, {0: Outcome.CERTIFIED, 1: Outcome.CERTIFIED}))
+    assert isinstance(stepping.action, Step)
+    assert stepping.accepted is not None
+    end = advance(SCENE, stepping.state, Failed(CirisError("step_too_large", "too large").to_document())).action
+    assert isinstance(end, Finish)
+    assert end.outcome is Outcome.CERTIFIED
+
+
+def test_a_given_polytope_is_certified_once_with_every_pair():
+    options = GrowthOptions(kind="certify", seed={"C": [[1.0, 0.0]], "d": [0.5]})
+    made, accepted, end = drive(SCENE, options, lambda index, d: Outcome.NOT_CERTIFIABLE if index == 0 else Outcome.CERTIFIED)
+    assert made[0].pairs == [0, 1]
+    assert not made[0].stop_at_first_failure
+    assert not accepted
+    assert end.outcome is Outcome.NOT_CERTIFIABLE
+
+
+@pytest.mark.parametrize(
+    ("document", "field"),
+    [
+        ({"colour": 1}, "options.colour"),
+        ({"kind": "shrink"}, "options.kind"),
+        ({"bisection_steps": -1}, "options.bisection_steps"),
+        ({"max_rounds": True}, "options.max_rounds"),
+        ({"tolerance": 0}, "options.tolerance"),
+    ],
+)
+def test_bad_options_are_named(document, field):
+    with pytest.raises(RegionError) as refusal:
+        GrowthOptions.from_document(document)
+    assert refusal.value.field == field
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [
+        {},
+        {"C": [[1.0]], "d": [1.0]},
+        {"C": [[1.0, 0.0]], "d": [1.0, 2.0]},
+        {"C": [["x", 0.0]], "d": [1.0]},
+        {"C": [[np.nan, 0.0]], "d": [1.0]},
+    ],
+)
+def test_bad_polytopes_are_refused(seed):
+    with pytest.raises(RegionError):
+        begin(SCENE, GrowthOptions(kind="certify", seed=seed))
+
+
+def test_the_polytope_step_grows_the_ellipsoid_and_what_it_proposes_certifies():
+    region = cube(SCENE, 0.0, 0.05)
+    for _ in range(3):
+        shared = PairCertification(SCENE, region, np.zeros(2))
+        proofs = {i: shared.certify(i).proof for i in range(len(SCENE.pairs))}
+        assert all(proofs.values())
+        moved = step(SCENE, region, proofs)
+        assert moved.growth > 0.05
+        assert inscribed_ellipsoid(type(region)(moved.C, moved.d)).volume >= inscribed_ellipsoid(region).volume
+        region = type(region)(moved.C, moved.d)
+    final = PairCertification(SCENE, region)
+    assert all(final.certify(i).outcome is Outcome.CERTIFIED for i in range(len(SCENE.pairs)))
