@@ -76,7 +76,7 @@ class Certification:
         check_ground(scene, self.ground)
         self._check = PairCheck(scene, self.ground)
         samples = hit_and_run(faces, self.center, CONE_SAMPLES, seed)
-        self._screen = np.concatenate([self.center[None], samples[:SCREEN_SAMPLES]])
+        self._screen = np.concatenate([self.center[None], samples])
         self._kinematics = Kinematics(scene)
         self._sides = Sides(self._kinematics, faces, box, self.center, samples)
 
@@ -88,7 +88,7 @@ class Certification:
 
     def _certify(self, pair: Pair, max_iterations: int) -> PairResult:
         frame = choose_frame(self._kinematics, pair)
-        contact = self._contact(pair, frame, self._screen)
+        contact = self._contact(pair, frame, self._screen[:SCREEN_SAMPLES])
         if isinstance(contact, _Witness):
             return PairResult(Outcome.REFUTED, Stage.SCREEN, witness_s=contact.s)
         try:
@@ -99,7 +99,7 @@ class Certification:
         if solution.status is Status.FEASIBLE:
             return self._prove(pair, frame, solution)
         weak = self._weak_points(frame, solution)
-        witness = self._contact(pair, frame, np.concatenate([self.center[None], weak[self._faces.contains(weak)]]))
+        witness = self._contact(pair, frame, np.concatenate([self._screen, weak[self._faces.contains(weak)]]))
         if isinstance(witness, _Witness):
             return PairResult(Outcome.REFUTED, Stage.SOS, witness_s=witness.s)
         if solution.status is Status.INFEASIBLE:

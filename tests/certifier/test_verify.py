@@ -70,7 +70,7 @@ def test_false_statements_are_rejected(index):
     rejected(
         scene, replace(proof, sides=(proof.sides[0], replace(proof.sides[1], exponent=proof.sides[1].exponent + 10))), "proof_residual"
     )
-    rejected(scene, replace(proof, sides=(replace(proof.sides[0], mantissa=proof.sides[0].mantissa[:1]), proof.sides[1])))
+    rejected(scene, replace(proof, sides=(replace(proof.sides[0], mantissa=proof.sides[0].mantissa[:, :-1]), proof.sides[1])))
     rejected(replace(scene, padding=scene.padding + 0.01), proof, "proof_scene")
 
 
