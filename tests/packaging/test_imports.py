@@ -36,7 +36,12 @@ def test_importing_modules_has_no_side_effects(graph: grimp.ImportGraph, tmp_pat
     """No output, no file, no thread, whatever is imported."""
     ours = {module for room in ROOMS for module in {room} | graph.find_descendants(room)}
     scripts = {module for module in ours if module.endswith(".__main__") or module.startswith("db.migrations")}
-    script = f"import importlib, threading\nfor name in {sorted(ours - scripts)}: importlib.import_module(name)\nassert threading.active_count() == 1"
+    script = f"""
+import importlib, threading
+for name in {sorted(ours - scripts)}:
+    importlib.import_module(name)
+assert threading.active_count() == 1
+"""
     environment = {"HOME": str(tmp_path), "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
     done = subprocess.run([sys.executable, "-c", script], env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
