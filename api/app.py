@@ -1,0 +1,43 @@
+"""The application: routes, problems, the guard and the dashboard put together."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from fastapi import FastAPI
+from fastapi.routing import APIRoute
+
+from api import guard, pages, problems
+from api.routers import events, jobs, planning, regions, scenes, service
+from db.session import Database, database
+from db.settings import settings
+
+DESCRIPTION = """Certified collision-free regions of robot configuration space.
+
+A scene goes in, a job grows or certifies a polytope, its regions come out with proofs that anyone can check offline.
+Errors are problem+json (RFC 9457) with a `code`, the `field` and a `hint`; unknown fields and numbers that are not finite are refused."""
+
+
+def create_app(db: Database | None = None) -> FastAPI:
+    """The service on this database; default: the one of the settings."""
+    app = FastAPI(
+        title="ciris",
+        version="1",
+        description=DESCRIPTION,
+        docs_url=None,
+        redoc_url=None,
+        generate_unique_id_function=_operation_id,
+        separate_input_output_schemas=False,
+    )
+    app.state.database = db or database()
+    app.add_middleware(guard.Guard, hosts=guard.LOOPBACK_NAMES if settings().host in guard.LOOPBACK_NAMES else None)
+    problems.install(app, pages.render_problem)
+    for module in (scenes, jobs, events, regions, planning, service):
+        app.include_router(module.router)
+    pages.install(app)
+    app.openapi = partial(problems.describe, app)  # type: ignore[method-assign]
+    return app
+
+
+def _operation_id(route: APIRoute) -> str:
+    return route.name

@@ -1,0 +1,77 @@
+"""Checks of a request's numbers against the scene they are about: cheap ones, no Drake. The job makes the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from api.schemas import PolytopeBody, Seed
+from certifier.errors import RegionError
+from certifier.model import Array, Scene
+from certifier.seed_options import SeedOptions
+
+
+def seed(scene: Scene, body: Seed) -> SeedOptions:
+    """The options of a seeding. Refuses what contradicts itself, and a configuration of the wrong length or outside the joint limits.
+
+    Raises:
+        RegionError: seed_wrong_length, seed_outside_limits, polytope_shape, or as SeedOptions.from_document; the field names the place.
+    """
+    options = SeedOptions.from_document(body.model_dump(exclude_none=True))
+    for i, row in enumerate(options.C or ()):
+        _length(scene, row, f"seed.C[{i}]", "polytope_shape")
+    if options.q is not None:
+        _length(scene, options.q, "seed.q", "seed_wrong_length")
+        _within_limits(scene, options.q)
+    return options
+
+
+def _within_limits(scene: Scene, q: Sequence[float]) -> None:
+    for i, (joint, value) in enumerate(zip(scene.moving, q, strict=True)):
+        lower, upper = scene.q_lower[i], scene.q_upper[i]
+        if not lower < value < upper:
+            raise RegionError(
+                "seed_outside_limits",
+                f"joint {joint.name} is at {value:g}, not between its limits {lower:g} and {upper:g}",
+                field=f"seed.q[{i}]",
+            )
+
+
+def polytope(scene: Scene, body: PolytopeBody) -> None:
+    """Refuse a polytope whose shapes do not fit the scene or each other, or whose centre is outside of it.
+
+    Raises:
+        RegionError: polytope_shape, center_outside.
+    """
+    for i, row in enumerate(body.C):
+        _length(scene, row, f"polytope.C[{i}]", "polytope_shape")
+    if len(body.C) != len(body.d):
+        raise RegionError("polytope_shape", f"C has {len(body.C)} rows and d has {len(body.d)} numbers", field="polytope.d")
+    if body.center is not None:
+        _length(scene, body.center, "polytope.center", "polytope_shape")
+        if not scene.polytope(body.C, body.d).contains(body.center):
+            raise RegionError(
+                "center_outside",
+                "the centre is not inside the polytope and the joint limits",
+                field="polytope.center",
+                hint="leave it out to have one found",
+            )
+
+
+def points(scene: Scene, rows: Sequence[Sequence[float]], field: str) -> Array:
+    """Points as (k, n).
+
+    Raises:
+        RegionError: wrong_length.
+    """
+    for i, row in enumerate(rows):
+        _length(scene, row, f"{field}[{i}]", "wrong_length")
+    return np.array(rows, dtype=float)
+
+
+def _length(scene: Scene, values: Sequence[float], field: str, code: str) -> None:
+    if len(values) != scene.n:
+        names = ", ".join(joint.name for joint in scene.moving)
+        message = f"{len(values)} numbers were given; {scene.name} has {scene.n} joints"
+        raise RegionError(code, message, field=field, hint=f"in the order {names}")

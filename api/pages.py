@@ -1,0 +1,233 @@
+"""The dashboard's pages: the templates of dashboard/, fed by the same functions as the JSON routes."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fastapi import APIRouter, FastAPI, Request, Response
+from fastapi.responses import HTMLResponse
+from fastapi.staticfiles import StaticFiles
+from fastapi.templating import Jinja2Templates
+
+import dashboard
+from api import problems
+from api.access import Db
+from api.routers import jobs, regions, scenes
+from api.schemas import GrowthPoint, Iteration, Job, PairCell, PairInfo, PairMatrix
+from db.session import Database
+
+_ROOT = Path(dashboard.__file__).parent
+_CHART = (600, 150)
+_SECURITY = {
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'; form-action 'self'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+}
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+templates = Jinja2Templates(_ROOT / "templates")
+
+
+def install(app: FastAPI) -> None:
+    """Adds the pages and their static files."""
+    app.include_router(router)
+    app.mount("/static", StaticFiles(directory=_ROOT / "static"), name="static")
+
+
+def render_problem(request: Request, problem: problems.Problem) -> Response:
+    """A page for people who look at pages, problem+json for everything else."""
+    if request.url.path.startswith(("/v1/", "/static/")) or "text/html" not in request.headers.get("accept", ""):
+        return problems.as_json(problem)
+    return _page(request, "problem.html", {"problem": problem}, problem.status)
+
+
+@router.get("/")
+def jobs_page(request: Request, db: Db) -> Response:
+    return _page(request, "jobs.html", _home(db))
+
+
+@router.get("/live")
+def jobs_live(request: Request, db: Db) -> Response:
+    return _page(request, "jobs_live.html", _home(db))
+
+
+@router.get("/jobs/{job_id}")
+def job_page(request: Request, job_id: str, db: Db) -> Response:
+    return _page(request, "job.html", _job(db, job_id))
+
+
+@router.get("/jobs/{job_id}/live")
+def job_live(request: Request, job_id: str, db: Db) -> Response:
+    return _page(request, "job_live.html", _job(db, job_id))
+
+
+@router.get("/regions/{region_id}")
+def region_page(request: Request, region_id: str, db: Db) -> Response:
+    region = regions.get_region(region_id, db)
+    shape = np.array(region.manifest["inscribed_ellipsoid"]["shape"])
+    reach = np.linalg.norm(shape, axis=1).tolist()
+    return _page(request, "region.html", {"region": region, "manifest": region.manifest, "reach": reach})
+
+
+@router.get("/scenes/{scene_id}")
+def scene_page(request: Request, scene_id: str, db: Db) -> Response:
+    context = {
+        "scene": scenes.get_scene(scene_id, db),
+        "lint": scenes.get_scene_lint(scene_id, db),
+        "pairs": scenes.get_scene_pairs(scene_id, db).pairs,
+        "regions": regions.list_regions(db, scene=scene_id).regions,
+    }
+    return _page(request, "scene.html", context)
+
+
+def _page(request: Request, name: str, context: dict[str, Any], status: int = 200) -> Response:
+    return templates.TemplateResponse(request, name, context, status_code=status, headers=_SECURITY)
+
+
+def _home(db: Database) -> dict[str, Any]:
+    known = scenes.list_scenes(db).scenes
+    return {
+        "jobs": jobs.list_jobs(db).jobs,
+        "scenes": known,
+        "scene_names": {scene.id: scene.name for scene in known},
+        "regions": regions.list_regions(db, limit=20).regions,
+    }
+
+
+def _job(db: Database, job_id: str) -> dict[str, Any]:
+    job = jobs.get_job(job_id, db)
+    matrix = jobs.get_job_pairs(job_id, db)
+    curve = jobs.get_job_growth(job_id, db).points
+    return {
+        "job": job,
+        "elapsed": elapsed(job),
+        "scene": scenes.get_scene(job.scene, db),
+        "iterations": matrix.iterations,
+        "rows": matrix_rows(matrix),
+        "progress": progress(matrix),
+        "chart": growth_chart(curve),
+        "curve": curve,
+        "regions": regions.list_regions(db, job=job_id).regions,
+    }
+
+
+def elapsed(job: Job) -> float | None:
+    """Seconds from the job's start to its end, or until now; None before the start."""
+    return None if job.started_at is None else ((job.finished_at or datetime.now(UTC)) - job.started_at).total_seconds()
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What the matrix shows for one pair in one iteration."""
+
+    state: str
+    glyph: str
+    title: str
+
+
+@dataclass(frozen=True)
+class Row:
+    """A pair and its cells, one for each iteration."""
+
+    pair: PairInfo
+    cells: list[Cell]
+
+
+_GLYPHS = {
+    "certified": "✓",
+    "refuted": "✗",
+    "not_certifiable": "⊘",
+    "inconclusive": "?",
+    "error": "!",
+    "running": "◌",
+    "open": "·",
+    "skipped": "\N{MINUS SIGN}",
+    "reused": "↺",
+    "absent": "",
+}
+
+
+def matrix_rows(matrix: PairMatrix) -> list[Row]:
+    """The pair matrix, row by row, every gap filled."""
+    cells = {(cell.pair, cell.iteration): cell for cell in matrix.cells}
+    return [Row(pair, [_cell(cells.get((pair.index, it.index)), pair.index, it) for it in matrix.iterations]) for pair in matrix.pairs]
+
+
+def _cell(cell: PairCell | None, pair: int, iteration: Iteration) -> Cell:
+    if cell is None:
+        source = iteration.reused.get(pair)
+        state = "absent" if source is None else "reused"
+        return Cell(state, _GLYPHS[state], "not reached" if source is None else f"certified by the proof of iteration {source}")
+    parts = [cell.state.replace("_", " ")]
+    if cell.stage:
+        parts.append(f"by {cell.stage.replace('_', ' ')}")
+    if cell.seconds is not None:
+        parts.append(f"{cell.seconds:.3g} s")
+    if cell.margin is not None:
+        parts.append(f"margin {1000 * cell.margin:.3g} mm")
+    if cell.witness_q is not None:
+        parts.append("in collision at q = " + ", ".join(f"{value:.4g}" for value in cell.witness_q))
+    if cell.detail:
+        parts.append(cell.detail)
+    return Cell(cell.state, _GLYPHS[cell.state], "; ".join(parts))
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far the last iteration is.
+
+    Attributes:
+        parts: (state, count), certified first.
+        settled: pairs that have their outcome or were reused.
+    """
+
+    iteration: Iteration
+    parts: list[tuple[str, int]]
+    settled: int
+    total: int
+
+
+def progress(matrix: PairMatrix) -> Progress | None:
+    """Progress of the last iteration; None before the first."""
+    if not matrix.iterations:
+        return None
+    last = matrix.iterations[-1]
+    counts = Counter(cell.state.value for cell in matrix.cells if cell.iteration == last.index)
+    if last.reused:
+        counts["reused"] = len(last.reused)
+    parts = [(state, counts[state]) for state in _GLYPHS if counts[state]]
+    unsettled = counts["open"] + counts["running"] + counts["skipped"]
+    return Progress(last, parts, counts.total() - unsettled, counts.total())
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A step line in an SVG of ``width`` by ``height``, logarithmic in the volume."""
+
+    width: int
+    height: int
+    line: str
+    dots: list[tuple[float, float, str]]
+
+
+def growth_chart(curve: list[GrowthPoint]) -> Chart | None:
+    """The certified volume over time; None before the first region."""
+    if not curve:
+        return None
+    width, height = _CHART
+    pad = 10
+    end = max(point.seconds for point in curve) or 1.0
+    logs = [math.log10(max(point.ellipsoid_volume, 1e-300)) for point in curve]
+    low, high = min(logs), max(logs)
+    spread = high - low or 1.0
+    xs = [pad + (width - 2 * pad) * point.seconds / end for point in curve]
+    ys = [height - pad - (height - 2 * pad) * ((value - low) / spread if high > low else 0.5) for value in logs]
+    line = f"M{xs[0]:.1f},{ys[0]:.1f}" + "".join(f"H{x:.1f}V{y:.1f}" for x, y in zip(xs[1:], ys[1:], strict=True))
+    labels = [f"iteration {p.iteration}: volume {p.ellipsoid_volume:.4g} after {p.seconds:.1f} s" for p in curve]
+    return Chart(width, height, line, list(zip(xs, ys, labels, strict=True)))

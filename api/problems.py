@@ -1,0 +1,144 @@
+"""Every error is an RFC 9457 problem: what is wrong (``code``), where (``field``), what to do (``hint``)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from fastapi.openapi.utils import get_openapi
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel
+from pydantic.json_schema import models_json_schema
+from starlette.exceptions import HTTPException
+
+from certifier.errors import CirisError
+
+MEDIA_TYPE = "application/problem+json"
+
+_STATUS_OF_CODE = {
+    **dict.fromkeys(("scene_not_found", "job_not_found", "region_not_found", "proof_not_found"), HTTPStatus.NOT_FOUND),
+    "idempotency_conflict": HTTPStatus.CONFLICT,
+    "job_not_retryable": HTTPStatus.CONFLICT,
+    "too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+    "bundle_too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+    "cross_site": HTTPStatus.FORBIDDEN,
+    "unknown_host": HTTPStatus.MISDIRECTED_REQUEST,
+}
+
+
+class FieldProblem(BaseModel):
+    """One thing that is wrong with the request."""
+
+    field: str
+    message: str
+
+
+class Problem(BaseModel):
+    """An error (RFC 9457): ``code`` is stable, ``detail`` is for people."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    code: str
+    field: str | None = None
+    hint: str = ""
+    errors: list[FieldProblem] = []
+
+
+Render = Callable[[Request, Problem], Response]
+
+
+def problem_of(error: CirisError, status: HTTPStatus | None = None, errors: Sequence[FieldProblem] = ()) -> Problem:
+    """The problem that an error is, with the status of its code unless one is given."""
+    status = _STATUS_OF_CODE.get(error.code, HTTPStatus.UNPROCESSABLE_ENTITY) if status is None else status
+    return Problem(
+        type=f"urn:ciris:problem:{error.code}",
+        title=status.phrase,
+        status=status,
+        detail=error.message,
+        code=error.code,
+        field=error.field,
+        hint=error.hint,
+        errors=list(errors),
+    )
+
+
+def as_json(problem: Problem) -> Response:
+    """A problem as a response for programs."""
+    return JSONResponse(problem.model_dump(), problem.status, media_type=MEDIA_TYPE)
+
+
+def install(app: FastAPI, render: Render) -> None:
+    """Makes every error that leaves a route a problem, presented by ``render``."""
+    for kind, explain in _EXPLANATIONS.items():
+        app.add_exception_handler(kind, partial(_handle, explain, render))
+
+
+def _handle(explain: Callable[[Any], Problem], render: Render, request: Request, error: Exception) -> Response:
+    response = render(request, explain(error))
+    response.headers.update(getattr(error, "headers", None) or {})
+    return response
+
+
+def _validation(error: RequestValidationError) -> Problem:
+    found = error.errors()
+    problems = [FieldProblem(field=_field(e["loc"]), message=_sentence(e)) for e in found]
+    if any(e["type"] == "json_invalid" for e in found):
+        return problem_of(CirisError("malformed_json", "the body is not JSON"), HTTPStatus.BAD_REQUEST)
+    return problem_of(CirisError("invalid_request", problems[0].message, field=problems[0].field or None), errors=problems)
+
+
+def _http(error: HTTPException) -> Problem:
+    status = HTTPStatus(error.status_code)
+    code = "too_large" if status == HTTPStatus.REQUEST_ENTITY_TOO_LARGE else status.name.lower()
+    return problem_of(CirisError(code, error.detail), status)
+
+
+def _unexpected(_error: Exception) -> Problem:
+    hint = "the service's log has the details"
+    return problem_of(CirisError("internal", "something went wrong in the service", hint=hint), HTTPStatus.INTERNAL_SERVER_ERROR)
+
+
+_EXPLANATIONS: dict[type[Exception], Callable[[Any], Problem]] = {
+    CirisError: problem_of,
+    RequestValidationError: _validation,
+    HTTPException: _http,
+    Exception: _unexpected,
+}
+
+
+def _field(loc: Sequence[str | int]) -> str:
+    """``("body", "grow", "seed", "q", 3)`` -> ``"seed.q[3]"``: what the client wrote, without what only the parser knows."""
+    parts = list(loc[1:])
+    if loc[0] == "body" and parts and parts[0] in ("grow", "certify"):
+        del parts[0]
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".")
+
+
+def _sentence(error: dict[str, Any]) -> str:
+    if error["type"] == "extra_forbidden":
+        return "there is no such field"
+    message = str(error["msg"]).removeprefix("Value error, ")
+    return message[:1].lower() + message[1:]
+
+
+def describe(app: FastAPI) -> dict[str, Any]:
+    """The OpenAPI document, with the problem as every operation's error response."""
+    if app.openapi_schema is None:
+        document = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
+        schemas = document["components"]["schemas"]
+        for name in ("HTTPValidationError", "ValidationError"):
+            schemas.pop(name, None)
+        schemas.update(models_json_schema([(Problem, "serialization")], ref_template="#/components/schemas/{model}")[1]["$defs"])
+        problem = {"description": "What is wrong", "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}}
+        for path in document["paths"].values():
+            for operation in path.values():
+                operation["responses"].pop("422", None)
+                operation["responses"]["default"] = problem
+        app.openapi_schema = document
+    return app.openapi_schema

@@ -1,0 +1,68 @@
+"""A job's events, as a list and as a stream of server-sent events that can be resumed."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Header, Query
+from fastapi.concurrency import run_in_threadpool
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+
+from api.access import Db
+from api.schemas import Event, EventList
+from db import events, jobs
+from db.session import Database
+
+POLL_SECONDS = 0.3
+PAGE = 500
+
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+
+
+@router.get("/{job_id}/events")
+def list_job_events(
+    job_id: str,
+    db: Db,
+    after: Annotated[int, Query(ge=0, description="Only events with a larger number.")] = 0,
+    limit: Annotated[int, Query(ge=1, le=1000)] = PAGE,
+) -> EventList:
+    """What happened to the job, in order."""
+    with db.read() as session:
+        jobs.get(session, job_id)
+        return EventList(events=[Event.of(row) for row in events.since(session, job_id, after, limit)])
+
+
+def _existing(job_id: str, db: Db) -> str:
+    """The id, once it is known that the job exists: a stream that has begun cannot answer 404 any more."""
+    with db.read() as session:
+        return jobs.get(session, job_id).id
+
+
+@router.get("/{job_id}/events/stream", response_class=EventSourceResponse)
+async def stream_job_events(
+    job_id: Annotated[str, Depends(_existing)],
+    db: Db,
+    after: Annotated[int, Query(ge=0, description="Only events with a larger number.")] = 0,
+    last_event_id: Annotated[int | None, Header(ge=0, description="Where an interrupted stream goes on; wins over `after`.")] = None,
+) -> AsyncIterator[ServerSentEvent]:
+    """The job's events as they happen; the last one is called `end`, then the stream closes."""
+    seq = after if last_event_id is None else last_event_id
+    while True:
+        page, ended = await run_in_threadpool(_next_page, db, job_id, seq)
+        for event in page:
+            yield ServerSentEvent(data=event.model_dump(mode="json"), event=event.kind, id=str(event.seq))
+        if page:
+            seq = page[-1].seq
+        if ended and len(page) < PAGE:
+            break
+        await asyncio.sleep(0 if page else POLL_SECONDS)
+    yield ServerSentEvent(data={"job": job_id}, event="end")
+
+
+def _next_page(db: Database, job_id: str, seq: int) -> tuple[list[Event], bool]:
+    """The next events and whether the job had ended by then, in one transaction: an ended job gets no more events."""
+    with db.read() as session:
+        job = jobs.get(session, job_id)
+        return [Event.of(row) for row in events.since(session, job_id, seq, PAGE)], not job.transitions[job.state]

@@ -1,0 +1,179 @@
+"""Jobs: idempotent creation, lists, cancelling, retrying, the pair matrix and the growth curve.
+
+Messages are sent after the commit and after the answer: the row is what was promised, and a Redis that is down must not hold up anybody.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from datetime import timedelta
+from typing import Annotated, Any
+
+from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
+
+from api import checks
+from api.access import Db
+from api.schemas import (
+    CertifyRequest,
+    GrowRequest,
+    GrowthCurve,
+    GrowthPoint,
+    Iteration,
+    Job,
+    JobPage,
+    NewJob,
+    PairCell,
+    PairInfo,
+    PairMatrix,
+)
+from certifier.model import Scene
+from certifier.outcome import Stage
+from db import jobs, pairs, regions, scenes
+from db.models import IterationRow, PairRow
+from db.states import IterationState, JobKind, JobState, PairState
+from db.types import utcnow
+from workers.app import send_coordinate
+
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+
+
+@router.post("", status_code=status.HTTP_201_CREATED, responses={200: {"model": Job, "description": "Made earlier under the same key."}})
+def create_job(
+    body: NewJob,
+    db: Db,
+    response: Response,
+    background: BackgroundTasks,
+    idempotency_key: Annotated[str | None, Header(min_length=1, max_length=200)] = None,
+) -> Job:
+    """Start growing a region, or certifying a polytope. The same request under the same Idempotency-Key is the same job."""
+    with db.read() as session:
+        scene = scenes.get(session, body.scene)
+    options = _options(body, Scene.from_document(scene.document))
+    with db.write() as session:
+        job, made = jobs.create(
+            session,
+            kind=body.kind,
+            scene_id=scene.id,
+            options=options,
+            deadline_at=utcnow() + timedelta(seconds=body.deadline_seconds) if body.deadline_seconds else None,
+            idempotency_key=idempotency_key,
+            request_digest=_digest(scene.id, options, body.deadline_seconds),
+        )
+    if made:
+        background.add_task(send_coordinate, job.id)
+    else:
+        response.status_code = status.HTTP_200_OK
+    response.headers["Location"] = f"/v1/jobs/{job.id}"
+    return Job.of(job)
+
+
+def _options(body: GrowRequest | CertifyRequest, scene: Scene) -> dict[str, Any]:
+    """The document of certifier.growth.GrowthOptions that the request asks for, its numbers checked against the scene."""
+    if isinstance(body, GrowRequest):
+        return {"kind": "grow", "seed": checks.seed(scene, body.seed).to_document(), **body.options.model_dump()}
+    checks.polytope(scene, body.polytope)
+    return {"kind": "certify", "seed": body.polytope.model_dump(exclude_none=True), "random_seed": body.random_seed}
+
+
+def _digest(scene_id: str, options: dict[str, Any], deadline_seconds: float | None) -> str:
+    return hashlib.sha256(json.dumps([scene_id, options, deadline_seconds], sort_keys=True).encode()).hexdigest()
+
+
+@router.get("")
+def list_jobs(
+    db: Db,
+    state: JobState | None = None,
+    kind: JobKind | None = None,
+    scene: str | None = None,
+    after: Annotated[str | None, Query(description="`next` of the page before.")] = None,
+    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+) -> JobPage:
+    """Jobs, newest first."""
+    with db.read() as session:
+        scene_id = scenes.get(session, scene).id if scene else None
+        page = jobs.page(session, state=state, kind=kind, scene_id=scene_id, after=after, limit=limit)
+    return JobPage(jobs=[Job.of(row) for row in page.jobs], next=page.next)
+
+
+@router.get("/{job_id}")
+def get_job(job_id: str, db: Db) -> Job:
+    """One job as it is now."""
+    with db.read() as session:
+        return Job.of(jobs.get(session, job_id))
+
+
+@router.post("/{job_id}/cancel", status_code=status.HTTP_202_ACCEPTED)
+def cancel_job(job_id: str, db: Db, background: BackgroundTasks) -> Job:
+    """Ask a job to end; regions certified before remain. Nothing happens to a job that has ended."""
+    with db.write() as session:
+        job = jobs.cancel(session, job_id)
+    background.add_task(send_coordinate, job_id)
+    return Job.of(job)
+
+
+@router.post("/{job_id}/retry", status_code=status.HTTP_201_CREATED)
+def retry_job(job_id: str, db: Db, response: Response, background: BackgroundTasks) -> Job:
+    """A new job like one that failed or was cancelled; asking again gives the same new job."""
+    with db.write() as session:
+        job = jobs.retry(session, job_id)
+    background.add_task(send_coordinate, job.id)
+    response.headers["Location"] = f"/v1/jobs/{job.id}"
+    return Job.of(job)
+
+
+@router.get("/{job_id}/pairs")
+def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge=0)] = None) -> PairMatrix:
+    """The pair matrix: what became of every pair on every iteration's polytope, or on one of them."""
+    with db.read() as session:
+        job = jobs.get(session, job_id)
+        scene = Scene.from_document(scenes.get(session, job.scene_id).document)
+        rows = pairs.of_job(session, job_id) if iteration is None else pairs.of_iteration(session, job_id, iteration)
+        iterations = [row for row in pairs.iterations(session, job_id) if iteration in (None, row.index)]
+    return PairMatrix(
+        pairs=[PairInfo(index=index, a=pair.a, b=pair.b) for index, pair in enumerate(scene.pairs)],
+        iterations=[_iteration(row) for row in iterations],
+        cells=[_cell(scene, row) for row in rows],
+    )
+
+
+def _iteration(row: IterationRow) -> Iteration:
+    return Iteration(
+        index=row.index,
+        label=row.label,
+        state=IterationState(row.state),
+        faces=len(row.arrays["d"]),
+        ellipsoid_volume=row.ellipsoid_volume,
+        reused={int(pair): iteration for pair, iteration in row.reuse.items()},
+        started_at=row.started_at,
+        finished_at=row.finished_at,
+    )
+
+
+def _cell(scene: Scene, row: PairRow) -> PairCell:
+    return PairCell(
+        iteration=row.iteration,
+        pair=row.pair_index,
+        state=PairState(row.state),
+        stage=None if row.stage is None else Stage(row.stage),
+        margin=row.margin,
+        seconds=row.seconds,
+        detail=row.detail,
+        worker=row.worker,
+        witness_q=None if row.witness_s is None else scene.to_q(row.witness_s).tolist(),
+        proof=row.proof_digest,
+    )
+
+
+@router.get("/{job_id}/growth")
+def get_job_growth(job_id: str, db: Db) -> GrowthCurve:
+    """The regions certified on the way, with their volumes."""
+    with db.read() as session:
+        job = jobs.get(session, job_id)
+        rows = sorted(regions.newest(session, job_id=job_id), key=lambda row: row.iteration)
+    start = job.started_at or job.created_at
+    points = [
+        GrowthPoint(iteration=r.iteration, region=r.id, ellipsoid_volume=r.ellipsoid_volume, seconds=(r.created_at - start).total_seconds())
+        for r in rows
+    ]
+    return GrowthCurve(points=points)

@@ -1,0 +1,34 @@
+"""Questions that planners ask about certified regions."""
+
+from __future__ import annotations
+
+import numpy as np
+from fastapi import APIRouter
+
+from api import checks
+from api.access import Db
+from api.schemas import Containment, ContainsRequest, ContainsResponse, Hit
+from certifier.model import Polytope, Scene
+from certifier.outcome import Guarantee
+from db import regions, scenes
+from planner.membership import MembershipIndex, to_s
+
+router = APIRouter(prefix="/v1/planning", tags=["planning"])
+
+
+@router.post("/contains")
+def contains(body: ContainsRequest, db: Db) -> ContainsResponse:
+    """Which certified regions of the scene hold each of these points, and how deep inside they are."""
+    with db.read() as session:
+        row = scenes.get(session, body.scene)
+        stored = regions.polytopes(session, row.id)
+    scene = Scene.from_document(row.document)
+    points = to_s(scene, checks.points(scene, body.q, "q")) if body.q is not None else checks.points(scene, body.s or [], "s")
+    found = MembershipIndex([Polytope(r.C, r.d) for r in stored], scene.n).locate(points)
+    answers = []
+    for inside, margin in zip(found.inside, found.margin, strict=True):
+        deepest = np.argsort(-margin)
+        hits = [Hit(region=stored[i].id, margin=margin[i], guarantee=Guarantee(stored[i].guarantee)) for i in deepest if inside[i]]
+        best = float(margin.max(initial=-np.inf))
+        answers.append(Containment(inside=bool(hits), regions=hits, margin=best if np.isfinite(best) else None))
+    return ContainsResponse(scene=row.id, regions=len(stored), points=answers)

@@ -1,0 +1,74 @@
+"""Regions: lists, manifests, proofs, exports."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response, status
+
+from api import exports
+from api.access import Db
+from api.schemas import RegionDetail, RegionPage, RegionSummary
+from db import jobs, proofs, regions, scenes
+
+router = APIRouter(prefix="/v1/regions", tags=["regions"])
+
+
+class ExportFormat(StrEnum):
+    """What a region can be exported as."""
+
+    JSON = "json"
+    """The manifest."""
+    NPZ = "npz"
+    """C, d, center and the ellipsoid, for NumPy."""
+    DRAKE_YAML = "drake-yaml"
+    """Drake's IrisRegions, in s; LoadIrisRegionsYamlFile reads it."""
+
+
+@router.get("")
+def list_regions(db: Db, scene: str | None = None, job: str | None = None, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> RegionPage:
+    """Certified regions, newest first."""
+    with db.read() as session:
+        scene_id = scenes.get(session, scene).id if scene else None
+        job_id = jobs.get(session, job).id if job else None
+        return RegionPage(regions=[RegionSummary.of(row) for row in regions.newest(session, scene_id=scene_id, job_id=job_id, limit=limit)])
+
+
+@router.get("/{region_id}")
+def get_region(region_id: str, db: Db) -> RegionDetail:
+    """One region with its manifest."""
+    with db.read() as session:
+        return RegionDetail.of(regions.get(session, region_id))
+
+
+@router.get("/{region_id}/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
+def download_region_proof(region_id: str, db: Db) -> Response:
+    """The proof file; `ciris verify` checks it offline."""
+    with db.read() as session:
+        digest = regions.get(session, region_id).proof_digest
+        data = proofs.get(session, digest)
+    return _download(data, f"{region_id}.proof", "application/octet-stream", etag=digest)
+
+
+@router.get(
+    "/{region_id}/export", response_class=Response, responses={200: {"content": {kind: {} for kind in exports.MEDIA_TYPES.values()}}}
+)
+def export_region(region_id: str, db: Db, format: ExportFormat = ExportFormat.JSON) -> Response:
+    """The region as a file for other programs."""
+    with db.read() as session:
+        row = regions.get(session, region_id)
+    data, suffix = exports.WRITERS[format](row)
+    return _download(data, f"{region_id}.{suffix}", exports.MEDIA_TYPES[format])
+
+
+@router.delete("/{region_id}", status_code=status.HTTP_204_NO_CONTENT)
+def delete_region(region_id: str, db: Db) -> None:
+    """Forget a region and its proof file."""
+    with db.write() as session:
+        regions.delete(session, region_id)
+
+
+def _download(data: bytes, filename: str, media_type: str, etag: str | None = None) -> Response:
+    headers = {"Content-Disposition": f'attachment; filename="{filename}"'}
+    return Response(data, media_type=media_type, headers=headers | ({"ETag": f'"{etag}"'} if etag else {}))

@@ -1,0 +1,72 @@
+"""Scenes: a bundle goes in, what was understood of it comes out."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated
+
+from fastapi import APIRouter, File, Query, Response, UploadFile, status
+
+from api.access import Db
+from api.schemas import IgnoredPair, LintReport, PairForecast, SceneDetail, ScenePage, ScenePairs, SceneSummary, Substitution
+from certifier.forecast import forecast
+from certifier.model import Scene
+from certifier.scene.bundle import load_bundle
+from db import scenes
+
+router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
+
+
+@router.post("", status_code=status.HTTP_201_CREATED)
+def create_scene(
+    bundle: Annotated[UploadFile, File(description="A zip with the scene file and every file it refers to.")], db: Db, response: Response
+) -> SceneDetail:
+    """Upload a scene. It is parsed in a process that may die without harm; the same content is the same scene."""
+    scene = load_bundle(bundle.file.read())
+    with db.write() as session:
+        row = scenes.add(session, scene)
+    response.headers["Location"] = f"/v1/scenes/{row.id}"
+    return SceneDetail.of(row)
+
+
+@router.get("")
+def list_scenes(db: Db, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> ScenePage:
+    """Scenes, newest first."""
+    with db.read() as session:
+        return ScenePage(scenes=[SceneSummary.of(row) for row in scenes.newest(session, limit)])
+
+
+@router.get("/{scene_id}")
+def get_scene(scene_id: str, db: Db) -> SceneDetail:
+    """One scene, by id or by name (the newest of that name)."""
+    with db.read() as session:
+        return SceneDetail.of(scenes.get(session, scene_id))
+
+
+@router.get("/{scene_id}/pairs")
+def get_scene_pairs(scene_id: str, db: Db) -> ScenePairs:
+    """The pairs to certify, with the reference frame chosen for each and a forecast of its cost."""
+    with db.read() as session:
+        scene = Scene.from_document(scenes.get(session, scene_id).document)
+    names = [joint.name for joint in scene.moving]
+    pairs = []
+    for index, cost in enumerate(forecast(scene)):
+        chains = {"chain_a": [names[i] for i in cost.chain_a], "chain_b": [names[i] for i in cost.chain_b]}
+        pairs.append(PairForecast.model_validate({"index": index, **asdict(cost), **chains}))
+    return ScenePairs(pairs=pairs)
+
+
+@router.get("/{scene_id}/lint")
+def get_scene_lint(scene_id: str, db: Db) -> LintReport:
+    """What a reader should know before trusting a certificate for the scene."""
+    with db.read() as session:
+        document = scenes.get(session, scene_id).document
+    return LintReport(
+        warnings=document["warnings"],
+        substitutions=[
+            Substitution(geometry=g["name"], substitution=g["substitution"], inflation=g["inflation"])
+            for g in document["geometries"]
+            if g["substitution"] is not None
+        ],
+        ignored=[IgnoredPair(a=i["pair"][0], b=i["pair"][1], reason=i["reason"]) for i in document["ignored"]],
+    )

@@ -1,0 +1,49 @@
+"""Whether the service is there and can do its work."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response, status
+from kombu.exceptions import OperationalError
+from redis.exceptions import RedisError
+from sqlalchemy import text
+from sqlalchemy.exc import SQLAlchemyError
+
+from api.access import Db
+from api.schemas import Health, Readiness
+from db.session import Database
+from workers.app import CONTROL, waiting
+
+router = APIRouter(tags=["service"])
+
+
+@router.get("/healthz")
+def get_health() -> Health:
+    """The process answers."""
+    return Health()
+
+
+@router.get("/readyz", responses={503: {"model": Readiness, "description": "Something that the service needs is missing."}})
+def get_readiness(db: Db, response: Response) -> Readiness:
+    """Whether the database and the queue can be reached. Without the queue jobs are accepted and wait."""
+    checks = {"database": _database(db), "queue": _queue()}
+    ready = set(checks.values()) == {"ok"}
+    if not ready:
+        response.status_code = status.HTTP_503_SERVICE_UNAVAILABLE
+    return Readiness(ready=ready, checks=checks)
+
+
+def _database(db: Database) -> str:
+    try:
+        with db.read() as session:
+            session.execute(text("SELECT 1 FROM jobs LIMIT 1"))
+    except SQLAlchemyError as error:
+        return f"cannot be used: {type(error).__name__}"
+    return "ok"
+
+
+def _queue() -> str:
+    try:
+        waiting(CONTROL)
+    except (OperationalError, RedisError) as error:
+        return f"Redis cannot be reached: {error}"
+    return "ok"

@@ -1,0 +1,1 @@
+"""The dashboard: templates and static files; api/pages.py serves them."""

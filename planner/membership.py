@@ -1,0 +1,57 @@
+"""Which regions {s : C s <= d} hold which points, and by how much: every face of every region in one matrix product."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from certifier.model import Array, Polytope, Scene
+
+
+@dataclass(frozen=True)
+class Membership:
+    """Answer for k points and r regions.
+
+    Attributes:
+        inside: (k, r) True where the point satisfies every inequality of the region.
+        margin: (k, r) distance in s from the point to the nearest face's hyperplane, negative outside:
+            min_j (d_j - c_j's) / |c_j|. Minus infinity where the point has no coordinates s.
+    """
+
+    inside: NDArray[np.bool_]
+    margin: Array
+
+
+class MembershipIndex:
+    """The faces of r >= 0 regions of an n-joint scene, stacked."""
+
+    def __init__(self, polytopes: Sequence[Polytope], n: int) -> None:
+        self._count = len(polytopes)
+        self._C = np.concatenate([np.zeros((0, n)), *(p.C for p in polytopes)])
+        self._d = np.concatenate([np.zeros(0), *(p.d for p in polytopes)])
+        self._first = np.cumsum([0, *(len(p.d) for p in polytopes[:-1])])
+        norms = np.linalg.norm(self._C, axis=1)
+        self._norms = np.where(norms > 0, norms, 1.0)
+
+    def locate(self, s: Array) -> Membership:
+        """Membership of the points s, (k, n); a row with a value that is not finite is outside of everything."""
+        k = len(s)
+        if not self._count:
+            return Membership(np.zeros((k, 0), dtype=bool), np.zeros((k, 0)))
+        finite = np.isfinite(s).all(axis=1, keepdims=True)
+        slack = self._d - np.where(finite, s, 0.0) @ self._C.T
+        inside = np.logical_and.reduceat(slack >= 0, self._first, axis=1) & finite
+        margin: Array = np.minimum.reduceat(slack / self._norms, self._first, axis=1)
+        return Membership(inside, np.where(finite, margin, -np.inf))
+
+
+def to_s(scene: Scene, q: Array) -> Array:
+    """Tangent-space coordinates of configurations q, (k, n); a row of NaN where a joint is outside its limits.
+
+    s has period 2 pi in a revolute joint: without the check, a configuration a full turn away would pass for one inside.
+    """
+    within = ((q >= scene.q_lower) & (q <= scene.q_upper)).all(axis=1, keepdims=True)
+    return np.where(within, scene.to_s(q), np.nan)

@@ -1,0 +1,107 @@
+"""The application on a migrated SQLite database and a real queue, and a really certified region to serve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from certifier.model import Scene
+from certifier.pair import Certification
+from certifier.region import Region, certified_region
+from db import jobs, pairs, regions, scenes
+from db.session import Database
+from db.settings import settings
+from tests.scenes import slider
+from tests.services import Queue
+from workers.app import celery_app
+
+BASE_URL = "http://127.0.0.1:8643"
+PROBLEM = "application/problem+json"
+
+
+@pytest.fixture
+def database(sqlite_url: str) -> Iterator[Database]:
+    database = Database(sqlite_url)
+    yield database
+    database.close()
+
+
+@pytest.fixture
+def environment(monkeypatch: pytest.MonkeyPatch) -> Iterator[pytest.MonkeyPatch]:
+    """Settings that a test may set; whatever was built from them is built anew, before and after."""
+
+    def forget() -> None:
+        settings.cache_clear()
+        celery_app.cache_clear()
+
+    forget()
+    yield monkeypatch
+    forget()
+
+
+@pytest.fixture
+def client(database: Database, queue: Queue, environment: pytest.MonkeyPatch) -> Iterator[TestClient]:
+    queue.flush()
+    environment.setenv("CIRIS_REDIS_URL", queue.url)
+    with TestClient(create_app(database), base_url=BASE_URL) as client:
+        yield client
+
+
+@pytest.fixture
+def scene(database: Database) -> Scene:
+    """A slider with two pairs, stored."""
+    scene = slider(posts=2)
+    with database.write() as session:
+        scenes.add(session, scene)
+    return scene
+
+
+@pytest.fixture(scope="session")
+def certified() -> Region:
+    """A region of the slider: -0.3 <= s <= 0.2, both pairs certified and the proof verified."""
+    scene = slider(posts=2)
+    polytope = scene.polytope([[1.0], [-1.0]], [0.2, 0.3])
+    certification = Certification(scene, polytope, np.zeros(1))
+    results = [certification.certify(index) for index in range(len(scene.pairs))]
+    proofs = {index: result.proof or b"" for index, result in enumerate(results)}
+    return certified_region(scene, polytope.C, polytope.d, np.zeros(1), proofs, {"seconds": 1.0})
+
+
+@pytest.fixture
+def region(database: Database, scene: Scene, certified: Region) -> str:
+    """The id of a stored region, made by a job that has succeeded."""
+    return store_region(database, certified)
+
+
+def store_region(database: Database, certified: Region) -> str:
+    """Runs a job by hand: one iteration, its pairs certified, the region accepted, the job ended."""
+    manifest = certified.manifest
+    with database.write() as session:
+        row = scenes.get(session, manifest["scene"]["hash"][:16])
+        job, _ = jobs.create(session, kind="grow", scene_id=row.id, options={"kind": "grow", "seed": {"q": [0.0]}, "random_seed": 0})
+        jobs.start(session, job)
+        names = [(index, pair["a"], pair["b"]) for index, pair in enumerate(manifest["pairs"])]
+        pairs.add_iteration(
+            session,
+            job,
+            index=0,
+            label="contract",
+            C=manifest["halfspace_normals"],
+            d=manifest["halfspace_offsets"],
+            center=manifest["interior_point"],
+            pairs=[pairs.NewPair(index, a, b, 0.1) for index, a, b in names],
+            reuse={},
+            stop_at_first_failure=True,
+        )
+        claim = pairs.claim(session, job.id, 0, [index for index, _, _ in names], task_id=None, lease_seconds=60)
+        assert claim is not None
+        found = pairs.Result(0, pairs.PairState.CERTIFIED, seconds=0.1, stage="sos", margin=0.3, detail="", proof=b"proof of a pair")
+        pairs.save(session, claim, [replace(found, index=index) for index, _, _ in names], worth_stopping=1)
+        region = regions.add(session, job, 0, manifest, certified.proof)
+        jobs.finish(session, job, jobs.JobState.SUCCEEDED, reason="as large as asked for", outcome="certified")
+        return region.id

@@ -1,0 +1,99 @@
+"""Events as a list and as a stream; the stream against a real server, because a test client would wait for its end."""
+
+import json
+import threading
+import time
+from collections.abc import Iterator
+
+import httpx2
+import pytest
+import uvicorn
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from certifier.model import Scene
+from db import events, jobs
+from db.session import Database
+from db.states import JobState
+
+
+@pytest.fixture
+def url(database: Database, client: TestClient) -> Iterator[str]:
+    """A real server on the database of the client."""
+    server = uvicorn.Server(uvicorn.Config(create_app(database), port=0, log_level="warning", timeout_graceful_shutdown=1))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    while not server.started:
+        time.sleep(0.02)
+    yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+    server.should_exit = True
+    thread.join()
+
+
+@pytest.fixture
+def job_id(database: Database, scene: Scene) -> str:
+    with database.write() as session:
+        job, _ = jobs.create(session, kind="grow", scene_id=scene.hash[:16], options={"random_seed": 0})
+        return job.id
+
+
+def add(database: Database, job_id: str, number: int) -> None:
+    with database.write() as session:
+        events.emit(session, jobs.lock(session, job_id), "pairs", {"iteration": number, "pairs": []})
+
+
+def finish(database: Database, job_id: str) -> None:
+    with database.write() as session:
+        job = jobs.lock(session, job_id)
+        jobs.start(session, job)
+        jobs.finish(session, job, JobState.SUCCEEDED, reason="done", outcome="certified")
+
+
+def read(lines: Iterator[str]) -> dict[str, str]:
+    """The next event of a stream, comments left out."""
+    fields: dict[str, str] = {}
+    for line in lines:
+        if not line and fields:
+            return fields
+        name, _, value = line.partition(": ")
+        if name:
+            fields[name] = value
+    raise AssertionError("the stream closed")
+
+
+def test_events_are_listed_in_order(client: TestClient, database: Database, job_id: str) -> None:
+    for number in range(3):
+        add(database, job_id, number)
+    found = client.get(f"/v1/jobs/{job_id}/events").json()["events"]
+    assert [event["seq"] for event in found] == [1, 2, 3, 4]
+    rest = client.get(f"/v1/jobs/{job_id}/events?after=2&limit=1").json()["events"]
+    assert [event["seq"] for event in rest] == [3]
+
+
+def test_events_arrive_as_they_happen_and_the_stream_closes_with_the_job(url: str, database: Database, job_id: str) -> None:
+    with httpx2.stream("GET", f"{url}/v1/jobs/{job_id}/events/stream", timeout=10) as response:
+        assert response.headers["content-type"].startswith("text/event-stream")
+        lines = response.iter_lines()
+        first = read(lines)
+        assert (first["event"], first["id"], json.loads(first["data"])["data"]) == ("job", "1", {"state": "queued"})
+        add(database, job_id, 7)
+        second = read(lines)
+        assert (second["event"], second["id"], json.loads(second["data"])["data"]["iteration"]) == ("pairs", "2", 7)
+        finish(database, job_id)
+        assert [read(lines)["event"] for _ in range(3)] == ["job", "job", "end"]
+        assert list(lines) == []
+
+
+def test_an_interrupted_stream_goes_on_where_it_was(url: str, database: Database, job_id: str) -> None:
+    add(database, job_id, 1)
+    finish(database, job_id)
+    answer = httpx2.get(f"{url}/v1/jobs/{job_id}/events/stream", headers={"Last-Event-ID": "2"})
+    ids = [line.removeprefix("id: ") for line in answer.text.splitlines() if line.startswith("id: ")]
+    assert ids == ["3", "4"]
+    nothing_new = httpx2.get(f"{url}/v1/jobs/{job_id}/events/stream", params={"after": 4})
+    assert [line for line in nothing_new.text.splitlines() if line.startswith("event: ")] == ["event: end"]
+
+
+def test_an_open_stream_does_not_keep_the_server_from_stopping(database: Database, job_id: str, url: str) -> None:
+    with httpx2.stream("GET", f"{url}/v1/jobs/{job_id}/events/stream", timeout=10) as response:
+        read(response.iter_lines())

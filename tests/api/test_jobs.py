@@ -1,0 +1,192 @@
+"""Jobs over HTTP: creation, idempotency, refusals, pages, cancel, retry; the queue is real, the workers are not there."""
+
+import json
+from dataclasses import fields
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from api.schemas import GrowOptions, Seed
+from certifier.growth import GrowthOptions
+from certifier.model import Scene
+from certifier.seed_options import SeedOptions
+from db import jobs, pairs
+from db.session import Database
+from tests.api.conftest import BASE_URL, PROBLEM
+from workers.app import CONTROL, waiting
+
+GROW: dict[str, Any] = {"kind": "grow", "scene": "slider", "seed": {"q": [0.1]}}
+CERTIFY: dict[str, Any] = {"kind": "certify", "scene": "slider", "polytope": {"C": [[1], [-1]], "d": [0.2, 0.2], "center": [0]}}
+
+
+def test_a_job_is_queued_and_announced(client: TestClient, scene: Scene) -> None:
+    answer = client.post("/v1/jobs", json=GROW)
+    assert answer.status_code == 201, answer.text
+    job = answer.json()
+    assert answer.headers["Location"] == f"/v1/jobs/{job['id']}"
+    assert (job["state"], job["kind"], job["scene"], job["ended"]) == ("queued", "grow", scene.hash[:16], False)
+    assert client.get(f"/v1/jobs/{job['id']}").json() == job
+    assert waiting(CONTROL) == 1
+    GrowthOptions.from_document(job["options"])
+
+
+def test_a_polytope_is_taken_as_it_is(client: TestClient, scene: Scene) -> None:
+    job = client.post("/v1/jobs", json=CERTIFY).json()
+    options = GrowthOptions.from_document(job["options"])
+    assert (options.kind, options.seed["C"], options.seed["center"]) == ("certify", [[1], [-1]], [0])
+
+
+def test_the_same_request_under_the_same_key_is_the_same_job(client: TestClient, scene: Scene) -> None:
+    headers = {"Idempotency-Key": "k"}
+    first = client.post("/v1/jobs", json=GROW, headers=headers)
+    again = client.post("/v1/jobs", json=GROW | {"scene": scene.hash[:16]}, headers=headers)
+    assert (first.status_code, again.status_code) == (201, 200)
+    assert again.json() == first.json()
+    other = client.post("/v1/jobs", json=CERTIFY, headers=headers)
+    assert (other.status_code, other.json()["code"], other.headers["content-type"]) == (409, "idempotency_conflict", PROBLEM)
+    assert len(client.get("/v1/jobs").json()["jobs"]) == 1
+
+
+REFUSED: list[tuple[dict[str, Any], int, str, str | None]] = [
+    (GROW | {"scene": "nope"}, 404, "scene_not_found", "scene"),
+    (GROW | {"seed": {"q": [0.1, 0.2]}}, 422, "seed_wrong_length", "seed.q"),
+    (GROW | {"seed": {"q": [1.5]}}, 422, "seed_outside_limits", "seed.q[0]"),
+    (GROW | {"seed": {"q": ["NaN"]}}, 422, "invalid_request", "seed.q[0]"),
+    (GROW | {"seed": {"q": [0.1], "method": "magic"}}, 422, "invalid_request", "seed.method"),
+    (GROW | {"seed": {}}, 422, "missing_option", "seed.q"),
+    (GROW | {"seed": {"q": [0.1], "C": [[1]]}}, 422, "option_value", "seed.C"),
+    (GROW | {"seed": {"method": "polytope", "C": [[1, 2]], "d": [1]}}, 422, "polytope_shape", "seed.C[0]"),
+    (GROW | {"seed": {"q": [0.1], "epsilon": 2}}, 422, "option_value", "seed.epsilon"),
+    (GROW | {"color": "red"}, 422, "invalid_request", "color"),
+    (GROW | {"options": {"max_rounds": -1}}, 422, "invalid_request", "options.max_rounds"),
+    (GROW | {"options": {"rounds": 1}}, 422, "invalid_request", "options.rounds"),
+    (GROW | {"deadline_seconds": 0}, 422, "invalid_request", "deadline_seconds"),
+    (GROW | {"kind": "conquer"}, 422, "invalid_request", None),
+    (CERTIFY | {"polytope": {"C": [[1, 2]], "d": [1]}}, 422, "polytope_shape", "polytope.C[0]"),
+    (CERTIFY | {"polytope": {"C": [[1]], "d": [1, 2]}}, 422, "polytope_shape", "polytope.d"),
+    (CERTIFY | {"polytope": {"C": [[1]], "d": [-1], "center": [0]}}, 422, "center_outside", "polytope.center"),
+    (CERTIFY | {"polytope": {"C": [[1]], "d": ["inf"]}}, 422, "invalid_request", "polytope.d[0]"),
+]
+
+
+@pytest.mark.parametrize(("body", "status", "code", "field"), REFUSED)
+def test_a_bad_request_is_a_problem_that_names_the_field(
+    client: TestClient, scene: Scene, body: dict[str, Any], status: int, code: str, field: str | None
+) -> None:
+    answer = client.post("/v1/jobs", json=body)
+    problem = answer.json()
+    assert (answer.status_code, problem["code"], problem["field"]) == (status, code, field)
+    assert answer.headers["content-type"] == PROBLEM
+    assert problem["detail"]
+    assert client.get("/v1/jobs").json()["jobs"] == []
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "1e999"])
+def test_numbers_that_are_not_finite_are_refused(client: TestClient, scene: Scene, number: str) -> None:
+    body = json.dumps(GROW).replace("0.1", number)
+    answer = client.post("/v1/jobs", content=body, headers={"Content-Type": "application/json"})
+    assert (answer.status_code, answer.json()["field"]) == (422, "seed.q[0]")
+
+
+def test_pages_follow_each_other_and_filters_apply(client: TestClient, scene: Scene) -> None:
+    ids = [client.post("/v1/jobs", json=GROW).json()["id"] for _ in range(5)]
+    client.post(f"/v1/jobs/{ids[0]}/cancel")
+    seen: list[str] = []
+    after = None
+    while True:
+        page = client.get("/v1/jobs", params={"limit": 2} | ({"after": after} if after else {})).json()
+        seen += [job["id"] for job in page["jobs"]]
+        after = page["next"]
+        if after is None:
+            break
+    assert seen == ids[::-1]
+    assert [job["id"] for job in client.get("/v1/jobs?state=cancelled").json()["jobs"]] == [ids[0]]
+    assert client.get("/v1/jobs?kind=certify").json()["jobs"] == []
+    assert len(client.get("/v1/jobs?scene=slider").json()["jobs"]) == 5
+    assert client.get("/v1/jobs?state=lost").json()["field"] == "state"
+    assert client.get("/v1/jobs?after=nope").status_code == 404
+
+
+def test_a_cancelled_job_can_be_tried_again_once(client: TestClient, scene: Scene) -> None:
+    job = client.post("/v1/jobs", json=GROW).json()
+    assert client.post(f"/v1/jobs/{job['id']}/retry").json()["code"] == "job_not_retryable"
+    cancelled = client.post(f"/v1/jobs/{job['id']}/cancel")
+    assert (cancelled.status_code, cancelled.json()["state"]) == (202, "cancelled")
+    again = client.post(f"/v1/jobs/{job['id']}/retry")
+    assert (again.status_code, again.json()["retry_of"], again.json()["state"]) == (201, job["id"], "queued")
+    assert client.post(f"/v1/jobs/{job['id']}/retry").json()["id"] == again.json()["id"]
+
+
+ROUTES = [
+    ("GET", ""),
+    ("GET", "/events"),
+    ("GET", "/events/stream"),
+    ("GET", "/pairs"),
+    ("GET", "/growth"),
+    ("POST", "/cancel"),
+    ("POST", "/retry"),
+]
+
+
+@pytest.mark.parametrize(("method", "path"), ROUTES)
+def test_unknown_jobs_are_not_found(client: TestClient, method: str, path: str) -> None:
+    answer = client.request(method, f"/v1/jobs/nope{path}")
+    assert (answer.status_code, answer.json()["code"]) == (404, "job_not_found")
+
+
+def test_the_matrix_and_the_curve_of_an_ended_job(client: TestClient, region: str) -> None:
+    job = client.get("/v1/jobs").json()["jobs"][0]
+    assert (job["state"], job["outcome"], job["region"], job["ended"]) == ("succeeded", "certified", region, True)
+    matrix = client.get(f"/v1/jobs/{job['id']}/pairs").json()
+    assert [(cell["pair"], cell["iteration"], cell["state"], cell["stage"]) for cell in matrix["cells"]] == [
+        (0, 0, "certified", "sos"),
+        (1, 0, "certified", "sos"),
+    ]
+    assert [pair["b"] for pair in matrix["pairs"]] == ["world/post0", "world/post1"]
+    assert [(it["label"], it["state"], it["faces"]) for it in matrix["iterations"]] == [("contract", "certified", 4)]
+    assert client.get(f"/v1/jobs/{job['id']}/pairs?iteration=7").json()["cells"] == []
+    points = client.get(f"/v1/jobs/{job['id']}/growth").json()["points"]
+    assert [point["region"] for point in points] == [region]
+
+
+def test_a_witness_is_given_in_joint_positions(client: TestClient, database: Database, scene: Scene) -> None:
+    job_id = client.post("/v1/jobs", json=CERTIFY).json()["id"]
+    with database.write() as session:
+        job = jobs.lock(session, job_id)
+        jobs.start(session, job)
+        new = [pairs.NewPair(0, scene.pairs[0].a, scene.pairs[0].b, 1.0)]
+        C, d = [[1.0], [-1.0]], [1.0, 1.0]
+        pairs.add_iteration(
+            session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={1: 0}, stop_at_first_failure=False
+        )
+        claim = pairs.claim(session, job_id, 0, [0], task_id=None, lease_seconds=60)
+        assert claim is not None
+        refuted = pairs.Result(0, pairs.PairState.REFUTED, seconds=0.1, stage="screen", margin=None, detail="", witness_s=[0.25])
+        pairs.save(session, claim, [refuted], worth_stopping=1)
+    matrix = client.get(f"/v1/jobs/{job_id}/pairs").json()
+    assert matrix["cells"][0]["witness_q"] == scene.to_q([0.25]).tolist()
+    assert matrix["iterations"][0]["reused"] == {"1": 0}
+
+
+def test_a_job_is_accepted_while_redis_is_down(database: Database, scene: Scene, environment: pytest.MonkeyPatch) -> None:
+    environment.setenv("CIRIS_REDIS_URL", "redis+socket:///tmp/there-is-no-queue?virtual_host=0")
+    with TestClient(create_app(database), base_url=BASE_URL) as client:
+        assert client.post("/v1/jobs", json=GROW).status_code == 201
+        assert [job["state"] for job in client.get("/v1/jobs").json()["jobs"]] == ["queued"]
+        ready = client.get("/readyz")
+        assert ready.status_code == 503
+        assert ready.json()["checks"]["database"] == "ok"
+        assert ready.json()["checks"]["queue"].startswith("Redis cannot be reached")
+        assert client.get("/healthz").status_code == 200
+
+
+def test_the_service_is_ready_with_its_database_and_its_queue(client: TestClient) -> None:
+    assert client.get("/readyz").json() == {"ready": True, "checks": {"database": "ok", "queue": "ok"}}
+
+
+def test_the_schema_has_the_options_of_the_certifier() -> None:
+    ours, theirs = GrowOptions().model_dump(), GrowthOptions().to_document()
+    assert ours == {name: value for name, value in theirs.items() if name not in ("kind", "seed")}
+    assert set(Seed.model_fields) == {field.name for field in fields(SeedOptions)}

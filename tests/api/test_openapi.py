@@ -1,0 +1,66 @@
+"""The OpenAPI document: operation ids are stable, errors are problems, examples hold."""
+
+from typing import Any
+
+from fastapi.testclient import TestClient
+from pydantic import TypeAdapter
+
+from api.schemas import ContainsRequest, NewJob
+
+OPERATIONS = {
+    "create_scene": "POST /v1/scenes",
+    "list_scenes": "GET /v1/scenes",
+    "get_scene": "GET /v1/scenes/{scene_id}",
+    "get_scene_pairs": "GET /v1/scenes/{scene_id}/pairs",
+    "get_scene_lint": "GET /v1/scenes/{scene_id}/lint",
+    "create_job": "POST /v1/jobs",
+    "list_jobs": "GET /v1/jobs",
+    "get_job": "GET /v1/jobs/{job_id}",
+    "cancel_job": "POST /v1/jobs/{job_id}/cancel",
+    "retry_job": "POST /v1/jobs/{job_id}/retry",
+    "get_job_pairs": "GET /v1/jobs/{job_id}/pairs",
+    "get_job_growth": "GET /v1/jobs/{job_id}/growth",
+    "list_job_events": "GET /v1/jobs/{job_id}/events",
+    "stream_job_events": "GET /v1/jobs/{job_id}/events/stream",
+    "list_regions": "GET /v1/regions",
+    "get_region": "GET /v1/regions/{region_id}",
+    "download_region_proof": "GET /v1/regions/{region_id}/proof",
+    "export_region": "GET /v1/regions/{region_id}/export",
+    "delete_region": "DELETE /v1/regions/{region_id}",
+    "contains": "POST /v1/planning/contains",
+    "get_health": "GET /healthz",
+    "get_readiness": "GET /readyz",
+}
+
+
+def operations(document: dict[str, Any]) -> dict[str, tuple[str, dict[str, Any]]]:
+    return {
+        operation["operationId"]: (f"{method.upper()} {path}", operation)
+        for path, methods in document["paths"].items()
+        for method, operation in methods.items()
+    }
+
+
+def test_operation_ids_are_stable(client: TestClient) -> None:
+    found = operations(client.get("/openapi.json").json())
+    assert {name: route for name, (route, _) in found.items()} == OPERATIONS
+
+
+def test_every_operation_is_described_and_answers_errors_with_problems(client: TestClient) -> None:
+    document = client.get("/openapi.json").json()
+    for name, (_, operation) in operations(document).items():
+        assert operation["description"], name
+        assert operation["responses"]["default"]["content"] == {
+            "application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}
+        }
+        assert "422" not in operation["responses"]
+    assert "HTTPValidationError" not in document["components"]["schemas"]
+
+
+def test_the_examples_are_accepted_by_the_schemas(client: TestClient) -> None:
+    schemas = client.get("/openapi.json").json()["components"]["schemas"]
+    for name in ("GrowRequest", "CertifyRequest"):
+        for example in schemas[name]["examples"]:
+            TypeAdapter(NewJob).validate_python(example)
+    for example in schemas["ContainsRequest"]["examples"]:
+        ContainsRequest.model_validate(example)

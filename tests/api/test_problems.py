@@ -1,0 +1,65 @@
+"""Every error is problem+json, and other web sites are kept out."""
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.app import create_app
+from db import jobs
+from db.session import Database
+from tests.api.conftest import BASE_URL, PROBLEM
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "status", "code"),
+    [
+        ("GET", "/v1/nothing", 404, "not_found"),
+        ("PUT", "/v1/jobs", 405, "method_not_allowed"),
+        ("GET", "/v1/regions?limit=0", 422, "invalid_request"),
+    ],
+)
+def test_errors_of_the_framework_are_problems_too(client: TestClient, method: str, path: str, status: int, code: str) -> None:
+    answer = client.request(method, path)
+    problem = answer.json()
+    assert (answer.status_code, problem["status"], problem["code"]) == (status, status, code)
+    assert answer.headers["content-type"] == PROBLEM
+    assert problem["type"] == f"urn:ciris:problem:{code}"
+
+
+def test_a_body_that_is_not_json_is_a_bad_request(client: TestClient) -> None:
+    answer = client.post("/v1/jobs", content="{", headers={"Content-Type": "application/json"})
+    assert (answer.status_code, answer.json()["code"]) == (400, "malformed_json")
+
+
+def test_every_wrong_field_is_listed(client: TestClient) -> None:
+    problem = client.post("/v1/jobs", json={"kind": "grow", "seed": {"q": []}, "options": {"a": 1}}).json()
+    assert {error["field"] for error in problem["errors"]} == {"scene", "seed.q", "options.a"}
+
+
+def test_an_unexpected_error_tells_nothing_of_the_inside(database: Database, client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_args: object, **_options: object) -> None:
+        raise RuntimeError("a secret")
+
+    monkeypatch.setattr(jobs, "page", fail)
+    with TestClient(create_app(database), base_url=BASE_URL, raise_server_exceptions=False) as quiet:
+        answer = quiet.get("/v1/jobs")
+    assert (answer.status_code, answer.json()["code"]) == (500, "internal")
+    assert "secret" not in answer.text
+
+
+def test_people_see_a_page_instead(client: TestClient) -> None:
+    answer = client.get("/jobs/nope", headers={"Accept": "text/html"})
+    assert answer.status_code == 404
+    assert answer.headers["content-type"].startswith("text/html")
+    assert "there is no job" in answer.text
+
+
+def test_another_site_cannot_change_anything(client: TestClient) -> None:
+    foreign = client.post("/v1/jobs/x/cancel", headers={"Origin": "https://evil.example"})
+    assert (foreign.status_code, foreign.json()["code"]) == (403, "cross_site")
+    own = client.post("/v1/jobs/x/cancel", headers={"Origin": BASE_URL})
+    assert own.status_code == 404
+
+
+@pytest.mark.parametrize(("host", "status"), [("evil.example", 421), ("localhost:8643", 200), ("127.0.0.1", 200), ("[::1]:8643", 200)])
+def test_the_loopback_service_answers_only_to_loopback_names(client: TestClient, host: str, status: int) -> None:
+    assert client.get("/healthz", headers={"Host": host}).status_code == status

@@ -1,0 +1,80 @@
+"""Regions over HTTP: a really certified one, its proof and its exports, read by those they are for."""
+
+import io
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from certifier.region import Region
+from certifier.verify.region import verify_region
+
+
+def test_a_region_is_listed_and_shown_with_its_manifest(client: TestClient, region: str, certified: Region) -> None:
+    for query in ("", "?scene=slider", f"?job={client.get('/v1/jobs').json()['jobs'][0]['id']}"):
+        (summary,) = client.get(f"/v1/regions{query}").json()["regions"]
+        assert (summary["id"], summary["guarantee"], summary["faces"]) == (region, "exact", 4)
+    assert client.get(f"/v1/regions/{region}").json()["manifest"] == certified.manifest
+
+
+def test_the_proof_that_is_downloaded_holds(client: TestClient, region: str, certified: Region) -> None:
+    answer = client.get(f"/v1/regions/{region}/proof")
+    assert answer.content == certified.proof
+    assert answer.headers["content-disposition"] == f'attachment; filename="{region}.proof"'
+    assert len(verify_region(answer.content).pairs) == 2
+
+
+def test_the_manifest_and_the_arrays_are_exported(client: TestClient, region: str, certified: Region) -> None:
+    assert client.get(f"/v1/regions/{region}/export").json() == certified.manifest
+    with np.load(io.BytesIO(client.get(f"/v1/regions/{region}/export?format=npz").content)) as arrays:
+        assert arrays["C"].tolist() == certified.manifest["halfspace_normals"]
+        assert arrays["d"].tolist() == certified.manifest["halfspace_offsets"]
+        assert set(arrays.files) == {"C", "d", "center", "ellipsoid_center", "ellipsoid_shape"}
+
+
+def test_drake_reads_its_yaml_to_the_last_bit(client: TestClient, region: str, certified: Region, tmp_path) -> None:
+    from pydrake.geometry.optimization import LoadIrisRegionsYamlFile
+
+    file = tmp_path / "regions.yaml"
+    file.write_bytes(client.get(f"/v1/regions/{region}/export?format=drake-yaml").content)
+    ((name, polyhedron),) = LoadIrisRegionsYamlFile(str(file)).items()
+    assert name == region
+    assert polyhedron.A().tolist() == certified.manifest["halfspace_normals"]
+    assert polyhedron.b().tolist() == certified.manifest["halfspace_offsets"]
+
+
+def test_an_unknown_format_is_a_problem(client: TestClient, region: str) -> None:
+    assert client.get(f"/v1/regions/{region}/export?format=step").json()["field"] == "format"
+
+
+def test_a_deleted_region_is_gone(client: TestClient, region: str) -> None:
+    assert client.delete(f"/v1/regions/{region}").status_code == 204
+    for answer in (client.get(f"/v1/regions/{region}"), client.get(f"/v1/regions/{region}/proof"), client.delete(f"/v1/regions/{region}")):
+        assert (answer.status_code, answer.json()["code"]) == (404, "region_not_found")
+    assert client.get("/v1/jobs").json()["jobs"][0]["region"] is None
+
+
+@pytest.mark.parametrize("space", ["q", "s"])
+def test_contains_says_which_region_holds_a_point_and_how_deep(client: TestClient, region: str, space: str) -> None:
+    body = {"scene": "slider", space: [[0.1], [0.9], [-0.3]]}
+    answer = client.post("/v1/planning/contains", json=body).json()
+    inside, outside, edge = answer["points"]
+    assert (answer["regions"], inside["inside"], inside["regions"][0]["region"]) == (1, True, region)
+    assert inside["margin"] == inside["regions"][0]["margin"] == pytest.approx(0.1)
+    assert inside["regions"][0]["guarantee"] == "exact"
+    assert (outside["inside"], outside["regions"], outside["margin"]) == (False, [], pytest.approx(-0.7))
+    assert (edge["inside"], edge["margin"]) == (True, 0.0)
+
+
+def test_contains_without_any_region_is_no(client: TestClient, scene) -> None:
+    answer = client.post("/v1/planning/contains", json={"scene": "slider", "q": [[0.1]]}).json()
+    assert answer == {"scene": scene.hash[:16], "regions": 0, "points": [{"inside": False, "regions": [], "margin": None}]}
+
+
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [({"q": [[0.1, 0.2]]}, "q[0]"), ({"q": [[0.1]], "s": [[0.1]]}, None), ({}, None), ({"q": [["x"]]}, "q[0][0]"), ({"q": []}, "q")],
+)
+def test_contains_refuses_what_makes_no_sense(client: TestClient, scene, body: dict[str, object], field: str | None) -> None:
+    answer = client.post("/v1/planning/contains", json={"scene": "slider"} | body)
+    assert (answer.status_code, answer.json()["field"]) == (422, field)
