@@ -1,0 +1,116 @@
+"""What a proposal is made from, and by which method."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, fields
+from enum import StrEnum
+from typing import Any
+
+from certifier.errors import RegionError
+
+
+class Method(StrEnum):
+    """Where a proposal comes from."""
+
+    IRIS_NP2 = "iris_np2"
+    """Drake's IrisNp2."""
+    IRIS_ZO = "iris_zo"
+    """Drake's IrisZo: no nonlinear programs, more faces."""
+    BOX = "box"
+    """A box around the seed, clipped to the joint limits."""
+    POLYTOPE = "polytope"
+    """The given C and d."""
+
+
+@dataclass(frozen=True)
+class SeedOptions:
+    """What to propose.
+
+    Attributes:
+        method: one of :class:`Method`.
+        q: (n,) the seed, joint positions; for every method but ``polytope``.
+        C, d: (m, n), (m,) the polytope in s, for ``polytope``; the joint limits are added to it.
+        center: (n,) a point inside that polytope, in s; default: the centre of its largest ball.
+        half_width: half the side of the ``box``, in s.
+        epsilon, delta: IRIS stops adding faces when, but for a probability delta, at most the fraction epsilon of the
+            volume is in collision.
+        max_iterations: IRIS' alternations between faces and ellipsoid.
+        max_iterations_separating_planes: IRIS' rounds of adding faces within each.
+        tolerance: IRIS ends when the ellipsoid's volume grows by less than this fraction.
+        margin: distance in s at which IRIS' faces stay clear of the collisions found.
+        random_seed: seeds IRIS.
+    """
+
+    method: Method = Method.IRIS_NP2
+    q: tuple[float, ...] | None = None
+    C: tuple[tuple[float, ...], ...] | None = None
+    d: tuple[float, ...] | None = None
+    center: tuple[float, ...] | None = None
+    half_width: float = 1e-3
+    epsilon: float = 0.01
+    delta: float = 0.05
+    max_iterations: int = 3
+    max_iterations_separating_planes: int = 20
+    tolerance: float = 0.02
+    margin: float = 0.01
+    random_seed: int = 0
+
+    def to_document(self) -> dict[str, Any]:
+        """The options as JSON-able data, those that are not given left out."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any]) -> SeedOptions:
+        """Inverse of :meth:`to_document`.
+
+        Raises:
+            RegionError: an unknown, missing or out-of-range option; the error names it.
+        """
+        known = {f.name for f in fields(cls)}
+        for name in document:
+            if name not in known:
+                raise _refuse(name, f"there is no option {name!r}", "unknown_option", f"options: {', '.join(sorted(known))}")
+        given = {name: value for name, value in document.items() if value is not None}
+        try:
+            method = Method(given.pop("method", Method.IRIS_NP2))
+        except ValueError:
+            raise _refuse("method", f"method is one of {', '.join(Method)}") from None
+        needed, idle = (("C", "d"), ("q",)) if method is Method.POLYTOPE else (("q",), ("C", "d", "center"))
+        for name in needed:
+            if name not in given:
+                raise _refuse(name, f"the method {method} needs {name}", "missing_option")
+        for name in idle:
+            if name in given:
+                raise _refuse(name, f"the method {method} has no use for {name}")
+        for name in ("q", "d", "center"):
+            if name in given:
+                given[name] = _numbers(name, given[name])
+        if "C" in given:
+            rows = given["C"]
+            given["C"] = tuple(_numbers(f"C[{i}]", row) for i, row in enumerate(rows if isinstance(rows, list | tuple) else [rows]))
+        for name, most in (("half_width", math.inf), ("epsilon", 1), ("delta", 1), ("tolerance", math.inf), ("margin", math.inf)):
+            if name in given and not (_is_number(given[name]) and 0 < given[name] < most):
+                raise _refuse(name, f"{name} must be a positive number" + (f" below {most}" if most < math.inf else ""))
+        for name, least, most in (
+            ("max_iterations", 1, 1000),
+            ("max_iterations_separating_planes", 1, 1000),
+            ("random_seed", 0, 2**31 - 1),
+        ):
+            if name in given and not (isinstance(given[name], int) and not isinstance(given[name], bool) and least <= given[name] <= most):
+                raise _refuse(name, f"{name} must be an integer from {least} to {most}")
+        return cls(method=method, **given)
+
+
+def _refuse(name: str, message: str, code: str = "option_value", hint: str = "") -> RegionError:
+    return RegionError(code, message, field=f"seed.{name}", hint=hint)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _numbers(name: str, values: object) -> tuple[float, ...]:
+    if not isinstance(values, list | tuple) or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
+        raise _refuse(name, f"{name} must be a list of numbers")
+    return tuple(float(v) for v in values)

@@ -1,0 +1,138 @@
+"""Proposals to certify: a polytope in s around a seed, or a given one. Nothing here is a proof."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.geometry import QueryObject
+
+from certifier.drake_model import build_diagram, geometry_name
+from certifier.errors import RegionError
+from certifier.iris import iris
+from certifier.model import Array, Scene
+from certifier.outcome import Guarantee
+from certifier.polytope import chebyshev_center, check
+from certifier.seed_options import Method, SeedOptions
+
+__all__ = ["Method", "Proposal", "SeedOptions", "check_seed", "propose"]
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A polytope to certify, {C s <= d} within the joint limits.
+
+    Attributes:
+        C, d: (m, n), (m,) the faces, |c_j| = 1 where IRIS made them; the joint limits are not among them.
+        center: (n,) the seed (for ``polytope``: the centre) in s, inside all faces and limits.
+        guarantee: ``sampled`` when IRIS passed its statistical test, else ``none``.
+        info: JSON-able: method, guarantee, faces, seconds, and for IRIS termination, iterations, epsilon, delta and Drake's warnings.
+    """
+
+    C: Array
+    d: Array
+    center: Array
+    guarantee: Guarantee
+    info: dict[str, Any]
+
+
+def check_seed(scene: Scene, q: ArrayLike) -> None:
+    """Refuse joint positions around which no region can be certified.
+
+    Raises:
+        RegionError: ``seed_wrong_length``, ``seed_not_finite``, ``seed_outside_limits`` (the limits themselves are outside) or
+            ``seed_in_collision``, naming the joint or the pair.
+    """
+    q = np.asarray(q, dtype=float)
+    if q.shape != (scene.n,):
+        names = ", ".join(joint.name for joint in scene.moving)
+        raise RegionError(
+            "seed_wrong_length", f"the seed has {q.size} numbers, the scene {scene.n} joints", field="seed.q", hint=f"in order: {names}"
+        )
+    for joint, value in zip(scene.moving, q, strict=True):
+        field = f"seed.q[{joint.index}]"
+        if not np.isfinite(value):
+            raise RegionError("seed_not_finite", f"joint {joint.name} is at {value}", field=field)
+        if value <= joint.lower or value >= joint.upper:
+            raise RegionError(
+                "seed_outside_limits",
+                f"joint {joint.name} is at {value:g}, not between its limits {joint.lower:g} and {joint.upper:g}",
+                field=field,
+            )
+    _check_free(scene, q)
+
+
+def _check_free(scene: Scene, q: Array) -> None:
+    """Refuse a configuration in which a pair is closer than twice the padding."""
+    if not scene.pairs:
+        return
+    diagram = build_diagram(scene)
+    context = diagram.CreateDefaultContext()
+    diagram.plant().SetPositions(diagram.mutable_plant_context(context), q)
+    query: QueryObject = diagram.scene_graph().get_query_output_port().Eval(diagram.mutable_scene_graph_context(context))
+    ids = {geometry_name(query.inspector(), g): g for g in query.inspector().GetAllGeometryIds()}
+    distance, pair = min(
+        ((query.ComputeSignedDistancePairClosestPoints(ids[p.a], ids[p.b]).distance, p) for p in scene.pairs), key=lambda found: found[0]
+    )
+    if distance <= 2 * scene.padding:
+        how = (
+            f"overlap by {-distance:.3g} m"
+            if distance <= 0
+            else f"are {distance:.3g} m apart, with a padding of {scene.padding:g} m on each"
+        )
+        raise RegionError(
+            "seed_in_collision", f"{pair.a} and {pair.b} {how}", field="seed.q", hint="move the seed, or ignore the pair in the scene"
+        )
+
+
+def propose(scene: Scene, options: SeedOptions) -> Proposal:
+    """A polytope around the seed, by the options' method; deterministic for ``random_seed``.
+
+    IRIS may take minutes, and native code runs: call it in a process that may die.
+
+    Raises:
+        RegionError: as :func:`check_seed` and ``polytope.check``; ``polytope_shape``; ``center_outside``;
+            ``seed_cut_off`` when IRIS' region does not contain the seed; ``seeding_failed`` with Drake's words.
+    """
+    start = time.perf_counter()
+    if options.method is Method.POLYTOPE:
+        C, d, center = _given(scene, options)
+        said: dict[str, Any] = {}
+    else:
+        assert options.q is not None, "every method but polytope has a seed"
+        check_seed(scene, options.q)
+        center = scene.to_s(options.q)
+        if options.method is Method.BOX:
+            C, d = _box(scene, center, options.half_width)
+            said = {}
+        else:
+            C, d, said = iris(scene, center, options)
+    guarantee = said.pop("guarantee", Guarantee.NONE)
+    info = {"method": options.method.value, "guarantee": guarantee.value, "faces": len(d), "seconds": time.perf_counter() - start, **said}
+    return Proposal(C, d, center, guarantee, info)
+
+
+def _given(scene: Scene, options: SeedOptions) -> tuple[Array, Array, Array]:
+    C, d = np.array(options.C, dtype=object), np.array(options.d, dtype=float)
+    if C.shape != (len(d), scene.n):
+        raise RegionError("polytope_shape", f"C must have a row of {scene.n} numbers for each of the {len(d)} numbers in d", field="seed.C")
+    C = C.astype(float)
+    limited = scene.polytope(C, d)
+    check(limited, tuple(joint.name for joint in scene.moving))
+    if options.center is None:
+        return C, d, chebyshev_center(limited)[0]
+    center = np.array(options.center)
+    if center.shape != (scene.n,) or not np.all(limited.C @ center < limited.d):
+        raise RegionError(
+            "center_outside", "the centre does not lie strictly inside the polytope and the joint limits", field="seed.center"
+        )
+    return C, d, center
+
+
+def _box(scene: Scene, center: Array, half_width: float) -> tuple[Array, Array]:
+    eye = np.eye(scene.n)
+    above, below = center + half_width < scene.s_upper, center - half_width > scene.s_lower
+    return np.concatenate([eye[above], -eye[below]]), np.concatenate([(center + half_width)[above], (half_width - center)[below]])
