@@ -28,7 +28,7 @@ _PR_SET_PDEATHSIG = 1
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
-def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes: int) -> Any:
+def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes: int, directory: Path | None = None) -> Any:
     """``function(payload)`` computed by a child process that is killed when it takes too long or outlives this process.
 
     Args:
@@ -36,6 +36,7 @@ def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes:
         payload: JSON-able data; NumPy arrays are allowed anywhere in it, as in the result.
         timeout_s: wall-clock limit in seconds.
         memory_bytes: limit of the child's address space.
+        directory: the child's working directory; None for this process's own.
 
     Raises:
         CirisError: the function's own error, of the class it was raised with; or ``child_timeout``, ``child_memory``, or
@@ -50,6 +51,7 @@ def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=log,
+            cwd=directory,
             env={**os.environ, **_ONE_THREAD, "PYTHONPATH": path},
         ) as process:
             try:

@@ -49,7 +49,8 @@ def pack_bundle(path: str | Path) -> bytes:
         file = waiting.pop()
         if file not in files and file.is_file():
             files.add(file)
-            waiting += [resolve(r, file.parent, scene_file.packages) for r in references(file)]
+            starts = _starts(file, scene_file.path)
+            waiting += [resolve(r, start, scene_file.packages) for r in references(file) for start in starts]
     root = Path(os.path.commonpath([f.parent for f in files] + list(scene_file.packages.values())))
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -93,7 +94,13 @@ def check_bundle(root: Path, scene: Path) -> None:
         for reference in references(file):
             if file.suffix.lower() in (".mjcf", ".xml") and ".." in PurePosixPath(reference).parts:
                 raise SceneError("bundle_uri", f"{where}: {reference!r}: .. is not accepted here")
-            _inside(resolve(reference, file.parent, packages), root, f"{where}: {reference!r}")
+            for start in _starts(file, scene):
+                _inside(resolve(reference, start, packages), root, f"{where}: {reference!r}")
+
+
+def _starts(file: Path, scene: Path) -> set[Path]:
+    """The directories that a relative reference in ``file`` may start at: its own, and for SDFormat's include the working directory."""
+    return {file.parent, scene.parent} if file.suffix.lower() == ".sdf" else {file.parent}
 
 
 def _inside(path: Path, root: Path, what: str) -> None:
@@ -121,7 +128,7 @@ def _unpack(data: bytes, root: Path, limits: BundleLimits) -> str:
                 left -= _extract(archive, entry, root, left)
                 if left < 0:
                     raise SceneError("bundle_too_large", f"the bundle unpacks to more than {limits.unpacked_bytes} bytes")
-        scene = json.loads((root / _INDEX).read_text(encoding="utf-8"))["scene"]
+        scene = str(json.loads((root / _INDEX).read_text(encoding="utf-8"))["scene"])
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, ValueError, KeyError, TypeError) as error:
         hint = "make bundles with pack_bundle or `ciris scene add`"
         raise SceneError("bundle_zip", f"this is not a scene bundle: {type(error).__name__}: {error}", hint=hint) from None

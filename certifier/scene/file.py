@@ -19,6 +19,7 @@ import yaml
 from certifier.errors import SceneError
 
 MAX_BYTES = 2**20
+MAX_DEPTH = 50
 MIN_HULL_VERTICES = 8
 
 
@@ -75,7 +76,7 @@ def read_scene_file(path: Path) -> SceneFile:
         SceneError: ``scene_not_found``, ``scene_yaml`` (not YAML, with the line) or ``scene_field`` (with the field).
     """
     text = _text(path)
-    root = _compose(text, path)
+    root = compose(text, path.name)
     keys = ("name", "packages", "directives", "q_star", "padding", "ignore", "mesh", "cylinder_sides")
     nodes = _mapping(root, "", keys)
     if "directives" not in nodes:
@@ -101,6 +102,28 @@ def read_scene_file(path: Path) -> SceneFile:
     )
 
 
+def compose(text: str, name: str) -> yaml.Node | None:
+    """The YAML nodes of a stranger's text: no aliases, and no deeper than a scene needs.
+
+    Raises:
+        SceneError: ``scene_yaml``, with the line.
+    """
+    try:
+        depth = 0
+        for event in yaml.parse(text, Loader=_Loader):
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            if isinstance(event, yaml.AliasEvent):
+                raise SceneError("scene_yaml", f"{name} uses the alias *{event.anchor}; aliases are not supported")
+            if depth > MAX_DEPTH:
+                raise SceneError("scene_yaml", f"{name} is nested more than {MAX_DEPTH} levels deep")
+        return yaml.compose(text, Loader=_Loader)
+    except yaml.MarkedYAMLError as error:
+        line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
+        raise SceneError("scene_yaml", f"{name}{line}: {error.problem}") from None
+    except yaml.YAMLError as error:
+        raise SceneError("scene_yaml", f"{name} is not YAML: {str(error).splitlines()[0]}") from None
+
+
 def close_matches(name: str, known: list[str]) -> str:
     """A hint naming the known names most like ``name``; empty when none is."""
     tails = {k.rsplit("/", 1)[-1]: k for k in known}
@@ -113,29 +136,14 @@ def close_matches(name: str, known: list[str]) -> str:
 def _text(path: Path) -> str:
     try:
         data = path.read_bytes()
-    except FileNotFoundError:
-        raise SceneError("scene_not_found", f"there is no scene file {path}") from None
     except OSError as error:
-        raise SceneError("scene_not_found", f"{path} cannot be read: {error.strerror}") from None
+        raise SceneError("scene_not_found", f"the scene file {path} cannot be read: {error.strerror}") from None
     if len(data) > MAX_BYTES:
         raise SceneError("scene_yaml", f"{path.name} has {len(data)} bytes; a scene file may have {MAX_BYTES}")
     try:
         return data.decode()
     except UnicodeDecodeError as error:
         raise SceneError("scene_yaml", f"{path.name} is not UTF-8 text: {error.reason} at byte {error.start}") from None
-
-
-def _compose(text: str, path: Path) -> yaml.Node | None:
-    try:
-        for event in yaml.parse(text, Loader=_Loader):
-            if isinstance(event, yaml.AliasEvent):
-                raise SceneError("scene_yaml", f"{path.name} uses the alias *{event.anchor}; aliases are not supported")
-        return yaml.compose(text, Loader=_Loader)
-    except yaml.MarkedYAMLError as error:
-        line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise SceneError("scene_yaml", f"{path.name}{line}: {error.problem}") from None
-    except (yaml.YAMLError, RecursionError) as error:
-        raise SceneError("scene_yaml", f"{path.name} is not YAML: {error}") from None
 
 
 def _construct(node: yaml.Node, where: str) -> Any:

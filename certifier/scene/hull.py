@@ -15,10 +15,10 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from certifier.errors import SceneError
 from certifier.model import Array
 
-_FLAT = 1e-9
-"""A hull thinner than this fraction of its size has no volume for qhull's purposes."""
+_FLAT = 1e-5
+"""A hull thinner than this fraction of its size counts as flat, and is given that half thickness."""
 _THICKNESS = 1e-6
-"""Half the thickness in metres that a flat point set is given."""
+"""The least half thickness in metres that a flat point set is given."""
 _SAFETY = 1e-9
 """Relative growth that puts rounding errors on the safe side."""
 
@@ -75,19 +75,20 @@ def _cut_down(points: Array, max_vertices: int) -> Array:
     normals = np.concatenate([axes, -axes])
     vertices = _intersection(normals, points)
     distances: dict[bytes, tuple[Array, float]] = {}
-    while True:
+    for _ in range(max_vertices):
         for v in vertices:
             if v.tobytes() not in distances:
                 distances[v.tobytes()] = _nearest(v, points)
         worst = max(vertices, key=lambda v: distances[v.tobytes()][1])
         nearest, distance = distances[worst.tobytes()]
-        if distance <= _SAFETY:
-            return vertices
+        if distance == 0:
+            break
         normals = np.concatenate([normals, [(worst - nearest) / distance]])
         refined = _intersection(normals, points)
         if len(refined) > max_vertices:
-            return vertices
+            break
         vertices = refined
+    return vertices
 
 
 def _intersection(normals: Array, points: Array) -> Array:

@@ -36,15 +36,15 @@ def _substituted(g: Geometry) -> str:
 
 
 def _filtered(scene: Scene, tree: Tree, candidates: list[tuple[str, str]]) -> list[str]:
-    """Pairs that a collision filter hides although more than one joint lies between their bodies."""
+    """Pairs that a collision filter hides although no joint connects their bodies directly."""
     kept = {frozenset(c) for c in candidates}
-    neighbours = {frozenset((tree.group[j.parent], tree.group[j.child])) for j in tree.joints}
+    neighbours = {frozenset((j.parent, j.child)) for j in tree.joints}
     hidden = [
         f"{a.name} and {b.name}"
         for i, a in enumerate(scene.geometries)
         for b in scene.geometries[i + 1 :]
-        if (groups := frozenset((tree.group[a.body], tree.group[b.body]))) not in neighbours
-        and len(groups) == 2
+        if tree.group[a.body] != tree.group[b.body]
+        and frozenset((a.body, b.body)) not in neighbours
         and frozenset((a.name, b.name)) not in kept
     ]
     if not hidden:

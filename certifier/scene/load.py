@@ -22,14 +22,21 @@ def load_scene(path: str | Path, *, bundle_root: Path | None = None, timeout_s: 
         SceneError: what is wrong and where; ``scene_model_crash`` when reading the models ended the child.
     """
     path = Path(path).absolute()
+    if not path.is_file():
+        raise SceneError("scene_not_found", f"there is no scene file {path}")
     payload = {"path": str(path), "bundle_root": None if bundle_root is None else str(bundle_root)}
     try:
-        document = run_in_child("certifier.scene.parse:parse", payload, timeout_s=timeout_s, memory_bytes=memory_bytes)
+        document = run_in_child(
+            "certifier.scene.parse:parse",
+            payload,
+            timeout_s=timeout_s,
+            memory_bytes=memory_bytes,
+            directory=path.parent,  # where SDFormat looks for included files
+        )
     except SceneError:
         raise
     except CirisError as death:
         message = f"reading the models of {path.name} failed: {death.message}"
-        raise SceneError(
-            "scene_model_crash", message, field="directives", hint="look for files that include themselves, broken shapes or meshes"
-        ) from None
+        hint = "look for files that include themselves, broken shapes or meshes"
+        raise SceneError("scene_model_crash", message, field="directives", hint=hint) from None
     return Scene.from_document(document)

@@ -181,7 +181,9 @@ def _joint(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
         case QuaternionFloatingJoint() | RpyFloatingJoint():
             raise floating(child)
         case _:
-            message = f"joint {name} is a {joint.type_name()} joint; revolute, prismatic and fixed joints are supported"
+            message = (
+                f"joint {name} is a {joint.type_name().removesuffix('_rpy')} joint; revolute, prismatic and fixed joints are supported"
+            )
             raise SceneError("unsupported_joint", message, field="directives")
     lower, upper = float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])
     return Joint(name, kind, parent, child, np.array(axis), X_PF, X_BM, joint.position_start(), lower, upper)

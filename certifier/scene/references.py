@@ -15,6 +15,7 @@ from xml.parsers import expat
 import yaml
 
 from certifier.errors import SceneError
+from certifier.scene.file import compose
 
 _ATTRIBUTES = {"file", "filename", "uri", "url"}
 _PLUGIN = "plugin"
@@ -36,7 +37,7 @@ def references(path: Path) -> list[str]:
         raise SceneError("bundle_file", f"{path.name}: files of this kind are not part of a scene", hint=f"known kinds: {kinds}") from None
     try:
         return read(path)
-    except (UnicodeDecodeError, json.JSONDecodeError, yaml.YAMLError, RecursionError) as error:
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         reason = str(error).splitlines()[0]
         raise SceneError("bundle_text", f"{path.name} cannot be read: {reason}") from None
 
@@ -98,11 +99,8 @@ def _xml(path: Path) -> list[str]:
 
 
 def _yaml(path: Path) -> list[str]:
-    text = path.read_text(encoding="utf-8")
-    if any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(text, Loader=yaml.SafeLoader)):
-        raise SceneError("bundle_text", f"{path.name} uses aliases, which are not accepted")
     found: list[str] = []
-    waiting = [yaml.compose(text, Loader=yaml.SafeLoader)]
+    waiting = [compose(path.read_text(encoding="utf-8"), path.name)]
     while waiting:
         node = waiting.pop()
         if isinstance(node, yaml.MappingNode):
@@ -120,8 +118,11 @@ def _obj(path: Path) -> list[str]:
 
 def _gltf(path: Path) -> list[str]:
     document = json.loads(path.read_text(encoding="utf-8"))
-    parts = [part for key in ("buffers", "images") for part in document.get(key, [])]
-    return [part["uri"] for part in parts if "uri" in part and not part["uri"].startswith("data:")]
+    try:
+        uris = [part["uri"] for key in ("buffers", "images") for part in document.get(key, []) if "uri" in part]
+        return [uri for uri in uris if not uri.startswith("data:")]
+    except (AttributeError, TypeError):
+        raise SceneError("bundle_text", f"{path.name} is not glTF") from None
 
 
 def _nothing(_: Path) -> list[str]:

@@ -1,0 +1,114 @@
+"""Outer approximations contain what they replace, and say how far they reach."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
+
+from certifier.scene import shapes
+from certifier.scene.hull import contains, hull_vertices, outer
+
+
+def in_hull(x, vertices):
+    """Whether x is a convex combination of the vertices, by a linear program: an oracle that knows no half-spaces."""
+    A = np.vstack([vertices.T, np.ones(len(vertices))])
+    return linprog(np.zeros(len(vertices)), A_eq=A, b_eq=np.append(x, 1.0), bounds=(0, None), method="highs").status == 0
+
+
+@st.composite
+def clouds(draw):
+    """Point clouds of many kinds: balls, rods, plates, flat discs, lattices with repeated and coplanar points; far from the origin too."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    count = draw(st.integers(4, 300))
+    kind = draw(st.sampled_from(["ball", "sphere", "lattice", "cylinder"]))
+    if kind == "ball":
+        points = rng.standard_normal((count, 3))
+    elif kind == "sphere":
+        points = rng.standard_normal((count, 3))
+        points /= np.linalg.norm(points, axis=1, keepdims=True)
+    elif kind == "lattice":
+        points = rng.integers(-3, 4, (count, 3)).astype(float)
+    else:
+        angle = 2 * np.pi * np.arange(count) / count
+        points = np.concatenate([np.column_stack([np.cos(angle), np.sin(angle), np.full(count, z)]) for z in (-1.0, 1.0)])
+    size = draw(st.sampled_from([0.001, 0.1, 1.0, 10.0]))
+    thinness = draw(st.sampled_from([1.0, 0.1, 1e-3, 1e-6, 0.0]))
+    rotation = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    points = size * (points * np.array([1.0, 0.7, thinness])) @ rotation.T
+    return points + draw(st.sampled_from([0.0, 5.0])) * rng.standard_normal(3)
+
+
+@settings(max_examples=60, deadline=None)
+@given(clouds(), st.integers(8, 40))
+def test_outer_contains_every_point_and_knows_its_inflation(points, max_vertices):
+    vertices, inflation = outer(points, max_vertices)
+    if inflation == 0:
+        original = {tuple(p) for p in points}
+        assert all(tuple(v) in original for v in vertices)
+        return
+    assert len(vertices) <= max_vertices
+    assert contains(vertices, points)
+    extreme = hull_vertices(points)
+    for p in extreme[:: max(1, len(extreme) // 10)]:
+        assert in_hull(p, vertices)
+    center = extreme.mean(axis=0)
+    directions = np.random.default_rng(0).standard_normal((500, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    gap = ((vertices - center) @ directions.T).max(axis=0) - ((extreme - center) @ directions.T).max(axis=0)
+    assert gap.max() <= inflation + 1e-12
+    assert inflation <= 2 * np.ptp(extreme, axis=0).max() + 1e-5
+
+
+def test_few_vertices_are_kept_as_they_are():
+    vertices, inflation = outer(np.concatenate([shapes.CORNERS, 0.5 * shapes.CORNERS, shapes.CORNERS]), 32)
+    assert inflation == 0.0
+    assert sorted(map(tuple, vertices)) == sorted(map(tuple, shapes.CORNERS))
+
+
+def test_more_vertices_fit_closer():
+    points = np.random.default_rng(1).standard_normal((400, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    volumes = [ConvexHull(outer(points, k)[0]).volume for k in (8, 16, 32, 64)]
+    assert volumes == sorted(volumes, reverse=True)
+    assert volumes[-1] < 1.2 * ConvexHull(points).volume
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(0.001, 2), st.floats(0.001, 2), st.integers(3, 24))
+@example(0.05, 0.3, 3)
+def test_a_prism_is_circumscribed_about_its_cylinder(radius, length, sides):
+    body = shapes.cylinder(radius, length, sides)
+    angle = np.linspace(0, 2 * np.pi, 361)
+    rim = np.concatenate(
+        [np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(361, z)]) for z in (-length / 2, length / 2)]
+    )
+    assert len(body.vertices) == 2 * sides
+    assert contains(body.vertices, rim, 1e-12)
+    assert body.inflation == pytest.approx(np.linalg.norm(body.vertices[:, :2], axis=1).max() - radius)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.tuples(*[st.floats(0.01, 1)] * 3), st.integers(8, 60))
+def test_a_polytope_is_circumscribed_about_its_ellipsoid(semi_axes, count):
+    body = shapes.ellipsoid(semi_axes, count)
+    u = np.random.default_rng(0).standard_normal((500, 3))
+    surface = u / np.linalg.norm(u, axis=1, keepdims=True) * np.array(semi_axes)
+    assert len(body.vertices) == count
+    assert contains(body.vertices, surface, 1e-12)
+    for v in body.vertices:
+        inside = v / np.linalg.norm(v / np.array(semi_axes))
+        assert np.linalg.norm(v - inside) <= body.inflation + 1e-12
+
+
+@given(st.tuples(*[st.floats(-2, 2)] * 3), st.floats(0.1, 3))
+def test_a_half_space_within_reach_is_a_box(center, reach):
+    center = np.array(center)
+    body = shapes.half_space(center, reach)
+    u = np.random.default_rng(0).standard_normal((2000, 3))
+    ball = center + reach * u / np.linalg.norm(u, axis=1, keepdims=True) * np.random.default_rng(1).uniform(0, 1, (2000, 1))
+    below = ball[ball[:, 2] <= 0]
+    assert np.all(below >= body.vertices.min(axis=0) - 1e-12)
+    assert np.all(below <= body.vertices.max(axis=0) + 1e-12)
+    assert body.vertices[:, 2].max() == 0.0
