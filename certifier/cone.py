@@ -13,10 +13,10 @@ Shapes: R rationals, K weights, L = 2^k, N_A chain points, M = 3^k of them the g
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from scipy.linalg import blas, lapack
 
 from certifier.basis import Basis
+from certifier.kernels import cholesky_inverse, schur
 from certifier.model import Array
 
 
@@ -67,45 +67,8 @@ class Cone:
     def schur(self, Q: Array, S: Array) -> Array:
         """H of x -> values(Q Lambda(x) S), symmetrised: (R, K, L, L) twice -> (R, N, N), lower triangles only."""
         H = np.zeros((len(Q), self.N, self.N))
-        _schur(self.rho, self.weights, self.slopes, self.grid, Q, S, H)
+        schur(self.rho, self.weights, self.slopes, self.grid, Q, S, H)
         return H
-
-
-@njit(cache=True, fastmath=True)
-def _schur(rho, weights, slopes, grid, Q, S, H):  # type: ignore[no-untyped-def]
-    R, K = Q.shape[0], Q.shape[1]
-    NA, outside = rho.shape[0], slopes.shape[1]
-    rho_t = np.ascontiguousarray(rho.T)
-    for r in range(R):
-        for k in range(K):
-            A = np.dot(np.dot(rho, Q[r, k]), rho_t)
-            B = np.dot(np.dot(rho, S[r, k]), rho_t)
-            for i in range(NA):
-                gi = weights[k, i]
-                for j in range(i + 1):
-                    A[i, j] *= B[i, j]
-                    H[r, i, j] += gi * weights[k, j] * A[i, j]
-            for a in range(outside):
-                ea = slopes[k, a]
-                if ea == 0.0:
-                    continue
-                row = NA + a * grid
-                for i in range(grid):
-                    for j in range(i + 1):
-                        H[r, row + i, j] += ea * weights[k, j] * A[i, j]
-                    for j in range(i + 1, NA):
-                        H[r, row + i, j] += ea * weights[k, j] * A[j, i]
-                for b in range(a + 1):
-                    eb = ea * slopes[k, b]
-                    if eb == 0.0:
-                        continue
-                    column = NA + b * grid
-                    for i in range(grid):
-                        for j in range(i + 1):
-                            H[r, row + i, column + j] += eb * A[i, j]
-                        if b < a:
-                            for j in range(i + 1, grid):
-                                H[r, row + i, column + j] += eb * A[j, i]
 
 
 class Factor:
@@ -125,15 +88,35 @@ class Factor:
 
     def forward(self, right: Array) -> Array:
         """U'^-1 right: (R, N, p) -> (R, N, p)."""
-        return np.stack([blas.dtrsm(1.0, U, b, trans_a=1) for U, b in zip(self._upper, right, strict=True)])
+        return self._triangular(right, 0)
 
     def backward(self, right: Array) -> Array:
         """U^-1 right: (R, N, p) -> (R, N, p)."""
-        return np.stack([blas.dtrsm(1.0, U, b) for U, b in zip(self._upper, right, strict=True)])
+        return self._triangular(right, 1)
+
+    def _triangular(self, right: Array, transposed: int) -> Array:
+        solution = right.copy(order="C")
+        for upper, block in zip(self._upper, solution, strict=True):
+            # Seen from Fortran, the block is its transpose; it is overwritten in place.
+            blas.dtrsm(1.0, upper, block.T, side=1, trans_a=transposed, overwrite_b=1)
+        return solution
 
     def solve(self, right: Array) -> Array:
         """(U'U)^-1 right: (R, N, p) -> (R, N, p)."""
         return self.backward(self.forward(right))
+
+
+def inverse_cholesky(X: Array) -> Array:
+    """Inverses of the lower Cholesky factors of positive definite matrices, (..., L, L).
+
+    Raises:
+        np.linalg.LinAlgError: a matrix is not positive definite.
+    """
+    inverse = np.empty_like(X)
+    L = X.shape[-1]
+    if not cholesky_inverse(X.reshape(-1, L, L), inverse.reshape(-1, L, L)):
+        raise np.linalg.LinAlgError("matrix is not positive definite")
+    return inverse
 
 
 def symmetrise(X: Array) -> Array:
@@ -156,7 +139,7 @@ class Centre:
     def __init__(self, cone: Cone, w: Array, start: Array, max_iterations: int = 50) -> None:
         x = start * (cone.degree / (w @ start))
         for _ in range(max_iterations):
-            inverse_chol = np.linalg.inv(np.linalg.cholesky(cone.adjoint(x[None])))
+            inverse_chol = inverse_cholesky(cone.adjoint(x[None]))
             Q = np.swapaxes(inverse_chol, -1, -2) @ inverse_chol
             residual = cone.values(Q)[0] - w
             factor = Factor(cone.schur(Q, Q))

@@ -16,12 +16,14 @@ from enum import StrEnum
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
-from certifier.cone import Centre, Cone, Factor, symmetrise
+from certifier.cone import Centre, Cone, Factor, inverse_cholesky, symmetrise
+from certifier.kernels import lowest_relative_eigenvalue
 from certifier.model import Array
 
 DUAL_TOLERANCE = 1e-9
 GAP_TOLERANCE = 1e-9
 START_MARGIN = 2.0
+STEP_TOLERANCE = 1e-3
 
 
 class Status(StrEnum):
@@ -119,8 +121,8 @@ class _Method:
         if gap < GAP_TOLERANCE:
             return Status.BOUNDARY
 
-        chol_Q = [np.linalg.cholesky(Q) for Q in self.Q]
-        inverse_chol_Z = [np.linalg.inv(np.linalg.cholesky(Z)) for Z in self.Z]
+        inverse_chol_Q = [inverse_cholesky(Q) for Q in self.Q]
+        inverse_chol_Z = [inverse_cholesky(Z) for Z in self.Z]
         S = [np.swapaxes(Li, -1, -2) @ Li for Li in inverse_chol_Z]
         factors, images, M = [], [], np.zeros((self.p, self.p))
         for b, Q, Si in zip(blocks, self.Q, S, strict=True):
@@ -150,7 +152,7 @@ class _Method:
 
         mu = gap / self.degree
         _, _, _, dZ, dQ = direction([-Q for Q in self.Q])
-        step_Q, step_Z = self._steps(chol_Q, inverse_chol_Z, dQ, dZ, 0.99)
+        step_Q, step_Z = self._steps(inverse_chol_Q, inverse_chol_Z, dQ, dZ, 0.99)
         predicted = self._inner(
             [Q + step_Q * d for Q, d in zip(self.Q, dQ, strict=True)], [Z + step_Z * d for Z, d in zip(self.Z, dZ, strict=True)]
         )
@@ -159,7 +161,7 @@ class _Method:
             sigma = max(sigma, 0.3)
         centres = [sigma * mu * Si - Q - symmetrise(a @ b @ Si) for Q, Si, a, b in zip(self.Q, S, dQ, dZ, strict=True)]
         dy, dlam, dx, dZ, dQ = direction(centres)
-        step_Q, step_Z = self._steps(chol_Q, inverse_chol_Z, dQ, dZ, 0.95)
+        step_Q, step_Z = self._steps(inverse_chol_Q, inverse_chol_Z, dQ, dZ, 0.95)
         self.y = self.y + step_Q * dy
         self.Q = [symmetrise(Q + step_Q * d) for Q, d in zip(self.Q, dQ, strict=True)]
         self.lam += step_Z * dlam
@@ -179,7 +181,7 @@ class _Method:
             # One step of refinement: the first correction is only as exact as the centre.
             candidate = symmetrise(candidate + _preimage(b, b.columns @ y - b.cone.values(candidate))[0])
             try:
-                np.linalg.cholesky(candidate)
+                inverse_cholesky(candidate)
             except np.linalg.LinAlgError:
                 return None
             repaired.append(candidate)
@@ -190,9 +192,11 @@ class _Method:
         return float(sum(np.vdot(a, b) for a, b in zip(Q, Z, strict=True)))
 
     @staticmethod
-    def _steps(chol_Q: list[Array], inverse_chol_Z: list[Array], dQ: list[Array], dZ: list[Array], fraction: float) -> tuple[float, float]:
+    def _steps(
+        inverse_chol_Q: list[Array], inverse_chol_Z: list[Array], dQ: list[Array], dZ: list[Array], fraction: float
+    ) -> tuple[float, float]:
         """The fractions of the longest primal and dual steps that stay psd, at most 1."""
-        step_Q = min(_longest(np.linalg.inv(L), d) for L, d in zip(chol_Q, dQ, strict=True))
+        step_Q = min(_longest(Li, d) for Li, d in zip(inverse_chol_Q, dQ, strict=True))
         step_Z = min(_longest(Li, d) for Li, d in zip(inverse_chol_Z, dZ, strict=True))
         return min(1.0, fraction * step_Q), min(1.0, fraction * step_Z)
 
@@ -210,5 +214,6 @@ def _preimage(block: Block, v: Array) -> tuple[Array, Array]:
 
 def _longest(inverse_chol: Array, direction: Array) -> float:
     """Largest a with L L' + a D psd, over a stack."""
-    lowest = float(np.linalg.eigvalsh(inverse_chol @ direction @ np.swapaxes(inverse_chol, -1, -2)).min())
+    L = direction.shape[-1]
+    lowest = lowest_relative_eigenvalue(inverse_chol.reshape(-1, L, L), direction.reshape(-1, L, L), STEP_TOLERANCE)
     return np.inf if lowest >= 0 else -1 / lowest
