@@ -225,17 +225,17 @@ def _center(scene_file: SceneFile, tree: Tree) -> Array:
 
 
 def _geometries(scene_file: SceneFile, plant: MultibodyPlant, inspector: SceneGraphInspector, tree: Tree) -> dict[GeometryId, Geometry]:
-    """Every geometry of the proximity role, half-spaces last because their size depends on the reach of the others."""
+    """Every geometry of the proximity role, half-spaces last because their size depends on the reach of the others.
+
+    Drake makes names unique within a body by appending an index; its prefix, the model's name, is dropped.
+    """
     found: dict[GeometryId, Geometry] = {}
-    names: set[str] = set()
     half_spaces = []
-    for index, i in enumerate(inspector.GetAllGeometryIds(Role.kProximity)):
+    for i in inspector.GetAllGeometryIds(Role.kProximity):
         body = plant.GetBodyFromFrameId(inspector.GetFrameId(i))
         body_name = _body_name(plant, body)
         short = inspector.GetName(i).removeprefix(f"{plant.GetModelInstanceName(body.model_instance())}::")
         name = f"{body_name}/{short}"
-        name = f"{name}_{index}" if name in names else name
-        names.add(name)
         if isinstance(inspector.GetShape(i), HalfSpace):
             half_spaces.append((i, name, body_name))
         else:

@@ -7,10 +7,10 @@ import zipfile
 import pytest
 
 from certifier.errors import SceneError
-from certifier.scene import BundleLimits, load_bundle, load_scene, pack_bundle
+from certifier.scene import BundleLimits, load_bundle, pack_bundle
 from certifier.scene.bundle import check_bundle
 from certifier.scene.references import references, resolve
-from tests.scene.workshop import EXAMPLES, ROOM, SCENE, write
+from tests.scene.workshop import EXAMPLES, ROOM, SCENE, parsed, write
 
 TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
@@ -32,7 +32,7 @@ def test_a_bundle_is_the_same_scene():
     bundle = pack_bundle(path)
     assert names(bundle) == ["bundle.json", "dual_ur3e/pallet.sdf", "dual_ur3e/scene.yaml", "ur3e_bin/ur3e.urdf"]
     assert bundle == pack_bundle(path)
-    assert load_bundle(bundle).hash == load_scene(path).hash
+    assert load_bundle(bundle).hash == parsed(path).hash
 
 
 def test_packages_and_meshes_travel_and_strangers_do_not(tmp_path):
@@ -60,7 +60,7 @@ def test_packages_and_meshes_travel_and_strangers_do_not(tmp_path):
     ]
     scene = load_bundle(bundle)
     assert len(scene.geometry("arm/hand/palm").vertices) == 4
-    assert scene.hash == load_scene(path).hash
+    assert scene.hash == parsed(path).hash
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,11 @@ directives:
 
 @pytest.fixture(scope="module")
 def examples():
-    return {name: load_scene(EXAMPLES / name / "scene.yaml") for name in NAMES}
+    return {name: parsed(EXAMPLES / name / "scene.yaml") for name in NAMES}
+
+
+def test_a_child_reads_the_same_scene(examples):
+    assert load_scene(EXAMPLES / "iiwa_shelf" / "scene.yaml").to_document() == examples["iiwa_shelf"].to_document()
 
 
 def original(path):

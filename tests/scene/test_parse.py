@@ -43,6 +43,16 @@ def test_nameless_geometries_are_told_apart(tmp_path):
     assert [g.name for g in scene.geometries][:4] == ["arm/base/Box", "arm/hand/Sphere", "arm/hand/Sphere_1", "arm/hand/Box"]
 
 
+def test_mjcf_with_a_floor_in_the_world(tmp_path):
+    arm = """<mujoco model="arm"><worldbody><geom type="plane" size="1 1 1"/>
+      <body name="base" pos="0 0 0.5"><joint name="turn" type="hinge" axis="0 1 0" range="-90 45"/>
+      <geom name="rod" type="capsule" fromto="0 0 0 0.3 0 0" size="0.05"/></body></worldbody></mujoco>"""
+    scene = parsed(write(tmp_path, "directives: [{add_model: {name: arm, file: arm.xml}}]\n", files={"arm.xml": arm}))
+    assert scene.pairs == (Pair("arm/base/rod", "world/geom0"),)
+    np.testing.assert_allclose([scene.q_lower[0], scene.q_upper[0]], [-np.pi / 2, np.pi / 4])
+    np.testing.assert_allclose(sorted(scene.geometry("arm/base/rod").vertices.tolist()), [[0, 0, 0], [0.3, 0, 0]], atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("shape", "vertices", "radius", "exact"),
     [
