@@ -4,13 +4,14 @@ Appendix B.4 and Algorithm 1 of C-IRIS. :func:`begin` and :func:`advance` decide
 whoever drives them (the service's coordinator, or :mod:`certifier.local`) carries out the :class:`Action` and reports back.
 State, actions and reports are JSON-able, so a job can be resumed from its rows alone.
 
-Contraction. With rows scaled to |c_j| = 1 and seed s0, trial delta is {c_j s <= max(d_j - delta, min(d_j, c_j s0 + r))}: the uniform
-contraction of B.4, with every face stopped a radius r short of the seed, so that the trials are nested, always contain the
-seed, and end in a tiny polytope that is certifiable whenever the seed is free.
+Contraction. Trial sigma is {c_j s <= c_j s0 + sigma (d_j - c_j s0)}, the proposal shrunk about the seed s0: B.4 with delta_j in
+proportion to the face's distance from the seed instead of one delta for all, which keeps the shape. The trials are nested, always contain
+the seed, and end in a tiny polytope that is certifiable whenever the seed is free with some room.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal
 
@@ -20,8 +21,8 @@ from certifier.errors import CirisError, RegionError
 from certifier.model import Array, Scene
 from certifier.outcome import Outcome, combine
 
-SEED_RADIUS = 1e-3
-"""Distance in s at which a contracting face stops short of the seed."""
+SMALLEST_SCALE = 1e-3
+"""The last trial of the contraction, relative to the proposal."""
 
 
 @dataclass(frozen=True)
@@ -298,16 +299,15 @@ def _proposed(scene: Scene, state: dict[str, Any], report: Proposed) -> Transiti
         "holds": {},
         "steps": state["options"]["bisection_steps"],
     }
-    return _contract(scene, state, 0.0)
+    return _contract(scene, state, 1.0)
 
 
-def _contract(scene: Scene, state: dict[str, Any], delta: float) -> Transition:
-    """Certify trial delta; a pair certified on a larger trial is certified on this one."""
+def _contract(scene: Scene, state: dict[str, Any], scale: float) -> Transition:
+    """Certify a trial; a pair certified on a larger trial is certified on this one."""
     C, d, seed = (np.array(state["rows"][name]) for name in ("C", "d", "seed"))
-    inner = np.minimum(d, C @ seed + SEED_RADIUS)
-    limited = scene.polytope(C, np.maximum(d - delta, inner))
-    reuse = {int(index): iteration for index, (iteration, held) in state["holds"].items() if held <= delta}
-    return _certify(scene, {**state, "delta": delta}, "contract", limited.C, limited.d, state["rows"]["seed"], reuse)
+    limited = scene.polytope(C, C @ seed + scale * (d - C @ seed))
+    reuse = {int(index): iteration for index, (iteration, held) in state["holds"].items() if held >= scale}
+    return _certify(scene, {**state, "scale": scale}, "contract", limited.C, limited.d, state["rows"]["seed"], reuse)
 
 
 def _certified(scene: Scene, state: dict[str, Any], report: Certification) -> Transition:
@@ -331,31 +331,29 @@ def _certified(scene: Scene, state: dict[str, Any], report: Certification) -> Tr
 
 
 def _bisect(scene: Scene, state: dict[str, Any], action: Certify, report: Certification, complete: bool) -> Transition:
-    """B.4: smallest delta that certifies, by bisection between the largest that failed and the smallest that did not."""
-    delta = state["delta"]
+    """B.4: the largest trial that certifies, by bisection (of the logarithm) between one that did and one that did not."""
+    scale = state["scale"]
     holds = dict(state["holds"])
     for index, outcome in report.outcomes.items():
-        if outcome is Outcome.CERTIFIED and (str(index) not in holds or holds[str(index)][1] > delta):
-            holds[str(index)] = [action.iteration, delta]
+        if outcome is Outcome.CERTIFIED and (str(index) not in holds or holds[str(index)][1] < scale):
+            holds[str(index)] = [action.iteration, scale]
     state["holds"] = holds
     if complete:
-        state["high"] = delta
-        if delta == 0:
+        state["certified_scale"] = scale
+        if scale == 1.0:
             return _step(state)
     else:
-        state["low"] = delta
-    if "high" not in state:
-        C, d, seed = (np.array(state["rows"][name]) for name in ("C", "d", "seed"))
-        largest = float((d - C @ seed).max())
-        if delta >= largest:
+        state["failed_scale"] = scale
+    if "certified_scale" not in state:
+        if scale == SMALLEST_SCALE:
             pair = scene.pairs[next(i for i, outcome in report.outcomes.items() if outcome is not Outcome.CERTIFIED)]
             reason = f"not even the smallest region around the seed can be certified: {pair.a} and {pair.b} are too close there"
             return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
-        return _contract(scene, state, largest)
+        return _contract(scene, state, SMALLEST_SCALE)
     if state["steps"] == 0:
         return _step(state)
     state["steps"] -= 1
-    return _contract(scene, state, (state["low"] + state["high"]) / 2)
+    return _contract(scene, state, math.sqrt(state["certified_scale"] * state["failed_scale"]))
 
 
 def _step(state: dict[str, Any]) -> Transition:

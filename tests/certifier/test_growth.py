@@ -7,6 +7,7 @@ import pytest
 
 from certifier.errors import CirisError, RegionError
 from certifier.growth import (
+    SMALLEST_SCALE,
     Certification,
     Certify,
     Failed,
@@ -78,7 +79,7 @@ def test_bisection_finds_the_largest_trial_and_never_loses_an_accepted_region(li
     made, accepted, end = drive(SCENE, GrowthOptions(seed={}, max_rounds=0, bisection_steps=12), certified_if(limit))
     sizes = [region.d[0] for region in accepted]
     assert sizes == sorted(sizes)
-    assert limit - 1.0 / 2**11 <= sizes[-1] <= limit
+    assert limit * SMALLEST_SCALE ** (1 / 2**11) <= sizes[-1] <= limit
     assert len(made) == 14
     assert end.outcome is Outcome.CERTIFIED
 
