@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry.optimization import HPolyhedron
 from scipy.optimize import linprog
-from scipy.sparse import csr_array, eye_array, kron
+from scipy.sparse import csr_array
 
 from certifier.errors import RegionError
 from certifier.model import Array, Polytope
@@ -159,11 +159,12 @@ def _largest_ball(polytope: Polytope, at_most: float | None) -> Any:
 
 
 def drop_redundant(polytope: Polytope, fixed: int = 0) -> NDArray[np.int64]:
-    """Indices, ascending, of rows that suffice to describe P. Never enlarges the set: a row goes only when a strict
-    dual bound proves it from the rows that stay, so some weakly redundant rows remain.
+    """Indices, ascending, of rows that suffice to describe P. Never enlarges the set: rows go only when strict dual bounds
+    on P's bounding box prove them from the rows that stay, so some weakly redundant rows remain.
 
-    A bound that is strict on P's bounding box needs no more: were the set larger without the row, a point of it just
-    outside P, hence inside the slightly larger box, would break the bound.
+    The box does no harm: on a way out of P through rows that went, the first of them to be reached would be reached in the
+    box, where the bounds hold. Rows are called needed when a ray from inside leaves P through them alone; each round tries
+    all others against these, and shoots at the points where that fails (Clarkson's algorithm).
 
     Args:
         fixed: this many rows at the end stay whatever happens (the joint limits, say).
@@ -171,20 +172,25 @@ def drop_redundant(polytope: Polytope, fixed: int = 0) -> NDArray[np.int64]:
     Raises:
         RegionError: as :func:`check`.
     """
-    C, d = polytope.C, polytope.d
     lo, hi = bounds(polytope)
+    center = chebyshev_center(polytope)[0]
     margin = 1e-6 * (1 + hi - lo)
-    stays = np.arange(len(d)) >= len(d) - fixed
-    kept = ~_repeated(polytope) | stays
-    needed = _hit_first(polytope, chebyshev_center(polytope)[0], hi - lo) | stays
-    for j in np.flatnonzero(kept & ~needed):
-        others = kept.copy()
-        others[j] = False
-        rest = Polytope(np.concatenate([C[others], C[j : j + 1]]), np.append(d[others], d[j] + 1 + abs(d[j])))
-        _, Y = _supports(rest, C[j : j + 1])
-        Y[:, -1] = 0
-        kept[j] = _proved_bounds(rest, C[j : j + 1], Y, lo - margin, hi + margin)[0] >= d[j]
-    return np.flatnonzero(kept)
+    lo, hi = lo - margin, hi + margin
+    stays = np.arange(len(polytope.d)) >= len(polytope.d) - fixed
+    rows = np.flatnonzero(~_repeated(polytope) | stays)
+    distinct = Polytope(polytope.C[rows], polytope.d[rows])
+    needed, idle = stays[rows], np.zeros(len(rows), dtype=bool)
+    rays = np.random.default_rng(0).normal(size=(_RAYS, len(center))) * (hi - lo)
+    needed |= _left_through(distinct, center, np.concatenate([rays, distinct.C * (hi - lo) ** 2]))
+    while not (needed | idle).all():
+        tried = np.flatnonzero(~needed & ~idle)
+        known, directions = Polytope(distinct.C[needed], distinct.d[needed]), distinct.C[tried]
+        points, Y = _maximise(known, directions, list(zip(lo, hi, strict=True)))
+        proved = _proved_bounds(known, directions, Y, lo, hi) < distinct.d[tried]
+        idle[tried[proved]] = True
+        found = _left_through(distinct, center, points[~proved] - center) & ~needed
+        needed |= found if found.any() else ~idle
+    return rows[needed]
 
 
 def _repeated(polytope: Polytope) -> NDArray[np.bool_]:
@@ -196,17 +202,15 @@ def _repeated(polytope: Polytope) -> NDArray[np.bool_]:
     return repeated
 
 
-def _hit_first(polytope: Polytope, center: Array, width: Array) -> NDArray[np.bool_]:
-    """(m,) True for rows that are certainly needed: some ray from the centre leaves P through them alone."""
-    normals = polytope.C * width**2
-    rays = np.concatenate([np.random.default_rng(0).normal(size=(_RAYS, len(center))) * width, normals])
+def _left_through(polytope: Polytope, center: Array, rays: Array) -> NDArray[np.bool_]:
+    """(m,) True for rows through which alone some ray (r, n) from the centre leaves P."""
     with np.errstate(divide="ignore", invalid="ignore"):
         speed = rays @ polytope.C.T
         time = np.where(speed > 0, (polytope.d - polytope.C @ center) / speed, np.inf)
     first, second = np.partition(time, 1, axis=1)[:, :2].T
-    needed = np.zeros(len(polytope.d), dtype=bool)
-    needed[time.argmin(axis=1)[first < (1 - 1e-9) * second]] = True
-    return needed
+    rows = np.zeros(len(polytope.d), dtype=bool)
+    rows[time.argmin(axis=1)[first < (1 - 1e-9) * second]] = True
+    return rows
 
 
 def inscribed_ellipsoid(polytope: Polytope) -> Ellipsoid:
@@ -270,14 +274,25 @@ def _standard_error(x: Array) -> float:
 
 
 def _supports(polytope: Polytope, directions: Array) -> tuple[Array, Array]:
-    """Support values (k,) and multipliers (k, m) >= 0 for directions (k, n), as one block-diagonal linear program."""
-    k = len(directions)
-    A = kron(eye_array(k), csr_array(polytope.C), format="csr")
-    result = linprog(-directions.ravel(), A, np.tile(polytope.d, k), bounds=(None, None), method="highs-ds", options=_options())
+    """Support values (k,) of P and multipliers (k, m) >= 0 for directions (k, n)."""
+    points, Y = _maximise(polytope, directions, (None, None))
+    return np.einsum("ki,ki->k", directions, points), Y
+
+
+def _maximise(polytope: Polytope, directions: Array, box: Any) -> tuple[Array, Array]:
+    """Maximisers (k, n) in P and the box, and the faces' multipliers (k, m) >= 0, as one block-diagonal linear program.
+
+    Args:
+        box: bounds of s in scipy's form.
+    """
+    k, (m, n) = len(directions), polytope.C.shape
+    columns = np.arange(n) + n * np.repeat(np.arange(k), m)[:, None]
+    A = csr_array((np.tile(polytope.C.ravel(), k), columns.ravel(), n * np.arange(k * m + 1)), shape=(k * m, k * n))
+    box = box * k if isinstance(box, list) else box
+    result = linprog(-directions.ravel(), A, np.tile(polytope.d, k), bounds=box, method="highs-ds", options=_options())
     if result.status != 0:
         raise _failure(polytope, result)
-    values = np.einsum("ki,ki->k", directions, result.x.reshape(k, -1))
-    return values, np.maximum(-result.ineqlin.marginals, 0).reshape(k, -1)
+    return result.x.reshape(k, n), np.maximum(-result.ineqlin.marginals, 0).reshape(k, m)
 
 
 def _options() -> dict[str, float]:

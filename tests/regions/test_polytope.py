@@ -217,6 +217,13 @@ def test_drop_redundant_of_equal_rows_keeps_the_limits():
     assert drop_redundant(polytope).tolist() == [2, 3, 4, 5]
 
 
+def test_drop_redundant_of_scaled_copies_keeps_the_set():
+    """No ray leaves through one of two equal faces alone, and no bound between them is strict."""
+    kept = drop_redundant(Polytope(np.array([[1.0], [2.0], [-1.0], [-2.0]]), np.array([1.0, 2.0, 1.0, 2.0])))
+    assert {0, 1} & set(kept.tolist())
+    assert {2, 3} & set(kept.tolist())
+
+
 @settings(max_examples=25, deadline=None)
 @given(limited_polytopes())
 def test_inscribed_ellipsoid_is_inside_and_as_large_as_a_ball(case):
