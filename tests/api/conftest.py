@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import uvicorn
 from fastapi.testclient import TestClient
 
 from api.app import create_app
@@ -50,6 +53,19 @@ def client(database: Database, queue: Queue, environment: pytest.MonkeyPatch) ->
     environment.setenv("CIRIS_REDIS_URL", queue.url)
     with TestClient(create_app(database), base_url=BASE_URL) as client:
         yield client
+
+
+@pytest.fixture
+def url(database: Database, client: TestClient) -> Iterator[str]:
+    """A real server on the database of the client."""
+    server = uvicorn.Server(uvicorn.Config(create_app(database), port=0, log_level="warning", timeout_graceful_shutdown=1))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    while not server.started:
+        time.sleep(0.02)
+    yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+    server.should_exit = True
+    thread.join()
 
 
 @pytest.fixture

@@ -1,33 +1,16 @@
 """Events as a list and as a stream; the stream against a real server, because a test client would wait for its end."""
 
 import json
-import threading
-import time
 from collections.abc import Iterator
 
 import httpx2
 import pytest
-import uvicorn
 from fastapi.testclient import TestClient
 
-from api.app import create_app
 from certifier.model import Scene
 from db import events, jobs
 from db.session import Database
 from db.states import JobState
-
-
-@pytest.fixture
-def url(database: Database, client: TestClient) -> Iterator[str]:
-    """A real server on the database of the client."""
-    server = uvicorn.Server(uvicorn.Config(create_app(database), port=0, log_level="warning", timeout_graceful_shutdown=1))
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    while not server.started:
-        time.sleep(0.02)
-    yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
-    server.should_exit = True
-    thread.join()
 
 
 @pytest.fixture

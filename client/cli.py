@@ -1,0 +1,142 @@
+"""The ``ciris`` command."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
+
+from certifier.errors import CirisError
+from client import commands
+from client.service import NEGATIVE
+
+EPILOG = """exit status: 0 success; 1 a negative answer (not certified, a proof that does not hold, a point outside);
+2 bad input or no service; 130 interrupted. An error is one line on standard error. --json prints one JSON document
+on standard output, everything else goes to standard error.
+
+SCENE is the path of a scene file (.yaml), or the name or id of a scene that the service knows."""
+
+INTERRUPTED = 130
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"error: {message} (see {self.prog} --help)\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command; returns the exit status."""
+    parsed = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
+    run: Callable[[argparse.Namespace], int] = parsed.run
+    try:
+        return run(parsed)
+    except CirisError as error:
+        return _fail(str(error), 1 if error.code in NEGATIVE else 2)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        return _fail(f"{error.filename or ''}: {error.strerror or error}".removeprefix(": "), 2)
+    except KeyboardInterrupt:
+        return _fail("interrupted", INTERRUPTED)
+
+
+def _fail(message: str, status: int) -> int:
+    print("error:", " ".join(message.split()), file=sys.stderr)
+    return status
+
+
+def _joined(arguments: Sequence[str]) -> list[str]:
+    """``--q -0.5,1`` as ``--q=-0.5,1``: argparse takes a list that begins with a minus for an option."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and joined[-1] == "--q" and re.match(r"-[\d.]", argument):
+            joined[-1] = f"--q={argument}"
+        else:
+            joined.append(argument)
+    return joined
+
+
+def _group(parser: argparse.ArgumentParser) -> Any:
+    return parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="ciris",
+        description="Certified collision-free regions of robot configuration space.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    verbs = _group(parser)
+    remote = _Parser(add_help=False)
+    remote.add_argument("--url", help="the service; default: CIRIS_URL, or the stack that `ciris up` runs here")
+    json = _Parser(add_help=False)
+    json.add_argument("--json", action="store_true", help="print one JSON document")
+
+    up = verbs.add_parser("up", help="run the service on this machine until Ctrl-C")
+    up.add_argument("--port", type=int, help="port of the API; default: CIRIS_PORT or 8643, or any free one when that is taken")
+    up.add_argument("--data", metavar="DIR", help="data directory; default: CIRIS_DATA_DIR")
+    up.set_defaults(run=commands.up)
+
+    scene = _group(verbs.add_parser("scene", help="add, list and show scenes"))
+    add = scene.add_parser("add", parents=[remote, json], help="upload a scene file with all it refers to")
+    add.add_argument("path", metavar="PATH.yaml")
+    add.set_defaults(run=commands.scene_add)
+    scene.add_parser("ls", parents=[remote, json], help="list scenes, newest first").set_defaults(run=commands.scene_ls)
+    show = scene.add_parser("show", parents=[remote, json], help="a scene's joints, warnings and pairs")
+    show.add_argument("scene", metavar="ID")
+    show.set_defaults(run=commands.scene_show)
+
+    grow = verbs.add_parser("grow", parents=[remote, json], help="grow a certified region around a configuration")
+    grow.add_argument("scene", metavar="SCENE")
+    grow.add_argument("--q", metavar='"0,0.3,..."', help="seed: joint positions; default: q of the seed.yaml beside the scene file")
+    grow.add_argument("--method", help="how the first polytope is found; default: the service's")
+    grow.add_argument("--rounds", type=int, help="rounds of the polytope step; 0 ends after contraction")
+    grow.add_argument("--random-seed", type=int, help="seeds every random choice; default 0")
+    grow.add_argument("--out", metavar="FILE", help="where the proof goes; default: named after scene and proof, here")
+    grow.add_argument("--watch", action="store_true", help="a line for every pair as it is settled")
+    grow.add_argument("--local", action="store_true", help="in this process, without a service")
+    grow.set_defaults(run=commands.grow)
+
+    certify = verbs.add_parser("certify", parents=[remote, json], help="one outcome per pair for a given polytope")
+    certify.add_argument("scene", metavar="SCENE")
+    certify.add_argument(
+        "--polytope", metavar="FILE.npz", required=True, help="C (m x n), d (m) and optionally center (n), in s; joint limits are added"
+    )
+    certify.add_argument("--watch", action="store_true", help="a line for every pair as it is settled")
+    certify.add_argument("--local", action="store_true", help="in this process, without a service")
+    certify.set_defaults(run=commands.certify)
+
+    verify = verbs.add_parser("verify", parents=[json], help="check a proof file offline; says what was proved")
+    verify.add_argument("proof", metavar="PROOF")
+    verify.set_defaults(run=commands.verify)
+
+    region = _group(verbs.add_parser("region", help="list, show and export regions"))
+    ls = region.add_parser("ls", parents=[remote, json], help="list regions, newest first")
+    ls.add_argument("--scene", help="only those of this scene")
+    ls.set_defaults(run=commands.region_ls)
+    show = region.add_parser("show", parents=[remote, json], help="a region's manifest")
+    show.add_argument("region", metavar="ID")
+    show.set_defaults(run=commands.region_show)
+    export = region.add_parser("export", parents=[remote], help="a region as a file")
+    export.add_argument("region", metavar="ID")
+    export.add_argument("--format", choices=["json", "npz", "drake-yaml", "proof"], default="json")
+    export.add_argument("--out", metavar="FILE", help="default: standard output")
+    export.set_defaults(run=commands.region_export)
+
+    contains = verbs.add_parser("contains", parents=[remote, json], help="which certified regions hold a configuration")
+    contains.add_argument("scene", metavar="SCENE")
+    contains.add_argument("--q", metavar='"0,0.3,..."', required=True, action="append", help="joint positions; may be given several times")
+    contains.set_defaults(run=commands.contains)
+
+    doctor = verbs.add_parser("doctor", parents=[remote, json], help="what is installed, what works, what the machine can do")
+    doctor.set_defaults(run=commands.doctor)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

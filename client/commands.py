@@ -1,0 +1,227 @@
+"""What the commands do. Each takes the parsed arguments and returns the exit status."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+from certifier.errors import CirisError
+from client import output, service
+from client.find import service_url
+from client.http import Client
+from client.inputs import configuration, polytope_file, seed_of
+from client.output import Screen, print_json
+
+OK, NO = 0, 1
+
+
+def up(args: Namespace) -> int:
+    """Becomes the supervisor of the embedded stack."""
+    options = [f"--{name}={value}" for name, value in (("port", args.port), ("data", args.data)) if value is not None]
+    sys.stdout.flush()
+    os.execv(sys.executable, [sys.executable, "-m", "workers.stack", *options])
+
+
+def scene_add(args: Namespace) -> int:
+    with _client(args) as client:
+        scene = client.add_scene(args.path)
+        warnings = client.lint(scene["id"])["warnings"]
+    for warning in warnings:
+        print("warning:", warning, file=sys.stderr)
+    if args.json:
+        print_json(scene)
+    else:
+        print(f"{scene['id']}  {scene['name']}: {scene['joints']} joints, {scene['geometries']} geometries, {scene['pairs']} pairs")
+    return OK
+
+
+def scene_ls(args: Namespace) -> int:
+    with _client(args) as client:
+        scenes = client.scenes()
+    if args.json:
+        print_json(scenes)
+    else:
+        rows = [(s["id"], s["name"], str(s["joints"]), str(s["geometries"]), str(s["pairs"])) for s in scenes]
+        output.print_table(("id", "name", "joints", "geometries", "pairs"), rows, right="joints geometries pairs")
+    return OK
+
+
+def scene_show(args: Namespace) -> int:
+    with _client(args) as client:
+        scene = client.scene(args.scene)
+        lint, pairs = client.lint(args.scene), client.scene_pairs(args.scene)
+    if args.json:
+        print_json({**scene, "lint": lint, "pair_list": pairs})
+        return OK
+    print(f"{scene['name']} ({scene['id']}), padding {output.metres(scene['padding'])}")
+    rows = [(j["name"], j["kind"], f"{j['lower']:.4f}", f"{j['upper']:.4f}", f"{j['q_star']:.4f}") for j in scene["positions"]]
+    output.print_table(("joint", "kind", "lower", "upper", "q*"), rows, right="lower upper q*")
+    print()
+    rows = [
+        (f"{p['a']} - {p['b']}", p["frame"], f"{p['gram_a']}, {p['gram_b']}", f"{p['N_a']}, {p['N_b']}", output.seconds(p["seconds"]))
+        for p in pairs
+    ]
+    output.print_table(("pair", "frame", "Gram", "N", "forecast"), rows, right="Gram N forecast")
+    for item in lint["substitutions"]:
+        print(f"{item['geometry']}: {item['substitution']} (reaches outside by at most {output.metres(item['inflation'])})")
+    for item in lint["ignored"]:
+        print(f"ignored: {item['a']} - {item['b']} ({item['reason']})")
+    for warning in lint["warnings"]:
+        print("warning:", warning)
+    return OK
+
+
+def grow(args: Namespace) -> int:
+    screen = Screen()
+    seed: dict[str, Any] = {"q": seed_of(args.scene, args.q)}
+    if args.method is not None:
+        seed["method"] = args.method
+    options = {name: value for name, value in (("max_rounds", args.rounds), ("random_seed", args.random_seed)) if value is not None}
+    if args.local:
+        from client import local
+
+        grown, url = local.grow(args.scene, seed, options, screen), None
+    else:
+        with _client(args) as client:
+            scene = service.known_scene(client, args.scene)
+            grown = service.grow(client, {"kind": "grow", "scene": scene["id"], "seed": seed, "options": options}, screen, args.watch)
+            url = f"{client.url}/regions/{grown.region}"
+    path = save_proof(grown.manifest, grown.proof, args.out)
+    if args.json:
+        print_json({**grown.manifest, "seconds": grown.seconds, "proof": str(path)})
+        return OK
+    extra = [("time", output.seconds(grown.seconds)), ("ended", grown.remark), ("proof", f"{path} (check it: ciris verify {path})")]
+    output.print_region(grown.manifest, [*extra, *([("region", url)] if url else [])])
+    return OK
+
+
+def save_proof(manifest: dict[str, Any], proof: bytes, out: str | None) -> Path:
+    """Writes the proof file, here unless told where; its name holds its digest, so the same proof is the same file."""
+    path = Path(out or f"{manifest['scene']['name']}-{hashlib.sha256(proof).hexdigest()[:8]}.proof")
+    path.write_bytes(proof)
+    return path
+
+
+def certify(args: Namespace) -> int:
+    screen = Screen()
+    polytope = polytope_file(args.polytope)
+    if args.local:
+        from client import local
+
+        document = local.certify(args.scene, polytope, screen, args.watch)
+    else:
+        with _client(args) as client:
+            document = service.certify(client, service.known_scene(client, args.scene), polytope, screen, args.watch)
+    if args.json:
+        print_json(document)
+    else:
+        output.print_pairs(document["pairs"])
+        for pair in document["pairs"]:
+            if pair["witness_q"] is not None:
+                print(f"collision of {pair['a']} and {pair['b']} at q = {', '.join(f'{value:.6g}' for value in pair['witness_q'])}")
+        scene = document["scene"]["name"]
+        print(f"{scene}: {output.plain(document['outcome'])}, guarantee {document['guarantee']}, {output.seconds(document['seconds'])}")
+    return OK if document["outcome"] == "certified" else NO
+
+
+def verify(args: Namespace) -> int:
+    from certifier.proof import ProofError
+    from certifier.verify.region import verify_region
+
+    data = Path(args.proof).read_bytes()
+    try:
+        statement = verify_region(data)
+    except ProofError as error:
+        if args.json:
+            print_json({"holds": False, "error": error.to_document()})
+        print("error:", " ".join(f"{args.proof}: the proof does not hold: {error}".split()), file=sys.stderr)
+        return NO
+    if args.json:
+        print_json({"holds": True, "scene": {"name": statement.scene.name, "hash": statement.scene.hash}, "statement": statement.lines()})
+    else:
+        print("the proof holds:", *statement.lines(), sep="\n  ")
+    return OK
+
+
+def region_ls(args: Namespace) -> int:
+    with _client(args) as client:
+        regions = client.regions(scene=args.scene)
+        names = {scene["id"]: scene["name"] for scene in client.scenes()}
+    if args.json:
+        print_json(regions)
+        return OK
+    rows = [
+        (
+            r["id"],
+            names.get(r["scene"]) or r["scene"],
+            str(r["faces"]),
+            f"{r['ellipsoid_volume']:.4g}",
+            r["guarantee"],
+            r["created_at"][:19],
+        )
+        for r in regions
+    ]
+    output.print_table(("id", "scene", "faces", "volume", "guarantee", "created"), rows, right="faces volume")
+    return OK
+
+
+def region_show(args: Namespace) -> int:
+    with _client(args) as client:
+        region = client.region(args.region)
+    if args.json:
+        print_json(region["manifest"])
+        return OK
+    output.print_region(region["manifest"], [("job", region["job"]), ("created", region["created_at"])])
+    print()
+    output.print_pairs(region["manifest"]["pairs"])
+    return OK
+
+
+def region_export(args: Namespace) -> int:
+    with _client(args) as client:
+        data = client.proof(args.region) if args.format == "proof" else client.export(args.region, args.format)
+    if args.out is not None:
+        Path(args.out).write_bytes(data)
+    elif args.format in ("npz", "proof") and sys.stdout.isatty():
+        raise CirisError("terminal", f"{args.format} is not for terminals", field="--out", hint="name a file")
+    else:
+        sys.stdout.buffer.write(data)
+    return OK
+
+
+def contains(args: Namespace) -> int:
+    points = [configuration(text) for text in args.q]
+    with _client(args) as client:
+        scene = service.known_scene(client, args.scene)
+        answer = client.contains(scene["id"], points)
+    inside = all(point["inside"] for point in answer["points"])
+    if args.json:
+        print_json(answer)
+        return OK if inside else NO
+    for q, point in zip(points, answer["points"], strict=True):
+        where = ", ".join(f"{value:g}" for value in q)
+        if point["inside"]:
+            hits = "; ".join(f"{hit['region']} (margin {hit['margin']:.3g}, {hit['guarantee']})" for hit in point["regions"])
+            print(f"inside: {where} in {hits}")
+        else:
+            print(f"outside: {where} is in none of {answer['regions']} regions")
+    return OK if inside else NO
+
+
+def doctor(args: Namespace) -> int:
+    from client.doctor import examine
+
+    findings = examine(args.url)
+    if args.json:
+        print_json([vars(finding) for finding in findings])
+    else:
+        output.print_facts([(finding.name, f"{'' if finding.good else 'PROBLEM: '}{finding.text}") for finding in findings])
+    return OK if all(finding.good for finding in findings) else NO
+
+
+def _client(args: Namespace) -> Client:
+    return Client(service_url(args.url))

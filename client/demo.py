@@ -1,0 +1,132 @@
+"""``./start``: the embedded stack, the example job and its progress, the certified region, its proof verified, the dashboard's address."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import certifier
+from certifier.errors import CirisError
+from client import output, service
+from client.commands import save_proof
+from client.find import data_dir, running_stack
+from client.http import Client
+from client.inputs import seed_of
+from client.output import Screen
+
+SCENE = Path(__file__).resolve().parent.parent / "examples" / "iiwa_shelf" / "scene.yaml"
+STOP_SECONDS = 30
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the demonstration; returns 0 only if the region was certified and its proof verified here."""
+    parser = argparse.ArgumentParser(prog="./start", description="A certified collision-free region for a 7-joint arm in front of a shelf.")
+    parser.add_argument("--once", action="store_true", help="end after the job")
+    once = parser.parse_args(arguments).once
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with _stack() as url:
+            verified = _demonstrate(url)
+            if not once:
+                print(f"\nthe service keeps running; dashboard: {url}/   (Ctrl-C ends it)", flush=True)
+                signal.pause()
+    except CirisError as error:
+        print("error:", " ".join(str(error).split()), file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print(file=sys.stderr)
+        return 0 if not once else 130
+    return 0 if verified else 1
+
+
+def _demonstrate(url: str) -> bool:
+    screen = Screen()
+    with Client(url) as client:
+        scene = client.add_scene(SCENE)
+        print(f"ciris is up at {url} (data: {data_dir()})")
+        size = f"{scene['joints']} joints, {scene['geometries']} convex bodies, {scene['pairs']} pairs to separate"
+        print(f"scene {scene['name']}: {size}", flush=True)
+        request = {"kind": "grow", "scene": scene["id"], "seed": {"q": seed_of(str(SCENE), None)}}
+        start = time.monotonic()
+        grown = service.grow(client, request, screen, idempotency_key=_key(request))
+        waited = time.monotonic() - start
+    path = save_proof(grown.manifest, grown.proof, str(data_dir() / f"{scene['name']}.proof"))
+    print("\nevery pair of bodies:")
+    output.print_pairs(grown.manifest["pairs"])
+    print("\ncertified region:")
+    earlier = "" if waited > 1 else ", in an earlier run: the stored region is shown"
+    output.print_region(grown.manifest, [("time", output.seconds(grown.seconds) + earlier), ("ended", grown.remark), ("proof", str(path))])
+    verified = _verified(grown.proof)
+    print(f"\nlook at it: {url}/regions/{grown.region}", flush=True)
+    return verified
+
+
+def _verified(proof: bytes) -> bool:
+    from certifier.proof import ProofError
+    from certifier.verify.region import verify_region
+
+    try:
+        lines = verify_region(proof).lines()
+    except ProofError as error:
+        print("error: the proof does not hold:", error, file=sys.stderr)
+        return False
+    print("\nthe proof was verified here, independently of the service:", *lines, sep="\n  ")
+    return True
+
+
+def _key(request: dict[str, Any]) -> str:
+    """One key for this request and this code: a second run shows the region of the first."""
+    code = hashlib.sha256(json.dumps(request, sort_keys=True).encode())
+    root = Path(certifier.__file__).parent
+    for file in sorted(root.rglob("*.py")):
+        code.update(file.read_bytes())
+    return f"start:{code.hexdigest()}"
+
+
+@contextmanager
+def _stack() -> Iterator[str]:
+    """The URL of the stack: the one that runs, or one that runs as long as this block."""
+    running = running_stack(data_dir())
+    if running is not None and _answers(running):
+        yield running
+        return
+    log = data_dir() / "logs" / "stack.log"
+    log.parent.mkdir(parents=True, exist_ok=True)
+    print("starting the service ...", flush=True)
+    with log.open("ab") as errors:
+        stack = subprocess.Popen([sys.executable, "-m", "workers.stack"], stdout=subprocess.PIPE, stderr=errors, text=True)
+    try:
+        assert stack.stdout is not None
+        if not stack.stdout.readline():
+            raise CirisError("stack_failed", "the service did not start", hint=f"see {log}")
+        url = running_stack(data_dir())
+        assert url is not None, "a stack that says it is up has written down where"
+        yield url
+    finally:
+        stack.terminate()
+        try:
+            stack.wait(STOP_SECONDS)
+        except subprocess.TimeoutExpired:
+            stack.kill()
+
+
+def _answers(url: str) -> bool:
+    try:
+        with Client(url) as client:
+            client.ready()
+    except CirisError:
+        return False
+    return True
+
+
+if __name__ == "__main__":
+    sys.exit(main())

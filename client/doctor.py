@@ -1,0 +1,90 @@
+"""What is installed, which solvers work, what the machine can do."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+
+from certifier.errors import CirisError
+from client.find import data_dir, service_url
+from client.http import Client
+
+PACKAGES = ("drake", "python-flint", "numpy", "scipy", "numba", "fastapi", "celery", "redis", "sqlalchemy")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at; ``good`` is False where something that is needed is missing."""
+
+    name: str
+    text: str
+    good: bool = True
+
+
+def examine(url: str | None) -> list[Finding]:
+    """Looks at everything, in an order for people."""
+    return [
+        Finding("python", f"{platform.python_version()} on {platform.platform()}", sys.version_info >= (3, 11)),
+        Finding("machine", f"{_cores()} cores, {_memory_gib():.1f} GiB of memory"),
+        *map(_package, PACKAGES),
+        _tried("drake solvers", _solvers),
+        _tried("exact arithmetic", _flint),
+        Finding("data directory", str(data_dir())),
+        _service(url),
+    ]
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _memory_gib() -> float:
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
+
+
+def _package(name: str) -> Finding:
+    try:
+        return Finding(name, version(name))
+    except PackageNotFoundError:
+        return Finding(name, "is not installed", False)
+
+
+def _tried(name: str, look: Callable[[], str]) -> Finding:
+    try:
+        return Finding(name, look())
+    except (ImportError, RuntimeError, AssertionError) as error:
+        return Finding(name, f"{type(error).__name__}: {error}", False)
+
+
+def _solvers() -> str:
+    """The convex and nonlinear solvers of this Drake that may be used, by trying the one that is needed."""
+    from pydrake import solvers
+
+    program = solvers.MathematicalProgram()
+    x = program.NewContinuousVariables(1)
+    program.AddLinearCost(x[0])
+    program.AddBoundingBoxConstraint(1, 2, x)
+    assert abs(solvers.ClarabelSolver().Solve(program).get_optimal_cost() - 1) < 1e-6, "Clarabel solved a linear program wrongly"
+    kinds = (solvers.ClarabelSolver, solvers.ScsSolver, solvers.SnoptSolver, solvers.IpoptSolver, solvers.MosekSolver)
+    return ", ".join(kind.__name__.removesuffix("Solver") for kind in kinds if kind().available() and kind().enabled())
+
+
+def _flint() -> str:
+    from flint import fmpq
+
+    assert fmpq(1, 3) + fmpq(1, 6) == fmpq(1, 2)
+    return "rationals work"
+
+
+def _service(url: str | None) -> Finding:
+    try:
+        with Client(service_url(url)) as client:
+            ready = client.ready()
+            wrong = "; ".join(f"{name}: {state}" for name, state in ready["checks"].items() if state != "ok")
+            return Finding("service", f"{client.url} is {'ready' if ready['ready'] else f'not ready ({wrong})'}", ready["ready"])
+    except CirisError as error:
+        return Finding("service", str(error), good=error.code == "no_service" and url is None)

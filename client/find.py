@@ -1,0 +1,38 @@
+"""Where the service is: an address that was given, or the embedded stack of the data directory."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+from certifier.errors import CirisError
+
+
+def data_dir() -> Path:
+    """The data directory of ``ciris up`` on this machine: CIRIS_DATA_DIR, or the user's data directory."""
+    given = os.environ.get("CIRIS_DATA_DIR")
+    if given:
+        return Path(given).expanduser()
+    home = os.environ.get("XDG_DATA_HOME")
+    return (Path(home) if home else Path.home() / ".local" / "share") / "ciris"
+
+
+def running_stack(data: Path) -> str | None:
+    """The URL that the stack of this data directory wrote down; None when none runs there."""
+    try:
+        return str(json.loads((data / "stack.json").read_text())["url"])
+    except FileNotFoundError:
+        return None
+
+
+def service_url(given: str | None) -> str:
+    """The service's URL: ``given``, CIRIS_URL, or the running stack's.
+
+    Raises:
+        CirisError: no_service.
+    """
+    url = given or os.environ.get("CIRIS_URL") or running_stack(data_dir())
+    if url is None:
+        raise CirisError("no_service", "no service is running here", hint="start one with `ciris up`, name one with --url, or use --local")
+    return url

@@ -1,0 +1,67 @@
+"""A job's events, told to people as they happen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from client.http import Client, Document
+from client.output import Screen, plain, seconds
+
+_STEPS = {"propose": "seeding", "step": "polytope step", "accept": "assembling and verifying the region"}
+
+
+class Teller:
+    """Turns events into lines and one status line.
+
+    Args:
+        watch: every pair gets a line of its own.
+    """
+
+    def __init__(self, screen: Screen, pairs: list[str], watch: bool) -> None:
+        self._screen, self._pairs, self._watch = screen, pairs, watch
+        self._total = self._done = 0
+
+    def tell(self, event: Document) -> None:
+        """Says what the event means; kinds that it does not know are left out."""
+        teller = getattr(self, f"_tell_{event['kind']}", None)
+        if teller is not None:
+            teller(event["data"])
+
+    def _tell_job(self, data: dict[str, Any]) -> None:
+        self._screen.status(f"job {data['state']}")
+
+    def _tell_step(self, data: dict[str, Any]) -> None:
+        name = _STEPS.get(data["kind"], data["kind"])
+        if data.get("seconds") is None:
+            self._screen.status(f"{name} ...")
+        else:
+            self._screen.line(f"{name}: {data['state']} after {seconds(data['seconds'])}")
+
+    def _tell_iteration(self, data: dict[str, Any]) -> None:
+        if data["state"] != "running":
+            settled = f"{self._done} of {self._total} pairs settled"
+            self._screen.line(f"iteration {data['index']} ({data['label']}): {plain(data['state'])}, {settled}")
+            return
+        self._total, self._done = data["pairs"], 0
+        self._screen.status(f"iteration {data['index']} ({data['label']}): {self._total} pairs")
+
+    def _tell_pairs(self, data: dict[str, Any]) -> None:
+        for pair in data["pairs"]:
+            self._done += 1
+            text = f"{self._pairs[pair['index']]}: {plain(pair['state'])}"
+            if self._watch:
+                self._screen.line(f"  {self._done}/{self._total} {text} ({seconds(pair['seconds'])})")
+            self._screen.status(f"iteration {data['iteration']}: {self._done}/{self._total} pairs, {text}")
+
+    def _tell_region(self, data: dict[str, Any]) -> None:
+        self._screen.line(f"certified region of iteration {data['iteration']}: ellipsoid volume {data['ellipsoid_volume']:.4g}")
+
+
+def follow(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:
+    """Tells the job's events until it has ended; returns the ended job."""
+    pairs = [f"{pair['a']} - {pair['b']}" for pair in client.job_pairs(job_id, iteration=0)["pairs"]]
+    teller = Teller(screen, pairs, watch)
+    for event in client.events(job_id):
+        teller.tell(event)
+    screen.clear()
+    return client.job(job_id)

@@ -1,0 +1,97 @@
+"""What users type and point to, as numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from certifier.errors import CirisError, RegionError
+
+Array = NDArray[np.float64]
+
+SEED_FILE = "seed.yaml"
+_LIST = "joint positions, separated by commas"
+
+
+def configuration(text: str, field: str = "--q") -> list[float]:
+    """``"0, 0.3, -1.8"`` as numbers.
+
+    Raises:
+        RegionError: bad_number, naming the place.
+    """
+    values = []
+    for i, part in enumerate(text.replace(",", " ").split()):
+        try:
+            value = float(part)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise RegionError("bad_number", f"{part!r} is not a finite number", field=f"{field}[{i}]", hint=_LIST)
+        values.append(value)
+    if not values:
+        raise RegionError("bad_number", "no numbers were given", field=field, hint=_LIST)
+    return values
+
+
+def is_scene_file(scene: str) -> bool:
+    """Whether the user means a file rather than a name or id that the service knows."""
+    return scene.endswith((".yaml", ".yml")) or "/" in scene
+
+
+def seed_of(scene: str, q: str | None) -> list[float]:
+    """The seed configuration: ``q``, or the ``q`` of the seed.yaml beside the scene file.
+
+    Raises:
+        CirisError: seed_missing, or what is wrong with it.
+    """
+    if q is not None:
+        return configuration(q)
+    path = Path(scene).parent / SEED_FILE
+    if not is_scene_file(scene) or not path.is_file():
+        raise CirisError("seed_missing", "no seed was given", field="--q", hint=f"or put a {SEED_FILE} with q beside the scene file")
+    try:
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        return configuration(" ".join(str(float(value)) for value in document["q"]), field=f"{path}: q")
+    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
+        raise CirisError("seed_file", f"{path} holds no list of numbers called q: {error}".splitlines()[0], field="--q") from None
+
+
+@dataclass(frozen=True)
+class PolytopeFile:
+    """C (m, n), d (m,) and optionally center (n,), in s."""
+
+    C: Array
+    d: Array
+    center: Array | None
+
+
+def polytope_file(path: str) -> PolytopeFile:
+    """Reads an npz file with C, d and optionally center.
+
+    Raises:
+        RegionError: polytope_file, saying what is wrong.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            content = {name: np.asarray(arrays[name], dtype=float) for name in arrays.files if name in ("C", "d", "center")}
+    except FileNotFoundError:
+        raise RegionError("polytope_file", f"there is no file {path}", field="--polytope") from None
+    except (OSError, ValueError, TypeError, BadZipFile, EOFError) as error:
+        raise RegionError("polytope_file", f"{path} cannot be read as an npz file of numbers: {error}", field="--polytope") from None
+    missing = {"C", "d"} - content.keys()
+    if missing:
+        raise RegionError("polytope_file", f"{path} has no array {' and no array '.join(sorted(missing))}", field="--polytope")
+    C, d, center = content["C"], content["d"], content.get("center")
+    if C.ndim != 2 or d.shape != (len(C),) or (center is not None and center.shape != C.shape[1:]):
+        shapes = f"C is {C.shape}, d is {d.shape}" + ("" if center is None else f", center is {center.shape}")
+        raise RegionError("polytope_shape", f"{shapes}; they must be (m, n), (m,) and (n,)", field="--polytope")
+    for name, array in content.items():
+        if not np.isfinite(array).all():
+            raise RegionError("polytope_not_finite", f"{name} holds a number that is not finite", field="--polytope")
+    return PolytopeFile(C, d, center)

@@ -1,0 +1,46 @@
+"""Growing and certifying in this process, without a service."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from certifier.errors import SceneError
+from certifier.model import Scene
+from client.inputs import PolytopeFile, is_scene_file
+from client.output import Screen
+from client.service import Grown
+
+
+def load(scene: str) -> Scene:
+    """The scene of a scene file.
+
+    Raises:
+        SceneError: scene_not_found for a name that only a service could know, or what is wrong with the file.
+    """
+    if not is_scene_file(scene):
+        raise SceneError("scene_not_found", f"{scene!r} is not a scene file", field="SCENE", hint="--local needs the path of a .yaml file")
+    from certifier.scene import load_scene
+
+    return load_scene(scene)
+
+
+def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], screen: Screen) -> Grown:
+    """Grows a region here."""
+    loaded = load(scene)
+    from certifier import local
+    from certifier.growth import GrowthOptions
+
+    region = local.grow(loaded, GrowthOptions.from_document({"kind": "grow", "seed": seed, **options}), screen.status)
+    screen.clear()
+    provenance = region.manifest["provenance"]
+    return Grown(region.manifest, region.proof, provenance["seconds"], remark=provenance["reason"])
+
+
+def certify(scene: str, polytope: PolytopeFile, screen: Screen, watch: bool) -> dict[str, Any]:
+    """Certifies a polytope here; the document of ``ciris certify --json``."""
+    loaded = load(scene)
+    from certifier import local
+
+    document = local.certify(loaded, polytope.C, polytope.d, polytope.center, screen.line if watch else screen.status)
+    screen.clear()
+    return document

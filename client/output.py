@@ -1,0 +1,111 @@
+"""What people see: results on standard output, progress on standard error, one status line on a terminal."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+Row = Sequence[str]
+
+
+class Screen:
+    """Progress on standard error: lines that stay, and on a terminal one line that is overwritten."""
+
+    def __init__(self) -> None:
+        self._terminal = sys.stderr.isatty()
+        self._status = False
+
+    def line(self, text: str) -> None:
+        """A line that stays."""
+        self.clear()
+        print(text, file=sys.stderr, flush=True)
+
+    def status(self, text: str) -> None:
+        """The present state of affairs; shown on a terminal only."""
+        if self._terminal:
+            width = shutil.get_terminal_size().columns - 1
+            print(f"\r\x1b[2K{text[:width]}", end="", file=sys.stderr, flush=True)
+            self._status = True
+
+    def clear(self) -> None:
+        """Removes the status line."""
+        if self._status:
+            print("\r\x1b[2K", end="", file=sys.stderr, flush=True)
+            self._status = False
+
+
+def print_json(document: Any) -> None:
+    """One JSON document on standard output."""
+    json.dump(document, sys.stdout, indent=1, allow_nan=False)
+    print()
+
+
+def print_table(header: Row, rows: Iterable[Row], right: str = "") -> None:
+    """Columns aligned; those whose header is in ``right`` (space-separated) to the right."""
+    lines = [tuple(header), *map(tuple, rows)]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(header))]
+    flush = [name in right.split() for name in header]
+    for line in lines:
+        cells = (text.rjust(w) if r else text.ljust(w) for text, w, r in zip(line, widths, flush, strict=True))
+        print("  ".join(cells).rstrip())
+
+
+def print_facts(facts: Iterable[tuple[str, str]]) -> None:
+    """Names and values, two columns."""
+    rows = list(facts)
+    width = max(len(name) for name, _ in rows)
+    for name, value in rows:
+        print(f"  {name.ljust(width)}  {value}")
+
+
+def plain(outcome: str | None) -> str:
+    """``not_certifiable`` -> ``not certifiable``."""
+    return "-" if outcome is None else outcome.replace("_", " ")
+
+
+def seconds(value: float | None) -> str:
+    """A duration for people."""
+    if value is None:
+        return "-"
+    return f"{value:.2f} s" if value < 10 else f"{value:.0f} s" if value < 600 else f"{value / 60:.0f} min"
+
+
+def metres(value: float | None) -> str:
+    """A distance for people."""
+    return "-" if value is None else f"{1000 * value:.3g} mm"
+
+
+def print_pairs(pairs: Iterable[dict[str, Any]]) -> None:
+    """One line for each pair of a ``certify`` document or a manifest, failures last."""
+    ordered = sorted(pairs, key=lambda pair: pair["outcome"] != "certified")
+    timed = any("stage" in pair for pair in ordered)
+    rows = [
+        (f"{p['a']} - {p['b']}", plain(p["outcome"]), metres(p["margin"]), *((plain(p["stage"]), seconds(p["seconds"])) if timed else ()))
+        for p in ordered
+    ]
+    print_table(("pair", "outcome", "margin", *(("stage", "time") if timed else ())), rows, right="margin time")
+
+
+def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()) -> None:
+    """A region's manifest in a few lines."""
+    volume, pairs, space = manifest["volume"], manifest["pairs"], manifest["space"]
+    limits = 2 * len(space["joints"])
+    faces = len(manifest["halfspace_offsets"])
+    closest = min((p for p in pairs if p["margin"] is not None), key=lambda p: p["margin"], default=None)
+    error = volume["polytope_stderr"]
+    polytope = f"{volume['polytope']:.4g}" + ("" if error is None else f" +- {error:.1g}")
+    print_facts(
+        [
+            ("scene", f"{manifest['scene']['name']} ({manifest['scene']['hash'][:16]})"),
+            ("joints", f"{len(space['joints'])}: {', '.join(space['joints'])}"),
+            ("faces", f"{faces}, {limits} of them joint limits" if faces > limits else str(faces)),
+            ("volume", f"inscribed ellipsoid {volume['ellipsoid']:.4g}, polytope {polytope} (in s)"),
+            ("pairs", f"{sum(p['outcome'] == 'certified' for p in pairs)} of {len(pairs)} certified, {len(manifest['ignored'])} ignored"),
+            *([("margin", f"at least {metres(closest['margin'])}: {closest['a']} - {closest['b']}")] if closest else []),
+            ("guarantee", manifest["guarantee"]),
+            *extra,
+        ]
+    )

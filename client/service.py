@@ -1,0 +1,117 @@
+"""Growing and certifying on the service."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from certifier.errors import CirisError
+from certifier.outcome import Guarantee, Outcome
+from client.follow import follow
+from client.http import Client, Document
+from client.inputs import PolytopeFile, is_scene_file
+from client.output import Screen
+
+NEGATIVE = {"not_grown"}
+"""Codes of errors that are answers: the input was fine, and the answer is no."""
+
+
+@dataclass(frozen=True)
+class Grown:
+    """A region that a job has grown.
+
+    Attributes:
+        region: its id on the service; None when it was grown in this process.
+        remark: why growing ended.
+    """
+
+    manifest: Document
+    proof: bytes
+    seconds: float
+    region: str | None = None
+    remark: str = ""
+
+
+def known_scene(client: Client, scene: str) -> Document:
+    """The scene of a scene file, uploaded, or of a name or id that the service knows."""
+    return client.add_scene(scene) if is_scene_file(scene) else client.scene(scene)
+
+
+def grow(client: Client, request: Document, screen: Screen, watch: bool = False, idempotency_key: str | None = None) -> Grown:
+    """Has the service grow a region and waits for it.
+
+    Raises:
+        CirisError: why there is no region.
+    """
+    job, new = client.create_job(request, idempotency_key)
+    if new or not job["ended"]:
+        screen.line(f"job {job['id']}: {client.url}/jobs/{job['id']}")
+        job = _wait(client, job["id"], screen, watch)
+    if job["region"] is None:
+        raise _error(job)
+    region = client.region(job["region"])
+    return Grown(region["manifest"], client.proof(job["region"]), _seconds(job), job["region"], job["reason"] or "")
+
+
+def certify(client: Client, scene: Document, polytope: PolytopeFile, screen: Screen, watch: bool = False) -> Document:
+    """Has the service certify a polytope; the document of ``ciris certify --json``.
+
+    Raises:
+        CirisError: the polytope was refused, or the job was cancelled.
+    """
+    body: dict[str, Any] = {"C": polytope.C.tolist(), "d": polytope.d.tolist()}
+    if polytope.center is not None:
+        body["center"] = polytope.center.tolist()
+    job, _ = client.create_job({"kind": "certify", "scene": scene["id"], "polytope": body})
+    screen.line(f"job {job['id']}: {client.url}/jobs/{job['id']}")
+    job = _wait(client, job["id"], screen, watch)
+    if job["outcome"] is None or (job["error"] and job["error"]["code"] not in NEGATIVE):
+        raise _error(job)
+    matrix = client.job_pairs(job["id"])
+    names = {pair["index"]: pair for pair in matrix["pairs"]}
+    outcome = Outcome(job["outcome"])
+    return {
+        "scene": {"name": scene["name"], "hash": scene["hash"]},
+        "outcome": outcome.value,
+        "guarantee": (Guarantee.EXACT if outcome is Outcome.CERTIFIED else Guarantee.NONE).value,
+        "seconds": _seconds(job),
+        "pairs": [
+            {
+                "a": names[cell["pair"]]["a"],
+                "b": names[cell["pair"]]["b"],
+                "outcome": cell["state"],
+                "margin": cell["margin"],
+                "seconds": cell["seconds"],
+                "stage": cell["stage"],
+                "witness_q": cell["witness_q"],
+                "detail": cell["detail"],
+            }
+            for cell in matrix["cells"]
+            if cell["state"] in set(Outcome)
+        ],
+    }
+
+
+def _wait(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:
+    ready = client.ready()
+    if not ready["ready"]:
+        wrong = "; ".join(f"{name}: {state}" for name, state in ready["checks"].items() if state != "ok")
+        screen.line(f"warning: the job waits until the service is ready ({wrong})")
+    try:
+        return follow(client, job_id, screen, watch)
+    except KeyboardInterrupt:
+        screen.line(f"job {job_id} goes on without you: {client.url}/jobs/{job_id}")
+        raise
+
+
+def _error(job: Document) -> CirisError:
+    """Why an ended job has no result."""
+    if job["error"]:
+        return CirisError.from_document(job["error"])
+    return CirisError(f"job_{job['state']}", job["reason"] or f"the job is {job['state']}")
+
+
+def _seconds(job: Document) -> float:
+    start, end = (datetime.fromisoformat(job[name]) for name in ("started_at", "finished_at"))
+    return (end - start).total_seconds()

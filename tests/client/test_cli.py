@@ -1,0 +1,224 @@
+"""The command line: exit status, one-line errors, JSON alone on standard output."""
+
+from __future__ import annotations
+
+import io
+import json
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import httpx2
+import numpy as np
+import pytest
+
+from certifier.model import Scene
+from certifier.region import Region
+from certifier.verify.region import verify_region
+from client.cli import _joined
+from client.find import data_dir
+from db.settings import Settings
+from tests.client.conftest import PLANAR, Ciris, command, surroundings
+
+
+def test_the_help_documents_the_exit_status(spawn: Ciris) -> None:
+    done = spawn("--help")
+    assert done.status == 0
+    assert "exit status: 0 success; 1 a negative answer" in done.stdout
+
+
+def test_a_wrong_command_line_is_one_line(ciris: Ciris) -> None:
+    for arguments in ((), ("fly",), ("certify", "scene.yaml"), ("grow", "a", "--rounds", "x")):
+        done = ciris(*arguments)
+        assert (done.status, done.raw) == (2, b"")
+        assert "--help" in done.error
+
+
+def test_without_a_service_the_error_says_what_to_do(ciris: Ciris) -> None:
+    done = ciris("scene", "ls")
+    assert done.status == 2
+    assert "ciris up" in done.error
+    assert ciris("scene", "ls", CIRIS_URL="http://127.0.0.1:9").error.startswith("the service at http://127.0.0.1:9 does not answer")
+
+
+def write(path: Path, **arrays: object) -> Path:
+    np.savez(path, **arrays)  # type: ignore[arg-type]
+    return path
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    """Polytopes for the planar arm, one good and many bad."""
+    eye, d = np.eye(2), np.full(4, 0.05)
+    C = np.concatenate([eye, -eye])
+    write(tmp_path / "small.npz", C=C, d=d, center=np.zeros(2))
+    write(tmp_path / "empty.npz", C=C, d=-d)
+    write(tmp_path / "narrow.npz", C=C[:, :1], d=d)
+    write(tmp_path / "ragged.npz", C=C, d=d[:2])
+    write(tmp_path / "nan.npz", C=C * np.nan, d=d)
+    write(tmp_path / "nothing.npz", A=C)
+    write(tmp_path / "pickled.npz", C=np.array([object()], dtype=object), d=d)
+    (tmp_path / "text.npz").write_text("no zip")
+    (tmp_path / "broken.yaml").write_text("directives: [")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("certify", PLANAR, "--polytope", "missing.npz"), "there is no file missing.npz"),
+        (("certify", PLANAR, "--polytope", "text.npz"), "cannot be read as an npz file"),
+        (("certify", PLANAR, "--polytope", "pickled.npz"), "cannot be read as an npz file"),
+        (("certify", PLANAR, "--polytope", "nothing.npz"), "no array C and no array d"),
+        (("certify", PLANAR, "--polytope", "ragged.npz"), "C is (4, 2), d is (2,)"),
+        (("certify", PLANAR, "--polytope", "nan.npz"), "not finite"),
+        (("certify", PLANAR, "--polytope", "narrow.npz"), "C is (4, 1)"),
+        (("certify", PLANAR, "--polytope", "empty.npz"), "no point satisfies"),
+        (("certify", "planar-2dof", "--polytope", "small.npz"), "is not a scene file"),
+        (("grow", "nowhere.yaml", "--q", "0,0"), "nowhere.yaml"),
+        (("grow", "broken.yaml", "--q", "0,0"), "broken.yaml, line 1"),
+        (("grow", "broken.yaml"), "--q: no seed was given"),
+        (("grow", PLANAR, "--q", "0,nan"), "--q[1]: 'nan' is not a finite number"),
+        (("grow", PLANAR, "--q", "0"), "2 joints"),
+        (("grow", PLANAR, "--q", "0,9"), "seed.q[1]: joint arm/elbow is at 9"),
+        (("grow", PLANAR, "--q", "-1.2,1.0"), "arm/lower/bar and obstacles/body/post overlap"),
+        (("grow", PLANAR, "--method", "magic"), "seed.method"),
+    ],
+)
+@pytest.mark.usefixtures("parsed_once")
+def test_bad_input_is_one_line_that_says_where(ciris: Ciris, files: Path, arguments: tuple[object, ...], words: str) -> None:
+    done = ciris(*arguments, "--local", "--json")
+    assert (done.status, done.raw) == (2, b"")
+    assert words in done.error
+
+
+def test_certifying_here_prints_the_stable_document(spawn: Ciris, files: Path) -> None:
+    done = spawn("certify", PLANAR, "--polytope", "small.npz", "--local", "--json")
+    document = done.json
+    assert done.status == 0
+    assert {"scene", "outcome", "guarantee", "seconds", "pairs"} <= set(document)
+    assert (document["scene"]["name"], document["outcome"], document["guarantee"]) == ("planar-2dof", "certified", "exact")
+    assert len(document["pairs"]) == 6
+    for pair in document["pairs"]:
+        assert {"a", "b", "outcome", "margin", "seconds", "stage", "witness_q"} <= set(pair)
+        assert (pair["outcome"], pair["witness_q"]) == ("certified", None)
+
+
+@pytest.mark.usefixtures("parsed_once")
+def test_a_collision_is_a_negative_answer_with_its_witness(ciris: Ciris, tmp_path: Path) -> None:
+    write(tmp_path / "all.npz", C=np.zeros((0, 2)), d=np.zeros(0))
+    done = ciris("certify", PLANAR, "--polytope", "all.npz", "--local")
+    assert done.status == 1
+    assert "collision of arm/lower/bar and obstacles/body/block at q = " in done.stdout
+    assert done.stdout.splitlines()[-1].startswith("planar-2dof: refuted, guarantee none")
+
+
+def test_a_proof_that_holds_says_what_it_proves(ciris: Ciris, certified: Region, tmp_path: Path) -> None:
+    (tmp_path / "good.proof").write_bytes(certified.proof)
+    done = ciris("verify", "good.proof")
+    assert (done.status, done.stderr) == (0, "")
+    assert done.stdout.splitlines() == ["the proof holds:", *(f"  {line}" for line in certified.statement.lines())]
+    assert ciris("verify", "good.proof", "--json").json["holds"] is True
+
+
+def test_a_proof_that_does_not_hold_is_a_negative_answer(ciris: Ciris, certified: Region, tmp_path: Path) -> None:
+    damaged = bytearray(certified.proof)
+    damaged[len(damaged) // 2] ^= 1
+    (tmp_path / "bad.proof").write_bytes(damaged)
+    done = ciris("verify", "bad.proof", "--json")
+    assert (done.status, done.json["holds"]) == (1, False)
+    assert "does not hold" in done.error
+    missing = ciris("verify", "missing.proof")
+    assert (missing.status, missing.error) == (2, "missing.proof: No such file or directory")
+
+
+def test_scenes_are_added_listed_and_shown(ciris: Ciris, url: str) -> None:
+    added = ciris("scene", "add", PLANAR, "--json", "--url", url)
+    assert (added.status, added.json["name"]) == (0, "planar-2dof")
+    assert [scene["id"] for scene in ciris("scene", "ls", "--json", CIRIS_URL=url).json] == [added.json["id"]]
+    shown = ciris("scene", "show", "planar-2dof", CIRIS_URL=url)
+    assert "arm/elbow" in shown.stdout
+    assert "arm/lower/bar - obstacles/body/post" in shown.stdout
+    assert len(ciris("scene", "show", "planar-2dof", "--json", CIRIS_URL=url).json["pair_list"]) == 6
+    unknown = ciris("scene", "show", "nope", CIRIS_URL=url)
+    assert (unknown.status, unknown.error) == (2, "scene: there is no scene 'nope'")
+
+
+def test_regions_are_listed_shown_and_exported(ciris: Ciris, url: str, region: str, certified: Region) -> None:
+    assert [r["id"] for r in ciris("region", "ls", "--scene", "slider", "--json", CIRIS_URL=url).json] == [region]
+    assert region in ciris("region", "ls", CIRIS_URL=url).stdout
+    assert ciris("region", "show", region, "--json", CIRIS_URL=url).json == certified.manifest
+    assert "guarantee  exact" in ciris("region", "show", region, CIRIS_URL=url).stdout
+    assert ciris("region", "export", region, CIRIS_URL=url).json == certified.manifest
+    with np.load(io.BytesIO(ciris("region", "export", region, "--format", "npz", CIRIS_URL=url).raw)) as arrays:
+        assert arrays["C"].tolist() == certified.manifest["halfspace_normals"]
+    assert verify_region(ciris("region", "export", region, "--format", "proof", CIRIS_URL=url).raw).faces == 4
+
+
+def test_contains_answers_by_its_exit_status(ciris: Ciris, url: str, region: str) -> None:
+    inside = ciris("contains", "slider", "--q", "-0.2", CIRIS_URL=url)
+    assert (inside.status, inside.stdout.startswith(f"inside: -0.2 in {region} (margin 0.1, exact)")) == (0, True)
+    outside = ciris("contains", "slider", "--q", "0.1", "--q", "0.9", "--json", CIRIS_URL=url)
+    assert outside.status == 1
+    assert [point["inside"] for point in outside.json["points"]] == [True, False]
+    wrong = ciris("contains", "slider", "--q", "0,1", CIRIS_URL=url)
+    assert (wrong.status, wrong.error.startswith("q[0]: 2 numbers were given")) == (2, True)
+
+
+def test_an_interrupted_wait_leaves_the_job_alone(url: str, scene: Scene, tmp_path: Path) -> None:
+    environment = surroundings(CIRIS_DATA_DIR=str(tmp_path), CIRIS_URL=url)
+    waiting = subprocess.Popen(command("grow", "slider", "--q", "0"), cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True)
+    assert waiting.stderr is not None
+    assert waiting.stderr.readline().startswith("job ")
+    time.sleep(1)
+    waiting.send_signal(signal.SIGINT)
+    _, said = waiting.communicate(timeout=20)
+    assert waiting.returncode == 130
+    assert "Traceback" not in said
+    lines = said.splitlines()
+    assert "goes on without you" in lines[-2]
+    assert lines[-1] == "error: interrupted"
+    (job,) = httpx2.get(f"{url}/v1/jobs").json()["jobs"]
+    assert job["state"] == "queued"
+
+
+def test_a_queue_that_is_down_is_one_warning(url: str, scene: Scene, environment: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    environment.setenv("CIRIS_REDIS_URL", "redis+socket:///tmp/there-is-no-queue?virtual_host=0")
+    from db.settings import settings
+    from workers.app import celery_app
+
+    settings.cache_clear()
+    celery_app.cache_clear()
+    variables = surroundings(CIRIS_DATA_DIR=str(tmp_path), CIRIS_URL=url)
+    waiting = subprocess.Popen(command("grow", "slider", "--q", "0"), cwd=tmp_path, env=variables, stderr=subprocess.PIPE, text=True)
+    assert waiting.stderr is not None
+    said = [waiting.stderr.readline() for _ in range(2)]
+    waiting.kill()
+    waiting.communicate()
+    assert said[1].startswith("warning: the job waits until the service is ready (queue: Redis cannot be reached")
+
+
+def test_doctor_lists_what_is_there(ciris: Ciris) -> None:
+    done = ciris("doctor", "--json")
+    findings = {finding["name"]: finding for finding in done.json}
+    assert done.status == 0
+    assert "Clarabel" in findings["drake solvers"]["text"]
+    assert findings["exact arithmetic"]["good"]
+    assert not any("PROBLEM" in json.dumps(finding) for finding in findings.values())
+    assert ciris("doctor", CIRIS_URL="http://127.0.0.1:9").status == 1
+
+
+def test_a_list_that_begins_with_a_minus_is_no_option() -> None:
+    assert _joined(["grow", "s", "--q", "-1,2", "--json"]) == ["grow", "s", "--q=-1,2", "--json"]
+    assert _joined(["contains", "s", "--q", "-.5", "--q", "1"]) == ["contains", "s", "--q=-.5", "--q", "1"]
+    assert _joined(["grow", "--q", "--json"]) == ["grow", "--q", "--json"]
+
+
+@pytest.mark.parametrize("variables", [{}, {"XDG_DATA_HOME": "/data"}, {"CIRIS_DATA_DIR": "/srv/ciris"}, {"CIRIS_DATA_DIR": "~/x"}])
+def test_client_and_service_agree_on_the_data_directory(monkeypatch: pytest.MonkeyPatch, variables: dict[str, str]) -> None:
+    for name in ("XDG_DATA_HOME", "CIRIS_DATA_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    assert data_dir() == Settings().data_dir.expanduser()
