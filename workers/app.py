@@ -21,6 +21,9 @@ log = logging.getLogger(__name__)
 CONTROL, SOLVE = "control", "solve"
 COORDINATE, SOLVE_PAIRS, RUN_STEP = "ciris.coordinate", "ciris.solve_pairs", "ciris.run_step"
 
+SENDING = {"max_retries": 1, "interval_start": 0, "interval_step": 0}
+"""Whoever sends does not wait for Redis to come back: the sweeper sends again."""
+
 
 @cache
 def celery_app() -> Celery:
@@ -44,12 +47,13 @@ def celery_app() -> Celery:
             # A whole worker that dies gives its messages back within seconds, not minutes.
             "unacked_restore_interval": 5,
             "unacked_restore_throttle": 1,
-            "visibility_timeout": 6 * 3600,
+            "visibility_timeout": 3600,
             # Waiting for a message is not a broken connection.
             "socket_timeout": None,
             "socket_connect_timeout": 2,
+            **SENDING,
         },
-        task_publish_retry=False,
+        task_publish_retry_policy=SENDING,
     )
     return app
 

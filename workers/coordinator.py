@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 from certifier.growth import Certification, Failed, GrowthOptions, Proposed, Report, Stepped, Transition, advance, begin
@@ -69,7 +70,7 @@ def batches(pairs: Sequence[tuple[int, float]], seconds: float) -> list[list[int
     """
     big = sorted((pair for pair in pairs if pair[1] >= seconds), key=lambda pair: -pair[1])
     groups = [[index] for index, _ in big]
-    filled = seconds
+    filled = inf
     for index, forecast in (pair for pair in pairs if pair[1] < seconds):
         if filled + forecast > seconds:
             groups.append([])

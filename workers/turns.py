@@ -115,14 +115,15 @@ def _save(turn: Turn, transition: Transition) -> None:
         jobs.start(session, job)
         _advance(job, transition.action)
         job.growth = transition.state
-        if transition.accepted is not None:
-            steps.supersede(session, job)
-            _add_step(session, job, StepKind.ACCEPT, asdict(transition.accepted), afterwards)
         match transition.action:
             case Propose() | Step() as action:
                 _add_step(session, job, StepKind(action.kind), action_to_document(action), afterwards)
             case Certify() as action:
                 _add_iteration(session, job, action, afterwards)
+        if transition.accepted is not None:
+            # After the work that the growth waits for: a region that is overtaken before anybody began to accept it is left out.
+            steps.supersede(session, job)
+            _add_step(session, job, StepKind.ACCEPT, asdict(transition.accepted), afterwards)
 
 
 def _advance(job: JobRow, action: Propose | Certify | Step | Finish) -> None:

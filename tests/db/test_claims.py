@@ -45,7 +45,7 @@ def test_processes_that_race_for_pairs_never_share_one(db: Database, database_ur
         job_id = a_running_job(session, 40).id
     context = multiprocessing.get_context("spawn")
     out = context.Queue()
-    workers = [context.Process(target=claim_and_certify, args=(database_url, job_id, out)) for _ in range(3)]
+    workers = [context.Process(target=claim_and_certify, args=(database_url, job_id, out)) for _ in range(2)]
     for worker in workers:
         worker.start()
     done = [out.get(timeout=60) for _ in range(40)]

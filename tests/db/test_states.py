@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 from hypothesis import given
+from hypothesis import settings as examples
 from hypothesis import strategies as st
 from sqlalchemy.orm import Session
 
@@ -28,6 +29,7 @@ def session() -> Iterator[Session]:
     database.close()
 
 
+@examples(max_examples=40)
 @given(wanted=st.lists(st.sampled_from(PairState), max_size=12))
 def test_a_pair_only_takes_paths_of_its_table(session: Session, wanted: list[PairState]) -> None:
     row = session.query(PairRow).one()
@@ -42,6 +44,7 @@ def test_a_pair_only_takes_paths_of_its_table(session: Session, wanted: list[Pai
         assert row.state == now
 
 
+@examples(max_examples=40)
 @given(wanted=st.lists(st.sampled_from(JobState), max_size=12))
 def test_a_job_that_has_ended_never_changes(session: Session, wanted: list[JobState]) -> None:
     row = session.query(JobRow).one()

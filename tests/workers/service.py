@@ -1,0 +1,158 @@
+"""A service for tests: real worker processes on a real queue and a real database, and the views of it that tests need."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+import pytest
+
+from certifier.model import Scene
+from db import events, jobs, pairs, scenes
+from db.models import EventRow, JobRow, PairRow
+from db.session import database
+from db.settings import settings
+from db.states import JOB, unfinished
+from workers.app import celery_app, send_coordinate
+from workers.processes import die_with_parent
+from workers.scenes import load_scene
+
+ROOT = Path(__file__).parents[2]
+PATIENCE_SECONDS = 60.0
+Found = TypeVar("Found")
+
+
+@contextmanager
+def environment(**variables: str) -> Iterator[None]:
+    """The process's settings, database and Celery app as these variables say, for a while."""
+    caches = (settings, database, celery_app, load_scene)
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in variables.items():
+            patch.setenv(name, value)
+        for cache in caches:
+            cache.cache_clear()
+        try:
+            yield
+        finally:
+            database().close()
+            celery_app().close()
+            for cache in caches:
+                cache.cache_clear()
+
+
+def eventually(look: Callable[[], Found | None], what: str, seconds: float = PATIENCE_SECONDS) -> Found:
+    """The first true answer."""
+    until = time.monotonic() + seconds
+    while not (found := look()):
+        if time.monotonic() > until:
+            raise AssertionError(f"{what}: not within {seconds} s")
+        time.sleep(0.01)
+    return found
+
+
+class Service:
+    """Worker processes with the settings of this process's environment."""
+
+    def __init__(self, logs: Path) -> None:
+        self._logs = logs
+        self._workers: dict[str, subprocess.Popen[bytes]] = {}
+
+    def start(self, queue: str) -> None:
+        with (self._logs / f"{queue}.log").open("ab") as log:
+            self._workers[queue] = subprocess.Popen(
+                [sys.executable, "-m", "workers", queue],
+                cwd=ROOT,
+                stdout=log,
+                stderr=log,
+                preexec_fn=partial(die_with_parent, signal.SIGKILL),
+            )
+
+    def kill(self, queue: str) -> None:
+        """Kills a whole worker, as the kernel does when memory runs out."""
+        self._workers[queue].kill()
+        self._workers[queue].wait()
+
+    def stop(self) -> None:
+        for worker in self._workers.values():
+            worker.send_signal(signal.SIGQUIT)
+        for worker in self._workers.values():
+            try:
+                worker.wait(10)
+            except subprocess.TimeoutExpired:
+                worker.kill()
+                worker.wait()
+
+    def log(self) -> str:
+        return "\n".join(path.read_text() for path in sorted(self._logs.glob("*.log")))
+
+
+@contextmanager
+def running_service(database_url: str, queue_url: str, logs: Path, **variables: str) -> Iterator[Service]:
+    """A control worker and two solving processes."""
+    given = {"CIRIS_DATABASE_URL": database_url, "CIRIS_REDIS_URL": queue_url, "CIRIS_SOLVE_PROCESSES": "2", "CIRIS_SWEEP_SECONDS": "0.5"}
+    with environment(**given, CIRIS_RESEND_SECONDS="2", **variables):
+        service = Service(logs)
+        try:
+            service.start("control")
+            service.start("solve")
+            yield service
+        finally:
+            service.stop()
+
+
+def submit(scene: Scene, options: dict[str, Any], **values: Any) -> str:
+    """Commits a job and asks for its coordination; returns its id."""
+    with database().write() as session:
+        row = scenes.add(session, scene)
+        job, _ = jobs.create(session, kind=options["kind"], scene_id=row.id, options=options, **values)
+    send_coordinate(job.id)
+    return job.id
+
+
+def job_of(job_id: str) -> JobRow:
+    with database().read() as session:
+        return jobs.get(session, job_id)
+
+
+def pairs_of(job_id: str) -> list[PairRow]:
+    with database().read() as session:
+        return list(pairs.of_job(session, job_id))
+
+
+def events_of(job_id: str) -> list[EventRow]:
+    with database().read() as session:
+        return list(events.since(session, job_id))
+
+
+def ended(job_id: str, seconds: float = PATIENCE_SECONDS) -> JobRow:
+    """The job, once it has ended."""
+
+    def look() -> JobRow | None:
+        job = job_of(job_id)
+        return None if job.state in unfinished(JOB) else job
+
+    return eventually(look, f"job {job_id} ends", seconds)
+
+
+def holder(row: PairRow) -> int:
+    """The process that holds a pair."""
+    return int((row.worker or "").rsplit(":", 2)[1])
+
+
+def kill_holder(job_id: str, index: int, attempt: int) -> None:
+    """Waits until the pair is being certified for the ``attempt``-th time and kills the process that does it."""
+
+    def look() -> PairRow | None:
+        return next(
+            (row for row in pairs_of(job_id) if row.pair_index == index and row.state == "running" and row.attempts == attempt), None
+        )
+
+    os.kill(holder(eventually(look, f"attempt {attempt} at pair {index}")), signal.SIGKILL)

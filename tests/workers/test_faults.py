@@ -1,0 +1,75 @@
+"""What can go wrong with workers, messages and input, on real worker processes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from certifier.model import Scene
+from db import pairs, steps
+from db.session import database
+from tests.services import Queue
+from tests.workers.options import box_around, grow_box
+from tests.workers.service import Service, ended, events_of, eventually, job_of, kill_holder, pairs_of, submit
+from workers.app import send_coordinate, send_pairs, send_step
+
+pytestmark = [pytest.mark.usefixtures("service"), pytest.mark.parametrize("service", ["sqlite"], indirect=True)]
+
+
+def test_a_seed_in_collision_fails_the_job_and_says_which_pair(planar: Scene) -> None:
+    job = ended(submit(planar, grow_box([0.74, 0.0], 0.2)))
+    assert job.state == "failed"
+    assert job.error is not None
+    assert job.error["code"] == "seed_in_collision"
+
+
+def test_a_pair_that_kills_its_process_every_time_ends_as_an_error(arm: tuple[Scene, np.ndarray]) -> None:
+    scene, s = arm
+    job_id = submit(scene, box_around(s, 0.01))
+    for attempt in (1, 2, 3):
+        kill_holder(job_id, index=2, attempt=attempt)
+    job = ended(job_id)
+    assert (job.state, job.outcome) == ("failed", "error")
+    assert "the worker died 3 times" in (job.error or {})["message"]
+    assert [row.state for row in pairs_of(job_id)] == ["certified", "certified", "error", "certified"]
+
+
+def test_messages_that_come_again_change_nothing(planar: Scene) -> None:
+    job_id = submit(planar, box_around([0.0, 0.0], 0.05))
+    for state in ("open", "running", "certified"):
+        eventually(lambda state=state: any(row.state in (state, "certified") for row in pairs_of(job_id)), f"a pair is {state}")
+        send_all_again(job_id)
+    ended(job_id)
+    before = len(events_of(job_id))
+    send_all_again(job_id)
+    last = ended(submit(planar, box_around([0.0, 0.0], 0.01)))
+    assert (job_of(job_id).outcome, last.outcome) == ("certified", "certified")
+    assert len(events_of(job_id)) == before
+    assert all(row.attempts == 1 for row in pairs_of(job_id))
+
+
+def send_all_again(job_id: str) -> None:
+    send_coordinate(job_id)
+    with database().read() as session:
+        rows, did = pairs.of_job(session, job_id), steps.of_job(session, job_id)
+    for iteration in {row.iteration for row in rows}:
+        send_pairs(job_id, iteration, [[row.pair_index for row in rows if row.iteration == iteration]])
+    for step in did:
+        send_step(step.id)
+
+
+def test_a_job_survives_the_death_of_the_whole_solve_worker(arm: tuple[Scene, np.ndarray], service: Service) -> None:
+    scene, s = arm
+    job_id = submit(scene, box_around(s, 0.012))
+    eventually(lambda: any(row.state == "running" for row in pairs_of(job_id)), "a pair is running")
+    service.kill("solve")
+    service.start("solve")
+    assert ended(job_id).outcome == "certified"
+
+
+def test_a_job_survives_the_loss_of_every_message(arm: tuple[Scene, np.ndarray], queue: Queue) -> None:
+    scene, s = arm
+    job_id = submit(scene, box_around(s, 0.013))
+    eventually(lambda: any(row.state == "running" for row in pairs_of(job_id)), "a pair is running")
+    queue.flush()
+    assert ended(job_id).outcome == "certified"

@@ -1,0 +1,69 @@
+"""Jobs carried out by real worker processes on a real queue, on both databases."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from certifier.model import Scene
+from certifier.verify.region import verify_region
+from db import jobs, pairs, proofs, regions
+from db.session import database
+from tests.workers.options import box_around, grow_box
+from tests.workers.service import ended, events_of, eventually, kill_holder, pairs_of, submit
+from workers.app import send_coordinate
+
+pytestmark = pytest.mark.usefixtures("service")
+SEED = [0.0, 0.0]
+
+
+def test_a_region_grows_is_stored_and_its_proof_holds(planar: Scene) -> None:
+    job = ended(submit(planar, grow_box(SEED, 0.05, max_rounds=1)))
+    assert (job.state, job.outcome, job.error) == ("succeeded", "certified", None)
+    with database().read() as session:
+        region = regions.get(session, job.region_id or "")
+        proof = proofs.get(session, region.proof_digest)
+        volumes = [row.ellipsoid_volume for row in pairs.iterations(session, job.id) if row.ellipsoid_volume]
+    statement = verify_region(proof)
+    assert len(statement.pairs) == len(planar.pairs)
+    assert np.all(region.arrays["C"] @ planar.to_s(SEED) <= region.arrays["d"])
+    assert region.manifest["guarantee"] == region.guarantee == "exact"
+    assert region.ellipsoid_volume == max(volumes)
+    events = events_of(job.id)
+    assert [event.seq for event in events] == list(range(1, len(events) + 1))
+    assert (events[0].data["state"], events[-1].data["state"]) == ("queued", "succeeded")
+    assert {"iteration", "pairs", "step", "region"} < {event.kind for event in events}
+
+
+def test_a_given_polytope_gets_a_verdict_for_every_pair(planar: Scene) -> None:
+    job = ended(submit(planar, box_around(planar.to_s(SEED), 10.0)))
+    rows = pairs_of(job.id)
+    assert (job.state, job.outcome, job.region_id) == ("succeeded", "refuted", None)
+    assert len(rows) == len(planar.pairs)
+    refuted = next(row for row in rows if row.state == "refuted")
+    assert refuted.witness_s is not None
+    assert len(refuted.witness_s) == planar.n
+
+
+def test_a_job_ends_the_same_when_a_solving_process_is_killed(arm: tuple[Scene, np.ndarray]) -> None:
+    scene, s = arm
+    job_id = submit(scene, box_around(s, 0.01))
+    kill_holder(job_id, index=1, attempt=1)
+    job = ended(job_id)
+    assert (job.state, job.outcome) == ("succeeded", "certified")
+    rows = pairs_of(job_id)
+    assert rows[1].attempts == 2
+    assert all(row.state == "certified" for row in rows)
+    assert sum(event.kind == "region" for event in events_of(job_id)) == 1
+
+
+def test_cancel_stops_the_work_at_once(arm: tuple[Scene, np.ndarray]) -> None:
+    scene, s = arm
+    job_id = submit(scene, box_around(s, 0.011))
+    eventually(lambda: any(row.state == "running" for row in pairs_of(job_id)), "a pair is running")
+    with database().write() as session:
+        jobs.cancel(session, job_id)
+    send_coordinate(job_id)
+    assert ended(job_id, seconds=5).state == "cancelled"
+    assert {row.state for row in pairs_of(job_id)} <= {"certified", "skipped"}
+    assert any(row.state == "skipped" for row in pairs_of(job_id))

@@ -1,0 +1,179 @@
+"""Coordination and sweeping, called directly, on a real queue without workers and on both databases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import timedelta
+
+import pytest
+from sqlalchemy import update
+
+from certifier.outcome import Outcome
+from db import jobs, pairs
+from db.models import JobRow, PairRow
+from db.session import database
+from db.states import PairState, transition
+from db.types import utcnow
+from tests.scenes import slider
+from tests.services import Queue, queue_server
+from tests.workers.options import box_around
+from tests.workers.service import environment, events_of, job_of, pairs_of, submit
+from workers import sweeper
+from workers.app import CONTROL, SOLVE, send_coordinate, waiting
+from workers.pairs import solve_pairs
+from workers.turns import coordinate
+
+ELSEWHERE = "elsewhere:1:1"
+
+
+@pytest.fixture(scope="module")
+def queue() -> Iterator[Queue]:
+    """A queue from which nobody else takes messages."""
+    with queue_server() as server:
+        yield server
+
+
+@pytest.fixture(autouse=True)
+def _here(database_url: str, queue: Queue) -> Iterator[None]:
+    """This process is the service."""
+    queue.flush()
+    with environment(CIRIS_DATABASE_URL=database_url, CIRIS_REDIS_URL=queue.url, CIRIS_RESEND_SECONDS="0"):
+        yield
+
+
+@pytest.fixture
+def job_id() -> str:
+    """A running job with three open pairs."""
+    made = submit(slider(posts=3), box_around([0.0], 0.1))
+    coordinate(made)
+    return made
+
+
+def test_a_job_begins_once_however_often_it_is_coordinated(job_id: str) -> None:
+    before = [(event.seq, event.kind) for event in events_of(job_id)]
+    for _ in range(3):
+        coordinate(job_id)
+    assert [(event.seq, event.kind) for event in events_of(job_id)] == before
+    assert [row.state for row in pairs_of(job_id)] == ["open"] * 3
+    assert (waiting(SOLVE), job_of(job_id).turn) == (1, 1)
+
+
+def test_solving_twice_certifies_once(job_id: str) -> None:
+    for _ in range(2):
+        solve_pairs(job_id, 0, [0, 1, 2], "t")
+    assert [(row.state, row.attempts) for row in pairs_of(job_id)] == [("certified", 1)] * 3
+    assert waiting(CONTROL) == 2
+
+
+def test_a_cancelled_job_ends_with_its_open_pairs_skipped(job_id: str) -> None:
+    with database().write() as session:
+        jobs.cancel(session, job_id)
+    solve_pairs(job_id, 0, [0, 1, 2])
+    coordinate(job_id)
+    assert [row.state for row in pairs_of(job_id)] == ["skipped"] * 3
+    job = job_of(job_id)
+    assert (job.state, job.outcome, job.region_id) == ("cancelled", None, None)
+    assert events_of(job_id)[-1].data["state"] == "cancelled"
+
+
+def test_a_deadline_ends_the_job_with_what_it_has(job_id: str) -> None:
+    with database().write() as session:
+        jobs.lock(session, job_id).deadline_at = utcnow() - timedelta(seconds=1)
+    coordinate(job_id)
+    job = job_of(job_id)
+    assert (job.state, job.outcome, job.reason) == ("succeeded", Outcome.INCONCLUSIVE, "the deadline was reached")
+
+
+def test_a_poison_pair_ends_as_an_error_with_its_cause(job_id: str) -> None:
+    with database().write() as session:
+        transition(session, PairRow, PairState.RUNNING, PairRow.pair_index == 1, attempts=3, worker=ELSEWHERE, lease_until=utcnow())
+    solve_pairs(job_id, 0, [0, 1, 2])
+    coordinate(job_id)
+    assert [row.state for row in pairs_of(job_id)] == ["certified", "error", "certified"]
+    job = job_of(job_id)
+    assert (job.state, job.outcome) == ("failed", Outcome.ERROR)
+    assert job.error is not None
+    assert job.error["code"] == "worker_lost"
+
+
+def test_a_coordination_that_always_dies_ends_the_job(job_id: str) -> None:
+    solve_pairs(job_id, 0, [0, 1, 2])
+    with database().write() as session:
+        jobs.lock(session, job_id).coordinator_attempts = 3
+    coordinate(job_id)
+    error = job_of(job_id).error
+    assert error is not None
+    assert error["code"] == "coordination_failed"
+
+
+def test_two_coordinators_do_not_work_at_once_and_a_dead_one_is_replaced(job_id: str) -> None:
+    solve_pairs(job_id, 0, [0, 1, 2])
+
+    def held_by(worker: str, seconds: float) -> None:
+        with database().write() as session:
+            job = jobs.lock(session, job_id)
+            job.coordinator, job.coordinator_until = worker, utcnow() + timedelta(seconds=seconds)
+
+    held_by(ELSEWHERE, 60)
+    coordinate(job_id)
+    assert job_of(job_id).turn == 1
+    held_by(ELSEWHERE, -1)
+    coordinate(job_id)
+    assert job_of(job_id).turn == 2
+
+
+def test_a_polytope_that_is_none_ends_the_job_with_its_error() -> None:
+    empty = box_around([0.0], -0.1)
+    del empty["seed"]["center"]
+    job_id = submit(slider(), empty)
+    coordinate(job_id)
+    solve_pairs(job_id, 0, [0])
+    coordinate(job_id)
+    error = job_of(job_id).error
+    assert error is not None
+    assert error["code"] == "polytope_empty"
+
+
+def test_options_that_cannot_be_used_end_the_job_with_their_error() -> None:
+    job_id = submit(slider(), {"kind": "certify", "seed": {}})
+    coordinate(job_id)
+    job = job_of(job_id)
+    assert (job.state, (job.error or {})["code"]) == ("failed", "polytope_missing")
+
+
+def test_the_sweeper_sends_lost_messages_again(job_id: str, queue: Queue) -> None:
+    queue.flush()
+    sweeper.sweep()
+    assert waiting(SOLVE) == 1
+    sweeper.sweep()
+    assert waiting(SOLVE) == 1
+    solve_pairs(job_id, 0, [0, 1, 2])
+    queue.flush()
+    sweeper.sweep()
+    assert waiting(CONTROL) == 1
+
+
+def test_the_sweeper_frees_what_a_lost_worker_held(job_id: str) -> None:
+    with database().write() as session:
+        for index in (0, 1):
+            pairs.claim(session, job_id, 0, [index], task_id=None, lease_seconds=60)
+        gone = {"worker": ELSEWHERE, "lease_until": utcnow() - timedelta(seconds=1)}
+        session.execute(update(PairRow).where(PairRow.pair_index == 0).values(gone))
+    sweeper.sweep()
+    assert [row.state for row in pairs_of(job_id)] == ["open", "running", "open"]
+    assert waiting(SOLVE) == 2
+
+
+def test_without_redis_a_job_is_kept_and_sent_by_the_sweeper(queue: Queue) -> None:
+    queue.stop()
+    try:
+        job_id = submit(slider(), box_around([0.0], 0.1))
+        assert not send_coordinate(job_id)
+        assert job_of(job_id).state == "queued"
+    finally:
+        queue.start()
+    queue.flush()
+    sweeper.sweep()
+    assert waiting(CONTROL) == 1
+    with database().read() as session:
+        assert session.get(JobRow, job_id) is not None
