@@ -1,4 +1,4 @@
-"""What stands before the routes: limits on the size of bodies, and no visits from other web sites.
+"""What stands before the routes: limits on the size of bodies (FastAPI's own answers no problem+json), no visits from other web sites.
 
 The service has no keys on the loopback interface, so a page that the user's browser happens to show must not be able to talk
 to it: neither under a name of its own that resolves to this machine, nor by sending forms across sites.

@@ -1,0 +1,124 @@
+"""The page of a job in a real browser: it changes while the job runs, without a reload; by keyboard; on a phone; in the dark."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from certifier.model import Scene
+from db import jobs, pairs
+from db.session import Database
+from db.states import JobState
+
+CHROMIUM = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        flags = ["--no-sandbox", "--disable-background-networking", "--disable-component-update"]
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=flags)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(browser: Any, url: str) -> Iterator[Any]:
+    """A page that must not complain, nor ask anybody but the service; closed before the service is."""
+    context = browser.new_context()
+    page = context.new_page()
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("request", lambda request: None if request.url.startswith("http://127.0.0.1:") else complaints.append(request.url))
+    yield page
+    context.close()
+    assert complaints == []
+
+
+@pytest.fixture
+def job_id(database: Database, scene: Scene) -> str:
+    with database.write() as session:
+        job, _ = jobs.create(session, kind="grow", scene_id=scene.hash[:16], options={"seed": {"q": [0.0]}, "random_seed": 0})
+        return job.id
+
+
+def begin(database: Database, scene: Scene, job_id: str) -> None:
+    with database.write() as session:
+        job = jobs.lock(session, job_id)
+        jobs.start(session, job)
+        polytope: dict[str, Any] = {"C": [[1.0], [-1.0]], "d": [0.5, 0.5], "center": [0.0]}
+        new = [pairs.NewPair(index, pair.a, pair.b, 1.0) for index, pair in enumerate(scene.pairs)]
+        pairs.add_iteration(session, job, index=0, label="contract", **polytope, pairs=new, reuse={}, stop_at_first_failure=False)
+
+
+def settle(database: Database, job_id: str, index: int) -> None:
+    with database.write() as session:
+        claim = pairs.claim(session, job_id, 0, [index], task_id=None, lease_seconds=60)
+        assert claim is not None
+        result = pairs.Result(index, pairs.PairState.CERTIFIED, seconds=0.1, stage="sos", margin=0.01, proof=b"proof")
+        pairs.save(session, claim, [result], worth_stopping=1)
+
+
+def test_a_job_is_followed_live_to_its_end(page: Any, url: str, database: Database, scene: Scene, job_id: str) -> None:
+    page.goto(f"{url}/jobs/{job_id}")
+    page.get_by_text("Waiting for a worker").wait_for()
+    page.evaluate("window.loadedOnce = true")
+    begin(database, scene, job_id)
+    page.get_by_text("0 of 2 pairs settled").wait_for()
+    settle(database, job_id, 0)
+    page.get_by_text("1 of 2 pairs settled").wait_for()
+    assert page.locator("td.cell.certified").count() == 1
+    page.get_by_text("Options").click()
+    settle(database, job_id, 1)
+    page.get_by_text("2 of 2 pairs settled").wait_for()
+    assert page.locator("details#options[open]").count() == 1, "what the reader opened stays open"
+    with database.write() as session:
+        jobs.finish(session, jobs.lock(session, job_id), JobState.SUCCEEDED, reason="as asked", outcome="certified")
+    page.locator(".badge.succeeded").wait_for()
+    assert page.evaluate("window.loadedOnce"), "the page was not loaded again"
+    assert page.get_by_role("button", name="Cancel").count() == 0
+
+
+def test_a_job_is_cancelled_and_tried_again_from_the_page(page: Any, url: str, job_id: str) -> None:
+    page.goto(f"{url}/jobs/{job_id}")
+    page.get_by_role("button", name="Cancel").click()
+    page.locator(".badge.cancelled").wait_for()
+    page.get_by_role("button", name="Try again").click()
+    page.wait_for_url(lambda address: "/jobs/" in address and job_id not in address)
+    page.locator(".badge.queued").wait_for()
+
+
+def test_the_region_is_two_links_away_by_keyboard(page: Any, url: str, region: str) -> None:
+    page.goto(url)
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.textContent") == "Skip to the content"
+    page.locator(f"a[href='/regions/{region}']").first.focus()
+    page.keyboard.press("Enter")
+    page.get_by_role("heading", name="Region of slider").wait_for()
+    with page.expect_download() as download:
+        page.get_by_role("link", name="proof").click()
+    assert Path(download.value.path()).stat().st_size > 0
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_page_is_wider_than_a_phone(browser: Any, url: str, region: str, scheme: str) -> None:
+    context = browser.new_context(**PHONE, color_scheme=scheme)
+    page = context.new_page()
+    page.goto(url)
+    job, scene = (page.locator(f"a[href^='/{kind}/']").first.get_attribute("href") for kind in ("jobs", "scenes"))
+    for path in ("/", job, scene, f"/regions/{region}"):
+        page.goto(f"{url}{path}")
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), path
+        light = page.evaluate("getComputedStyle(document.body).backgroundColor").split("(")[1].split(",")[0]
+        assert (int(light) > 128) == (scheme == "light")
+    context.close()

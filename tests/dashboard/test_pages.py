@@ -1,0 +1,119 @@
+"""The pages as HTML: they work offline, escape what users wrote, and say what the JSON says."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.pages import growth_chart, matrix_rows, progress
+from api.schemas import GrowthPoint, Iteration, PairCell, PairInfo, PairMatrix
+from db import scenes
+from db.session import Database
+from db.states import IterationState, PairState
+from tests.scenes import slider
+
+
+@pytest.fixture
+def paths(client: TestClient, region: str) -> list[str]:
+    job = client.get("/v1/jobs").json()["jobs"][0]
+    return ["/", "/live", f"/jobs/{job['id']}", f"/jobs/{job['id']}/live", f"/regions/{region}", f"/scenes/{job['scene']}"]
+
+
+def test_every_page_works_offline_and_under_a_strict_policy(client: TestClient, paths: list[str]) -> None:
+    for path in [*paths, "/static/ciris.css", "/static/ciris.js", "/static/icon.svg"]:
+        answer = client.get(path)
+        assert answer.status_code == 200, path
+        assert re.findall(r"(?:src|href|url)\s*[=(]\s*[\"']?(?:https?:)?//", answer.text) == [], path
+        if not path.startswith("/static"):
+            assert "default-src 'self'" in answer.headers["content-security-policy"]
+            assert not re.search(r"<script>|\sstyle=|\son\w+=", answer.text), path
+
+
+def test_the_pages_are_no_part_of_the_api(client: TestClient, paths: list[str]) -> None:
+    assert all(path.startswith(("/v1/", "/healthz", "/readyz")) for path in client.get("/openapi.json").json()["paths"])
+
+
+def test_names_are_escaped(client: TestClient, database: Database) -> None:
+    with database.write() as session:
+        row = scenes.add(session, replace(slider(), name="<script>alert(1)</script>"))
+    for path in ("/", f"/scenes/{row.id}"):
+        text = client.get(path).text
+        assert "&lt;script&gt;alert(1)" in text
+        assert "<script>alert" not in text
+
+
+def test_the_job_page_shows_outcomes_regions_and_their_files(client: TestClient, region: str) -> None:
+    job = client.get("/v1/jobs").json()["jobs"][0]
+    text = client.get(f"/jobs/{job['id']}").text
+    assert text.count('class="cell certified"') == 2
+    for link in (f"/regions/{region}", f"/v1/regions/{region}/proof", f"/v1/regions/{region}/export?format=json"):
+        assert f'href="{link}"' in text
+    assert "data-events" not in text, "an ended job is not followed"
+
+
+def test_an_empty_service_says_how_to_begin(client: TestClient) -> None:
+    assert "ciris grow" in client.get("/").text
+
+
+NOW = datetime(2026, 1, 1, tzinfo=UTC)
+
+
+def iteration(index: int, reused: dict[int, int]) -> Iteration:
+    return Iteration(
+        index=index,
+        label="round",
+        state=IterationState.RUNNING,
+        faces=4,
+        ellipsoid_volume=None,
+        reused=reused,
+        started_at=NOW,
+        finished_at=None,
+    )
+
+
+def cell(pair: int, index: int, state: PairState, **values: object) -> PairCell:
+    known = dict.fromkeys(("stage", "margin", "seconds", "detail", "worker", "witness_q", "proof")) | values
+    return PairCell(iteration=index, pair=pair, state=state, **known)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def matrix() -> PairMatrix:
+    return PairMatrix(
+        pairs=[PairInfo(index=i, a=f"a{i}", b=f"b{i}") for i in range(3)],
+        iterations=[iteration(0, {}), iteration(1, {0: 0})],
+        cells=[
+            cell(0, 0, PairState.CERTIFIED, seconds=0.5, margin=0.0123, stage="sos"),
+            cell(1, 0, PairState.REFUTED, witness_q=[0.5, 1.0]),
+            cell(1, 1, PairState.RUNNING),
+            cell(2, 1, PairState.OPEN),
+        ],
+    )
+
+
+def test_the_matrix_has_a_cell_for_every_pair_and_iteration(matrix: PairMatrix) -> None:
+    rows = matrix_rows(matrix)
+    assert [[cell.state for cell in row.cells] for row in rows] == [["certified", "reused"], ["refuted", "running"], ["absent", "open"]]
+    assert rows[0].cells[0].title == "certified; by sos; 0.5 s; margin 12.3 mm"
+    assert rows[0].cells[1].title == "certified by the proof of iteration 0"
+    assert rows[1].cells[0].title == "refuted; in collision at q = 0.5, 1"
+
+
+def test_progress_counts_what_is_settled(matrix: PairMatrix) -> None:
+    found = progress(matrix)
+    assert found is not None
+    assert (found.parts, found.settled, found.total) == ([("running", 1), ("open", 1), ("reused", 1)], 1, 3)
+    assert progress(matrix.model_copy(update={"iterations": [], "cells": []})) is None
+
+
+def test_the_chart_stays_inside_its_frame() -> None:
+    points = [GrowthPoint(iteration=i, region="r", ellipsoid_volume=10.0 ** (i - 20), seconds=float(i)) for i in range(5)]
+    chart = growth_chart(points)
+    assert chart is not None
+    assert all(0 <= x <= chart.width and 0 <= y <= chart.height for x, y, _ in chart.dots)
+    assert [y for _, y, _ in chart.dots] == sorted((y for _, y, _ in chart.dots), reverse=True)
+    assert growth_chart(points[:1]) is not None
+    assert growth_chart([]) is None
