@@ -28,6 +28,8 @@ from certifier.verify.pair import PairCheck, check_ground
 
 SCREEN_SAMPLES = 64
 CONE_SAMPLES = 300
+FACES_AT_A_TIME = 4
+"""A polytope with many faces is first replaced by its box; then this many faces are added at a time, as the dual asks for them."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,11 @@ class Certification:
         samples = hit_and_run(faces, self.center, CONE_SAMPLES, seed)
         self._screen = np.concatenate([self.center[None], samples])
         self._kinematics = Kinematics(scene)
-        self._sides = Sides(self._kinematics, faces, box, self.center, samples)
+        self._box, self._samples = box, samples
+        m = len(kept)
+        self._every = tuple(range(m))
+        few = tuple(range(m, m + 2 * scene.n))
+        self._first = self._sides(few if m > len(few) + FACES_AT_A_TIME else self._every)
 
     def certify(self, index: int, max_iterations: int = 60) -> PairResult:
         """Certify pair ``scene.pairs[index]``."""
@@ -91,14 +97,23 @@ class Certification:
         contact = self._contact(pair, frame, self._screen[:SCREEN_SAMPLES])
         if isinstance(contact, _Witness):
             return PairResult(Outcome.REFUTED, Stage.SCREEN, witness_s=contact.s)
-        try:
-            program = build(self._sides, pair, frame, contact)
-            solution = solve(program.blocks, program.normal, program.start, max_iterations)
-        except np.linalg.LinAlgError as error:
-            return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"numerical trouble: {error}")
-        if solution.status is Status.FEASIBLE:
-            return self._prove(pair, frame, solution)
-        weak = self._weak_points(frame, solution)
+        sides = self._first
+        while True:
+            try:
+                program = build(sides, pair, frame, contact)
+                solution = solve(program.blocks, program.normal, program.start, max_iterations)
+            except np.linalg.LinAlgError as error:
+                if sides.faces == self._every:
+                    return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"numerical trouble: {error}")
+                sides = self._sides(self._every)
+                continue
+            if solution.status is Status.FEASIBLE:
+                return self._prove(pair, frame, sides, solution)
+            more = self._more_faces(frame, sides, solution)
+            if more == sides.faces:
+                break
+            sides = self._sides(more)
+        weak = self._weak_points(frame, sides, solution)
         witness = self._contact(pair, frame, np.concatenate([self._screen, weak[self._faces.contains(weak)]]))
         if isinstance(witness, _Witness):
             return PairResult(Outcome.REFUTED, Stage.SOS, witness_s=witness.s)
@@ -108,11 +123,32 @@ class Certification:
         detail = f"{solution.status.value} after {solution.iterations} iterations"
         return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak)
 
-    def _prove(self, pair: Pair, frame: Frame, solution: Solution) -> PairResult:
+    def _sides(self, faces: tuple[int, ...]) -> Sides:
+        return Sides(self._kinematics, self._faces, self._box, faces, self.center, self._samples)
+
+    def _more_faces(self, frame: Frame, sides: Sides, solution: Solution) -> tuple[int, ...]:
+        """The faces to go on with after a program on a superset of P had no solution; the same ones when it had none on P either.
+
+        The dual point shows infeasibility for every face j with Lambda_j(x) psd; the faces where it is not are worth having.
+        """
+        unused = tuple(j for j in self._every if j not in sides.faces)
+        if not unused:
+            return sides.faces
+        if solution.status is not Status.INFEASIBLE or 2 * (len(sides.faces) + FACES_AT_A_TIME) > len(self._every) + len(self._first.faces):
+            return self._every
+        lowest = np.full(len(unused), np.inf)
+        for chain, x in zip((frame.chain_a, frame.chain_b), solution.x[:2], strict=True):
+            Z = sides.cone_of(chain, unused).adjoint(x)
+            mass = np.trace(Z[:, 0], axis1=1, axis2=2)[:, None]
+            lowest = np.minimum(lowest, (np.linalg.eigvalsh(Z[:, 1:])[:, :, 0] / mass).min(axis=0))
+        worst = [unused[i] for i in np.argsort(lowest)[:FACES_AT_A_TIME] if lowest[i] < 0]
+        return (*sides.faces, *worst)
+
+    def _prove(self, pair: Pair, frame: Frame, sides: Sides, solution: Solution) -> PairResult:
         """The proof in as few bits as hold."""
         failure = ""
         for kind in BITS:
-            proof = self._proof(pair, frame, solution, kind)
+            proof = self._proof(pair, frame, sides, solution, kind)
             try:
                 statement = self._check.verify(proof)
             except ProofError as error:
@@ -137,21 +173,22 @@ class Certification:
                 return _Witness(s[i])
         return first
 
-    def _proof(self, pair: Pair, frame: Frame, solution: Solution, kind: str) -> PairProof:
-        n, u_c = self.scene.n, self._sides.u_c
+    def _proof(self, pair: Pair, frame: Frame, sides: Sides, solution: Solution, kind: str) -> PairProof:
+        n, u_c = self.scene.n, sides.u_c
         plane = solution.y[: 4 * (n + 1)].reshape(4, n + 1).copy()
         plane[:, 0] -= plane[:, 1:] @ u_c
         kappa = float(solution.y[4 * (n + 1)]) if len(solution.y) > 4 * (n + 1) + 1 else 0.0
-        scale = np.concatenate([[1.0], self._sides.slack])
-        sides = []
+        factors = []
         for chain, Q in zip((frame.chain_a, frame.chain_b), solution.Q[:2], strict=True):
             monomial = np.sqrt(3.0) ** subsets(len(chain)).sum(axis=1)
-            sides.append(Side.from_gram(chain, Q * (monomial[:, None] * monomial) / scale[:, None, None], kind))
-        return PairProof(self.scene.hash, pair.a, pair.b, frame.body, self.ground, plane, solution.t, kappa, (sides[0], sides[1]))
+            factors.append(Side.from_gram(chain, Q * (monomial[:, None] * monomial) / sides.scales[:, None, None], kind))
+        return PairProof(
+            self.scene.hash, pair.a, pair.b, frame.body, self.ground, plane, solution.t, kappa, sides.faces, (factors[0], factors[1])
+        )
 
-    def _weak_points(self, frame: Frame, solution: Solution) -> Array:
+    def _weak_points(self, frame: Frame, sides: Sides, solution: Solution) -> Array:
         """Means of the pseudo-moments that carry weight, (w, n)."""
-        found = [self._sides.means(chain, x) for chain, x in zip((frame.chain_a, frame.chain_b), solution.x[:2], strict=True)]
+        found = [sides.means(chain, x) for chain, x in zip((frame.chain_a, frame.chain_b), solution.x[:2], strict=True)]
         means, mass = np.concatenate([m for m, _ in found]), np.concatenate([w for _, w in found])
         return means[mass > 0.15 * mass.max()]
 

@@ -125,7 +125,7 @@ class _Identities:
             u = np.zeros((len(space.points), n))
             u[:, chain] = space.points
             X = self.kinematics.numerators(proof.frame, geometry.body, proof.ground.mid + proof.ground.half * u)
-            squares = _squares(side, space)
+            squares = _face_multipliers(proof, side, space)
             for v, vertex in enumerate(geometry.vertices):
                 p = sign * (X @ np.append(vertex, 1.0))
                 constant = -MARGIN_SHARE * proof.t * X[:, 3, 3]
@@ -164,7 +164,7 @@ class _Identities:
             columns.append(affine(rounding, 1.0, np.zeros(n)))
             variables.append(kappa)
         right = -affine(offset, 1.0, np.zeros(n))
-        for c, square in zip(ground.C, squares[1:], strict=True):
+        for c, square in zip(ground.C, squares, strict=True):
             j = self.index.get(c.tobytes())
             if j is None:
                 continue
@@ -204,8 +204,26 @@ class _Identities:
             _cone(self.program, kappa, plane[:3, 0] + plane[:3, 1:] @ signs)
 
 
+def _face_multipliers(proof: PairProof, side: Side, space: Basis) -> Array:
+    """Values of lambda_j at the points for every face of the ground, (V, m, N_A).
+
+    A multiplier of a face of the box counts for the faces that imply it, half_i (1 -+ u_i) = sum_j y_j g_j + (a constant >= 0); what
+    falls to the constant and to the joint limits is free in (12) anyway.
+    """
+    ground, squares = proof.ground, _squares(side, space)[:, 1:]
+    m, n = ground.C.shape
+    multipliers = np.zeros((len(squares), m, squares.shape[2]))
+    for position, face in enumerate(proof.faces):
+        if face < m:
+            multipliers[:, face] += squares[:, position]
+        else:
+            i, Y = (face - m) % n, ground.Y_lower if face < m + n else ground.Y_upper
+            multipliers += (Y[i, :m] / ground.half[i])[:, None] * squares[:, position, None]
+    return multipliers
+
+
 def _squares(side: Side, space: Basis) -> Array:
-    """Values of |L_j' rho|^2 at the points, (V, m + 1, N_A)."""
+    """Values of |L_j' rho|^2 at the points for 1 and the faces used, (V, f + 1, N_A)."""
     length = 2 ** len(side.chain)
     rows, columns = np.tril_indices(length)
     L = np.zeros((*side.exponent.shape, length, length))

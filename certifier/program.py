@@ -63,18 +63,32 @@ class Sides:
     """The cones of all chains on one polytope, made on demand and shared by the pairs.
 
     Args:
-        polytope: the faces used, (m, n); P must be bounded.
+        polytope: P's faces, (m, n); P must be bounded.
+        faces: which faces the cones use, numbered as in :class:`certifier.proof.PairProof`.
         center: (n,) interior point of P; samples: (S, n) points inside P, S > 2^k for the longest chain.
     """
 
-    def __init__(self, kinematics: Kinematics, polytope: Polytope, box: Box, center: Array, samples: Array) -> None:
-        self.kinematics, self.box, self.center = kinematics, box, center
+    def __init__(self, kinematics: Kinematics, polytope: Polytope, box: Box, faces: tuple[int, ...], center: Array, samples: Array) -> None:
+        self.kinematics, self.box, self.faces = kinematics, box, faces
         self.u_c = box.to_u(center)
-        self.slack = polytope.d - polytope.C @ center
-        self._constant = (polytope.d - polytope.C @ box.mid) / self.slack
-        self._slopes = -(polytope.C * box.half) / self.slack[:, None]
+        eye = np.eye(len(center))
+        constant = np.concatenate([polytope.d - polytope.C @ box.mid, np.ones(2 * len(center))])
+        slopes = np.concatenate([-polytope.C * box.half, eye, -eye])
+        self._slack = constant + slopes @ self.u_c
+        self._constant, self._slopes = constant / self._slack, slopes / self._slack[:, None]
         self._u = box.to_u(samples)
         self._centres: dict[tuple[int, ...], tuple[Cone, Centre]] = {}
+
+    @property
+    def scales(self) -> Array:
+        """(f + 1,) what 1 and the faces used were divided by to be 1 at the centre."""
+        return np.concatenate([[1.0], self._slack[list(self.faces)]])
+
+    def cone_of(self, chain: tuple[int, ...], faces: tuple[int, ...]) -> Cone:
+        """The chain's cone for 1 and any faces."""
+        inside, outside, chosen = list(chain), self.outside(chain), list(faces)
+        slopes = self._slopes[chosen]
+        return Cone.of_faces(basis(len(chain)), self._constant[chosen], slopes[:, inside], slopes[:, outside])
 
     def points(self, chain: tuple[int, ...]) -> Array:
         """(N_A, n) points u of the chain's basis, 0 outside the chain."""
@@ -95,7 +109,7 @@ class Sides:
         """
         if chain not in self._centres:
             space, inside, outside = basis(len(chain)), list(chain), self.outside(chain)
-            cone = Cone.of_faces(space, self._constant, self._slopes[:, inside], self._slopes[:, outside])
+            cone = self.cone_of(chain, self.faces)
             revolute = self.kinematics.scene.revolute[inside]
             s = self.box.mid[inside] + self.box.half[inside] * space.points
             w = np.zeros(cone.N)

@@ -3,10 +3,11 @@
 A pair's proof on P = {s : C s <= d} holds, in the frame F and the coordinates u = (s - mid)/half of a box around P,
 the plane [a; b] = Z [1; u], a margin t, a bound kappa of |a|, and for every vertex v of either body Gram factors L_j with
 
-    +-(a'p_v + b den) - r kappa den - t den - sum_j g_j |L_j' rho|^2  ~  0,   g_0 = 1,  g_j = d_j - c_j's,
+    +-(a'p_v + b den) - r kappa den - t den - |L_0' rho|^2 - sum_j g_j |L_j' rho|^2  ~  0,
 
-rho the 2^k products of the chain's coordinates u_i (plain monomials). The factors are fixed-point numbers, one exponent a
-matrix, of 30 bits or, where rounding would eat up the margin, of 48. Nothing here decides whether a proof holds: certifier.verify does.
+the g_j some of P's faces d_j - c_j's and of its box's, 1 + u_i and 1 - u_i, rho the 2^k products of the chain's coordinates u_i
+(plain monomials). The factors are fixed-point numbers, one exponent a matrix, of 30 bits or, where rounding would eat up the margin,
+of 48. Nothing here decides whether a proof holds: certifier.verify does.
 The file is a zip of plain arrays and one JSON header (docs/algorithm.md, "Proof file").
 """
 
@@ -41,7 +42,7 @@ class Ground:
     """The polytope a proof is about and its box.
 
     Attributes:
-        C, d: (m, n), (m,) the faces used by the proof; the joint limits hold besides.
+        C, d: (m, n), (m,) faces; the joint limits hold besides.
         mid, half: (n,) the box.
         Y_lower, Y_upper: (n, m + 2n) multipliers of the faces, the upper and the lower joint limits, that prove the box.
     """
@@ -60,8 +61,8 @@ class Side:
 
     Attributes:
         chain: position indices of the joints between F and the body; rho's coordinates in this order.
-        mantissa: (V, m + 1, L (L + 1) / 2) int32 or int64, L = 2^k.
-        exponent: (V, m + 1) int32.
+        mantissa: (V, f + 1, L (L + 1) / 2) int32 or int64, L = 2^k, for 1 and the f faces used.
+        exponent: (V, f + 1) int32.
     """
 
     chain: tuple[int, ...]
@@ -70,7 +71,7 @@ class Side:
 
     @classmethod
     def from_gram(cls, chain: tuple[int, ...], Q: Array, kind: str = "int32") -> Side:
-        """Rounded factors of positive definite Gram matrices Q, (V, m + 1, L, L), in plain monomials; ``kind`` as in BITS.
+        """Rounded factors of positive definite Gram matrices Q, (V, f + 1, L, L), in plain monomials; ``kind`` as in BITS.
 
         Raises:
             np.linalg.LinAlgError: a matrix is not positive definite.
@@ -91,6 +92,7 @@ class PairProof:
         frame: body whose frame the plane is expressed in.
         plane: Z, (4, n + 1).
         t, kappa: margin and bound of |a(u)| on the box (0 where no radius is involved).
+        faces: the f faces used: j for the ground's face j, m + i for 1 + u_i, m + n + i for 1 - u_i.
         sides: of a and b.
     """
 
@@ -102,6 +104,7 @@ class PairProof:
     plane: Array
     t: float
     kappa: float
+    faces: tuple[int, ...]
     sides: tuple[Side, Side]
 
     def to_bytes(self) -> bytes:
@@ -121,7 +124,8 @@ class PairProof:
             return _pair(header["scene_hash"], header["pairs"][0], [_ground("ground/0", arrays)], "pair/0", arrays)
 
     def _header(self, ground: int) -> dict[str, Any]:
-        return {"a": self.a, "b": self.b, "frame": self.frame, "ground": ground, "chains": [list(s.chain) for s in self.sides]}
+        chains = [list(side.chain) for side in self.sides]
+        return {"a": self.a, "b": self.b, "frame": self.frame, "ground": ground, "faces": list(self.faces), "chains": chains}
 
     def _arrays(self, prefix: str) -> dict[str, np.ndarray]:
         arrays = {f"{prefix}/plane": self.plane, f"{prefix}/scalars": np.array([self.t, self.kappa])}
@@ -227,15 +231,15 @@ def _integers(array: np.ndarray) -> np.ndarray:
 
 def _pair(scene_hash: str, header: dict[str, Any], grounds: list[Ground], prefix: str, arrays: dict[str, np.ndarray]) -> PairProof:
     t, kappa = _floats(arrays[f"{prefix}/scalars"])
+    faces = tuple(int(j) for j in header["faces"])
     chain_a, chain_b = (tuple(int(i) for i in chain) for chain in header["chains"])
     side_a, side_b = (
         Side(chain, _integers(arrays[f"{prefix}/mantissa{i}"]), _integers(arrays[f"{prefix}/exponent{i}"]))
         for i, chain in enumerate((chain_a, chain_b))
     )
     plane = _floats(arrays[f"{prefix}/plane"])
-    return PairProof(
-        scene_hash, header["a"], header["b"], header["frame"], grounds[header["ground"]], plane, float(t), float(kappa), (side_a, side_b)
-    )
+    names = (header["a"], header["b"], header["frame"])
+    return PairProof(scene_hash, *names, grounds[header["ground"]], plane, float(t), float(kappa), faces, (side_a, side_b))
 
 
 def _pack(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> bytes:

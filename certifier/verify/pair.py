@@ -2,7 +2,7 @@
 
 For every vertex v of the body on the positive side (and likewise, with the sign changed, on the other)
 
-    e(u) = a'p_v + b den - (r kappa + t) den - sigma sum_j g_j |L_j' rho|^2,   sigma = prod (1 + tau_i^2),
+    e(u) = a'p_v + b den - (r kappa + t) den - sigma sum_j g_j |L_j' rho|^2,   g_0 = 1,   sigma = prod (1 + tau_i^2),
 
 is expanded exactly; on the box |u_i| <= 1 it is at most the sum of its coefficients' absolute values. den >= sigma, so if
 that sum is below t sigma then a'p_v/den + b > r kappa >= r |a|, for every point of the polytope: the body, ball included, is strictly
@@ -86,11 +86,13 @@ class PairCheck:
         self._ring = fmpq_mpoly_ctx.get([f"u{i}" for i in range(scene.n)], Ordering.lex)
         self._kinematics = ExactKinematics(scene, self._ring, ground.mid, ground.half)
         mid, half = [exact(x) for x in ground.mid], [exact(x) for x in ground.half]
-        self._faces = [self._ring.constant(fmpq(1))]
+        self._faces = []
         for c, d in zip(ground.C, ground.d, strict=True):
             terms = [exact(x) for x in c]
             constant = exact(d) - sum((x * m for x, m in zip(terms, mid, strict=True)), fmpq(0))
             self._faces.append(self._affine([constant, *(-x * h for x, h in zip(terms, half, strict=True))]))
+        one = self._ring.constant(fmpq(1))
+        self._faces += [one + u for u in self._ring.gens()] + [one - u for u in self._ring.gens()]
 
     def verify(self, proof: PairProof) -> PairStatement:
         """Check one proof on the ground.
@@ -105,6 +107,8 @@ class PairCheck:
             raise ProofError("proof_pair", f"{proof.a} and {proof.b} are not a pair of the scene")
         if proof.frame not in scene.bodies:
             raise ProofError("proof_frame", f"the scene has no body {proof.frame!r}")
+        if not all(0 <= j < len(self._faces) for j in proof.faces):
+            raise ProofError("proof_malformed", "the proof uses a face that is not there")
         if proof.plane.shape != (4, scene.n + 1):
             raise ProofError("proof_malformed", "the plane has the wrong shape")
         t, kappa = exact(proof.t), exact(proof.kappa)
@@ -117,8 +121,9 @@ class PairCheck:
         norm = self._largest_square_norm(proof)
         if any(radii) and not (kappa >= 0 and kappa * kappa >= norm):
             raise ProofError("proof_norm", "kappa does not bound the plane's normal")
+        weights = [self._ring.constant(fmpq(1)), *(self._faces[j] for j in proof.faces)]
         worst = max(
-            self._side(geometry, radius, proof.frame, side, sign, plane, t, kappa)
+            self._side(geometry, radius, proof.frame, side, sign, plane, t, kappa, weights)
             for geometry, radius, side, sign in ((a, radii[0], proof.sides[0], 1), (b, radii[1], proof.sides[1], -1))
         )
         margin = t - worst
@@ -145,12 +150,21 @@ class PairCheck:
         return largest
 
     def _side(
-        self, geometry: Geometry, radius: fmpq, frame: str, side: Side, sign: int, plane: list[fmpq_mpoly], t: fmpq, kappa: fmpq
+        self,
+        geometry: Geometry,
+        radius: fmpq,
+        frame: str,
+        side: Side,
+        sign: int,
+        plane: list[fmpq_mpoly],
+        t: fmpq,
+        kappa: fmpq,
+        weights: list[fmpq_mpoly],
     ) -> fmpq:
         """The largest residual over the body's vertices, divided by sigma."""
         joints = [joint.index for joint, _ in self._kinematics.path(frame, geometry.body) if joint.index is not None]
         length = 2 ** len(side.chain)
-        shape = (len(geometry.vertices), len(self._faces))
+        shape = (len(geometry.vertices), len(weights))
         if (
             len(joints) > MAX_CHAIN
             or sorted(joints) != sorted(side.chain)
@@ -167,8 +181,8 @@ class PairCheck:
         for v, vertex in enumerate(geometry.vertices):
             residual = fixed + sum((exact(x) * axis for x, axis in zip(vertex, axes, strict=True)), start=self._ring.constant(fmpq(0)))
             certificate = self._ring.constant(fmpq(0))
-            for face, square in zip(self._faces, self._squares(side, v), strict=True):
-                certificate += face * square
+            for weight, square in zip(weights, self._squares(side, v), strict=True):
+                certificate += weight * square
             residual -= sigma * certificate
             worst = max(worst, sum((abs(c) for c in residual.coeffs()), fmpq(0)))
         return worst / sigma

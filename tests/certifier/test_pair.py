@@ -104,3 +104,23 @@ def test_closest_points_of_two_cubes(distance):
     assert found.distance == pytest.approx(distance, rel=1e-5)
     assert found.gap == pytest.approx(distance, rel=1e-5)
     assert closest(cube_, cube_ + 0.5).gap <= 0
+
+
+def many_faces(scene, half, count, seed):
+    """A polytope with many random faces around the origin."""
+    rng = np.random.default_rng(seed)
+    C = rng.normal(size=(count, scene.n))
+    C /= np.linalg.norm(C, axis=1)[:, None]
+    return scene.polytope(C, np.full(count, half))
+
+
+@pytest.mark.parametrize("half", [0.1, 0.25, 0.4, 0.6])
+def test_chosen_faces_give_the_verdict_of_all_faces(half, monkeypatch):
+    scene = planar_arm(3, obstacle(0.9))
+    region = many_faces(scene, half, 60, seed=1)
+    chosen = [Certification(scene, region, np.zeros(3)).certify(i) for i in range(3)]
+    monkeypatch.setattr("certifier.pair.FACES_AT_A_TIME", 10**6)
+    every = [Certification(scene, region, np.zeros(3)).certify(i) for i in range(3)]
+    assert [result.outcome for result in chosen] == [result.outcome for result in every]
+    used = [len(PairProof.from_bytes(result.proof).faces) for result in chosen if result.proof]
+    assert all(count < 40 for count in used)
