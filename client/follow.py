@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from certifier.outcome import Outcome
 from client.http import Client, Document
 from client.output import Screen, plain, seconds
 
@@ -20,6 +21,7 @@ class Teller:
     def __init__(self, screen: Screen, pairs: list[str], watch: bool) -> None:
         self._screen, self._pairs, self._watch = screen, pairs, watch
         self._total = self._done = 0
+        self._failure = ""
 
     def tell(self, event: Document) -> None:
         """Says what the event means; kinds that it does not know are left out."""
@@ -39,16 +41,18 @@ class Teller:
 
     def _tell_iteration(self, data: dict[str, Any]) -> None:
         if data["state"] != "running":
-            settled = f"{self._done} of {self._total} pairs settled"
-            self._screen.line(f"iteration {data['index']} ({data['label']}): {plain(data['state'])}, {settled}")
+            result = f"{plain(data['state'])}, {self._done} of {self._total} pairs settled"
+            self._screen.line(f"iteration {data['index']} ({data['label']}): {result}{self._failure}")
             return
-        self._total, self._done = data["pairs"], 0
+        self._total, self._done, self._failure = data["pairs"], 0, ""
         self._screen.status(f"iteration {data['index']} ({data['label']}): {self._total} pairs")
 
     def _tell_pairs(self, data: dict[str, Any]) -> None:
         for pair in data["pairs"]:
             self._done += 1
             text = f"{self._pairs[pair['index']]}: {plain(pair['state'])}"
+            if pair["state"] != Outcome.CERTIFIED:
+                self._failure = f"; {text}"
             if self._watch:
                 self._screen.line(f"  {self._done}/{self._total} {text} ({seconds(pair['seconds'])})")
             self._screen.status(f"iteration {data['iteration']}: {self._done}/{self._total} pairs, {text}")
