@@ -41,12 +41,16 @@ def known_scene(client: Client, scene: str) -> Document:
 def grow(client: Client, request: Document, screen: Screen, watch: bool = False, idempotency_key: str | None = None) -> Grown:
     """Has the service grow a region and waits for it.
 
+    Under an idempotency key the job made earlier serves again, or its retry where it ended without a region.
+
     Raises:
         CirisError: why there is no region.
     """
     job, new = client.create_job(request, idempotency_key)
-    if new or not job["ended"]:
-        screen.line(f"job {job['id']}: {client.url}/jobs/{job['id']}")
+    while not new and job["ended"] and job["region"] is None:
+        job = client.retry(job["id"])
+    screen.line(f"job {job['id']}{', done in an earlier run' if job['ended'] else ''}: {client.url}/jobs/{job['id']}")
+    if not job["ended"]:
         job = _wait(client, job["id"], screen, watch)
     if job["region"] is None:
         raise _error(job)
@@ -101,7 +105,7 @@ def _wait(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:
     try:
         return follow(client, job_id, screen, watch)
     except KeyboardInterrupt:
-        screen.line(f"job {job_id} goes on without you: {client.url}/jobs/{job_id}")
+        screen.line(f"job {job_id} goes on while the service runs: {client.url}/jobs/{job_id}")
         raise
 
 

@@ -177,7 +177,7 @@ def test_an_interrupted_wait_leaves_the_job_alone(url: str, scene: Scene, tmp_pa
     assert waiting.returncode == 130
     assert "Traceback" not in said
     lines = said.splitlines()
-    assert "goes on without you" in lines[-2]
+    assert "goes on while the service runs" in lines[-2]
     assert lines[-1] == "error: interrupted"
     (job,) = httpx2.get(f"{url}/v1/jobs").json()["jobs"]
     assert job["state"] == "queued"

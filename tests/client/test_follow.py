@@ -1,0 +1,65 @@
+"""What people are told of a job's events."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from client.follow import Teller
+from client.output import Screen
+
+
+class Paper(Screen):
+    """Keeps what is said."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.lines: list[str] = []
+        self.last = ""
+
+    def line(self, text: str) -> None:
+        self.lines.append(text)
+
+    def status(self, text: str) -> None:
+        self.last = text
+
+
+def pair(index: int, state: str) -> dict[str, Any]:
+    return {"index": index, "state": state, "stage": "sos", "margin": None, "seconds": 0.25}
+
+
+EVENTS: list[tuple[str, dict[str, Any]]] = [
+    ("job", {"state": "running"}),
+    ("step", {"kind": "propose", "state": "open"}),
+    ("step", {"kind": "propose", "state": "done", "seconds": 4.8}),
+    ("iteration", {"index": 0, "label": "contract", "state": "running", "pairs": 2, "reused": 0}),
+    ("pairs", {"iteration": 0, "pairs": [pair(0, "certified"), pair(1, "not_certifiable")]}),
+    ("iteration", {"index": 0, "label": "contract", "state": "failed"}),
+    ("iteration", {"index": 1, "label": "contract", "state": "running", "pairs": 1, "reused": 1}),
+    ("pairs", {"iteration": 1, "pairs": [pair(1, "certified")]}),
+    ("iteration", {"index": 1, "label": "contract", "state": "certified"}),
+    ("region", {"region_id": "r", "iteration": 1, "guarantee": "exact", "ellipsoid_volume": 0.5}),
+    ("something_new", {}),
+]
+
+
+def told(watch: bool) -> Paper:
+    paper = Paper()
+    teller = Teller(paper, ["a - b", "a - c"], watch)
+    for kind, data in EVENTS:
+        teller.tell({"kind": kind, "data": data})
+    return paper
+
+
+def test_the_course_of_a_job_in_a_few_lines() -> None:
+    assert told(watch=False).lines == [
+        "seeding: done after 4.80 s",
+        "iteration 0 (contract): failed, 2 of 2 pairs settled; a - c: not certifiable",
+        "iteration 1 (contract): certified, 1 of 1 pairs settled",
+        "certified region of iteration 1: ellipsoid volume 0.5",
+    ]
+
+
+def test_watching_tells_of_every_pair() -> None:
+    paper = told(watch=True)
+    assert "  2/2 a - c: not certifiable (0.25 s)" in paper.lines
+    assert paper.last == "iteration 1: 1/1 pairs, a - c: certified"
