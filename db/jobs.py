@@ -39,20 +39,18 @@ def create(
         CirisError: idempotency_conflict, when the key was used for a different request.
     """
     job_id = str(uuid4())
-    made = insert_new(
-        session,
-        JobRow,
-        id=job_id,
-        kind=kind,
-        scene_id=scene_id,
-        options=options,
-        deadline_at=deadline_at,
-        idempotency_key=idempotency_key,
-        request_digest=request_digest,
-        retry_of=retry_of,
-        attempt=attempt,
-    )
-    if made:
+    new = {
+        "id": job_id,
+        "kind": kind,
+        "scene_id": scene_id,
+        "options": options,
+        "deadline_at": deadline_at,
+        "idempotency_key": idempotency_key,
+        "request_digest": request_digest,
+        "retry_of": retry_of,
+        "attempt": attempt,
+    }
+    if insert_new(session, JobRow, [new]):
         job = lock(session, job_id)
         events.emit(session, job, "job", {"state": job.state})
         return job, True

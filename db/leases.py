@@ -67,16 +67,16 @@ def is_free(row: Row, now: datetime) -> bool:
     return alive is False or (alive is None and (row.lease_until is None or row.lease_until < now))
 
 
-def take(session: Session, model: type[Row], ids: Sequence[int], *, task_id: str | None, seconds: float) -> str:
+def take(session: Session, model: type[Row], rows: Sequence[Row], *, task_id: str | None, seconds: float) -> str:
     """Claims rows that :func:`is_free` (the caller holds their job's lock) and counts the attempt. Returns the lease's token."""
     token, now = str(uuid4()), utcnow()
-    where = model.id.in_(ids)
-    transition(session, model, OPEN, where)
+    if left := [row.id for row in rows if row.state == RUNNING]:
+        transition(session, model, OPEN, model.id.in_(left))
     transition(
         session,
         model,
         RUNNING,
-        where,
+        model.id.in_([row.id for row in rows]),
         attempts=model.attempts + 1,
         worker=this_worker(),
         task_id=task_id,

@@ -82,9 +82,9 @@ class JobRow(Base):
     """CirisError.to_document() when it failed."""
     options: Mapped[Document]
     """certifier.growth.GrowthOptions.to_document()"""
-    growth: Mapped[Document | None]
+    growth: Mapped[Document | None] = mapped_column(deferred=True)
     """The state of certifier.growth after the last transition."""
-    action: Mapped[Document | None]
+    action: Mapped[Document | None] = mapped_column(deferred=True)
     """The action that this state waits for."""
     idempotency_key: Mapped[str | None] = mapped_column(String(255), unique=True)
     request_digest: Mapped[str | None] = mapped_column(String(64))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sqlalchemy import Select, insert, select
+from sqlalchemy import ColumnElement, Select, insert, select
 from sqlalchemy.orm import Session
 
 from db import events, jobs, leases, proofs
@@ -142,7 +142,7 @@ def claim(
     if not chosen:
         return None
     pairs = tuple(Claimed(row.pair_index, row.attempts + 1) for row in chosen)
-    token = leases.take(session, PairRow, [row.id for row in chosen], task_id=task_id, seconds=lease_seconds)
+    token = leases.take(session, PairRow, chosen, task_id=task_id, seconds=lease_seconds)
     return Claim(token, job_id, job.scene_id, iteration, pairs)
 
 
@@ -153,29 +153,30 @@ def save(session: Session, claim: Claim, results: Sequence[Result], *, worth_sto
     the pair that they hold is expected to take more than ``worth_stopping`` seconds.
     """
     job = jobs.lock(session, claim.job_id)
-    saved = [result for result in results if _save_one(session, claim, result)]
+    where = (PairRow.job_id == claim.job_id, PairRow.iteration == claim.iteration, leases.held(PairRow, claim.token))
+    held = {row.pair_index: row for row in session.scalars(select(PairRow).where(*where))}
+    saved = [result for result in results if result.index in held]
     if not saved:
         return Saved(held=False, finished=False)
+    digests = proofs.put(session, [result.proof for result in saved if result.proof is not None])
+    for state in {result.state for result in saved}:
+        ids = [held[result.index].id for result in saved if result.state == state]
+        transition(session, PairRow, state, PairRow.id.in_(ids), lease_until=None)
+    for result in saved:
+        row = held[result.index]
+        row.stage, row.margin, row.seconds, row.detail = result.stage, result.margin, result.seconds, result.detail
+        row.witness_s, row.weak_points = result.witness_s, result.weak_points
+        row.proof_digest = None if result.proof is None else digests[result.proof]
     job.error = next((result.error for result in saved if result.error is not None), job.error)
     events.emit(session, job, "pairs", {"iteration": claim.iteration, "pairs": [_public(result) for result in saved]})
-    iteration = session.get_one(IterationRow, (claim.job_id, claim.iteration))
+    label, stop_at_first_failure = session.execute(
+        select(IterationRow.label, IterationRow.stop_at_first_failure).where(*_iteration(job.id, claim.iteration))
+    ).one()
     stopped: tuple[str, ...] = ()
-    if iteration.stop_at_first_failure and any(result.state != PairState.CERTIFIED for result in saved):
+    if stop_at_first_failure and any(result.state != PairState.CERTIFIED for result in saved):
         stopped = skip(session, claim.job_id, worth_stopping=worth_stopping, but=claim.token)
-    finished = _finish_iteration(session, job, iteration)
+    finished = _finish_iteration(session, job, claim.iteration, label)
     return Saved(held=len(saved) == len(results), finished=finished, stopped=stopped)
-
-
-def _save_one(session: Session, claim: Claim, result: Result) -> bool:
-    """Moves one pair, if it is still held, to its result; a proof is stored only with the pair that it belongs to."""
-    where = (PairRow.job_id == claim.job_id, PairRow.iteration == claim.iteration, PairRow.pair_index == result.index)
-    row_id = session.scalar(select(PairRow.id).where(*where, leases.held(PairRow, claim.token)))
-    if row_id is None:
-        return False
-    values: dict[str, Any] = {name: getattr(result, name) for name in ("stage", "margin", "seconds", "detail", "witness_s", "weak_points")}
-    if result.proof is not None:
-        values["proof_digest"] = proofs.put(session, result.proof)
-    return bool(transition(session, PairRow, result.state, PairRow.id == row_id, lease_until=None, **values))
 
 
 def skip(session: Session, job_id: str, *, worth_stopping: float, but: str | None = None) -> tuple[str, ...]:
@@ -189,16 +190,15 @@ def skip(session: Session, job_id: str, *, worth_stopping: float, but: str | Non
     return stopped
 
 
-def _finish_iteration(session: Session, job: JobRow, iteration: IterationRow) -> bool:
+def _finish_iteration(session: Session, job: JobRow, index: int, label: str) -> bool:
     """Settles the iteration if no pair of it is unfinished; True for the one call that does."""
-    states = set(session.scalars(select(PairRow.state).distinct().where(PairRow.job_id == job.id, PairRow.iteration == iteration.index)))
+    states = set(session.scalars(select(PairRow.state).distinct().where(PairRow.job_id == job.id, PairRow.iteration == index)))
     if states & UNFINISHED:
         return False
     state = IterationState.CERTIFIED if states <= {PairState.CERTIFIED} else IterationState.FAILED
-    where = (IterationRow.job_id == job.id, IterationRow.index == iteration.index)
-    if not transition(session, IterationRow, state, *where, finished_at=utcnow()):
+    if not transition(session, IterationRow, state, *_iteration(job.id, index), finished_at=utcnow()):
         return False
-    events.emit(session, job, "iteration", {"index": iteration.index, "label": iteration.label, "state": state})
+    events.emit(session, job, "iteration", {"index": index, "label": label, "state": state})
     return True
 
 
@@ -232,6 +232,10 @@ def proving(session: Session, job_id: str, iteration_of: Mapping[int, int]) -> d
         )
     )
     return {row.pair_index: row for row in rows if iteration_of.get(row.pair_index) == row.iteration}
+
+
+def _iteration(job_id: str, index: int) -> tuple[ColumnElement[bool], ColumnElement[bool]]:
+    return IterationRow.job_id == job_id, IterationRow.index == index
 
 
 def _pairs(job_id: str, iteration: int) -> Select[PairRow]:

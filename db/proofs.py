@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Collection
 
 from sqlalchemy.orm import Session
 
@@ -11,11 +12,11 @@ from db.models import ProofRow
 from db.session import insert_new
 
 
-def put(session: Session, data: bytes) -> str:
-    """Stores a proof, unless it is there, and returns its digest."""
-    digest = hashlib.sha256(data).hexdigest()
-    insert_new(session, ProofRow, digest=digest, data=data)
-    return digest
+def put(session: Session, files: Collection[bytes]) -> dict[bytes, str]:
+    """Stores proofs, unless they are there, and returns the digest of each."""
+    digests = {data: hashlib.sha256(data).hexdigest() for data in files}
+    insert_new(session, ProofRow, [{"digest": digest, "data": data} for data, digest in digests.items()])
+    return digests
 
 
 def get(session: Session, digest: str) -> bytes:

@@ -28,7 +28,7 @@ def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any],
         guarantee=manifest["guarantee"],
         manifest=manifest,
         arrays={"C": np.array(manifest["halfspace_normals"]), "d": np.array(manifest["halfspace_offsets"])},
-        proof_digest=proofs.put(session, proof),
+        proof_digest=proofs.put(session, [proof])[proof],
         ellipsoid_volume=volume,
     )
     session.add(region)

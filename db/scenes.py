@@ -18,7 +18,7 @@ ID_LENGTH = 16
 def add(session: Session, scene: Scene) -> SceneRow:
     """The row of this scene, made now if no scene has the same content. The name of the first one stays."""
     for name in (scene.hash[:ID_LENGTH], scene.hash):
-        insert_new(session, SceneRow, id=name, name=scene.name, hash=scene.hash, document=scene.to_document())
+        insert_new(session, SceneRow, [{"id": name, "name": scene.name, "hash": scene.hash, "document": scene.to_document()}])
         row = session.scalar(select(SceneRow).where(SceneRow.hash == scene.hash))
         if row is not None:
             return row

@@ -57,11 +57,13 @@ class Database:
         self.engine.dispose()
 
 
-def insert_new(session: Session, model: type[DeclarativeBase], **values: Any) -> bool:
-    """Inserts a row unless a unique constraint says it is there already; tells whether it did."""
+def insert_new(session: Session, model: type[DeclarativeBase], rows: list[dict[str, Any]]) -> int:
+    """Inserts rows, except those that a unique constraint says are there already; tells how many it inserted."""
+    if not rows:
+        return 0
     dialect = {"sqlite": sqlite, "postgresql": postgresql}[session.get_bind().dialect.name]
-    insert = dialect.insert(model).values(**values).on_conflict_do_nothing()
-    return session.execute(insert.returning(*model.__table__.primary_key)).first() is not None
+    insert = dialect.insert(model).on_conflict_do_nothing().returning(*model.__table__.primary_key)
+    return len(session.execute(insert, rows).all())
 
 
 @cache

@@ -50,7 +50,7 @@ def claim(session: Session, step_id: int, *, task_id: str | None, lease_seconds:
     if job.state not in unfinished(JOB) or not leases.is_free(step, utcnow()):
         return None
     attempt = step.attempts + 1
-    token = leases.take(session, StepRow, [step_id], task_id=task_id, seconds=lease_seconds)
+    token = leases.take(session, StepRow, [step], task_id=task_id, seconds=lease_seconds)
     return Claim(token, step_id, job.id, job.scene_id, job.options, StepKind(step.kind), step.input, attempt)
 
 

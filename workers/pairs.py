@@ -22,20 +22,22 @@ from workers.transaction import writing
 
 log = logging.getLogger(__name__)
 
-SAVE_SECONDS = 0.1
+SAVE_SECONDS = 0.5
 """Results are saved together until this much time has gone into them."""
 
 
 def solve_pairs(job_id: str, iteration: int, indices: Sequence[int], task_id: str | None = None) -> None:
     """Certifies these pairs of an iteration, as far as they are still wanted and nobody else is at them."""
-    lease = settings().lease_seconds
-    while True:
+    lease, left = settings().lease_seconds, set(indices)
+    while left:
         with database().write() as session:
-            claim = pairs.claim(session, job_id, iteration, indices, task_id=task_id, lease_seconds=lease)
+            wanted = [index for index in indices if index in left]
+            claim = pairs.claim(session, job_id, iteration, wanted, task_id=task_id, lease_seconds=lease)
         if claim is None:
             return
         with leases.renewed(database(), PairRow, claim.token, lease):
             _certify_claimed(claim)
+        left -= {pair.index for pair in claim.pairs}
 
 
 def _certify_claimed(claim: pairs.Claim) -> None:

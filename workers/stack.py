@@ -1,7 +1,7 @@
 """The embedded stack of ``ciris up``: queue, API and workers as supervised child processes on one machine.
 
-Data directory: ``ciris.sqlite3`` (unless a database is given), ``queue/`` (the queue's append-only file), ``logs/``, ``stack.json`` (where
-the API is, while the stack runs) and ``stack.lock`` (held while it runs).
+Data directory: ``ciris.sqlite3`` (unless a database is given), ``queue/`` (the queue's append-only file), ``queue.sock``,
+``logs/``, ``stack.json`` (where the API is, while the stack runs) and ``stack.lock`` (held while it runs).
 """
 
 from __future__ import annotations
@@ -34,6 +34,10 @@ from workers.processes import die_with_parent, queue_server_command, queue_url
 
 log = logging.getLogger(__name__)
 
+QUEUE = "queue"
+"""Stopped last, so that the workers can give their messages back."""
+SOCKET = "queue.sock"
+MAX_SOCKET_PATH = 100
 POLL_SECONDS = 0.2
 MAX_BACKOFF_SECONDS = 30.0
 HEALTHY_SECONDS = 30.0
@@ -79,12 +83,15 @@ class Child:
             self.process = None
         return ran < self.backoff
 
-    def stop(self) -> None:
-        """Asks the child to end, waits, and kills what is left of its group."""
+    def ask_to_stop(self) -> None:
+        if self.process is not None:
+            with suppress(ProcessLookupError):
+                self.process.send_signal(self.stop_signal)
+
+    def wait_or_kill(self) -> None:
+        """Waits for the child, and kills what is left of its group."""
         if self.process is None:
             return
-        with suppress(ProcessLookupError):
-            self.process.send_signal(self.stop_signal)
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(STOP_SECONDS)
         with suppress(ProcessLookupError):
@@ -104,11 +111,11 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
     """
     data = settings.data_dir.expanduser().absolute()
     (data / "logs").mkdir(parents=True, exist_ok=True)
-    with _only_one(data), _stop_signals() as stopping, tempfile.TemporaryDirectory(prefix="ciris-", dir="/tmp") as sockets:
+    with _only_one(data), _stop_signals() as stopping, _socket_directory(data) as sockets:
         bound = _choose_port(settings, port)
         url = f"http://{settings.host}:{bound}"
-        children = _children(settings, data, Path(sockets) / "queue")
-        environment = _environment(settings, data, Path(sockets) / "queue", bound)
+        children = _children(settings, data, sockets / SOCKET)
+        environment = _environment(settings, data, sockets / SOCKET, bound)
         migrate.upgrade(settings.database)
         try:
             for child in children:
@@ -118,20 +125,20 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
                 ready(url)
             _supervise(children, environment, data, url, stopping)
         finally:
-            for child in reversed(children):
-                child.stop()
+            _stop([child for child in children if child.name != QUEUE])
+            _stop([child for child in children if child.name == QUEUE])
             (data / "stack.json").unlink(missing_ok=True)
 
 
 def _children(settings: Settings, data: Path, queue_socket: Path) -> list[Child]:
-    """The processes, in the order of starting; they are stopped in the opposite one."""
+    """The processes, in the order of starting."""
     children = [
         Child("control", [sys.executable, "-m", "workers", "control"], signal.SIGQUIT),
         Child("solve", [sys.executable, "-m", "workers", "solve"], signal.SIGQUIT),
         Child("api", [sys.executable, "-m", "api"], signal.SIGTERM),
     ]
     if not settings.redis_url:
-        children.insert(0, Child("queue", queue_server_command(data / "queue", queue_socket), signal.SIGTERM))
+        children.insert(0, Child(QUEUE, queue_server_command(data / "queue", queue_socket), signal.SIGTERM))
     return children
 
 
@@ -153,6 +160,13 @@ def _supervise(children: list[Child], environment: dict[str, str], data: Path, u
                 child.start(environment, data / "logs")
                 _describe(data, url, children)
         time.sleep(POLL_SECONDS)
+
+
+def _stop(children: list[Child]) -> None:
+    for child in children:
+        child.ask_to_stop()
+    for child in children:
+        child.wait_or_kill()
 
 
 def _describe(data: Path, url: str, children: list[Child]) -> None:
@@ -186,6 +200,16 @@ def _choose_port(settings: Settings, asked: int | None) -> int:
                 probe.bind((settings.host, port))
                 return int(probe.getsockname()[1])
     raise CirisError("port_taken", f"port {asked} of {settings.host} cannot be bound", field="port", hint="choose another, or none")
+
+
+@contextmanager
+def _socket_directory(data: Path) -> Iterator[Path]:
+    """Where the queue's socket is: the data directory, or a directory of its own where that path would be too long for a socket."""
+    if len(os.fsencode(data / SOCKET)) < MAX_SOCKET_PATH:
+        yield data
+    else:
+        with tempfile.TemporaryDirectory(prefix="ciris-", dir="/tmp") as directory:
+            yield Path(directory)
 
 
 @contextmanager

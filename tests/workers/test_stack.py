@@ -1,0 +1,109 @@
+"""The embedded stack: one command starts all of it, mends it, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from db.leases import _started
+from tests.workers.service import ROOT, eventually
+from workers.stack import Child
+
+COMMAND = [sys.executable, "-m", "workers.stack"]
+
+
+class Stack:
+    """A running stack and what its stack.json says."""
+
+    def __init__(self, data: Path) -> None:
+        self.data = data
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")}
+        self.process = subprocess.Popen([*COMMAND, "--data", str(data)], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)
+        assert self.process.stdout is not None
+        assert self.process.stdout.readline() == f"ciris is up at {self.description['url']}\n"
+
+    @property
+    def description(self) -> dict[str, Any]:
+        return dict(json.loads((self.data / "stack.json").read_text()))
+
+    def ready(self) -> bool:
+        try:
+            with urllib.request.urlopen(f"{self.description['url']}/readyz", timeout=5) as answer:
+                return bool(json.load(answer)["ready"])
+        except OSError:
+            return False
+
+
+@pytest.fixture
+def stack(tmp_path: Path) -> Iterator[Stack]:
+    running = Stack(tmp_path / "data")
+    try:
+        yield running
+    finally:
+        running.process.kill()
+        running.process.wait()
+        assert running.process.stdout is not None
+        running.process.stdout.close()
+
+
+def gone(pids: dict[str, int]) -> bool:
+    return all(_started(pid) is None for pid in pids.values())
+
+
+def test_what_dies_is_started_again_and_a_stop_leaves_nothing(stack: Stack) -> None:
+    second = subprocess.run([*COMMAND, "--data", str(stack.data)], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert second.returncode == 1
+    assert second.stderr.splitlines()[-1].startswith("error: a stack with the data directory")
+
+    before = stack.description["pids"]
+    assert set(before) == {"queue", "control", "solve", "api"}
+    os.kill(before["queue"], signal.SIGKILL)
+    os.kill(before["api"], signal.SIGKILL)
+    eventually(lambda: not set(stack.description["pids"].values()) & {before["queue"], before["api"]}, "both are started again")
+    eventually(stack.ready, "the API reaches the queue again")
+
+    after = stack.description["pids"]
+    stack.process.send_signal(signal.SIGTERM)
+    assert stack.process.wait(30) == 0
+    assert gone(after)
+    assert not (stack.data / "stack.json").exists()
+
+
+def test_nothing_outlives_a_supervisor_that_is_killed(stack: Stack) -> None:
+    pids = stack.description["pids"]
+    stack.process.kill()
+    eventually(lambda: gone(pids), "every child ends")
+
+
+def test_a_port_that_was_asked_for_and_is_taken_is_told(tmp_path: Path) -> None:
+    import socket
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        failed = subprocess.run([*COMMAND, "--data", str(tmp_path), "--port", port], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert failed.returncode == 1
+    assert failed.stderr.startswith(f"error: port: port {port} of 127.0.0.1 cannot be bound")
+
+
+def test_a_child_that_keeps_dying_is_waited_for_longer_each_time(tmp_path: Path) -> None:
+    child = Child("dies", [sys.executable, "-c", ""], signal.SIGTERM)
+    waits = []
+    for _ in range(3):
+        child.start(dict(os.environ), tmp_path)
+        assert child.process is not None
+        child.process.wait()
+        assert child.dead
+        child.wait_longer()
+        waits.append(child.backoff)
+    assert waits == [1.0, 2.0, 4.0]
