@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from api.schemas import PolytopeBody, Seed
+from api.schemas.jobs import PolytopeBody, Seed
 from certifier.errors import RegionError
 from certifier.model import Array, Scene
 from certifier.seed_options import SeedOptions

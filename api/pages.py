@@ -19,7 +19,8 @@ import dashboard
 from api import problems
 from api.access import Db
 from api.routers import jobs, regions, scenes
-from api.schemas import GrowthPoint, Iteration, Job, PairCell, PairInfo, PairMatrix
+from api.schemas.jobs import GrowthPoint, Iteration, Job, PairCell, PairMatrix
+from api.schemas.scenes import PairInfo
 from db.session import Database
 
 _ROOT = Path(dashboard.__file__).parent

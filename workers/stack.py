@@ -252,7 +252,8 @@ def main() -> None:
     try:
         run_stack(chosen, port=arguments.port, ready=lambda url: print(f"ciris is up at {url}", flush=True))
     except CirisError as error:
-        sys.exit(f"error: {error}")
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
 
 
 if __name__ == "__main__":

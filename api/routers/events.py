@@ -11,7 +11,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from api.access import Db
-from api.schemas import Event, EventList
+from api.schemas.jobs import Event, EventList
 from db import events, jobs
 from db.session import Database
 

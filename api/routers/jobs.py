@@ -14,19 +14,8 @@ from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 
 from api import checks
 from api.access import Db
-from api.schemas import (
-    CertifyRequest,
-    GrowRequest,
-    GrowthCurve,
-    GrowthPoint,
-    Iteration,
-    Job,
-    JobPage,
-    NewJob,
-    PairCell,
-    PairInfo,
-    PairMatrix,
-)
+from api.schemas.jobs import CertifyRequest, GrowRequest, GrowthCurve, GrowthPoint, Iteration, Job, JobPage, NewJob, PairCell, PairMatrix
+from api.schemas.scenes import PairInfo
 from certifier.model import Scene
 from certifier.outcome import Stage
 from db import jobs, pairs, regions, scenes

@@ -7,7 +7,7 @@ from fastapi import APIRouter
 
 from api import checks
 from api.access import Db
-from api.schemas import Containment, ContainsRequest, ContainsResponse, Hit
+from api.schemas.regions import Containment, ContainsRequest, ContainsResponse, Hit
 from certifier.model import Polytope, Scene
 from certifier.outcome import Guarantee
 from db import regions, scenes

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query, Response, status
 
 from api import exports
 from api.access import Db
-from api.schemas import RegionDetail, RegionPage, RegionSummary
+from api.schemas.regions import RegionDetail, RegionPage, RegionSummary
 from db import jobs, proofs, regions, scenes
 
 router = APIRouter(prefix="/v1/regions", tags=["regions"])

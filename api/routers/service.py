@@ -9,7 +9,7 @@ from sqlalchemy import text
 from sqlalchemy.exc import SQLAlchemyError
 
 from api.access import Db
-from api.schemas import Health, Readiness
+from api.schemas.service import Health, Readiness
 from db.session import Database
 from workers.app import CONTROL, waiting
 

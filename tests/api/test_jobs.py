@@ -8,7 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api.app import create_app
-from api.schemas import GrowOptions, Seed
+from api.schemas.jobs import GrowOptions, Seed
 from certifier.growth import GrowthOptions
 from certifier.model import Scene
 from certifier.seed_options import SeedOptions

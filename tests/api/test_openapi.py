@@ -5,7 +5,8 @@ from typing import Any
 from fastapi.testclient import TestClient
 from pydantic import TypeAdapter
 
-from api.schemas import ContainsRequest, NewJob
+from api.schemas.jobs import NewJob
+from api.schemas.regions import ContainsRequest
 
 OPERATIONS = {
     "create_scene": "POST /v1/scenes",

@@ -10,7 +10,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api.pages import growth_chart, matrix_rows, progress
-from api.schemas import GrowthPoint, Iteration, PairCell, PairInfo, PairMatrix
+from api.schemas.jobs import GrowthPoint, Iteration, PairCell, PairMatrix
+from api.schemas.scenes import PairInfo
 from db import scenes
 from db.session import Database
 from db.states import IterationState, PairState

@@ -1,0 +1,21 @@
+"""What requests have in common."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Real = Annotated[float, Field(allow_inf_nan=False)]
+Vector = Annotated[list[Real], Field(min_length=1, max_length=64)]
+RandomSeed = Annotated[int, Field(ge=0, le=2**63 - 1, description="Seeds every random choice.")]
+Document = dict[str, Any]
+
+Rows = Annotated[list[Vector], Field(max_length=2000)]
+Offsets = Annotated[list[Real], Field(max_length=2000)]
+
+
+class Request(BaseModel):
+    """Base of everything that clients send."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)

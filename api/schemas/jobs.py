@@ -1,0 +1,204 @@
+"""Jobs, their events, iterations and pairs."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from api.schemas.common import Document, Offsets, RandomSeed, Real, Request, Rows, Vector
+from api.schemas.scenes import PairInfo
+from certifier.outcome import Outcome, Stage
+from certifier.seed_options import Method
+from db.models import EventRow, JobRow
+from db.states import IterationState, JobKind, JobState, PairState
+
+
+class GrowOptions(Request):
+    """How far to go."""
+
+    bisection_steps: Annotated[int, Field(ge=0, le=60, description="Certifications spent on contraction after its two ends.")] = 6
+    max_rounds: Annotated[int, Field(ge=0, le=1000, description="Rounds of the polytope step; 0 ends after contraction.")] = 3
+    tolerance: Annotated[Real, Field(gt=0, lt=10, description="Growth of the ellipsoid's volume under which the alternation stops.")] = 0.02
+    backoff: Annotated[int, Field(ge=0, le=20, description="How often a step that fails to certify is halved.")] = 2
+    random_seed: RandomSeed = 0
+
+
+class Seed(Request):
+    """Where growing begins, and how the first polytope is found; what is left out has the certifier's default."""
+
+    method: Method = Method.IRIS_NP2
+    q: Vector | None = Field(None, description="Joint positions, radians or metres, in position order; for every method but `polytope`.")
+    C: Rows | None = Field(None, description="Faces of the first polytope, in s; for the method `polytope`.")
+    d: Offsets | None = None
+    center: Vector | None = Field(None, description="A point inside that polytope, in s.")
+    half_width: Real | None = Field(None, description="Half the side of the `box`, in s.")
+    epsilon: Real | None = Field(None, description="Fraction of the volume that IRIS may leave in collision.")
+    delta: Real | None = Field(None, description="Probability with which IRIS may be wrong about that.")
+    max_iterations: int | None = Field(None, description="IRIS' alternations between faces and ellipsoid.")
+    max_iterations_separating_planes: int | None = Field(None, description="IRIS' rounds of adding faces within each.")
+    tolerance: Real | None = Field(None, description="IRIS ends when the ellipsoid's volume grows by less than this fraction.")
+    margin: Real | None = Field(None, description="Distance in s at which IRIS' faces stay clear of the collisions found.")
+    random_seed: int | None = Field(None, description="Seeds IRIS.")
+
+
+class JobRequest(Request):
+    """What every job has."""
+
+    scene: str = Field(min_length=1, max_length=255, description="A scene's id, or its name.")
+    deadline_seconds: Real | None = Field(None, gt=0, le=30 * 86400, description="The job ends after this long, with what it has by then.")
+
+
+class GrowRequest(JobRequest):
+    """Grow a certified region around a configuration."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"kind": "grow", "scene": "iiwa-shelf", "seed": {"q": [0, 0.3, 0, -1.8, 0, 0.9, 0]}}]}
+    )
+
+    kind: Literal["grow"]
+    seed: Seed
+    options: GrowOptions = Field(default_factory=GrowOptions)
+
+
+class PolytopeBody(Request):
+    """{s : C s <= d}; the joint limits are always added."""
+
+    C: Rows = Field(description="(m, n), one row a face, in s with the joints in position order.")
+    d: Offsets
+    center: Vector | None = Field(None, description="An interior point; found when it is not given.")
+
+
+class CertifyRequest(JobRequest):
+    """One outcome per pair for a given polytope."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"kind": "certify", "scene": "planar2", "polytope": {"C": [[1, 0], [-1, 0]], "d": [0.1, 0.1]}}]}
+    )
+
+    kind: Literal["certify"]
+    polytope: PolytopeBody
+    random_seed: RandomSeed = 0
+
+
+NewJob = Annotated[GrowRequest | CertifyRequest, Field(discriminator="kind")]
+
+
+class Job(BaseModel):
+    """A job as it is now."""
+
+    id: str
+    kind: JobKind
+    scene: str = Field(description="The scene's id.")
+    state: JobState
+    outcome: Outcome | None = Field(description="About the polytope asked for, once the job has ended.")
+    reason: str | None = Field(description="Why it ended, a sentence.")
+    error: Document | None = Field(description="What was wrong (code, message, field, hint) when it failed.")
+    options: Document
+    region: str | None = Field(description="The id of the last region certified.")
+    retry_of: str | None
+    attempt: int
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+    deadline_at: datetime | None
+    ended: bool
+
+    @classmethod
+    def of(cls, row: JobRow) -> Self:
+        return cls(
+            id=row.id,
+            kind=JobKind(row.kind),
+            scene=row.scene_id,
+            state=JobState(row.state),
+            outcome=None if row.outcome is None else Outcome(row.outcome),
+            reason=row.reason,
+            error=row.error,
+            options=row.options,
+            region=row.region_id,
+            retry_of=row.retry_of,
+            attempt=row.attempt,
+            created_at=row.created_at,
+            started_at=row.started_at,
+            finished_at=row.finished_at,
+            deadline_at=row.deadline_at,
+            ended=not row.transitions[row.state],
+        )
+
+
+class JobPage(BaseModel):
+    """Jobs, newest first."""
+
+    jobs: list[Job]
+    next: str | None = Field(description="Pass as `after` for the next page; null on the last.")
+
+
+class Event(BaseModel):
+    """Something that happened to a job."""
+
+    seq: int = Field(description="1, 2, 3 ... within the job; the event's id in the stream.")
+    kind: str = Field(description="job, iteration, pairs, step or region.")
+    data: Document
+    created_at: datetime
+
+    @classmethod
+    def of(cls, row: EventRow) -> Self:
+        return cls(seq=row.seq, kind=row.kind, data=row.data, created_at=row.created_at)
+
+
+class EventList(BaseModel):
+    """Events in order."""
+
+    events: list[Event]
+
+
+class Iteration(BaseModel):
+    """A polytope whose pairs were certified together."""
+
+    index: int
+    label: str
+    state: IterationState
+    faces: int = Field(description="Rows of C, joint limits included.")
+    ellipsoid_volume: float | None
+    reused: dict[int, int] = Field(description="Pair index to the earlier iteration whose proof serves here too.")
+    started_at: datetime
+    finished_at: datetime | None
+
+
+class PairCell(BaseModel):
+    """One pair on one iteration's polytope."""
+
+    iteration: int
+    pair: int
+    state: PairState
+    stage: Stage | None
+    margin: float | None = Field(description="Certified lower bound, in metres, of the distance between the padded bodies.")
+    seconds: float | None
+    detail: str | None
+    worker: str | None
+    witness_q: list[float] | None = Field(description="A configuration in collision, when refuted.")
+    proof: str | None = Field(description="SHA-256 of the pair's proof.")
+
+
+class PairMatrix(BaseModel):
+    """Pairs by iterations; a pair without a cell in an iteration is reused there or was not reached."""
+
+    pairs: list[PairInfo]
+    iterations: list[Iteration]
+    cells: list[PairCell]
+
+
+class GrowthPoint(BaseModel):
+    """A certified region on the way."""
+
+    iteration: int
+    region: str
+    ellipsoid_volume: float
+    seconds: float = Field(description="Since the job started.")
+
+
+class GrowthCurve(BaseModel):
+    """The volume of the certified region over time."""
+
+    points: list[GrowthPoint]

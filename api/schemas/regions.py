@@ -1,0 +1,98 @@
+"""Regions and the questions that planners ask about them."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from api.schemas.common import Document, Request, Vector
+from certifier.outcome import Guarantee
+from db.models import RegionRow
+
+MAX_POINTS = 10_000
+
+
+class RegionSummary(BaseModel):
+    """A certified region in a list."""
+
+    id: str
+    job: str
+    scene: str
+    iteration: int
+    guarantee: Guarantee
+    faces: int = Field(description="Rows of C, joint limits included.")
+    ellipsoid_volume: float
+    proof: str = Field(description="SHA-256 of the proof file.")
+    created_at: datetime
+
+    @classmethod
+    def of(cls, row: RegionRow) -> Self:
+        return cls(
+            id=row.id,
+            job=row.job_id,
+            scene=row.scene_id,
+            iteration=row.iteration,
+            guarantee=Guarantee(row.guarantee),
+            faces=len(row.arrays["d"]),
+            ellipsoid_volume=row.ellipsoid_volume,
+            proof=row.proof_digest,
+            created_at=row.created_at,
+        )
+
+
+class RegionPage(BaseModel):
+    """The newest regions."""
+
+    regions: list[RegionSummary]
+
+
+class RegionDetail(RegionSummary):
+    """A certified region with its manifest."""
+
+    manifest: Document
+
+    @classmethod
+    def of(cls, row: RegionRow) -> Self:
+        return cls(**RegionSummary.of(row).model_dump(), manifest=row.manifest)
+
+
+class ContainsRequest(Request):
+    """Points to look up: either joint positions `q` or tangent-space coordinates `s`."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "iiwa-shelf", "q": [[0, 0.3, 0, -1.8, 0, 0.9, 0]]}]})
+
+    scene: str = Field(min_length=1, max_length=255, description="A scene's id, or its name.")
+    q: list[Vector] | None = Field(None, min_length=1, max_length=MAX_POINTS, description="Joint positions, radians or metres.")
+    s: list[Vector] | None = Field(None, min_length=1, max_length=MAX_POINTS, description="Tangent-space coordinates.")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        if (self.q is None) == (self.s is None):
+            raise ValueError("give either q or s")
+        return self
+
+
+class Hit(BaseModel):
+    """A region that holds the point."""
+
+    region: str
+    margin: float = Field(description="Distance in s from the point to the region's nearest face.")
+    guarantee: Guarantee
+
+
+class Containment(BaseModel):
+    """The answer for one point."""
+
+    inside: bool
+    regions: list[Hit] = Field(description="The regions that hold the point, deepest first.")
+    margin: float | None = Field(description="The largest margin over all regions, negative outside; null where there is none.")
+
+
+class ContainsResponse(BaseModel):
+    """One answer for each point, in order."""
+
+    scene: str
+    regions: int = Field(description="How many regions were looked at.")
+    points: list[Containment]

@@ -1,0 +1,132 @@
+"""Scenes, their pairs and what to know about them."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Self
+
+from pydantic import BaseModel, Field
+
+from api.schemas.common import Document
+from certifier.model import JointKind
+from db.models import SceneRow
+
+
+class SceneSummary(BaseModel):
+    """A scene in a list."""
+
+    id: str
+    name: str
+    hash: str = Field(description="SHA-256 over everything that a proof depends on.")
+    joints: int = Field(description="Number of joint positions.")
+    geometries: int
+    pairs: int
+    warnings: int
+    created_at: datetime
+
+    @classmethod
+    def of(cls, row: SceneRow) -> Self:
+        document = row.document
+        return cls(
+            id=row.id,
+            name=row.name,
+            hash=row.hash,
+            joints=len(document["q_star"]),
+            geometries=len(document["geometries"]),
+            pairs=len(document["pairs"]),
+            warnings=len(document["warnings"]),
+            created_at=row.created_at,
+        )
+
+
+class ScenePage(BaseModel):
+    """The newest scenes."""
+
+    scenes: list[SceneSummary]
+
+
+class JointInfo(BaseModel):
+    """A joint with a position, in radians or metres."""
+
+    name: str
+    kind: JointKind
+    lower: float
+    upper: float
+    q_star: float = Field(description="Centre of the parametrisation: s = tan((q - q_star) / 2), or q - q_star for a prismatic joint.")
+
+
+class SceneDetail(SceneSummary):
+    """A scene with its joints, in position order."""
+
+    positions: list[JointInfo]
+    bodies: list[str]
+    padding: float = Field(description="Metres added around every geometry of every pair.")
+    provenance: Document
+
+    @classmethod
+    def of(cls, row: SceneRow) -> Self:
+        document = row.document
+        moving = sorted((j for j in document["joints"] if j["index"] is not None), key=lambda j: j["index"])
+        positions = [
+            JointInfo(name=j["name"], kind=j["kind"], lower=j["lower"], upper=j["upper"], q_star=centre)
+            for j, centre in zip(moving, document["q_star"], strict=True)
+        ]
+        return cls(
+            **SceneSummary.of(row).model_dump(),
+            positions=positions,
+            bodies=document["bodies"],
+            padding=document["padding"],
+            provenance=document["provenance"],
+        )
+
+
+class PairInfo(BaseModel):
+    """Two geometries that must not touch."""
+
+    index: int
+    a: str
+    b: str
+
+
+class PairForecast(PairInfo):
+    """A pair with what its program will cost; side `a` and side `b` each have a chain, a Gram matrix and a space of polynomials."""
+
+    frame: str = Field(description="The body in whose frame the separating plane is expressed.")
+    chain_a: list[str] = Field(description="Joints between the frame and `a`.")
+    chain_b: list[str]
+    gram_a: int = Field(description="Rows of the Gram matrices, 2^k for k joints in the chain.")
+    gram_b: int
+    N_a: int = Field(description="Dimension of the space of polynomials.")
+    N_b: int
+    rationals: int = Field(description="Polynomial identities: one for each vertex of both bodies.")
+    seconds: float = Field(description="Roughly, on one thread.")
+
+
+class ScenePairs(BaseModel):
+    """The pairs that a certification goes through."""
+
+    pairs: list[PairForecast]
+
+
+class Substitution(BaseModel):
+    """A shape that was replaced by one around it."""
+
+    geometry: str
+    substitution: str
+    inflation: float = Field(description="Upper bound, in metres, on how far the replacement reaches outside the shape.")
+
+
+class IgnoredPair(BaseModel):
+    """Two geometries that are not certified, and why."""
+
+    a: str
+    b: str
+    reason: str
+
+
+class LintReport(BaseModel):
+    """What a reader should know about the scene before trusting a certificate for it."""
+
+    warnings: list[str]
+    substitutions: list[Substitution]
+    ignored: list[IgnoredPair]
