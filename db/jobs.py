@@ -12,7 +12,7 @@ from sqlalchemy import exists, or_, select, tuple_
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db import events
+from db import events, leases
 from db.models import JobRow, PairRow, StepRow
 from db.session import insert_new
 from db.states import JOB, PAIR, STEP, JobState, StepKind, transition, unfinished
@@ -172,10 +172,17 @@ def finish(
         events.emit(session, job, "job", {"state": state, "outcome": outcome, "reason": reason, "region_id": job.region_id})
 
 
-def awaiting_coordination(session: Session, now: datetime) -> Sequence[str]:
+def is_coordinated(job: JobRow, now: datetime) -> bool:
+    """Whether somebody is computing the job's next transition. A coordination that takes too long does not count."""
+    if job.coordinator is None or job.coordinator_until is None or job.coordinator_until < now:
+        return False
+    return leases.is_alive(job.coordinator) is not False
+
+
+def awaiting_coordination(session: Session, now: datetime) -> list[str]:
     """Unfinished jobs for which a coordination is due: nobody coordinates them, and no pair or step is being waited for (or no longer)."""
-    nobody = or_(JobRow.coordinator_until.is_(None), JobRow.coordinator_until < now)
     pair = exists().where(PairRow.job_id == JobRow.id, PairRow.state.in_(unfinished(PAIR)))
     step = exists().where(StepRow.job_id == JobRow.id, StepRow.state.in_(unfinished(STEP)), StepRow.kind != StepKind.ACCEPT)
     due = or_(JobRow.state == JobState.CANCELLING, JobRow.deadline_at <= now, ~pair & ~step)
-    return session.scalars(select(JobRow.id).where(JobRow.state.in_(unfinished(JOB)), nobody, due).order_by(JobRow.created_at)).all()
+    rows = session.scalars(select(JobRow).where(JobRow.state.in_(unfinished(JOB)), due).order_by(JobRow.created_at))
+    return [job.id for job in rows if not is_coordinated(job, now)]

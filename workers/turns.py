@@ -83,12 +83,12 @@ def _begin(job_id: str) -> Turn | None:
         if job.action is not None and job.action["kind"] == "finish":
             _finish(session, job)
             return None
-        busy = job.coordinator_until is not None and job.coordinator_until > now and leases.is_alive(job.coordinator) is not False
-        if busy or (job.action is not None and not (report := _report(session, job))):
+        report = None if job.action is None else _report(session, job)
+        if jobs.is_coordinated(job, now) or (job.action is not None and report is None):
             return None
         job.coordinator, job.coordinator_until = leases.this_worker(), now + timedelta(seconds=COORDINATION_SECONDS)
         job.coordinator_attempts += 1
-        return Turn(job_id, job.turn, job.scene_id, job.options, job.growth, report if job.action is not None else None)
+        return Turn(job_id, job.turn, job.scene_id, job.options, job.growth, report)
 
 
 def _report(session: Session, job: JobRow) -> Report | None:

@@ -177,7 +177,7 @@ def test_a_job_that_awaits_coordination_is_found(db: Database) -> None:
         overdue = a_running_job(session)
         overdue.deadline_at = now - timedelta(seconds=1)
         held = a_job(session)
-        held.coordinator_until = now + timedelta(seconds=60)
+        held.coordinator, held.coordinator_until = "elsewhere:1:1", now + timedelta(seconds=60)
         due = {queued.id, idle.id, cancelling.id, overdue.id}
         assert busy.state == JobState.RUNNING
     with db.read() as session:

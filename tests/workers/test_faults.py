@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -58,12 +60,13 @@ def send_all_again(job_id: str) -> None:
         send_step(step.id)
 
 
-def test_a_job_survives_the_death_of_the_whole_solve_worker(arm: tuple[Scene, np.ndarray], service: Service) -> None:
+def test_a_job_survives_the_death_of_both_workers(arm: tuple[Scene, np.ndarray], service: Service) -> None:
     scene, s = arm
     job_id = submit(scene, box_around(s, 0.012))
     eventually(lambda: any(row.state == "running" for row in pairs_of(job_id)), "a pair is running")
-    service.kill("solve")
-    service.start("solve")
+    for queue in ("solve", "control"):
+        service.kill(queue)
+        service.start(queue)
     assert ended(job_id).outcome == "certified"
 
 
@@ -72,4 +75,14 @@ def test_a_job_survives_the_loss_of_every_message(arm: tuple[Scene, np.ndarray],
     job_id = submit(scene, box_around(s, 0.013))
     eventually(lambda: any(row.state == "running" for row in pairs_of(job_id)), "a pair is running")
     queue.flush()
+    assert ended(job_id).outcome == "certified"
+
+
+def test_a_job_survives_an_outage_of_redis(arm: tuple[Scene, np.ndarray], queue: Queue) -> None:
+    scene, s = arm
+    job_id = submit(scene, box_around(s, 0.014))
+    eventually(lambda: any(row.state == "running" for row in pairs_of(job_id)), "a pair is running")
+    queue.stop()
+    time.sleep(1)
+    queue.start()
     assert ended(job_id).outcome == "certified"

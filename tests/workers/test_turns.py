@@ -9,18 +9,19 @@ import pytest
 from sqlalchemy import update
 
 from certifier.outcome import Outcome
-from db import jobs, pairs
-from db.models import JobRow, PairRow
+from db import jobs, pairs, regions, steps
+from db.models import JobRow, PairRow, ProofRow
 from db.session import database
 from db.states import PairState, transition
 from db.types import utcnow
 from tests.scenes import slider
 from tests.services import Queue, queue_server
-from tests.workers.options import box_around
+from tests.workers.options import box_around, grow_box
 from tests.workers.service import environment, events_of, job_of, pairs_of, submit
 from workers import sweeper
 from workers.app import CONTROL, SOLVE, send_coordinate, waiting
 from workers.pairs import solve_pairs
+from workers.steps import run_step
 from workers.turns import coordinate
 
 ELSEWHERE = "elsewhere:1:1"
@@ -139,6 +140,49 @@ def test_options_that_cannot_be_used_end_the_job_with_their_error() -> None:
     coordinate(job_id)
     job = job_of(job_id)
     assert (job.state, (job.error or {})["code"]) == ("failed", "polytope_missing")
+
+
+def test_a_step_whose_worker_dies_each_time_ends_the_job_with_its_cause() -> None:
+    job_id = submit(slider(), grow_box([0.0], 0.1))
+    coordinate(job_id)
+    with database().write() as session:
+        (step,) = steps.of_job(session, job_id)
+        step.attempts = 3
+    run_step(step.id)
+    coordinate(job_id)
+    job = job_of(job_id)
+    assert (job.state, (job.error or {})["code"]) == ("failed", "worker_lost")
+
+
+def test_a_region_whose_proof_is_refused_is_never_stored(job_id: str) -> None:
+    solve_pairs(job_id, 0, [0, 1, 2])
+    coordinate(job_id)
+    with database().write() as session:
+        session.execute(update(ProofRow).values(data=b"not the proof that was verified"))
+        (step,) = steps.of_job(session, job_id)
+    run_step(step.id)
+    coordinate(job_id)
+    job = job_of(job_id)
+    assert (job.state, job.region_id, job.reason) == ("failed", None, "the proof of a region was refused")
+    assert (job.error or {})["code"] == "proof_malformed"
+    with database().read() as session:
+        assert not regions.newest(session)
+
+
+def test_a_certified_polytope_becomes_a_region_even_after_a_cancel(job_id: str) -> None:
+    solve_pairs(job_id, 0, [0, 1, 2])
+    coordinate(job_id)
+    with database().write() as session:
+        jobs.cancel(session, job_id)
+        (step,) = steps.of_job(session, job_id)
+    coordinate(job_id)
+    assert job_of(job_id).state == "cancelling"
+    run_step(step.id)
+    coordinate(job_id)
+    job = job_of(job_id)
+    assert job.state == "cancelled"
+    with database().read() as session:
+        assert regions.get(session, job.region_id or "").guarantee == "exact"
 
 
 def test_the_sweeper_sends_lost_messages_again(job_id: str, queue: Queue) -> None:
