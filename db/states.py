@@ -101,7 +101,7 @@ def _table(states: type[StrEnum], moves: dict[StrEnum, set[StrEnum]]) -> Table:
 JOB: Table = _table(
     JobState,
     {
-        JobState.QUEUED: {JobState.RUNNING, JobState.FAILED, JobState.CANCELLED},
+        JobState.QUEUED: {JobState.RUNNING, JobState.CANCELLED},
         JobState.RUNNING: {JobState.SUCCEEDED, JobState.FAILED, JobState.CANCELLING},
         JobState.CANCELLING: {JobState.CANCELLED},
     },
@@ -116,14 +116,14 @@ _SETTLED_PAIR: set[StrEnum] = {
 PAIR: Table = _table(
     PairState,
     {
-        PairState.OPEN: {PairState.RUNNING, PairState.ERROR, PairState.SKIPPED},
+        PairState.OPEN: {PairState.RUNNING, PairState.SKIPPED},
         PairState.RUNNING: {PairState.OPEN, PairState.SKIPPED} | _SETTLED_PAIR,
     },
 )
 STEP: Table = _table(
     StepState,
     {
-        StepState.OPEN: {StepState.RUNNING, StepState.FAILED, StepState.SKIPPED},
+        StepState.OPEN: {StepState.RUNNING, StepState.SKIPPED},
         StepState.RUNNING: {StepState.OPEN, StepState.DONE, StepState.FAILED, StepState.SKIPPED},
     },
 )

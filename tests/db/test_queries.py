@@ -109,6 +109,7 @@ def test_a_job_is_retried_once_and_only_when_it_has_failed(db: Database) -> None
         job = a_job(session, deadline_at=utcnow() + timedelta(seconds=100))
         with pytest.raises(CirisError, match="only a failed or cancelled"):
             jobs.retry(session, job.id)
+        jobs.start(session, job)
         jobs.finish(session, job, JobState.FAILED, reason="no")
         again = jobs.retry(session, job.id)
         assert (again.retry_of, again.attempt, again.state) == (job.id, 2, "queued")

@@ -13,7 +13,7 @@ import yaml
 from certifier.forecast import forecast
 from certifier.model import Scene
 from certifier.scene import load_scene
-from tests.services import Queue
+from tests.services import Queue, queue_server
 from tests.workers.service import Service, running_service
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -32,6 +32,13 @@ def arm() -> tuple[Scene, np.ndarray]:
     longest = np.argsort([-cost.seconds for cost in forecast(scene)])[:4]
     q = yaml.safe_load((EXAMPLES / "iiwa_shelf" / "seed.yaml").read_text())["q"]
     return replace(scene, pairs=tuple(scene.pairs[i] for i in sorted(longest))), scene.to_s(np.array(q))
+
+
+@pytest.fixture(scope="session")
+def queue() -> Iterator[Queue]:
+    """The workers' own queue: they would take the messages of other tests."""
+    with queue_server() as server:
+        yield server
 
 
 @pytest.fixture(scope="session", params=["sqlite", "postgresql"])
