@@ -10,7 +10,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from certifier.seeding import SeedOptions, propose
 from sqlalchemy.orm import Session
 
 from certifier.child import run_in_child
@@ -20,6 +19,7 @@ from certifier.local import stepped, versions
 from certifier.model import Polytope, Scene
 from certifier.polytope_step import step as polytope_step
 from certifier.region import certified_region
+from certifier.seeding import SeedOptions, propose
 from db import jobs, leases, pairs, proofs, regions, steps
 from db.models import JobRow, StepRow
 from db.session import database
