@@ -22,6 +22,13 @@ def drake_body(plant, name):
     return plant.world_body() if name == WORLD else plant.GetBodyByName(name.split("/")[1])
 
 
+def path_length(scene, bodies):
+    """Metres along the path's frames, at least 1: what a relative error of a position is relative to."""
+    inner = set(bodies)
+    joints = [joint for joint in scene.joints if {joint.parent, joint.child} <= inner]
+    return 1 + sum(np.linalg.norm(X[:3, 3]) for joint in joints for X in (joint.X_PF, joint.X_BM))
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_numerators_are_drakes_poses_times_the_denominator(seed):
     """Every body seen from every other: up the tree, down, across, through welds."""
@@ -41,8 +48,8 @@ def test_numerators_are_drakes_poses_times_the_denominator(seed):
                     context, drake_body(plant, frame).body_frame(), drake_body(plant, body).body_frame()
                 ).GetAsMatrix4()
                 denominator = np.prod([1 + point[i] ** 2 for i in kinematics.chain(frame, body) if scene.revolute[i]])
-                # Lengths of intermediate frames, not of the result, set the rounding.
-                np.testing.assert_allclose(X, denominator * expected, rtol=0, atol=1e-12 * denominator * 10)
+                reach = path_length(scene, kinematics.bodies_between(frame, body))
+                np.testing.assert_allclose(X, denominator * expected, rtol=0, atol=1e-12 * denominator * reach)
 
 
 def test_the_trees_have_every_kind_of_joint():

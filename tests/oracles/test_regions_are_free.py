@@ -1,4 +1,4 @@
-"""Certified polytopes of the examples hold no configuration that Drake, reading the original files, finds in collision."""
+"""Regions grown from the examples hold no configuration that Drake, reading the original files, finds in collision."""
 
 from functools import cache
 from pathlib import Path
@@ -7,32 +7,42 @@ import numpy as np
 import pytest
 import yaml
 
-from certifier.outcome import Outcome
-from certifier.pair import Certification
+from certifier.growth import GrowthOptions
+from certifier.local import grow
+from certifier.model import Polytope
 from certifier.scene import load_scene
 from tests.certifier.scenes import cube
 from tests.oracles.original import collision
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-SAMPLES = 30_000
+SAMPLES = 100_000
 load = cache(load_scene)
 
 
-def certified(scene, polytope, center):
-    certification = Certification(scene, polytope, center)
-    return all(certification.certify(index).outcome is Outcome.CERTIFIED for index in range(len(scene.pairs)))
-
-
-@pytest.mark.parametrize("name", ["planar_2dof", "arm_3dof"])
-def test_no_sample_of_a_certified_polytope_collides(name):
+def free_region(name, options):
+    """Grows a region of an example, samples it, and samples its twin, which is large enough to collide."""
     path = EXAMPLES / name / "scene.yaml"
     scene = load(path)
-    center = scene.to_s(yaml.safe_load((path.parent / "seed.yaml").read_text())["q"])
-    half = 0.8
-    while not certified(scene, cube(scene, center, half), center):
-        half /= 1.5
-    assert collision(path, scene, cube(scene, center, half), SAMPLES) is None
-    assert collision(path, scene, cube(scene, center, 8 * half), SAMPLES) is not None, "the twin is large enough to collide"
+    q = yaml.safe_load((path.parent / "seed.yaml").read_text())["q"]
+    manifest = grow(scene, GrowthOptions(seed={"q": q}, **options)).manifest
+    region = Polytope(np.array(manifest["halfspace_normals"]), np.array(manifest["halfspace_offsets"]))
+    assert region.contains(scene.to_s(q))
+    assert collision(path, scene, region, SAMPLES) is None
+    assert collision(path, scene, cube(scene, scene.to_s(q), 8.0), SAMPLES) is not None
+
+
+def test_no_sample_of_a_grown_region_collides_planar():
+    free_region("planar_2dof", {"bisection_steps": 4, "max_rounds": 2})
+
+
+def test_no_sample_of_a_grown_region_collides_three_joints():
+    free_region("arm_3dof", {"bisection_steps": 3, "max_rounds": 1})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["iiwa_shelf", "ur3e_bin"])
+def test_no_sample_of_a_grown_region_collides_real_arms(name):
+    free_region(name, {"bisection_steps": 4, "max_rounds": 0})
 
 
 def test_the_oracle_finds_what_is_known_to_collide():
