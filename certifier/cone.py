@@ -155,6 +155,10 @@ class Centre:
                 x = x + _line_search(curvature, float(w @ step)) * step
         raise np.linalg.LinAlgError("centring did not converge")
 
+    def solve(self, v: Array) -> Array:
+        """H^-1 v, (R, N) -> (R, N)."""
+        return self.factor.solve(v.T[None])[0].T
+
 
 def _line_search(eigenvalues: Array, slope: float) -> float:
     """The minimiser over a of a slope - sum log(1 + a eigenvalue), by safeguarded Newton from 0."""

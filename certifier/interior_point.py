@@ -1,10 +1,16 @@
 """Primal-dual path-following method for the pair program (HKM direction, Mehrotra predictor-corrector).
 
-    maximise t  over y = (z, t), Q :   A_r z - t w_r = sum_j g_j rho' Q_rj rho  for every rational r,   l'z = 1,   Q_rj psd
-    dual:       minimise lam over x :  sum_r A_r' x_r = lam l,   sum_r w_r' x_r = 1,   Lambda_j(x_r) psd
+    maximise t  over y = (z, t), Q :   A_r z - t w_r = sum_j g_j rho' Q_rj rho  for every rational r,   a'z = 1,   Q_rj psd
+    dual:       minimise lam over x :  sum_r A_r' x_r = lam a,   sum_r w_r' x_r = 1,   Lambda_j(x_r) psd
 
-A weak-duality pair: t <= lam. So t > 0 with the residual absorbed is a certificate, and a dual point with lam < 0 proves that
-no certificate of this form exists; both are looked for in every iteration, and the first one found ends the search.
+A weak-duality pair: t <= lam. The normalisation is a = sum_r A_r' x_w, x_w the centre of the cone for w: an interior point of the
+dual cone, so every certificate has a'z > 0 and can be scaled to meet it. t > 0 with the residual absorbed is a certificate; a dual point with lam < 0
+proves that no certificate of this form exists. Both are looked for in every iteration, and the first one found ends the search.
+
+Start: with H the Hessian at x_w and B_r = [A_r, -w_r], let y minimise sum_r |B_r y|^2 in the metric H^-1 subject to a'y = 1, so that
+sum_r B_r' H^-1 B_r y is a multiple of a. For T large enough z, t - T and Q_r = T Q_w + Q_w Lambda(H^-1 B_r y) Q_w are primal feasible,
+x_r ~ x_w - H^-1 B_r y / T is dual feasible, and Q_r Lambda(x_r) = T I to first order: the start is close to the central path, and an
+easy pair is certified by it alone.
 Helmberg, Rendl, Vanderbei, Wolkowicz (1996); Kojima, Shindoh, Hara (1997); Mehrotra (1992). Symbols as in certifier.cone.
 """
 
@@ -22,7 +28,10 @@ from certifier.model import Array
 
 DUAL_TOLERANCE = 1e-9
 GAP_TOLERANCE = 1e-9
-START_MARGIN = 2.0
+START_SPREAD = 0.8
+"""Relative deviation from the central path that the start may have."""
+RIDGE = 1e-13
+"""Relative ridge of the normal equations: plane coefficients that no rational depends on have no column."""
 STEP_TOLERANCE = 1e-3
 
 
@@ -72,14 +81,9 @@ class Solution:
         return float(self.y[-1])
 
 
-def solve(blocks: list[Block], normal: Array, z0: Array, max_iterations: int = 60) -> Solution:
-    """Solve the program over ``blocks``.
-
-    Args:
-        normal: (p - 1,) the l of the normalisation l'z = 1.
-        z0: (p - 1,) a start with l'z0 = 1.
-    """
-    method = _Method(blocks, normal, z0)
+def solve(blocks: list[Block], max_iterations: int = 60) -> Solution:
+    """Solve the program over ``blocks``."""
+    method = _Method(blocks)
     for iteration in range(max_iterations):
         try:
             status = method.iterate()
@@ -91,18 +95,34 @@ def solve(blocks: list[Block], normal: Array, z0: Array, max_iterations: int = 6
 
 
 class _Method:
-    def __init__(self, blocks: list[Block], normal: Array, z0: Array) -> None:
-        self.blocks, self.p = blocks, len(normal) + 1
-        self.a = np.append(normal, 0.0)
-        self.target = np.append(np.zeros(len(normal)), -1.0)
-        images = [_preimage(b, b.columns[:, :, :-1] @ z0) for b in blocks]
-        T = max(START_MARGIN * max(-float(relative.min()) for _, relative in images), 1e-6)
-        self.y, self.lam = np.append(z0, -T), 0.0
-        self.Q = [T * b.centre.Q + dQ for b, (dQ, _) in zip(blocks, images, strict=True)]
-        scale = 1 / sum(len(b.columns) * float(-b.columns[0, :, -1] @ b.centre.x) for b in blocks)
-        self.x = [np.tile(scale * b.centre.x, (len(b.columns), 1)) for b in blocks]
-        self.Z = [b.cone.adjoint(x) for b, x in zip(blocks, self.x, strict=True)]
+    def __init__(self, blocks: list[Block]) -> None:
+        self.blocks, self.p = blocks, blocks[0].columns.shape[2]
         self.degree = sum(len(b.columns) * b.cone.degree for b in blocks)
+        self.target = np.append(np.zeros(self.p - 1), -1.0)
+        a: Array = np.sum([np.einsum("rnp,n->p", b.columns, b.centre.x) for b in blocks], axis=0)
+        a[-1] = 0.0
+        self.a = a / np.linalg.norm(a)
+        self.y = self._least_deviation()
+        deviations = [b.columns @ self.y for b in blocks]
+        images = [_preimage(b, v) for b, v in zip(blocks, deviations, strict=True)]
+        T = max(float(np.abs(relative).max()) for _, relative in images) / START_SPREAD
+        self.y[-1] -= T
+        self.Q = [T * b.centre.Q + dQ for b, (dQ, _) in zip(blocks, images, strict=True)]
+        x = [b.centre.x - b.centre.solve(v) / T for b, v in zip(blocks, deviations, strict=True)]
+        mass = sum(float(-b.columns[0, :, -1] @ v.sum(axis=0)) for b, v in zip(blocks, x, strict=True))
+        self.x = [v / mass for v in x]
+        self.Z = [b.cone.adjoint(v) for b, v in zip(blocks, self.x, strict=True)]
+        self.lam = float(self.a @ self._moments())
+
+    def _least_deviation(self) -> Array:
+        """The y with a'y = 1 whose B_r y are smallest in the metric of the centres."""
+        images = [b.centre.factor.forward(np.moveaxis(b.columns, 0, 1).reshape(1, b.cone.N, -1)).reshape(-1, self.p) for b in self.blocks]
+        y = np.linalg.solve(_ridged(np.sum([image.T @ image for image in images], axis=0)), self.a)
+        return y / (self.a @ y)
+
+    def _moments(self) -> Array:
+        """sum_r B_r' x_r, (p,)."""
+        return np.sum([np.einsum("rnp,rn->p", b.columns, x) for b, x in zip(self.blocks, self.x, strict=True)], axis=0)
 
     def solution(self, status: Status, iterations: int) -> Solution:
         return Solution(status, self.y, self.lam, self.Q, self.x, iterations)
@@ -111,10 +131,9 @@ class _Method:
         """Test for an answer, then take one predictor-corrector step."""
         blocks = self.blocks
         primal = [b.columns @ self.y - b.cone.values(Q) for b, Q in zip(blocks, self.Q, strict=True)]
-        dual = self.target + self.lam * self.a - sum(np.einsum("rnp,rn->p", b.columns, x) for b, x in zip(blocks, self.x, strict=True))
+        dual = self.target + self.lam * self.a - self._moments()
         gap = self._inner(self.Q, self.Z)
-        if self.y[-1] > 0 and (repaired := self._absorb(primal)) is not None:
-            self.Q, self.y = repaired, np.append(self.y[:-1], self.y[-1] / 2)
+        if self.y[-1] > 0 and self._settle(self.y, self.Q):
             return Status.FEASIBLE
         if self.lam < 0 and np.abs(dual).max() < DUAL_TOLERANCE * max(1.0, abs(self.lam)):
             return Status.INFEASIBLE
@@ -133,7 +152,7 @@ class _Method:
             factors.append(factor)
             images.append(image)
         border = np.zeros((self.p + 1, self.p + 1))
-        border[: self.p, : self.p], border[: self.p, -1], border[-1, : self.p] = M, self.a, self.a
+        border[: self.p, : self.p], border[: self.p, -1], border[-1, : self.p] = _ridged(M), self.a, self.a
         lu = lu_factor(border, check_finite=False)
 
         def direction(centres: list[Array]) -> tuple[Array, float, list[Array], list[Array], list[Array]]:
@@ -151,8 +170,11 @@ class _Method:
             return dy, dlam, dx, dZ, dQ
 
         mu = gap / self.degree
-        _, _, _, dZ, dQ = direction([-Q for Q in self.Q])
+        dy, _, _, dZ, dQ = direction([-Q for Q in self.Q])
         step_Q, step_Z = self._steps(inverse_chol_Q, inverse_chol_Z, dQ, dZ, 0.99)
+        y = self.y + step_Q * dy
+        if y[-1] > 0 and self._settle(y, [Q + step_Q * d for Q, d in zip(self.Q, dQ, strict=True)]):
+            return Status.FEASIBLE
         predicted = self._inner(
             [Q + step_Q * d for Q, d in zip(self.Q, dQ, strict=True)], [Z + step_Z * d for Z, d in zip(self.Z, dZ, strict=True)]
         )
@@ -169,23 +191,25 @@ class _Method:
         self.Z = [b.cone.adjoint(x) for b, x in zip(blocks, self.x, strict=True)]
         return None
 
-    def _absorb(self, primal: list[Array]) -> list[Array] | None:
-        """Gram matrices that meet the identities at margin t/2, if the residuals fit into the other half.
+    def _settle(self, y: Array, Q: list[Array]) -> bool:
+        """Whether the residuals at (y, Q) fit into half of the margin: Q + (t/2) Q_w + dQ with values(dQ) = residual is psd.
 
-        Q + (t/2) Q_w + dQ with values(dQ) = residual; None when it is not psd.
+        If so, it is taken as the solution, with margin t/2.
         """
-        y = np.append(self.y[:-1], self.y[-1] / 2)
+        y = np.append(y[:-1], y[-1] / 2)
         repaired = []
-        for b, Q, residual in zip(self.blocks, self.Q, primal, strict=True):
-            candidate = symmetrise(Q + y[-1] * b.centre.Q + _preimage(b, residual)[0])
-            # One step of refinement: the first correction is only as exact as the centre.
-            candidate = symmetrise(candidate + _preimage(b, b.columns @ y - b.cone.values(candidate))[0])
+        for b, given in zip(self.blocks, Q, strict=True):
+            candidate = symmetrise(given + y[-1] * b.centre.Q)
+            # Twice: the first correction is only as exact as the centre.
+            for _ in range(2):
+                candidate = symmetrise(candidate + _correction(b, b.columns @ y - b.cone.values(candidate)))
             try:
                 inverse_cholesky(candidate)
             except np.linalg.LinAlgError:
-                return None
+                return False
             repaired.append(candidate)
-        return repaired
+        self.y, self.Q = y, repaired
+        return True
 
     @staticmethod
     def _inner(Q: list[Array], Z: list[Array]) -> float:
@@ -201,15 +225,21 @@ class _Method:
         return min(1.0, fraction * step_Q), min(1.0, fraction * step_Z)
 
 
-def _preimage(block: Block, v: Array) -> tuple[Array, Array]:
-    """The smallest dQ in the metric of the centre with values(dQ) = v, (R, K, L, L), and its eigenvalues relative to Q_w.
+def _ridged(M: Array) -> Array:
+    diagonal = np.diag(M)
+    return M + np.diag(RIDGE * (diagonal + diagonal.max()))
 
-    dQ = Q_w Lambda(H(x_w)^-1 v) Q_w.
-    """
-    Q_w = block.centre.Q
-    inner = block.cone.adjoint(block.centre.factor.solve(v.T[None])[0].T)
-    chol = np.linalg.cholesky(Q_w)
-    return Q_w @ inner @ Q_w, np.linalg.eigvalsh(np.swapaxes(chol, -1, -2) @ inner @ chol)
+
+def _correction(block: Block, v: Array) -> Array:
+    """The smallest dQ in the metric of the centre with values(dQ) = v, (R, N) -> (R, K, L, L): Q_w Lambda(H^-1 v) Q_w."""
+    return block.centre.Q @ block.cone.adjoint(block.centre.solve(v)) @ block.centre.Q
+
+
+def _preimage(block: Block, v: Array) -> tuple[Array, Array]:
+    """That dQ, and its eigenvalues relative to Q_w."""
+    inner = block.cone.adjoint(block.centre.solve(v))
+    chol = np.linalg.cholesky(block.centre.Q)
+    return block.centre.Q @ inner @ block.centre.Q, np.linalg.eigvalsh(np.swapaxes(chol, -1, -2) @ inner @ chol)
 
 
 def _longest(inverse_chol: Array, direction: Array) -> float:

@@ -100,8 +100,7 @@ class Certification:
         sides = self._first
         while True:
             try:
-                program = build(sides, pair, frame, contact)
-                solution = solve(program.blocks, program.normal, program.start, max_iterations)
+                solution = solve(build(sides, pair, frame), max_iterations)
             except np.linalg.LinAlgError as error:
                 if sides.faces == self._every:
                     return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"numerical trouble: {error}")

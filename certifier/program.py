@@ -10,8 +10,7 @@ K_A, K_B the weighted sums of squares over P's faces (certifier.cone). Where a r
     [ kappa I   A1                                     ]
     [ A1'       kappa E00 - sum_i tau_i (E00 - E_ii)   ]  psd,   tau >= 0,   a(u) = A1 [1; u]
 
-(the Schur complement at [1; u] says |a|^2 <= kappa (kappa - sum_i tau_i (1 - u_i^2))). The normalisation is
-a(u_c)'(p_A - p_B) = 1 for the bodies' closest points at the interior point, so t is the least value of +-(a'x + b) over bodies and P.
+(the Schur complement at [1; u] says |a|^2 <= kappa (kappa - sum_i tau_i (1 - u_i^2))).
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from certifier.basis import basis
-from certifier.closest import Closest
 from certifier.cone import Centre, Cone
 from certifier.frames import Frame
 from certifier.interior_point import Block
@@ -44,19 +42,6 @@ class Box:
 
     def to_u(self, s: Array) -> Array:
         return (s - self.mid) / self.half
-
-
-@dataclass(frozen=True)
-class Program:
-    """Blocks of the program in the order side A, side B, [LMI, tau]; y = (Z row-major, [kappa, tau], t).
-
-    Attributes:
-        normal, start: (p - 1,) normalisation and a point that meets it.
-    """
-
-    blocks: list[Block]
-    normal: Array
-    start: Array
 
 
 class Sides:
@@ -130,11 +115,8 @@ class Sides:
         return self.box.mid + self.box.half * u, mass
 
 
-def build(sides: Sides, pair: Pair, frame: Frame, contact: Closest) -> Program:
-    """The program of one pair.
-
-    Args:
-        contact: closest points at the centre, in F, with a positive gap beyond the radii.
+def build(sides: Sides, pair: Pair, frame: Frame) -> list[Block]:
+    """The program of one pair: blocks in the order side A, side B, [LMI, tau], over y = (Z row-major, [kappa, tau], t).
 
     Raises:
         np.linalg.LinAlgError: a cone is numerically degenerate.
@@ -163,15 +145,7 @@ def build(sides: Sides, pair: Pair, frame: Frame, contact: Closest) -> Program:
             B[:, : len(u), 4 * (n + 1)] = -radius * X[:, 3, 3]
         B[:, : len(u), -1] = -X[:, 3, 3]
         blocks.append(Block(cone, B, centre))
-    normal, initial = np.zeros(columns - 1), np.zeros(columns - 1)
-    normal[0 : 3 * (n + 1) : n + 1] = contact.p_a - contact.p_b
-    initial[0 : 3 * (n + 1) : n + 1] = contact.normal / contact.distance
-    initial[3 * (n + 1)] = -contact.normal @ (contact.p_a + contact.p_b) / 2 / contact.distance
-    if rounded:
-        initial[4 * (n + 1)] = 1.1 / contact.distance
-        initial[4 * (n + 1) + 1 :] = 0.1 / contact.distance / n
-        blocks += _norm_blocks(n, sides.u_c, columns)
-    return Program(blocks, normal, initial)
+    return blocks + (_norm_blocks(n, sides.u_c, columns) if rounded else [])
 
 
 def _norm_blocks(n: int, u_c: Array, columns: int) -> list[Block]:
