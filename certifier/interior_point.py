@@ -3,9 +3,9 @@
     maximise t  over y = (z, t), Q :   A_r z - t w_r = sum_j g_j rho' Q_rj rho  for every rational r,   a'z = 1,   Q_rj psd
     dual:       minimise lam over x :  sum_r A_r' x_r = lam a,   sum_r w_r' x_r = 1,   Lambda_j(x_r) psd
 
-A weak-duality pair: t <= lam. The normalisation is a = sum_r A_r' x_w, x_w the centre of the cone for w: an interior point of the
-dual cone, so every certificate has a'z > 0 and can be scaled to meet it. t > 0 with the residual absorbed is a certificate; a dual point with lam < 0
-proves that no certificate of this form exists. Both are looked for in every iteration, and the first one found ends the search.
+A weak-duality pair: t <= lam. The normalisation is a = sum_r A_r' x_w with x_w the centre of the cone for w, an interior point of
+the dual cone: every certificate has a'z > 0 and can be scaled to meet it. t > 0 with the residual absorbed is a certificate; a dual
+point with lam < 0 proves that no certificate of this form exists. Both are looked for in every iteration; the first one ends the search.
 
 Start: with H the Hessian at x_w and B_r = [A_r, -w_r], let y minimise sum_r |B_r y|^2 in the metric H^-1 subject to a'y = 1, so that
 sum_r B_r' H^-1 B_r y is a multiple of a. For T large enough z, t - T and Q_r = T Q_w + Q_w Lambda(H^-1 B_r y) Q_w are primal feasible,
