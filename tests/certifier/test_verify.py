@@ -83,7 +83,7 @@ def test_a_proof_of_another_model_is_rejected_even_if_it_claims_its_hash():
     """Edited kinematics: the identities no longer hold."""
     scene, proof = pair_proof(1)
     moved = scene.joints[1].X_PF.copy()
-    moved[0, 3] += 0.3
+    moved[0, 3] += 1.0
     edited = replace(scene, joints=(scene.joints[0], replace(scene.joints[1], X_PF=moved)))
     rejected(edited, proof, "proof_scene")
     rejected(edited, replace(proof, scene_hash=edited.hash), "proof_residual")
