@@ -19,7 +19,6 @@ from certifier.basis import Basis
 from certifier.kernels import cholesky_inverse, schur
 from certifier.model import Array
 
-
 MAX_NEWTON = 12
 NEWTON_TOLERANCE = 1e-3
 
