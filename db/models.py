@@ -62,6 +62,22 @@ class Leased:
     """When a message for it was last sent."""
 
 
+class ApiKeyRow(Base):
+    """A key that lets its holder in. The key itself is shown once and not kept."""
+
+    __tablename__ = "api_keys"
+
+    id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    """The part of the key that is no secret."""
+    name: Mapped[str]
+    digest: Mapped[str] = mapped_column(String(64))
+    """SHA-256 of the key."""
+    scope: Mapped[str] = mapped_column(String(16))
+    """Scope."""
+    created_at: Mapped[datetime] = mapped_column(default=utcnow)
+    revoked_at: Mapped[datetime | None]
+
+
 class JobRow(Base):
     """One request to grow a region or to certify a polytope."""
 
@@ -89,6 +105,8 @@ class JobRow(Base):
     idempotency_key: Mapped[str | None] = mapped_column(String(255), unique=True)
     request_digest: Mapped[str | None] = mapped_column(String(64))
     """SHA-256 of the request, to tell a repetition from a different request under the same key."""
+    key_id: Mapped[str | None] = mapped_column(ForeignKey("api_keys.id"), index=True)
+    """Whose job it is; None where the service asks for no key."""
     retry_of: Mapped[str | None] = mapped_column(ForeignKey("jobs.id"))
     attempt: Mapped[int] = mapped_column(default=1)
     """1, or one more than the attempt of ``retry_of``."""
@@ -222,3 +240,24 @@ class EventRow(Base):
     kind: Mapped[str] = mapped_column(String(32))
     data: Mapped[Document]
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
+
+
+class WebhookRow(Base):
+    """Whom to tell when a job has ended."""
+
+    __tablename__ = "webhooks"
+    __table_args__ = (Index(None, "state", "next_at"),)
+    transitions: ClassVar[states.Table] = states.WEBHOOK
+
+    id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), unique=True)
+    url: Mapped[str]
+    secret: Mapped[str]
+    """``whsec_`` and the base64 of the bytes that sign."""
+    state: Mapped[str] = mapped_column(String(16), default=states.WebhookState.WAITING)
+    attempts: Mapped[int] = mapped_column(default=0)
+    """How often the receiver was called."""
+    next_at: Mapped[datetime] = mapped_column(default=utcnow)
+    """Not to be called before."""
+    error: Mapped[str | None]
+    """Why the last attempt failed."""
