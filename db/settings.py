@@ -19,6 +19,9 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
+
+
 class Settings(BaseSettings):
     """Every setting of the service; ``CIRIS_DATA_DIR=/srv/ciris`` sets ``data_dir``, and so on."""
 
@@ -32,11 +35,11 @@ class Settings(BaseSettings):
     """Celery's broker; empty: the embedded stack starts its own."""
 
     host: str = "127.0.0.1"
-    """Address the API binds to."""
-    allow_remote: bool = False
-    """Let the API bind to an address that others can reach, though it asks nobody for a key (inside a container, behind a proxy)."""
+    """Address the API binds to; one that others can reach needs an API key to have been made."""
     port: int = 8643
     """Port the API binds to; the embedded stack takes a free one when it is taken and was not asked for."""
+    requests_per_second: float = Field(default=100.0, gt=0)
+    """How many requests one key (or one address without a key) may make for long; for a short while, twice as many."""
     solve_processes: int = Field(default_factory=_cores, ge=1)
     """Processes that solve pairs, one thread each."""
 
@@ -50,10 +53,17 @@ class Settings(BaseSettings):
     """Pause between two rounds of the sweeper."""
     resend_seconds: float = 10.0
     """Work that nobody has claimed this long after it was sent, with the queue empty, is sent again."""
+    webhook_private: bool = False
+    """Let webhooks go to addresses that are not public, as in a network of one's own."""
     step_timeout_seconds: float = 3600.0
     """Limit of one seeding or polytope step."""
     child_memory_bytes: int = 16 << 30
     """Limit of the address space of the process that runs a seeding or polytope step."""
+
+    @property
+    def loopback(self) -> bool:
+        """Whether only this machine can reach the API."""
+        return self.host in LOOPBACK_NAMES
 
     @property
     def database(self) -> str:

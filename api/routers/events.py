@@ -10,7 +10,7 @@ from fastapi import APIRouter, Depends, Header, Query
 from fastapi.concurrency import run_in_threadpool
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
-from api.access import Db
+from api.access import READ, Db
 from api.schemas.jobs import Event, EventList
 from db import events, jobs
 from db.session import Database
@@ -18,7 +18,7 @@ from db.session import Database
 POLL_SECONDS = 0.3
 PAGE = 500
 
-router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ])
 
 
 @router.get("/{job_id}/events")

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 
 from api import checks
-from api.access import Db
+from api.access import READ, SUBMIT, Db, Submitter
 from api.schemas.jobs import CertifyRequest, GrowRequest, GrowthCurve, GrowthPoint, Iteration, Job, JobPage, NewJob, PairCell, PairMatrix
 from api.schemas.scenes import PairInfo
 from certifier.model import Scene
@@ -24,12 +24,13 @@ from db.states import IterationState, JobKind, JobState, PairState
 from db.types import utcnow
 from workers.app import send_coordinate
 
-router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ])
 
 
 @router.post("", status_code=status.HTTP_201_CREATED, responses={200: {"model": Job, "description": "Made earlier under the same key."}})
 def create_job(
     body: NewJob,
+    caller: Submitter,
     db: Db,
     response: Response,
     background: BackgroundTasks,
@@ -92,7 +93,7 @@ def get_job(job_id: str, db: Db) -> Job:
         return Job.of(jobs.get(session, job_id))
 
 
-@router.post("/{job_id}/cancel", status_code=status.HTTP_202_ACCEPTED)
+@router.post("/{job_id}/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
 def cancel_job(job_id: str, db: Db, background: BackgroundTasks) -> Job:
     """Ask a job to end; regions certified before remain. Nothing happens to a job that has ended."""
     with db.write() as session:
@@ -101,7 +102,7 @@ def cancel_job(job_id: str, db: Db, background: BackgroundTasks) -> Job:
     return Job.of(job)
 
 
-@router.post("/{job_id}/retry", status_code=status.HTTP_201_CREATED)
+@router.post("/{job_id}/retry", dependencies=[SUBMIT], status_code=status.HTTP_201_CREATED)
 def retry_job(job_id: str, db: Db, response: Response, background: BackgroundTasks) -> Job:
     """A new job like one that failed or was cancelled; asking again gives the same new job."""
     with db.write() as session:

@@ -8,11 +8,11 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response, status
 
 from api import exports
-from api.access import Db
+from api.access import ADMIN, READ, Db
 from api.schemas.regions import RegionDetail, RegionPage, RegionSummary
 from db import jobs, proofs, regions, scenes
 
-router = APIRouter(prefix="/v1/regions", tags=["regions"])
+router = APIRouter(prefix="/v1/regions", tags=["regions"], dependencies=[READ])
 
 
 class ExportFormat(StrEnum):
@@ -62,7 +62,7 @@ def export_region(region_id: str, db: Db, format: ExportFormat = ExportFormat.JS
     return _download(data, f"{region_id}.{suffix}", exports.MEDIA_TYPES[format])
 
 
-@router.delete("/{region_id}", status_code=status.HTTP_204_NO_CONTENT)
+@router.delete("/{region_id}", dependencies=[ADMIN], status_code=status.HTTP_204_NO_CONTENT)
 def delete_region(region_id: str, db: Db) -> None:
     """Forget a region and its proof file."""
     with db.write() as session:

@@ -7,17 +7,17 @@ from typing import Annotated
 
 from fastapi import APIRouter, File, Query, Response, UploadFile, status
 
-from api.access import Db
+from api.access import READ, SUBMIT, Db
 from api.schemas.scenes import IgnoredPair, LintReport, PairForecast, SceneDetail, ScenePage, ScenePairs, SceneSummary, Substitution
 from certifier.forecast import forecast
 from certifier.model import Scene
 from certifier.scene.bundle import load_bundle
 from db import scenes
 
-router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
+router = APIRouter(prefix="/v1/scenes", tags=["scenes"], dependencies=[READ])
 
 
-@router.post("", status_code=status.HTTP_201_CREATED)
+@router.post("", dependencies=[SUBMIT], status_code=status.HTTP_201_CREATED)
 def create_scene(
     bundle: Annotated[UploadFile, File(description="A zip with the scene file and every file it refers to.")], db: Db, response: Response
 ) -> SceneDetail:

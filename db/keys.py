@@ -1,0 +1,159 @@
+"""API keys: made and revoked here, or with ``python -m db.keys`` (which is what ``ciris key`` runs).
+
+A key is ``ciris_<id>_<secret>`` with 256 random bits of secret, so that a fast hash is enough to keep: there is nothing to guess.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import hmac
+import re
+import secrets
+import sys
+from collections.abc import Sequence
+from enum import StrEnum
+from pathlib import Path
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from certifier.errors import CirisError
+from db import migrate
+from db.models import ApiKeyRow
+from db.session import Database
+from db.settings import Settings
+from db.types import utcnow
+
+_KEY = re.compile(r"ciris_([0-9a-f]{12})_[\w-]{43}", re.ASCII)
+_NAME = re.compile(r"[\w.@-]{1,64}")
+
+
+class Scope(StrEnum):
+    """What a key allows; each scope includes those before it."""
+
+    READ = "read"
+    """Look at scenes, jobs and regions, ask about configurations."""
+    SUBMIT = "submit"
+    """Upload scenes; create, cancel and retry jobs."""
+    ADMIN = "admin"
+    """Delete regions."""
+
+    def includes(self, other: Scope) -> bool:
+        """Whether a key of this scope may do what needs the other."""
+        order = list(Scope)
+        return order.index(self) >= order.index(other)
+
+
+def add(session: Session, name: str, scope: Scope) -> str:
+    """Makes a key and returns it. It cannot be had a second time.
+
+    Raises:
+        CirisError: key_name, for a name that cannot be used or is in use.
+    """
+    if not _NAME.fullmatch(name):
+        raise CirisError("key_name", f"{name!r} is no name for a key", field="name", hint="up to 64 letters, digits and . _ - @")
+    if _active(session, name):
+        raise CirisError("key_name", f"there is a key {name!r} already", field="name", hint="revoke it, or choose another name")
+    key_id = secrets.token_hex(6)
+    key = f"ciris_{key_id}_{secrets.token_urlsafe(32)}"
+    session.add(ApiKeyRow(id=key_id, name=name, digest=_digest(key), scope=scope))
+    return key
+
+
+def revoke(session: Session, name: str) -> None:
+    """Ends a key at once.
+
+    Raises:
+        CirisError: key_not_found.
+    """
+    rows = _active(session, name)
+    if not rows:
+        raise CirisError("key_not_found", f"there is no key {name!r}", field="name", hint="`ciris key ls` lists them")
+    for row in rows:
+        row.revoked_at = utcnow()
+
+
+def newest(session: Session) -> Sequence[ApiKeyRow]:
+    """Every key, newest first; the revoked ones too."""
+    return session.scalars(select(ApiKeyRow).order_by(ApiKeyRow.created_at.desc(), ApiKeyRow.id)).all()
+
+
+def exist(session: Session) -> bool:
+    """Whether a key was ever made. Revoking the last one therefore locks the service instead of opening it."""
+    return session.scalar(select(ApiKeyRow.id).limit(1)) is not None
+
+
+def check(session: Session, key: str) -> ApiKeyRow | None:
+    """The row of a valid key; None for anything else."""
+    parts = _KEY.fullmatch(key)
+    row = session.get(ApiKeyRow, parts[1]) if parts else None
+    if row is None or row.revoked_at is not None or not hmac.compare_digest(row.digest, _digest(key)):
+        return None
+    return row
+
+
+def check_bind(session: Session, settings: Settings) -> None:
+    """Refuses to serve an address that others can reach while nobody has a key.
+
+    Raises:
+        CirisError: no_keys.
+    """
+    if not settings.loopback and not exist(session):
+        problem = f"others can reach {settings.host}, and no API key has been made that could keep them out"
+        raise CirisError("no_keys", problem, field="CIRIS_HOST", hint="`ciris key add NAME --scope admin` makes one")
+
+
+def _active(session: Session, name: str) -> Sequence[ApiKeyRow]:
+    return session.scalars(select(ApiKeyRow).where(ApiKeyRow.name == name, ApiKeyRow.revoked_at.is_(None))).all()
+
+
+def _digest(key: str) -> str:
+    return hashlib.sha256(key.encode()).hexdigest()
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """``ciris key``: acts on the database of the settings, migrated if need be."""
+    parser = argparse.ArgumentParser(prog="ciris key", description="The API keys of the service whose database the settings name.")
+    parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    adding = verbs.add_parser("add", help="make a key and print it, once")
+    adding.add_argument("name")
+    adding.add_argument("--scope", type=Scope, choices=list(Scope), required=True)
+    verbs.add_parser("ls", help="list the keys, without what is secret")
+    verbs.add_parser("revoke", help="end a key at once").add_argument("name")
+    given = parser.parse_args(arguments)
+    settings = Settings() if given.data is None else Settings(data_dir=given.data)
+    migrate.upgrade(settings.database)
+    database = Database(settings.database)
+    try:
+        with database.write() as session:
+            lines = _run(session, given)
+    except CirisError as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
+    finally:
+        database.close()
+    for line in lines:
+        print(line)
+
+
+def _run(session: Session, given: argparse.Namespace) -> list[str]:
+    """Does what was asked; the lines to print once it is committed."""
+    match given.verb:
+        case "add":
+            return [add(session, given.name, given.scope)]
+        case "revoke":
+            revoke(session, given.name)
+            return []
+        case _:
+            return [_line(row) for row in newest(session)]
+
+
+def _line(row: ApiKeyRow) -> str:
+    ended = f"  revoked {row.revoked_at:%Y-%m-%d}" if row.revoked_at else ""
+    return f"{row.name}  {row.scope}  {row.id}  {row.created_at:%Y-%m-%d}{ended}"
+
+
+if __name__ == "__main__":
+    main()
