@@ -8,7 +8,6 @@ import uvicorn
 
 from certifier.errors import CirisError
 from db import keys, logs
-from db.session import database
 from db.settings import settings
 
 SHUTDOWN_SECONDS = 2
@@ -19,8 +18,7 @@ def main() -> None:
     """Serves until a signal ends it; refuses an address that others can reach while there are no keys."""
     logs.configure("api")
     try:
-        with database().read() as session:
-            keys.check_bind(session, settings())
+        keys.check_bind(settings())
     except CirisError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)

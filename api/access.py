@@ -35,7 +35,7 @@ def identify(db: Database, headers: Headers) -> Caller | None:
     with db.read() as session:
         if given is not None:
             row = keys.check(session, given)
-            return row and Caller(Scope(row.scope), row.id, row.name)
+            return None if row is None else Caller(Scope(row.scope), row.id, row.name)
         return Caller(Scope.ADMIN) if settings().loopback and not keys.exist(session) else None
 
 

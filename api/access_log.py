@@ -8,14 +8,16 @@ from http import HTTPStatus
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from api.metrics import Requests
+
 log = logging.getLogger(__name__)
 
 
 class AccessLog:
-    """ASGI middleware, the outermost. A stream is logged when it ends."""
+    """ASGI middleware, the outermost; it counts the requests too. A stream is logged when it ends."""
 
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
+    def __init__(self, app: ASGIApp, requests: Requests) -> None:
+        self._app, self._requests = app, requests
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -31,12 +33,14 @@ class AccessLog:
         try:
             await self._app(scope, receive, noted)
         finally:
+            seconds = time.perf_counter() - start
+            self._requests.note(scope["method"], status, seconds)
             caller = scope.get("state", {}).get("caller")
             fields = {
                 "method": scope["method"],
                 "path": scope["path"],
                 "status": status,
-                "seconds": round(time.perf_counter() - start, 4),
+                "seconds": round(seconds, 4),
                 "client": scope["client"][0] if scope.get("client") else None,
                 "key": caller and caller.key_id,
             }

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from functools import partial
 
+from anyio import CapacityLimiter
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
 from api import guard, login, pages, problems
 from api.access_log import AccessLog
+from api.metrics import Requests
 from api.routers import events, jobs, planning, regions, scenes, service
 from db.session import Database, database
 from db.settings import LOOPBACK_NAMES, settings
@@ -31,6 +33,8 @@ def create_app(db: Database | None = None) -> FastAPI:
         separate_input_output_schemas=False,
     )
     app.state.database = db or database()
+    app.state.requests = Requests()
+    app.state.parsers = CapacityLimiter(scenes.UPLOADS_AT_ONCE)
     app.add_middleware(
         guard.Guard,
         database=app.state.database,
@@ -38,7 +42,7 @@ def create_app(db: Database | None = None) -> FastAPI:
         rate=settings().requests_per_second,
         respond=partial(problems.respond, pages.render_problem),
     )
-    app.add_middleware(AccessLog)
+    app.add_middleware(AccessLog, requests=app.state.requests)
     problems.install(app, pages.render_problem)
     for module in (scenes, jobs, events, regions, planning, service):
         app.include_router(module.router)

@@ -21,7 +21,7 @@ from certifier.errors import CirisError
 MEDIA_TYPE = "application/problem+json"
 
 _STATUS_OF_CODE = {
-    **dict.fromkeys(("scene_not_found", "job_not_found", "region_not_found", "proof_not_found"), HTTPStatus.NOT_FOUND),
+    **dict.fromkeys(("scene_not_found", "job_not_found", "region_not_found", "proof_not_found", "webhook_not_found"), HTTPStatus.NOT_FOUND),
     "idempotency_conflict": HTTPStatus.CONFLICT,
     "job_not_retryable": HTTPStatus.CONFLICT,
     "too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,

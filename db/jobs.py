@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import exists, or_, select, tuple_
+from sqlalchemy import exists, or_, select
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db import events, leases
+from db import events, leases, pages, webhooks
 from db.models import JobRow, PairRow, StepRow
+from db.pages import Page
 from db.session import insert_new
 from db.states import JOB, PAIR, STEP, JobState, StepKind, transition, unfinished
 from db.types import utcnow
@@ -28,6 +27,7 @@ def create(
     deadline_at: datetime | None = None,
     idempotency_key: str | None = None,
     request_digest: str | None = None,
+    key_id: str | None = None,
     retry_of: str | None = None,
     attempt: int = 1,
 ) -> tuple[JobRow, bool]:
@@ -47,6 +47,7 @@ def create(
         "deadline_at": deadline_at,
         "idempotency_key": idempotency_key,
         "request_digest": request_digest,
+        "key_id": key_id,
         "retry_of": retry_of,
         "attempt": attempt,
     }
@@ -65,8 +66,8 @@ def create(
     return job, False
 
 
-def retry(session: Session, job_id: str) -> JobRow:
-    """A new job with the same scene, options and time to its deadline as one that failed or was cancelled.
+def retry(session: Session, job_id: str, key_id: str | None = None) -> JobRow:
+    """A new job with the same scene, options, webhook and time to its deadline as one that failed or was cancelled.
 
     A job is retried once: doing it again returns the same new job.
 
@@ -76,16 +77,19 @@ def retry(session: Session, job_id: str) -> JobRow:
     job = lock(session, job_id)
     if job.state not in (JobState.FAILED, JobState.CANCELLED):
         raise CirisError("job_not_retryable", f"the job is {job.state}; only a failed or cancelled one can be retried", field="job")
-    again, _ = create(
+    again, made = create(
         session,
         kind=job.kind,
         scene_id=job.scene_id,
         options=job.options,
         deadline_at=job.deadline_at and utcnow() + (job.deadline_at - job.created_at),
         idempotency_key=f"retry:{job.id}",
+        key_id=key_id,
         retry_of=job.id,
         attempt=job.attempt + 1,
     )
+    if made:
+        webhooks.copy(session, job.id, again.id)
     return again
 
 
@@ -113,14 +117,6 @@ def _found(job: JobRow | None, job_id: str) -> JobRow:
     return job
 
 
-@dataclass(frozen=True)
-class Page:
-    """Jobs, newest first, and the id to pass as ``after`` for the next page (None on the last)."""
-
-    jobs: Sequence[JobRow]
-    next: str | None
-
-
 def page(
     session: Session,
     *,
@@ -129,20 +125,15 @@ def page(
     scene_id: str | None = None,
     after: str | None = None,
     limit: int = 50,
-) -> Page:
+) -> Page[JobRow]:
     """One page of the jobs that fit the filters.
 
     Raises:
-        CirisError: job_not_found, when ``after`` is no job's id.
+        CirisError: cursor.
     """
-    query = select(JobRow).order_by(JobRow.created_at.desc(), JobRow.id.desc()).limit(limit + 1)
     filters = {JobRow.state: state, JobRow.kind: kind, JobRow.scene_id: scene_id}
-    query = query.where(*(column == value for column, value in filters.items() if value is not None))
-    if after is not None:
-        last = get(session, after)
-        query = query.where(tuple_(JobRow.created_at, JobRow.id) < tuple_(last.created_at, last.id))
-    rows = session.scalars(query).all()
-    return Page(rows[:limit], rows[limit - 1].id if len(rows) > limit else None)
+    query = select(JobRow).where(*(column == value for column, value in filters.items() if value is not None))
+    return pages.page(session, JobRow, query, after, limit)
 
 
 def cancel(session: Session, job_id: str) -> JobRow:

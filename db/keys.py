@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import hmac
+import json
 import re
 import secrets
 import sys
@@ -16,6 +17,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from sqlalchemy import select
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
@@ -26,7 +28,7 @@ from db.settings import Settings
 from db.types import utcnow
 
 _KEY = re.compile(r"ciris_([0-9a-f]{12})_[\w-]{43}", re.ASCII)
-_NAME = re.compile(r"[\w.@-]{1,64}")
+_NAME = re.compile(r"\w[\w.@-]{0,63}")
 
 
 class Scope(StrEnum):
@@ -93,13 +95,24 @@ def check(session: Session, key: str) -> ApiKeyRow | None:
     return row
 
 
-def check_bind(session: Session, settings: Settings) -> None:
-    """Refuses to serve an address that others can reach while nobody has a key.
+def check_bind(settings: Settings) -> None:
+    """Refuses to serve an address that others can reach while no key was made.
 
     Raises:
-        CirisError: no_keys.
+        CirisError: no_keys, or no_database when the database cannot tell.
     """
-    if not settings.loopback and not exist(session):
+    if settings.loopback:
+        return
+    database = Database(settings.database)
+    try:
+        with database.read() as session:
+            guarded = exist(session)
+    except SQLAlchemyError as error:
+        hint = "is it there, and migrated (`python -m db.migrate`)?"
+        raise CirisError("no_database", f"the database cannot be used: {type(error).__name__}", hint=hint) from None
+    finally:
+        database.close()
+    if not guarded:
         problem = f"others can reach {settings.host}, and no API key has been made that could keep them out"
         raise CirisError("no_keys", problem, field="CIRIS_HOST", hint="`ciris key add NAME --scope admin` makes one")
 
@@ -120,7 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     adding = verbs.add_parser("add", help="make a key and print it, once")
     adding.add_argument("name")
     adding.add_argument("--scope", type=Scope, choices=list(Scope), required=True)
-    verbs.add_parser("ls", help="list the keys, without what is secret")
+    verbs.add_parser("ls", help="list the keys, without what is secret").add_argument("--json", action="store_true")
     verbs.add_parser("revoke", help="end a key at once").add_argument("name")
     given = parser.parse_args(arguments)
     settings = Settings() if given.data is None else Settings(data_dir=given.data)
@@ -147,12 +160,15 @@ def _run(session: Session, given: argparse.Namespace) -> list[str]:
             revoke(session, given.name)
             return []
         case _:
-            return [_line(row) for row in newest(session)]
+            rows = [_described(row) for row in newest(session)]
+            return [json.dumps(rows, indent=1)] if given.json else ["  ".join(f"{k} {v}" for k, v in row.items() if v) for row in rows]
 
 
-def _line(row: ApiKeyRow) -> str:
-    ended = f"  revoked {row.revoked_at:%Y-%m-%d}" if row.revoked_at else ""
-    return f"{row.name}  {row.scope}  {row.id}  {row.created_at:%Y-%m-%d}{ended}"
+def _described(row: ApiKeyRow) -> dict[str, str | None]:
+    """What may be shown of a key."""
+    created_at = row.created_at.isoformat(timespec="seconds")
+    revoked_at = None if row.revoked_at is None else row.revoked_at.isoformat(timespec="seconds")
+    return {"name": row.name, "scope": row.scope, "id": row.id, "created_at": created_at, "revoked_at": revoked_at}
 
 
 if __name__ == "__main__":

@@ -1,11 +1,13 @@
 """The log of every process of the service: one JSON object a line on standard error, with the job and pair that it is about.
 
 What is bound with ``structlog.contextvars.bound_contextvars(job=...)`` stands in every line until the block ends, whichever library
-writes it; libraries and our own code use the standard library's loggers. Secrets do not get into log calls; should one get into the text of an error all the same, it is blotted out here.
+writes it; libraries and our own code use the standard library's loggers. Secrets do not get into log calls; should one get into the
+text of an error all the same, it is blotted out here.
 """
 
 from __future__ import annotations
 
+import json
 import logging
 import re
 import sys
@@ -46,8 +48,7 @@ def configure(process: str) -> None:
             named,
             structlog.processors.format_exc_info,
             structlog.processors.EventRenamer("message"),
-            structlog.processors.JSONRenderer(),
-            _blot,
+            _render,
         ],
     )
     handler = logging.StreamHandler(sys.stderr)
@@ -55,7 +56,8 @@ def configure(process: str) -> None:
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
 
 
-def _blot(_logger: object, _method: str, line: str) -> str:
+def _render(_logger: object, _method: str, event: EventDict) -> str:
+    line = json.dumps(event, default=str)
     for pattern, replacement in _SECRETS:
         line = pattern.sub(replacement, line)
     return line

@@ -30,7 +30,7 @@ class Database:
     def __init__(self, url: str) -> None:
         parsed = make_url(url)
         self.sqlite = parsed.get_backend_name() == "sqlite"
-        options: dict[str, Any] = {"json_serializer": _strict_json, "pool_pre_ping": not self.sqlite}
+        options: dict[str, Any] = {"json_serializer": _strict_json, "pool_pre_ping": not self.sqlite, "hide_parameters": True}
         if self.sqlite:
             if parsed.database:
                 Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)

@@ -7,6 +7,8 @@ import time
 from collections.abc import Sequence
 from functools import lru_cache, partial
 
+from structlog.contextvars import bound_contextvars
+
 from certifier.errors import CirisError
 from certifier.growth import GrowthOptions
 from certifier.model import Polytope
@@ -35,7 +37,7 @@ def solve_pairs(job_id: str, iteration: int, indices: Sequence[int], task_id: st
             claim = pairs.claim(session, job_id, iteration, wanted, task_id=task_id, lease_seconds=lease)
         if claim is None:
             return
-        with leases.renewed(database(), PairRow, claim.token, lease):
+        with bound_contextvars(job=job_id, iteration=iteration), leases.renewed(database(), PairRow, claim.token, lease):
             _certify_claimed(claim)
         left -= {pair.index for pair in claim.pairs}
 
@@ -45,7 +47,8 @@ def _certify_claimed(claim: pairs.Claim) -> None:
     results: list[pairs.Result] = []
     since = time.monotonic()
     for place, pair in enumerate(claim.pairs, start=1):
-        results.append(_certify(claim, pair))
+        with bound_contextvars(pair=pair.index):
+            results.append(_certify(claim, pair))
         failed = results[-1].state != PairState.CERTIFIED
         if failed or place == len(claim.pairs) or time.monotonic() - since >= SAVE_SECONDS:
             if not _save_results(claim, results):
@@ -63,7 +66,7 @@ def _certify(claim: pairs.Claim, pair: pairs.Claimed) -> pairs.Result:
     except CirisError as error:
         return _error(pair, error, start)
     except Exception as error:
-        log.exception("job %s, iteration %d: pair %d failed", claim.job_id, claim.iteration, pair.index)
+        log.exception("the pair failed")
         return _error(pair, CirisError("internal_error", f"{type(error).__name__}: {error}"), start)
     return pairs.Result(
         index=pair.index,

@@ -28,7 +28,7 @@ from pathlib import Path
 from types import FrameType
 
 from certifier.errors import CirisError
-from db import migrate
+from db import keys, logs, migrate
 from db.settings import Settings
 from workers.processes import die_with_parent, queue_server_command, queue_url
 
@@ -107,7 +107,7 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
         ready: called once with the API's URL, when it answers.
 
     Raises:
-        CirisError: stack_running, port_taken, or stack_failed when the API does not come up.
+        CirisError: stack_running, port_taken, no_keys, or stack_failed when the API does not come up.
     """
     data = settings.data_dir.expanduser().absolute()
     (data / "logs").mkdir(parents=True, exist_ok=True)
@@ -117,6 +117,7 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
         children = _children(settings, data, sockets / SOCKET)
         environment = _environment(settings, data, sockets / SOCKET, bound)
         migrate.upgrade(settings.database)
+        keys.check_bind(settings)
         try:
             for child in children:
                 child.start(environment, data / "logs")
@@ -247,7 +248,7 @@ def main() -> None:
     parser.add_argument("--port", type=int, help="the API's port; default: CIRIS_PORT, or any free one when that is taken")
     parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
     arguments = parser.parse_args()
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s")
+    logs.configure("stack")
     chosen = Settings() if arguments.data is None else Settings(data_dir=arguments.data)
     try:
         run_stack(chosen, port=arguments.port, ready=lambda url: print(f"ciris is up at {url}", flush=True))

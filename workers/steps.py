@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from sqlalchemy.orm import Session
+from structlog.contextvars import bound_contextvars
 
 from certifier.child import run_in_child
 from certifier.errors import CirisError
@@ -49,13 +50,13 @@ def run_step(step_id: int, task_id: str | None = None) -> None:
     if claim is None:
         return
     start = time.perf_counter()
-    with leases.renewed(database(), StepRow, claim.token, lease):
+    with bound_contextvars(job=claim.job_id, step=claim.kind.value), leases.renewed(database(), StepRow, claim.token, lease):
         try:
             state, done = StepState.DONE, _do(claim)
         except CirisError as error:
             state, done = StepState.FAILED, Done(error.to_document())
         except Exception as error:
-            log.exception("job %s: step %s failed", claim.job_id, claim.kind)
+            log.exception("the step failed")
             problem = CirisError("internal_error", f"{claim.kind}: {type(error).__name__}: {error}")
             state, done = StepState.FAILED, Done(problem.to_document())
         with writing() as (session, afterwards):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from celery import Celery, Task
+from structlog.contextvars import bound_contextvars
 
 from workers.app import CONTROL, COORDINATE, RUN_STEP, SOLVE_PAIRS
 
@@ -12,7 +13,11 @@ def register(app: Celery, queue: str) -> None:
     if queue == CONTROL:
         from workers.turns import coordinate
 
-        app.task(name=COORDINATE)(coordinate)
+        @app.task(name=COORDINATE)
+        def _coordinate(job_id: str) -> None:
+            with bound_contextvars(job=job_id):
+                coordinate(job_id)
+
         return
 
     from workers.pairs import solve_pairs

@@ -54,7 +54,7 @@ def coordinate(job_id: str) -> None:
         except CirisError as error:
             _give_up(turn, error)
         except Exception as error:
-            log.exception("job %s: the next step could not be decided", job_id)
+            log.exception("the next step could not be decided")
             _give_up(turn, CirisError("internal_error", f"the next step could not be decided: {type(error).__name__}: {error}"))
         else:
             _save(turn, transition)

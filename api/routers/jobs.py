@@ -14,11 +14,25 @@ from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 
 from api import checks
 from api.access import READ, SUBMIT, Db, Submitter
-from api.schemas.jobs import CertifyRequest, GrowRequest, GrowthCurve, GrowthPoint, Iteration, Job, JobPage, NewJob, PairCell, PairMatrix
+from api.schemas.common import Cursor
+from api.schemas.jobs import (
+    CertifyRequest,
+    GrowRequest,
+    GrowthCurve,
+    GrowthPoint,
+    Iteration,
+    Job,
+    JobPage,
+    JobRequest,
+    NewJob,
+    PairCell,
+    PairMatrix,
+    Webhook,
+)
 from api.schemas.scenes import PairInfo
 from certifier.model import Scene
 from certifier.outcome import Stage
-from db import jobs, pairs, regions, scenes
+from db import jobs, pairs, regions, scenes, webhooks
 from db.models import IterationRow, PairRow
 from db.states import IterationState, JobKind, JobState, PairState
 from db.types import utcnow
@@ -40,6 +54,8 @@ def create_job(
     with db.read() as session:
         scene = scenes.get(session, body.scene)
     options = _options(body, Scene.from_document(scene.document))
+    if body.webhook is not None:
+        checks.webhook(body.webhook)
     with db.write() as session:
         job, made = jobs.create(
             session,
@@ -47,9 +63,12 @@ def create_job(
             scene_id=scene.id,
             options=options,
             deadline_at=utcnow() + timedelta(seconds=body.deadline_seconds) if body.deadline_seconds else None,
-            idempotency_key=idempotency_key,
-            request_digest=_digest(scene.id, options, body.deadline_seconds),
+            idempotency_key=idempotency_key and f"{caller.key_id or 'open'}:{idempotency_key}",
+            request_digest=_digest(scene.id, options, body),
+            key_id=caller.key_id,
         )
+        if made and body.webhook is not None:
+            webhooks.add(session, job.id, body.webhook.url, body.webhook.secret)
     if made:
         background.add_task(send_coordinate, job.id)
     else:
@@ -66,8 +85,9 @@ def _options(body: GrowRequest | CertifyRequest, scene: Scene) -> dict[str, Any]
     return {"kind": "certify", "seed": body.polytope.model_dump(exclude_none=True), "random_seed": body.random_seed}
 
 
-def _digest(scene_id: str, options: dict[str, Any], deadline_seconds: float | None) -> str:
-    return hashlib.sha256(json.dumps([scene_id, options, deadline_seconds], sort_keys=True).encode()).hexdigest()
+def _digest(scene_id: str, options: dict[str, Any], body: JobRequest) -> str:
+    document = [scene_id, options, body.deadline_seconds, body.webhook and body.webhook.model_dump()]
+    return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 
 @router.get("")
@@ -76,14 +96,14 @@ def list_jobs(
     state: JobState | None = None,
     kind: JobKind | None = None,
     scene: str | None = None,
-    after: Annotated[str | None, Query(description="`next` of the page before.")] = None,
+    after: Cursor = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
 ) -> JobPage:
     """Jobs, newest first."""
     with db.read() as session:
         scene_id = scenes.get(session, scene).id if scene else None
         page = jobs.page(session, state=state, kind=kind, scene_id=scene_id, after=after, limit=limit)
-    return JobPage(jobs=[Job.of(row) for row in page.jobs], next=page.next)
+    return JobPage(jobs=[Job.of(row) for row in page.rows], next=page.next)
 
 
 @router.get("/{job_id}")
@@ -102,14 +122,21 @@ def cancel_job(job_id: str, db: Db, background: BackgroundTasks) -> Job:
     return Job.of(job)
 
 
-@router.post("/{job_id}/retry", dependencies=[SUBMIT], status_code=status.HTTP_201_CREATED)
-def retry_job(job_id: str, db: Db, response: Response, background: BackgroundTasks) -> Job:
+@router.post("/{job_id}/retry", status_code=status.HTTP_201_CREATED)
+def retry_job(job_id: str, caller: Submitter, db: Db, response: Response, background: BackgroundTasks) -> Job:
     """A new job like one that failed or was cancelled; asking again gives the same new job."""
     with db.write() as session:
-        job = jobs.retry(session, job_id)
+        job = jobs.retry(session, job_id, caller.key_id)
     background.add_task(send_coordinate, job.id)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return Job.of(job)
+
+
+@router.get("/{job_id}/webhook")
+def get_job_webhook(job_id: str, db: Db) -> Webhook:
+    """Whether the end of the job has been told to the receiver that the request named."""
+    with db.read() as session:
+        return Webhook.of(webhooks.of_job(session, jobs.get(session, job_id).id))
 
 
 @router.get("/{job_id}/pairs")
@@ -160,7 +187,7 @@ def get_job_growth(job_id: str, db: Db) -> GrowthCurve:
     """The regions certified on the way, with their volumes."""
     with db.read() as session:
         job = jobs.get(session, job_id)
-        rows = sorted(regions.newest(session, job_id=job_id), key=lambda row: row.iteration)
+        rows = regions.of_job(session, job_id)
     start = job.started_at or job.created_at
     points = [
         GrowthPoint(iteration=r.iteration, region=r.id, ellipsoid_volume=r.ellipsoid_volume, seconds=(r.created_at - start).total_seconds())

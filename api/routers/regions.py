@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query, Response, status
 
 from api import exports
 from api.access import ADMIN, READ, Db
+from api.schemas.common import Cursor
 from api.schemas.regions import RegionDetail, RegionPage, RegionSummary
 from db import jobs, proofs, regions, scenes
 
@@ -27,12 +28,19 @@ class ExportFormat(StrEnum):
 
 
 @router.get("")
-def list_regions(db: Db, scene: str | None = None, job: str | None = None, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> RegionPage:
+def list_regions(
+    db: Db,
+    scene: str | None = None,
+    job: str | None = None,
+    after: Cursor = None,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+) -> RegionPage:
     """Certified regions, newest first."""
     with db.read() as session:
         scene_id = scenes.get(session, scene).id if scene else None
         job_id = jobs.get(session, job).id if job else None
-        return RegionPage(regions=[RegionSummary.of(row) for row in regions.newest(session, scene_id=scene_id, job_id=job_id, limit=limit)])
+        page = regions.page(session, scene_id=scene_id, job_id=job_id, after=after, limit=limit)
+    return RegionPage(regions=[RegionSummary.of(row) for row in page.rows], next=page.next)
 
 
 @router.get("/{region_id}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
+from fastapi import Query
 from pydantic import BaseModel, ConfigDict, Field
 
 Real = Annotated[float, Field(allow_inf_nan=False)]
@@ -12,6 +13,7 @@ RandomSeed = Annotated[int, Field(ge=0, le=2**63 - 1, description="Seeds every r
 Document = dict[str, Any]
 
 Rows = Annotated[list[Vector], Field(max_length=2000)]
+Cursor = Annotated[str | None, Query(max_length=200, description="`next` of the page before.")]
 Offsets = Annotated[list[Real], Field(max_length=2000)]
 
 
@@ -19,3 +21,9 @@ class Request(BaseModel):
     """Base of everything that clients send."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class Page(BaseModel):
+    """Base of every list that comes in pages."""
+
+    next: str | None = Field(description="Pass as `after` for the next page; null on the last.")

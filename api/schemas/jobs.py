@@ -7,12 +7,12 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from api.schemas.common import Document, Offsets, RandomSeed, Real, Request, Rows, Vector
+from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, Vector
 from api.schemas.scenes import PairInfo
 from certifier.outcome import Outcome, Stage
 from certifier.seed_options import Method
-from db.models import EventRow, JobRow
-from db.states import IterationState, JobKind, JobState, PairState
+from db.models import EventRow, JobRow, WebhookRow
+from db.states import IterationState, JobKind, JobState, PairState, WebhookState
 
 
 class GrowOptions(Request):
@@ -43,11 +43,22 @@ class Seed(Request):
     random_seed: int | None = Field(None, description="Seeds IRIS.")
 
 
+class WebhookRequest(Request):
+    """Whom to tell when the job has ended: a POST, signed as Standard Webhooks has it, repeated until it is answered with success."""
+
+    url: str = Field(max_length=2000, pattern=r"^https?://", description="http:// or https://, of a public address.")
+    secret: str = Field(
+        pattern=r"^whsec_[A-Za-z0-9+/]{32,88}={0,2}$",
+        description="`whsec_` and the base64 of 24 to 64 random bytes, with which the message is signed. It is not shown again.",
+    )
+
+
 class JobRequest(Request):
     """What every job has."""
 
     scene: str = Field(min_length=1, max_length=255, description="A scene's id, or its name.")
     deadline_seconds: Real | None = Field(None, gt=0, le=30 * 86400, description="The job ends after this long, with what it has by then.")
+    webhook: WebhookRequest | None = None
 
 
 class GrowRequest(JobRequest):
@@ -127,11 +138,24 @@ class Job(BaseModel):
         )
 
 
-class JobPage(BaseModel):
+class JobPage(Page):
     """Jobs, newest first."""
 
     jobs: list[Job]
-    next: str | None = Field(description="Pass as `after` for the next page; null on the last.")
+
+
+class Webhook(BaseModel):
+    """Whether the end of the job has been told."""
+
+    url: str
+    state: WebhookState
+    attempts: int
+    next_at: datetime = Field(description="Not tried before.")
+    error: str | None = Field(description="Why the last attempt failed.")
+
+    @classmethod
+    def of(cls, row: WebhookRow) -> Self:
+        return cls(url=row.url, state=WebhookState(row.state), attempts=row.attempts, next_at=row.next_at, error=row.error)
 
 
 class Event(BaseModel):

@@ -7,7 +7,7 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from api.schemas.common import Document, Request, Vector
+from api.schemas.common import Document, Page, Request, Vector
 from certifier.outcome import Guarantee
 from db.models import RegionRow
 
@@ -42,8 +42,8 @@ class RegionSummary(BaseModel):
         )
 
 
-class RegionPage(BaseModel):
-    """The newest regions."""
+class RegionPage(Page):
+    """Regions, newest first."""
 
     regions: list[RegionSummary]
 

@@ -106,7 +106,7 @@ def test_pages_follow_each_other_and_filters_apply(client: TestClient, scene: Sc
     assert client.get("/v1/jobs?kind=certify").json()["jobs"] == []
     assert len(client.get("/v1/jobs?scene=slider").json()["jobs"]) == 5
     assert client.get("/v1/jobs?state=lost").json()["field"] == "state"
-    assert client.get("/v1/jobs?after=nope").status_code == 404
+    assert client.get("/v1/jobs?after=nope").json()["code"] == "cursor"
 
 
 def test_a_cancelled_job_can_be_tried_again_once(client: TestClient, scene: Scene) -> None:

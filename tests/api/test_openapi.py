@@ -21,6 +21,7 @@ OPERATIONS = {
     "retry_job": "POST /v1/jobs/{job_id}/retry",
     "get_job_pairs": "GET /v1/jobs/{job_id}/pairs",
     "get_job_growth": "GET /v1/jobs/{job_id}/growth",
+    "get_job_webhook": "GET /v1/jobs/{job_id}/webhook",
     "list_job_events": "GET /v1/jobs/{job_id}/events",
     "stream_job_events": "GET /v1/jobs/{job_id}/events/stream",
     "list_regions": "GET /v1/regions",
@@ -31,6 +32,7 @@ OPERATIONS = {
     "contains": "POST /v1/planning/contains",
     "get_health": "GET /healthz",
     "get_readiness": "GET /readyz",
+    "get_metrics": "GET /metrics",
 }
 
 

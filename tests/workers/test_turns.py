@@ -166,7 +166,7 @@ def test_a_region_whose_proof_is_refused_is_never_stored(job_id: str) -> None:
     assert (job.state, job.region_id, job.reason) == ("failed", None, "the proof of a region was refused")
     assert (job.error or {})["code"] == "proof_malformed"
     with database().read() as session:
-        assert not regions.newest(session)
+        assert not regions.page(session).rows
 
 
 def test_a_certified_polytope_becomes_a_region_even_after_a_cancel(job_id: str) -> None:
