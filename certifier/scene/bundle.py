@@ -10,17 +10,20 @@ import json
 import os
 import tempfile
 import zipfile
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from certifier.errors import CirisError, SceneError
 from certifier.model import Scene
 from certifier.scene.file import read_scene_file
-from certifier.scene.load import load_scene
+from certifier.scene.load import read_in_child
 from certifier.scene.references import references, resolve
 
 _INDEX = "bundle.json"
 _EPOCH = (1980, 1, 1, 0, 0, 0)
+_DEPTH = 32
+_CHUNK = 2**20
 
 
 @dataclass(frozen=True)
@@ -63,21 +66,40 @@ def pack_bundle(path: str | Path) -> bytes:
 
 
 def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
-    """The scene in a bundle from a stranger: unpacked within limits, checked and parsed in a child process.
+    """The scene in a bundle from a stranger: unpacked within limits, checked and parsed, all of it in a child process.
 
     Raises:
         SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_path``, ``bundle_file``, ``bundle_uri``, ``bundle_xml``,
             ``bundle_text``, or what :func:`load_scene` raises.
     """
     limits = limits or BundleLimits()
+    if len(data) > limits.bytes:
+        raise SceneError("bundle_too_large", f"the bundle has {len(data)} bytes; at most {limits.bytes} are accepted")
     with tempfile.TemporaryDirectory(prefix="ciris-") as directory:
-        root = Path(directory).resolve()
-        scene = _unpack(data, root, limits)
+        archive, root = Path(directory).resolve() / "bundle.zip", Path(directory).resolve() / "files"
+        archive.write_bytes(data)
+        root.mkdir()
+        payload = {"archive": str(archive), "root": str(root), "limits": asdict(limits)}
         try:
-            return load_scene(root / scene, bundle_root=root, timeout_s=limits.timeout_s, memory_bytes=limits.memory_bytes)
+            return read_in_child("certifier.scene.bundle:parse_bundle", payload, "the bundle", None, limits.timeout_s, limits.memory_bytes)
         except CirisError as error:
             error.message = error.message.replace(f"{root}/", "")
             raise
+
+
+def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
+    """The child's side of :func:`load_bundle`: the document of the Scene. Drake is loaded once the files have passed.
+
+    Raises:
+        SceneError: as :func:`load_bundle`.
+    """
+    root = Path(payload["root"])
+    scene = root / unpack(Path(payload["archive"]), root, BundleLimits(**payload["limits"]))
+    check_bundle(root, scene)
+    os.chdir(scene.parent)  # where SDFormat looks for included files
+    from certifier.scene.parse import parse
+
+    return parse({"path": str(scene)})
 
 
 def check_bundle(root: Path, scene: Path) -> None:
@@ -114,30 +136,32 @@ def _write(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
     archive.writestr(entry, content)
 
 
-def _unpack(data: bytes, root: Path, limits: BundleLimits) -> str:
-    """Write the zip's files below root; the path of the scene file."""
-    if len(data) > limits.bytes:
-        raise SceneError("bundle_too_large", f"the bundle has {len(data)} bytes; at most {limits.bytes} are accepted")
+def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
+    """Write the zip's files below root; the path of the scene file.
+
+    Raises:
+        SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_path``.
+    """
     try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        with zipfile.ZipFile(bundle) as archive:
             entries = archive.infolist()
             if len(entries) > limits.files:
                 raise SceneError("bundle_too_large", f"the bundle has {len(entries)} files; at most {limits.files} are accepted")
             left = limits.unpacked_bytes
             for entry in entries:
                 left -= _extract(archive, entry, root, left)
-                if left < 0:
-                    raise SceneError("bundle_too_large", f"the bundle unpacks to more than {limits.unpacked_bytes} bytes")
         scene = str(json.loads((root / _INDEX).read_text(encoding="utf-8"))["scene"])
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, ValueError, KeyError, TypeError) as error:
+    except SceneError:
+        raise
+    except Exception as error:  # zipfile and the decompressors raise a dozen kinds
         hint = "make bundles with pack_bundle or `ciris scene add`"
         raise SceneError("bundle_zip", f"this is not a scene bundle: {type(error).__name__}: {error}", hint=hint) from None
     _checked_name(scene)
     return scene
 
 
-def _extract(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, root: Path, limit: int) -> int:
-    """Write one entry, at most ``limit`` bytes of it and one more; the number of bytes written."""
+def _extract(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, root: Path, left: int) -> int:
+    """Write one entry, unless it has more than ``left`` bytes, whatever it says; the number of its bytes."""
     target = root / _checked_name(entry.filename)
     if entry.is_dir():
         target.mkdir(parents=True, exist_ok=True)
@@ -145,14 +169,20 @@ def _extract(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, root: Path, limit
     if (entry.external_attr >> 16) & 0o170000 not in (0, 0o100000):
         raise SceneError("bundle_path", f"{entry.filename!r} is not a plain file")
     target.parent.mkdir(parents=True, exist_ok=True)
+    written = 0
     with archive.open(entry) as source, target.open("xb") as sink:
-        content = source.read(limit + 1)
-        sink.write(content)
-    return len(content)
+        while chunk := source.read(_CHUNK):
+            written += len(chunk)
+            if written > left:
+                raise SceneError("bundle_too_large", f"the bundle unpacks to more than is accepted; {entry.filename!r} goes beyond it")
+            sink.write(chunk)
+    return written
 
 
 def _checked_name(name: str) -> str:
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts or "\\" in name or "\0" in name or not path.parts:
         raise SceneError("bundle_path", f"{name!r} is not a path inside the bundle")
+    if len(path.parts) > _DEPTH:
+        raise SceneError("bundle_path", f"{name[:80]!r}... is nested more than {_DEPTH} directories deep")
     return name
