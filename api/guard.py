@@ -70,6 +70,7 @@ class Guard:
         headers = Headers(scope=scope)
         limit = UPLOAD_BYTES if scope["path"] == UPLOADS else BODY_BYTES
         try:
+            _check_url(scope)
             self._check_origin(scope["method"], headers)
             _check_length(headers, limit)
             await self._check_caller(scope, headers)
@@ -103,6 +104,12 @@ def _name(host: str) -> str:
     """The host without its port and brackets."""
     name = host.rpartition(":")[0] if ":" in host and not host.endswith("]") else host
     return name.strip("[]")
+
+
+def _check_url(scope: Scope) -> None:
+    """Refuses what no database can look up."""
+    if "\0" in scope["path"] or b"%00" in scope["query_string"]:
+        raise CirisError("invalid_request", "the address holds a zero byte")
 
 
 def _too_large(limit: int) -> str:

@@ -14,7 +14,7 @@ from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 
 from api import checks
 from api.access import READ, SUBMIT, Db, Submitter
-from api.schemas.common import Cursor
+from api.schemas.common import MAX_INT, Cursor
 from api.schemas.jobs import (
     CertifyRequest,
     GrowRequest,
@@ -140,7 +140,7 @@ def get_job_webhook(job_id: str, db: Db) -> Webhook:
 
 
 @router.get("/{job_id}/pairs")
-def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge=0)] = None) -> PairMatrix:
+def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge=0, le=MAX_INT)] = None) -> PairMatrix:
     """The pair matrix: what became of every pair on every iteration's polytope, or on one of them."""
     with db.read() as session:
         job = jobs.get(session, job_id)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, Vector
+from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector
 from api.schemas.scenes import PairInfo
 from certifier.outcome import Outcome, Stage
 from certifier.seed_options import Method
@@ -56,7 +56,7 @@ class WebhookRequest(Request):
 class JobRequest(Request):
     """What every job has."""
 
-    scene: str = Field(min_length=1, max_length=255, description="A scene's id, or its name.")
+    scene: SceneName
     deadline_seconds: Real | None = Field(None, gt=0, le=30 * 86400, description="The job ends after this long, with what it has by then.")
     webhook: WebhookRequest | None = None
 

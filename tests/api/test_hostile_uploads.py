@@ -126,8 +126,8 @@ def test_a_bomb_that_lies_about_its_size(client: TestClient) -> None:
     refused(client, data, 422, "bundle_zip")
 
 
-def test_files_that_share_their_bytes_count_each(tmp_path: Path) -> None:
-    """A bomb of overlapping files: small limits stand for large ones."""
+def test_files_count_together(tmp_path: Path) -> None:
+    """Small limits stand for large ones."""
     data = zipped(**{f"{i}.obj": bytes(1000) for i in range(20)})
     (tmp_path / "bundle.zip").write_bytes(data)
     with pytest.raises(SceneError) as caught:
