@@ -47,7 +47,9 @@ async def stream_job_events(
     job_id: Annotated[str, Depends(_existing)],
     db: Db,
     after: After = 0,
-    last_event_id: Annotated[int | None, Header(ge=0, le=MAX_INT, description="Where an interrupted stream goes on; wins over `after`.")] = None,
+    last_event_id: Annotated[
+        int | None, Header(ge=0, le=MAX_INT, description="Where an interrupted stream goes on; beats `after`.")
+    ] = None,
 ) -> AsyncIterator[ServerSentEvent]:
     """The job's events as they happen; the last one is called `end`, then the stream closes."""
     seq = after if last_event_id is None else last_event_id

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from base64 import b64decode
 from datetime import datetime
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector
 from api.schemas.scenes import PairInfo
@@ -51,6 +52,13 @@ class WebhookRequest(Request):
         pattern=r"^whsec_[A-Za-z0-9+/]{32,88}={0,2}$",
         description="`whsec_` and the base64 of 24 to 64 random bytes, with which the message is signed. It is not shown again.",
     )
+
+    @field_validator("secret")
+    @classmethod
+    def _is_base64(cls, secret: str) -> str:
+        if not 24 <= len(b64decode(secret.removeprefix("whsec_"), validate=True)) <= 64:
+            raise ValueError("it must stand for 24 to 64 bytes")
+        return secret
 
 
 class JobRequest(Request):
