@@ -12,6 +12,8 @@ from db.settings import settings
 
 SHUTDOWN_SECONDS = 2
 """How long open streams may hold up the end."""
+KEEP_ALIVE_SECONDS = 75
+"""Longer than clients keep idle connections: whoever closes first must not be the one who answers."""
 
 
 def main() -> None:
@@ -28,6 +30,7 @@ def main() -> None:
         host=settings().host,
         port=settings().port,
         timeout_graceful_shutdown=SHUTDOWN_SECONDS,
+        timeout_keep_alive=KEEP_ALIVE_SECONDS,
         log_config=None,
         access_log=False,
     )

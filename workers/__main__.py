@@ -13,12 +13,17 @@ from typing import Any
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
+NICENESS = 10
+"""Of the processes that solve, so that on a busy machine the API answers and the coordinator decides first."""
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m workers", description="A Celery worker of ciris.")
     parser.add_argument("queue", choices=["control", "solve"])
     queue = parser.parse_args().queue
     os.environ.update(ONE_THREAD)  # before numpy is imported
+    if queue == "solve":
+        os.nice(NICENESS)
 
     from celery.signals import setup_logging, worker_process_init, worker_ready
 
@@ -53,6 +58,7 @@ def main() -> None:
 
     app.worker_main(
         [
+            "--quiet",
             "worker",
             f"--queues={queue}",
             f"--hostname={queue}-{os.getpid()}@%h",

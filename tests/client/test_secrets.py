@@ -45,7 +45,6 @@ def test_no_secret_is_in_any_log(machine: dict[str, str], tmp_path: Path) -> Non
     assert (refused.status, "no API key has been made" in refused.stderr) == (2, True)
     admin = run(machine, "key", "add", "admin", "--scope", "admin").stdout.strip()
     reader = run(machine, "key", "add", "reader", "--scope", "read").stdout.strip()
-    assert {row["name"] for row in run(machine, "key", "ls", "--json").json} == {"admin", "reader"}
 
     with (tmp_path / "up.log").open("wb") as log:
         stack = subprocess.Popen(command("up", "--port", "0"), env=machine, stdout=log, stderr=log)
@@ -71,8 +70,6 @@ def test_no_secret_is_in_any_log(machine: dict[str, str], tmp_path: Path) -> Non
 
 def use(machine: dict[str, str], admin: str, reader: str, directory: Path) -> None:
     """Every way in which a secret enters the service, rightly and wrongly."""
-    keyless = run(machine, "scene", "ls")
-    assert (keyless.status, "needs an API key" in keyless.stderr) == (2, True)
     (directory / "key").write_text(admin + "\n")
     added = run(machine, "scene", "add", PLANAR, "--json", CIRIS_API_KEY_FILE=str(directory / "key"))
     assert added.status == 0, added.stderr

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 from structlog.contextvars import bound_contextvars
@@ -14,20 +15,24 @@ from db import logs
 log = logging.getLogger("room.module")
 
 
-@pytest.fixture
-def lines(capsys: pytest.CaptureFixture[str]) -> Iterator[pytest.CaptureFixture[str]]:
+@contextmanager
+def logging_as(process: str) -> Iterator[None]:
     root = logging.getLogger()
     before, level = root.handlers[:], root.level
-    logs.configure("solve")
-    yield capsys
-    root.handlers[:], root.level = before, level
+    root.handlers[:] = []
+    logs.configure(process)
+    try:
+        yield
+    finally:
+        root.handlers[:], root.level = before, level
 
 
-def test_a_line_says_what_it_is_about(lines: pytest.CaptureFixture[str]) -> None:
-    with bound_contextvars(job="j", iteration=2, pair=7):
-        log.warning("it took %d s", 3)
-    log.info("afterwards")
-    first, second = map(json.loads, lines.readouterr().err.splitlines())
+def test_a_line_says_what_it_is_about(capsys: pytest.CaptureFixture[str]) -> None:
+    with logging_as("solve"):
+        with bound_contextvars(job="j", iteration=2, pair=7):
+            log.warning("it took %d s", 3)
+        log.info("afterwards")
+    first, second = map(json.loads, capsys.readouterr().err.splitlines())
     assert (
         first.items()
         >= {
@@ -44,13 +49,14 @@ def test_a_line_says_what_it_is_about(lines: pytest.CaptureFixture[str]) -> None
     assert "job" not in second
 
 
-def test_an_exception_stays_on_its_line_without_local_variables(lines: pytest.CaptureFixture[str]) -> None:
+def test_an_exception_stays_on_its_line_without_local_variables(capsys: pytest.CaptureFixture[str]) -> None:
     hidden = "a local secret"
-    try:
-        raise ValueError("no good")
-    except ValueError:
-        log.exception("failed")
-    (line,) = map(json.loads, lines.readouterr().err.splitlines())
+    with logging_as("solve"):
+        try:
+            raise ValueError("no good")
+        except ValueError:
+            log.exception("failed")
+    (line,) = map(json.loads, capsys.readouterr().err.splitlines())
     assert "ValueError: no good" in line["exception"]
     assert hidden not in json.dumps(line["exception"])
 
@@ -64,13 +70,14 @@ def test_an_exception_stays_on_its_line_without_local_variables(lines: pytest.Ca
         ("pa55w0rd", "redis://:{}@valkey:6379/0"),
     ],
 )
-def test_what_got_in_is_blotted(lines: pytest.CaptureFixture[str], secret: str, text: str) -> None:
-    log.warning("cannot use %s", text.format(secret))
-    try:
-        raise ValueError(text.format(secret))
-    except ValueError:
-        log.exception("failed")
-    said = lines.readouterr().err
+def test_what_got_in_is_blotted(capsys: pytest.CaptureFixture[str], secret: str, text: str) -> None:
+    with logging_as("solve"):
+        log.warning("cannot use %s", text.format(secret))
+        try:
+            raise ValueError(text.format(secret))
+        except ValueError:
+            log.exception("failed")
+    said = capsys.readouterr().err
     assert secret not in said
     assert said.count("***") >= 2
     for line in said.splitlines():
