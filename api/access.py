@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import Depends, Request, Security
 from fastapi.security import HTTPBearer, SecurityScopes
+from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
 from starlette.requests import cookie_parser
 
 from certifier.errors import CirisError
 from db import keys
-from db.keys import Scope
+from db.keys import Ring, Scope
 from db.session import Database
-from db.settings import settings
 
 COOKIE = "ciris_key"
+KEYS_SECONDS = 1.0
 _BEARER = HTTPBearer(auto_error=False, scheme_name="key", description="An API key. The service on loopback needs none until one is made.")
 
 
@@ -29,14 +31,35 @@ class Caller:
     name: str = "anybody"
 
 
-def identify(db: Database, headers: Headers) -> Caller | None:
-    """The caller by the key in the Authorization header or else the cookie; None for those who may not come in."""
-    given = presented_key(headers)
-    with db.read() as session:
+class Keyring:
+    """Tells callers by their keys, which are read from the database once in ``KEYS_SECONDS`` and not for every request.
+
+    A key that was revoked is refused after that time at the latest; one that was just made is looked for at once.
+    """
+
+    def __init__(self, database: Database, *, open_without_keys: bool) -> None:
+        self._database, self._open = database, open_without_keys
+        self._ring: Ring | None = None
+        self._read_at = -KEYS_SECONDS
+
+    async def caller(self, headers: Headers) -> Caller | None:
+        """The caller by the key in the Authorization header or else the cookie; None for those who may not come in."""
+        given, ring = presented_key(headers), self._ring
+        if ring is None or time.monotonic() - self._read_at > KEYS_SECONDS or (given is not None and not ring.knows(given)):
+            self._read_at = time.monotonic()
+            ring = self._ring = await run_in_threadpool(self._read)
         if given is not None:
-            row = keys.check(session, given)
+            row = ring.check(given)
             return None if row is None else Caller(Scope(row.scope), row.id, row.name)
-        return Caller(Scope.ADMIN) if settings().loopback and not keys.exist(session) else None
+        return Caller(Scope.ADMIN) if self._open and not ring.rows else None
+
+    def _read(self) -> Ring:
+        try:
+            with self._database.read() as session:
+                return keys.ring(session)
+        except Exception:
+            self._ring = None  # nobody gets in by what was known before
+            raise
 
 
 def presented_key(headers: Headers) -> str | None:

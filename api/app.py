@@ -9,6 +9,7 @@ from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
 from api import guard, login, pages, problems
+from api.access import Keyring
 from api.access_log import AccessLog
 from api.metrics import Requests
 from api.routers import events, jobs, planning, regions, scenes, service
@@ -37,7 +38,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.parsers = CapacityLimiter(scenes.UPLOADS_AT_ONCE)
     app.add_middleware(
         guard.Guard,
-        database=app.state.database,
+        keyring=Keyring(app.state.database, open_without_keys=settings().loopback),
         hosts=LOOPBACK_NAMES if settings().loopback else None,
         rate=settings().requests_per_second,
         respond=partial(problems.respond, pages.render_problem),

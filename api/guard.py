@@ -11,18 +11,16 @@ import math
 from collections.abc import Callable
 from http import HTTPStatus
 
-from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from api.access import identify, presented_key
+from api.access import Keyring, presented_key
 from api.limits import Buckets
 from api.problems import UNAVAILABLE
 from certifier.errors import CirisError
-from db.session import Database
 
 BODY_BYTES = 16 * 2**20
 """More than the largest request of every route but uploads."""
@@ -58,9 +56,9 @@ class Guard:
     """
 
     def __init__(
-        self, app: ASGIApp, database: Database, hosts: frozenset[str] | None, rate: float, respond: Callable[[Request, Exception], Response]
+        self, app: ASGIApp, keyring: Keyring, hosts: frozenset[str] | None, rate: float, respond: Callable[[Request, Exception], Response]
     ) -> None:
-        self._app, self._database, self._hosts, self._respond = app, database, hosts, respond
+        self._app, self._keyring, self._hosts, self._respond = app, keyring, hosts, respond
         self._buckets = Buckets(rate)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -90,7 +88,7 @@ class Guard:
     async def _check_caller(self, scope: Scope, headers: Headers) -> None:
         """Finds out who asks (``request.state.caller``), unless anybody may, and counts the request."""
         public = scope["path"] in PUBLIC or scope["path"].startswith(STATIC)
-        caller = None if public else await run_in_threadpool(identify, self._database, headers)
+        caller = None if public else await self._keyring.caller(headers)
         address = scope["client"][0] if scope.get("client") else "unknown"
         wait = self._buckets.take(f"key {caller.key_id}" if caller and caller.key_id else f"address {address}")
         if wait > 0:

@@ -13,6 +13,7 @@ import re
 import secrets
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
@@ -86,13 +87,29 @@ def exist(session: Session) -> bool:
     return session.scalar(select(ApiKeyRow.id).limit(1)) is not None
 
 
-def check(session: Session, key: str) -> ApiKeyRow | None:
-    """The row of a valid key; None for anything else."""
-    parts = _KEY.fullmatch(key)
-    row = session.get(ApiKeyRow, parts[1]) if parts else None
-    if row is None or row.revoked_at is not None or not hmac.compare_digest(row.digest, _digest(key)):
-        return None
-    return row
+@dataclass(frozen=True)
+class Ring:
+    """Every key that was made, by its id, as of one moment."""
+
+    rows: dict[str, ApiKeyRow]
+
+    def knows(self, key: str) -> bool:
+        """Whether the ring has a key of this id, valid or not."""
+        parts = _KEY.fullmatch(key)
+        return parts is not None and parts[1] in self.rows
+
+    def check(self, key: str) -> ApiKeyRow | None:
+        """The row of a valid key; None for anything else."""
+        parts = _KEY.fullmatch(key)
+        row = self.rows.get(parts[1]) if parts else None
+        if row is None or row.revoked_at is not None or not hmac.compare_digest(row.digest, _digest(key)):
+            return None
+        return row
+
+
+def ring(session: Session) -> Ring:
+    """The keys as they are now."""
+    return Ring({row.id: row for row in session.scalars(select(ApiKeyRow))})
 
 
 def check_bind(settings: Settings) -> None:

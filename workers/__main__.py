@@ -13,27 +13,24 @@ from typing import Any
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
-NICENESS = 10
-"""Of the processes that solve, so that on a busy machine the API answers and the coordinator decides first."""
-
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m workers", description="A Celery worker of ciris.")
     parser.add_argument("queue", choices=["control", "solve"])
     queue = parser.parse_args().queue
     os.environ.update(ONE_THREAD)  # before numpy is imported
-    if queue == "solve":
-        os.nice(NICENESS)
 
     from celery.signals import setup_logging, worker_process_init, worker_ready
 
     from db import logs
     from db.session import database
     from db.settings import settings
-    from workers.app import CONTROL, celery_app
-    from workers.processes import die_with_parent
+    from workers.app import CONTROL, SOLVE, celery_app
+    from workers.processes import die_with_parent, give_way
     from workers.tasks import register
 
+    if queue == SOLVE:
+        give_way()  # on a busy machine the API answers and the coordinator decides first
     app = celery_app()
     register(app, queue)
     pool = ["--pool=threads", "--concurrency=2"] if queue == CONTROL else ["--pool=prefork", f"--concurrency={settings().solve_processes}"]

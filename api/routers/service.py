@@ -19,7 +19,7 @@ router = APIRouter(tags=["service"])
 
 
 @router.get("/healthz")
-def get_health() -> Health:
+async def get_health() -> Health:
     """The process answers."""
     return Health()
 

@@ -21,12 +21,12 @@ def test_a_key_is_valid_until_it_is_revoked(db: Database) -> None:
         assert not keys.exist(session)
         key = keys.add(session, "planner", Scope.READ)
     with db.write() as session:
-        row = keys.check(session, key)
+        row = keys.ring(session).check(key)
         assert row is not None
         assert (row.name, row.scope) == ("planner", "read")
         keys.revoke(session, "planner")
     with db.read() as session:
-        assert keys.check(session, key) is None
+        assert keys.ring(session).check(key) is None
         assert keys.exist(session), "revoking the last key does not open the service"
 
 
@@ -40,8 +40,8 @@ def test_a_name_serves_again_once_its_key_is_revoked(db: Database) -> None:
             keys.revoke(session, "planner")
         second = keys.add(session, "planner", Scope.SUBMIT)
     with db.read() as session:
-        assert keys.check(session, first) is None
-        assert keys.check(session, second) is not None
+        assert keys.ring(session).check(first) is None
+        assert keys.ring(session).check(second) is not None
 
 
 def test_the_database_does_not_hold_the_key(db: Database) -> None:
@@ -59,8 +59,8 @@ def test_no_other_key_is_valid(key_database: tuple[Database, str], place: int, l
     database, key = key_database
     other = key[: place % len(key)] + letter + key[place % len(key) + 1 :]
     with database.read() as session:
-        assert (keys.check(session, other) is not None) == (other == key)
-        assert keys.check(session, key + letter) is None
+        assert (keys.ring(session).check(other) is not None) == (other == key)
+        assert keys.ring(session).check(key + letter) is None
 
 
 @pytest.fixture(scope="module")
