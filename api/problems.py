@@ -11,7 +11,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.openapi.utils import get_openapi
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict
 from pydantic.json_schema import models_json_schema
 from sqlalchemy.exc import InterfaceError, OperationalError, TimeoutError
 from starlette.exceptions import HTTPException
@@ -48,6 +48,23 @@ class FieldProblem(BaseModel):
 
 class Problem(BaseModel):
     """An error (RFC 9457): ``code`` is stable, ``detail`` is for people."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "type": "urn:ciris:problem:seed_outside_limits",
+                    "title": "Unprocessable Content",
+                    "status": 422,
+                    "detail": "joint arm/elbow is at 9, not between its limits -2 and 2",
+                    "code": "seed_outside_limits",
+                    "field": "seed.q[1]",
+                    "hint": "",
+                    "errors": [],
+                }
+            ]
+        }
+    )
 
     type: str
     title: str

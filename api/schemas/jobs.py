@@ -47,6 +47,12 @@ class Seed(Request):
 class WebhookRequest(Request):
     """Whom to tell when the job has ended: a POST, signed as Standard Webhooks has it, repeated until it is answered with success."""
 
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"url": "https://planner.example.org/ciris", "secret": "whsec_AAECAwQFBgcICQoLDA0ODxAREhMUFRYXGBkaGxwdHh8="}]
+        }
+    )
+
     url: str = Field(max_length=2000, pattern=r"^https?://", description="http:// or https://, of a public address.")
     secret: str = Field(
         pattern=r"^whsec_[A-Za-z0-9+/]{32,88}={0,2}$",
