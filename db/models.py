@@ -53,13 +53,9 @@ class Leased:
     """How often it was begun."""
     worker: Mapped[str | None]
     """Who holds or last held it: ``host:pid:start``."""
-    task_id: Mapped[str | None] = mapped_column(String(36))
-    """The message under which it is held."""
     lease_token: Mapped[str | None] = mapped_column(String(36))
     """Proof of being the holder; new with every claim."""
     lease_until: Mapped[datetime | None]
-    sent_at: Mapped[datetime | None]
-    """When a message for it was last sent."""
 
 
 class ApiKeyRow(Base):
@@ -107,6 +103,10 @@ class JobRow(Base):
     """SHA-256 of the request, to tell a repetition from a different request under the same key."""
     key_id: Mapped[str | None] = mapped_column(ForeignKey("api_keys.id"), index=True)
     """Whose job it is; None where the service asks for no key."""
+    priority: Mapped[int] = mapped_column(default=0)
+    """Each step doubles the job's share of its key's work."""
+    served: Mapped[float] = mapped_column(default=0.0)
+    """Seconds of work that it was given, divided by its share; whoever has the least goes next (db.work)."""
     retry_of: Mapped[str | None] = mapped_column(ForeignKey("jobs.id"))
     attempt: Mapped[int] = mapped_column(default=1)
     """1, or one more than the attempt of ``retry_of``."""
@@ -153,7 +153,11 @@ class PairRow(Leased, Base):
     """One pair of geometries on one iteration's polytope."""
 
     __tablename__ = "pairs"
-    __table_args__ = (UniqueConstraint("job_id", "iteration", "pair_index"), Index(None, "state", "lease_until"))
+    __table_args__ = (
+        UniqueConstraint("job_id", "iteration", "pair_index"),
+        Index(None, "state", "lease_until"),
+        Index(None, "job_id", "state"),
+    )
     transitions: ClassVar[states.Table] = states.PAIR
 
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -179,7 +183,7 @@ class StepRow(Leased, Base):
     """A piece of a job that is not a pair: seeding, the polytope step, accepting a region."""
 
     __tablename__ = "steps"
-    __table_args__ = (UniqueConstraint("job_id", "turn", "kind"), Index(None, "state", "lease_until"))
+    __table_args__ = (UniqueConstraint("job_id", "turn", "kind"), Index(None, "state", "lease_until"), Index(None, "job_id", "state"))
     transitions: ClassVar[states.Table] = states.STEP
 
     id: Mapped[int] = mapped_column(primary_key=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from sqlalchemy.orm import Session
 
 from db import events, jobs, leases, proofs
 from db.models import IterationRow, JobRow, PairRow
-from db.states import PAIR, IterationState, JobState, PairState, transition, unfinished
+from db.states import PAIR, IterationState, PairState, transition, unfinished
 from db.types import utcnow
 
 UNFINISHED = unfinished(PAIR)
@@ -71,12 +72,10 @@ class Saved:
     Attributes:
         held: False when some of the pairs were not held any more; their results were dropped.
         finished: True for the one saving after which the iteration has no open or running pair.
-        stopped: messages under which other workers hold pairs of this iteration that are not needed any more.
     """
 
     held: bool
     finished: bool
-    stopped: tuple[str, ...] = ()
 
 
 def add_iteration(
@@ -93,8 +92,7 @@ def add_iteration(
     stop_at_first_failure: bool,
 ) -> None:
     """Adds an iteration and its pairs; one without pairs is certified at once. The caller holds the job's lock."""
-    now = utcnow()
-    certified = {} if pairs else {"state": IterationState.CERTIFIED, "finished_at": now}
+    certified = {} if pairs else {"state": IterationState.CERTIFIED, "finished_at": utcnow()}
     session.add(
         IterationRow(
             job_id=job.id,
@@ -117,7 +115,6 @@ def add_iteration(
                     "a": p.a,
                     "b": p.b,
                     "forecast_seconds": p.forecast_seconds,
-                    "sent_at": now,
                 }
                 for p in pairs
             ],
@@ -125,32 +122,45 @@ def add_iteration(
     events.emit(session, job, "iteration", {"index": index, "label": label, "state": "running", "pairs": len(pairs), "reused": len(reuse)})
 
 
-def claim(
-    session: Session, job_id: str, iteration: int, indices: Sequence[int], *, task_id: str | None, lease_seconds: float
-) -> Claim | None:
-    """Claims what is free among these pairs: all that were never begun, or else one that was (its worker died, perhaps because of it).
+def batches(pairs: Sequence[tuple[int, float]], seconds: float) -> list[list[int]]:
+    """Groups (pair index, forecast in seconds) into pieces of work, those to do first first.
 
-    None when there is nothing to do: done, skipped, held by someone else, or the job is not running.
+    Pairs expected to take ``seconds`` or more are on their own, longest first; the others keep their order and go together until
+    they fill that time. Taking the first group away leaves the other groups as they are.
     """
-    job = jobs.lock(session, job_id)
-    if job.state != JobState.RUNNING:
+    big = sorted((pair for pair in pairs if pair[1] >= seconds), key=lambda pair: -pair[1])
+    groups = [[index] for index, _ in big]
+    filled = inf
+    for index, forecast in (pair for pair in pairs if pair[1] < seconds):
+        if filled + forecast > seconds:
+            groups.append([])
+            filled = 0.0
+        groups[-1].append(index)
+        filled += forecast
+    return groups
+
+
+def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds: float) -> Claim | None:
+    """Claims the next batch of the job's open pairs, or one that was begun before (its worker died, perhaps because of it) alone.
+
+    None when no pair is open. The caller holds the job's lock.
+    """
+    rows = session.scalars(select(PairRow).where(PairRow.job_id == job.id, PairRow.state == PairState.OPEN).order_by(PairRow.id)).all()
+    if not rows:
         return None
-    now, wanted = utcnow(), {index: place for place, index in enumerate(indices)}
-    rows = session.scalars(_pairs(job_id, iteration).where(PairRow.pair_index.in_(indices), PairRow.state.in_(UNFINISHED))).all()
-    free = sorted((row for row in rows if leases.is_free(row, now)), key=lambda row: wanted[row.pair_index])
-    chosen = [row for row in free if row.attempts == 0] or free[:1]
-    if not chosen:
-        return None
+    fresh = {row.pair_index: row for row in rows if row.attempts == 0}
+    groups = batches([(index, row.forecast_seconds) for index, row in fresh.items()], batch_seconds)
+    chosen = [fresh[index] for index in groups[0]] if groups else rows[:1]
     pairs = tuple(Claimed(row.pair_index, row.attempts + 1) for row in chosen)
-    token = leases.take(session, PairRow, chosen, task_id=task_id, seconds=lease_seconds)
-    return Claim(token, job_id, job.scene_id, iteration, pairs)
+    jobs.charge(session, job, sum(row.forecast_seconds for row in chosen))
+    token = leases.take(session, PairRow, chosen, seconds=lease_seconds)
+    return Claim(token, job.id, job.scene_id, chosen[0].iteration, pairs)
 
 
-def save(session: Session, claim: Claim, results: Sequence[Result], *, worth_stopping: float) -> Saved:
+def save(session: Session, claim: Claim, results: Sequence[Result]) -> Saved:
     """Saves results with their proofs, in one transaction, if they are still held.
 
-    A first failure skips the iteration's other pairs, where it was asked for. Other workers' messages are named in ``stopped`` when
-    the pair that they hold is expected to take more than ``worth_stopping`` seconds.
+    A first failure skips the iteration's other pairs, where it was asked for; whoever holds one of them stops (leases.kept).
     """
     job = jobs.lock(session, claim.job_id)
     where = (PairRow.job_id == claim.job_id, PairRow.iteration == claim.iteration, leases.held(PairRow, claim.token))
@@ -172,22 +182,15 @@ def save(session: Session, claim: Claim, results: Sequence[Result], *, worth_sto
     label, stop_at_first_failure = session.execute(
         select(IterationRow.label, IterationRow.stop_at_first_failure).where(*_iteration(job.id, claim.iteration))
     ).one()
-    stopped: tuple[str, ...] = ()
     if stop_at_first_failure and any(result.state != PairState.CERTIFIED for result in saved):
-        stopped = skip(session, claim.job_id, worth_stopping=worth_stopping, but=claim.token)
+        skip(session, claim.job_id)
     finished = _finish_iteration(session, job, claim.iteration, label)
-    return Saved(held=len(saved) == len(results), finished=finished, stopped=stopped)
+    return Saved(held=len(saved) == len(results), finished=finished)
 
 
-def skip(session: Session, job_id: str, *, worth_stopping: float, but: str | None = None) -> tuple[str, ...]:
-    """Skips the job's unfinished pairs; returns the messages, except those held under the token ``but``, that are worth stopping."""
-    where = (PairRow.job_id == job_id, PairRow.state.in_(UNFINISHED))
-    running = session.scalars(
-        select(PairRow).where(*where, PairRow.state == PairState.RUNNING, PairRow.forecast_seconds > worth_stopping)
-    ).all()
-    stopped = tuple(sorted({row.task_id for row in running if row.task_id and row.lease_token != but}))
-    transition(session, PairRow, PairState.SKIPPED, *where)
-    return stopped
+def skip(session: Session, job_id: str) -> None:
+    """Skips the job's unfinished pairs."""
+    transition(session, PairRow, PairState.SKIPPED, PairRow.job_id == job_id, PairRow.state.in_(UNFINISHED))
 
 
 def _finish_iteration(session: Session, job: JobRow, index: int, label: str) -> bool:

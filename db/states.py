@@ -68,7 +68,7 @@ class StepState(StrEnum):
     FAILED = "failed"
     """``report`` says why; for an ``accept`` the region's proof was refused and the region is not served."""
     SKIPPED = "skipped"
-    """Not needed any more: the job ended."""
+    """Not needed any more: the job ended, or (``accept``) a later region was accepted."""
 
 
 class StepKind(StrEnum):

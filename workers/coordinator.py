@@ -6,9 +6,7 @@ and the rows' outcomes into its reports, and says how a job ends. Nothing here r
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
 from typing import Any
 
 from certifier.growth import Certification, Failed, GrowthOptions, Proposed, Report, Stepped, Transition, advance, begin
@@ -60,21 +58,3 @@ def ending(kind: str, outcome: Outcome, reason: str, error: dict[str, Any] | Non
     if outcome == Outcome.CERTIFIED or (kind == JobKind.CERTIFY and outcome != Outcome.ERROR):
         return Ending(JobState.SUCCEEDED, outcome, reason)
     return Ending(JobState.FAILED, outcome, reason, error or {"code": "not_grown", "message": reason, "field": None, "hint": ""})
-
-
-def batches(pairs: Sequence[tuple[int, float]], seconds: float) -> list[list[int]]:
-    """Groups (pair index, forecast in seconds) into messages.
-
-    Pairs expected to take ``seconds`` or more travel alone, longest first; the others keep their order and travel together until
-    they fill that time.
-    """
-    big = sorted((pair for pair in pairs if pair[1] >= seconds), key=lambda pair: -pair[1])
-    groups = [[index] for index, _ in big]
-    filled = inf
-    for index, forecast in (pair for pair in pairs if pair[1] < seconds):
-        if filled + forecast > seconds:
-            groups.append([])
-            filled = 0.0
-        groups[-1].append(index)
-        filled += forecast
-    return groups

@@ -1,4 +1,4 @@
-"""Certifying pairs: claim a batch, certify, save with the proofs. A message may come twice, or its worker die halfway, without harm."""
+"""Certifying a batch of claimed pairs and saving what came of them with the proofs. The worker may die halfway without harm."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from db import jobs, leases, pairs
 from db.models import IterationRow, PairRow
 from db.session import database
 from db.settings import settings
-from db.states import PairState
-from workers.app import send_coordinate, stop_messages
+from db.states import JobState, PairState
+from db.types import Arrays
+from workers.app import send_coordinate
 from workers.scenes import load_scene
-from workers.transaction import writing
+from workers.transaction import persistently
 
 log = logging.getLogger(__name__)
 
@@ -28,22 +29,17 @@ SAVE_SECONDS = 0.5
 """Results are saved together until this much time has gone into them."""
 
 
-def solve_pairs(job_id: str, iteration: int, indices: Sequence[int], task_id: str | None = None) -> None:
-    """Certifies these pairs of an iteration, as far as they are still wanted and nobody else is at them."""
-    lease, left = settings().lease_seconds, set(indices)
-    while left:
-        with database().write() as session:
-            wanted = [index for index in indices if index in left]
-            claim = pairs.claim(session, job_id, iteration, wanted, task_id=task_id, lease_seconds=lease)
-        if claim is None:
-            return
-        with bound_contextvars(job=job_id, iteration=iteration), leases.renewed(database(), PairRow, claim.token, lease):
-            _certify_claimed(claim)
-        left -= {pair.index for pair in claim.pairs}
-
-
-def _certify_claimed(claim: pairs.Claim) -> None:
+def certify_pairs(claim: pairs.Claim) -> None:
     """Certifies and saves the claimed pairs, until one of them turns out not to be held any more."""
+    bound = bound_contextvars(job=claim.job_id, iteration=claim.iteration)
+    with bound, leases.kept(database(), PairRow, claim.token, settings().lease_seconds, [JobState.RUNNING]):
+        finished = _certify_and_save(claim)
+    if finished:
+        send_coordinate(claim.job_id)
+
+
+def _certify_and_save(claim: pairs.Claim) -> bool:
+    """Whether that finished the iteration."""
     results: list[pairs.Result] = []
     since = time.monotonic()
     for place, pair in enumerate(claim.pairs, start=1):
@@ -51,15 +47,17 @@ def _certify_claimed(claim: pairs.Claim) -> None:
             results.append(_certify(claim, pair))
         failed = results[-1].state != PairState.CERTIFIED
         if failed or place == len(claim.pairs) or time.monotonic() - since >= SAVE_SECONDS:
-            if not _save_results(claim, results):
-                return
+            saved = persistently(partial(_save, claim, results))
+            if saved.finished or not saved.held:
+                return saved.finished
             results, since = [], time.monotonic()
+    return False
 
 
 def _certify(claim: pairs.Claim, pair: pairs.Claimed) -> pairs.Result:
     limit, start = settings().max_attempts, time.perf_counter()
     if pair.attempt > limit:
-        problem = f"the worker died {limit} times while certifying this pair (killed, crashed or out of memory)"
+        problem = f"the worker died {limit} times while certifying this pair (killed, crashed, out of memory or over the time limit)"
         return _error(pair, CirisError("worker_lost", problem), start)
     try:
         found = _certification(claim.scene_id, claim.job_id, claim.iteration).certify(pair.index)
@@ -88,17 +86,16 @@ def _error(pair: pairs.Claimed, error: CirisError, start: float) -> pairs.Result
 @lru_cache(maxsize=2)
 def _certification(scene_id: str, job_id: str, iteration: int) -> Certification:
     """What the pairs of an iteration share; its polytope never changes, so the last two are kept."""
-    with database().read() as session:
-        arrays = session.get_one(IterationRow, (job_id, iteration)).arrays
-        seed = GrowthOptions.from_document(jobs.get(session, job_id).options).random_seed
+
+    def read() -> tuple[Arrays, int]:
+        with database().read() as session:
+            arrays = session.get_one(IterationRow, (job_id, iteration)).arrays
+            return arrays, GrowthOptions.from_document(jobs.get(session, job_id).options).random_seed
+
+    arrays, seed = persistently(read)
     return Certification(load_scene(scene_id), Polytope(arrays["C"], arrays["d"]), arrays.get("center"), seed)
 
 
-def _save_results(claim: pairs.Claim, results: Sequence[pairs.Result]) -> bool:
-    """Saves, then tells the others what follows from it. False when some of the pairs are not held any more."""
-    with writing() as (session, afterwards):
-        saved = pairs.save(session, claim, results, worth_stopping=settings().batch_seconds)
-        afterwards.append(partial(stop_messages, saved.stopped))
-        if saved.finished:
-            afterwards.append(partial(send_coordinate, claim.job_id))
-    return saved.held
+def _save(claim: pairs.Claim, results: Sequence[pairs.Result]) -> pairs.Saved:
+    with database().write() as session:
+        return pairs.save(session, claim, results)

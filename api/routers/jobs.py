@@ -66,6 +66,7 @@ def create_job(
             idempotency_key=idempotency_key and f"{caller.key_id or 'open'}:{idempotency_key}",
             request_digest=_digest(scene.id, options, body),
             key_id=caller.key_id,
+            priority=body.priority,
         )
         if made and body.webhook is not None:
             webhooks.add(session, job.id, body.webhook.url, body.webhook.secret)
@@ -86,7 +87,7 @@ def _options(body: GrowRequest | CertifyRequest, scene: Scene) -> dict[str, Any]
 
 
 def _digest(scene_id: str, options: dict[str, Any], body: JobRequest) -> str:
-    document = [scene_id, options, body.deadline_seconds, body.webhook and body.webhook.model_dump()]
+    document = [scene_id, options, body.priority, body.deadline_seconds, body.webhook and body.webhook.model_dump()]
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 

@@ -71,6 +71,7 @@ class JobRequest(Request):
     """What every job has."""
 
     scene: SceneName
+    priority: int = Field(0, ge=-3, le=3, description="Each step doubles the job's share of the work done for its key.")
     deadline_seconds: Real | None = Field(None, gt=0, le=30 * 86400, description="The job ends after this long, with what it has by then.")
     webhook: WebhookRequest | None = None
 
@@ -121,6 +122,7 @@ class Job(BaseModel):
     reason: str | None = Field(description="Why it ended, a sentence.")
     error: Document | None = Field(description="What was wrong (code, message, field, hint) when it failed.")
     options: Document
+    priority: int
     region: str | None = Field(description="The id of the last region certified.")
     retry_of: str | None
     attempt: int
@@ -141,6 +143,7 @@ class Job(BaseModel):
             reason=row.reason,
             error=row.error,
             options=row.options,
+            priority=row.priority,
             region=row.region_id,
             retry_of=row.retry_of,
             attempt=row.attempt,
@@ -176,7 +179,7 @@ class Event(BaseModel):
     """Something that happened to a job."""
 
     seq: int = Field(description="1, 2, 3 ... within the job; the event's id in the stream.")
-    kind: str = Field(description="job, iteration, pairs, step or region.")
+    kind: str = Field(description="job, iteration, pairs, step, region or lost.")
     data: Document
     created_at: datetime
 
