@@ -56,7 +56,7 @@ class Holders:
         return now - self._since >= lease
 
     def database_was_away(self) -> None:
-        self._since = utcnow()
+        self._since = self._last
 
 
 def sweep(*, by_time: bool = True) -> None:

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from certifier.model import Scene
-from db import pairs, steps
-from db.session import database
 from tests.services import Queue
 from tests.workers.options import box_around, grow_box
 from tests.workers.service import Service, ended, events_of, eventually, job_of, kill_holder, pairs_of, submit
-from workers.app import send_coordinate, send_pairs, send_step
+from workers.app import send_coordinate, send_work
 
 pytestmark = [pytest.mark.usefixtures("service"), pytest.mark.parametrize("service", ["sqlite"], indirect=True)]
 
@@ -51,13 +49,9 @@ def test_messages_that_come_again_change_nothing(planar: Scene) -> None:
 
 
 def send_all_again(job_id: str) -> None:
-    send_coordinate(job_id)
-    with database().read() as session:
-        rows, did = pairs.of_job(session, job_id), steps.of_job(session, job_id)
-    for iteration in {row.iteration for row in rows}:
-        send_pairs(job_id, iteration, [[row.pair_index for row in rows if row.iteration == iteration]])
-    for step in did:
-        send_step(step.id)
+    for _ in range(5):
+        send_coordinate(job_id)
+    send_work(10)
 
 
 def test_a_job_survives_the_death_of_both_workers(arm: tuple[Scene, np.ndarray], service: Service) -> None:
