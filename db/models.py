@@ -195,6 +195,8 @@ class StepRow(Leased, Base):
     state: Mapped[str] = mapped_column(String(16), default=states.StepState.OPEN)
     input: Mapped[Document]
     """What it works on: the action, or the accepted polytope."""
+    due_at: Mapped[datetime] = mapped_column(default=utcnow)
+    """Not to be begun before."""
     report: Mapped[Document | None]
     """What it found, or the CirisError document of why it failed."""
     seconds: Mapped[float | None]

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any
+from datetime import datetime
+from typing import Any, cast
 
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, CursorResult, select, update
 from sqlalchemy.orm import Session
 
 from db import events, jobs, leases
 from db.models import JobRow, StepRow
 from db.states import STEP, StepKind, StepState, transition, unfinished
+from db.types import utcnow
 
 UNFINISHED = unfinished(STEP)
 
@@ -30,9 +32,9 @@ class Claim:
     attempt: int
 
 
-def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any]) -> StepRow:
-    """Adds a step of the job's present turn; the caller holds the job's lock."""
-    step = StepRow(job_id=job.id, turn=job.turn, kind=kind, input=input)
+def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any], due_at: datetime | None = None) -> StepRow:
+    """Adds a step of the job's present turn, due now unless told otherwise; the caller holds the job's lock."""
+    step = StepRow(job_id=job.id, turn=job.turn, kind=kind, input=input, due_at=due_at or utcnow())
     session.add(step)
     session.flush()
     events.emit(session, job, "step", {"kind": kind, "state": StepState.OPEN})
@@ -40,8 +42,8 @@ def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any]) ->
 
 
 def claim(session: Session, job: JobRow, kinds: Collection[StepKind], *, lease_seconds: float) -> Claim | None:
-    """Claims the job's latest open step of these kinds; None when there is none. The caller holds the job's lock."""
-    query = select(StepRow).where(StepRow.job_id == job.id, StepRow.state == StepState.OPEN, StepRow.kind.in_(kinds))
+    """Claims the job's latest step of these kinds that is open and due; None when there is none. The caller holds the job's lock."""
+    query = select(StepRow).where(StepRow.job_id == job.id, is_due(StepRow), StepRow.kind.in_(kinds))
     step = session.scalar(query.order_by(StepRow.turn.desc()).limit(1))
     if step is None:
         return None
@@ -66,6 +68,18 @@ def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any
         earlier = (StepRow.job_id == job.id, StepRow.kind == StepKind.ACCEPT, StepRow.turn < turn)
         transition(session, StepRow, StepState.SKIPPED, *earlier, StepRow.state == StepState.OPEN)
     return True
+
+
+def is_due(step: type[StepRow]) -> ColumnElement[bool]:
+    """Condition: the step is open and may be begun."""
+    return (step.state == StepState.OPEN) & (step.due_at <= utcnow())
+
+
+def hasten(session: Session, job_id: str) -> bool:
+    """Makes the job's open steps due now; False when they are already."""
+    now = utcnow()
+    late = update(StepRow).where(StepRow.job_id == job_id, StepRow.state == StepState.OPEN, StepRow.due_at > now).values(due_at=now)
+    return bool(cast("CursorResult[Any]", session.execute(late)).rowcount)
 
 
 def skip(session: Session, job_id: str) -> None:

@@ -47,20 +47,21 @@ def served_by_now(session: Session) -> float:
 
 
 def open_pieces(session: Session) -> int:
-    """How many messages are enough for all that is open."""
-    return sum(session.scalar(select(func.count()).where(row.state == PairState.OPEN)) or 0 for row in (PairRow, StepRow))
+    """How many messages are enough for all that is open and due."""
+    conditions = (PairRow.state == PairState.OPEN, steps.is_due(StepRow))
+    return sum(session.scalar(select(func.count()).where(condition)) or 0 for condition in conditions)
 
 
 def _has_work() -> ColumnElement[bool]:
     """Condition: :func:`claim` would find something."""
     pair = exists().where(PairRow.job_id == JobRow.id, PairRow.state == PairState.OPEN)
-    step = exists().where(StepRow.job_id == JobRow.id, StepRow.state == StepState.OPEN, StepRow.kind.in_(URGENT))
+    step = exists().where(StepRow.job_id == JobRow.id, steps.is_due(StepRow), StepRow.kind.in_(URGENT))
     return or_(and_(JobRow.state == JobState.RUNNING, or_(pair, step)), _has_region())
 
 
 def _has_region() -> ColumnElement[bool]:
     """Condition: the job has a region to accept and nobody is accepting one of its regions."""
     step, other = aliased(StepRow), aliased(StepRow)
-    waits = exists().where(step.job_id == JobRow.id, step.kind == StepKind.ACCEPT, step.state == StepState.OPEN)
+    waits = exists().where(step.job_id == JobRow.id, step.kind == StepKind.ACCEPT, steps.is_due(step))
     accepting = exists().where(other.job_id == JobRow.id, other.kind == StepKind.ACCEPT, other.state == StepState.RUNNING)
     return and_(JobRow.state.in_((JobState.RUNNING, JobState.CANCELLING)), waits, ~accepting)

@@ -32,6 +32,8 @@ from workers.transaction import Afterwards, persistently, writing
 
 log = logging.getLogger(__name__)
 
+ACCEPT_SECONDS = 20.0
+"""How long a certified polytope waits for a larger one before it is made a region, which takes as long as verifying all its proofs."""
 COORDINATION_SECONDS = 60.0
 """A coordinator that has not answered after this time is believed dead."""
 
@@ -79,7 +81,7 @@ def _forecast(scene_id: str) -> list[PairCost]:
 
 def _begin(job_id: str) -> Turn | None:
     """Ends the job if it is to end; else claims its next turn. None when there is nothing to decide."""
-    with database().write() as session:
+    with writing() as (session, afterwards):
         job = jobs.lock(session, job_id)
         if job.state not in unfinished(JOB):
             return None
@@ -93,7 +95,7 @@ def _begin(job_id: str) -> Turn | None:
             job.error = CirisError("coordination_failed", "the coordinator died or hung each time it decided about this job").to_document()
             _finish_growth(session, job, Finish(Outcome.ERROR, "the coordinator failed"))
         if job.action is not None and job.action["kind"] == "finish":
-            _finish(session, job)
+            _finish(session, job, afterwards)
             return None
         report = None if job.action is None else _report(session, job)
         if jobs.is_coordinated(job, now) or (job.action is not None and report is None):
@@ -130,11 +132,12 @@ def _save(turn: Turn, transition: Transition) -> None:
         job.growth = transition.state
         match transition.action:
             case Propose() | Step() as action:
-                _add_step(session, job, StepKind(action.kind), action_to_document(action), afterwards)
+                steps.add(session, job, StepKind(action.kind), action_to_document(action))
+                afterwards.append(send_work)
             case Certify() as action:
                 _add_iteration(session, job, action, afterwards)
         if transition.accepted is not None:
-            _add_step(session, job, StepKind.ACCEPT, asdict(transition.accepted), afterwards)
+            steps.add(session, job, StepKind.ACCEPT, asdict(transition.accepted), utcnow() + timedelta(seconds=ACCEPT_SECONDS))
 
 
 def _advance(job: JobRow, action: Propose | Certify | Step | Finish) -> None:
@@ -142,11 +145,6 @@ def _advance(job: JobRow, action: Propose | Certify | Step | Finish) -> None:
     job.action = action_to_document(action)
     job.coordinator = job.coordinator_until = None
     job.coordinator_attempts = 0
-
-
-def _add_step(session: Session, job: JobRow, kind: StepKind, document: dict[str, Any], afterwards: Afterwards) -> None:
-    steps.add(session, job, kind, document)
-    afterwards.append(send_work)
 
 
 def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: Afterwards) -> None:
@@ -188,10 +186,12 @@ def _finish_growth(session: Session, job: JobRow, finish: Finish) -> None:
     _advance(job, finish)
 
 
-def _finish(session: Session, job: JobRow) -> None:
+def _finish(session: Session, job: JobRow, afterwards: Afterwards) -> None:
     """Ends the job once its last region has been accepted or refused."""
     rows = steps.of_job(session, job.id)
     if any(step.state in unfinished(STEP) for step in rows):
+        if steps.hasten(session, job.id):
+            afterwards.append(send_work)
         return
     refused = next((step.report for step in rows if step.kind == StepKind.ACCEPT and step.state == StepState.FAILED), None)
     failed = next((step.report for step in reversed(rows) if step.state == StepState.FAILED), None)

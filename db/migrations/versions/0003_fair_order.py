@@ -23,9 +23,13 @@ def upgrade() -> None:
             batch_op.drop_column("task_id")
             batch_op.drop_column("sent_at")
             batch_op.create_index(batch_op.f(f"ix_{table}_job_id_state"), ["job_id", "state"], unique=False)
+    with op.batch_alter_table("steps", schema=None) as batch_op:
+        batch_op.add_column(sa.Column("due_at", sa.DateTime(timezone=True), nullable=False, server_default="2026-01-01"))
 
 
 def downgrade() -> None:
+    with op.batch_alter_table("steps", schema=None) as batch_op:
+        batch_op.drop_column("due_at")
     for table in ("steps", "pairs"):
         with op.batch_alter_table(table, schema=None) as batch_op:
             batch_op.drop_index(batch_op.f(f"ix_{table}_job_id_state"))
