@@ -46,6 +46,14 @@ class Queue:
             self._process.wait()
             self._process = None
 
+    def kill(self, *, losing_everything: bool) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+        if losing_everything:
+            shutil.rmtree(self._directory / "data")
+
     def flush(self) -> None:
         """Loses every message."""
         redis.Redis(unix_socket_path=str(self.socket)).flushall()
@@ -87,7 +95,7 @@ def postgres_server() -> Iterator[Postgres]:
     with tempfile.TemporaryDirectory(prefix="cp-", dir="/tmp") as directory:
         if user is not None:
             shutil.chown(directory, user)
-        data, port = Path(directory) / "data", _free_port()
+        data, port = Path(directory) / "data", free_port()
         initialise = [binaries / "initdb", "-D", data, "-U", "postgres", "-A", "trust", "--no-sync", "--locale=C.UTF-8", "-E", "UTF8"]
         subprocess.run(initialise, check=True, stdout=subprocess.DEVNULL, user=user, cwd=directory)
         serve = [binaries / "postgres", "-D", data, "-p", str(port), "-k", directory, "-c", "listen_addresses=127.0.0.1", "-c", "fsync=off"]
@@ -99,7 +107,7 @@ def postgres_server() -> Iterator[Postgres]:
             _wait(lambda: server.connect().close(), psycopg.OperationalError, process)
             yield server
         finally:
-            process.send_signal(signal.SIGINT)
+            process.send_signal(signal.SIGQUIT)  # at once: nobody needs the data any more
             process.wait()
 
 
@@ -114,7 +122,7 @@ def _postgres_binaries() -> Path:
     return found
 
 
-def _free_port() -> int:
+def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
