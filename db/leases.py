@@ -41,13 +41,17 @@ LOOK_SECONDS = 0.5
 
 def this_worker() -> str:
     """This process, as ``host:pid:start``; the start tells it from a later process with the same number."""
-    return f"{_host()}:{os.getpid()}:{_started(os.getpid())}"
+    return _name(os.getpid())
 
 
 def is_alive(worker: str | None) -> bool | None:
     """Whether that worker lives; None when it is not of this host, so that nobody here can tell."""
     host, pid, started = (worker or "::").rsplit(":", 2)
     return _started(int(pid)) == started if host == _host() else None
+
+
+def _name(pid: int) -> str:
+    return f"{_host()}:{pid}:{_started(pid)}"
 
 
 @cache
@@ -86,6 +90,7 @@ def take(session: Session, model: type[Row], rows: Sequence[Row], *, seconds: fl
         model.id.in_([row.id for row in rows]),
         attempts=model.attempts + 1,
         worker=this_worker(),
+        parent=_name(os.getppid()),
         lease_token=token,
         lease_until=utcnow() + timedelta(seconds=seconds),
     )
@@ -143,12 +148,13 @@ def _renew(database: Database, model: type[Row], token: str, seconds: float) -> 
 
 @dataclass(frozen=True)
 class Lost:
-    """A lease that is over, and why."""
+    """A lease that is over, and why; ``alone`` when the holder died and the process that had forked it lives."""
 
     job_id: str
     token: str
     worker: str
     reason: str
+    alone: bool
 
 
 def lost(session: Session, model: type[Row], *, by_time: bool) -> list[Lost]:
@@ -156,18 +162,25 @@ def lost(session: Session, model: type[Row], *, by_time: bool) -> list[Lost]:
     now = utcnow()
     found = {}
     for row in session.scalars(select(model).where(model.state == RUNNING)):
+        alone = False
         if is_alive(row.worker) is False:
-            reason = "its process died"
+            alone = is_alive(row.parent) is True
+            reason = "its process died" if alone else "its worker ended"
         elif by_time and row.lease_until is not None and row.lease_until < now:
             reason = "its lease ran out"
         else:
             continue
-        found[row.lease_token] = Lost(row.job_id, row.lease_token or "", row.worker or "", reason)
+        found[row.lease_token] = Lost(row.job_id, row.lease_token or "", row.worker or "", reason, alone)
     return list(found.values())
 
 
-def release(session: Session, model: type[Row], token: str) -> list[Row]:
-    """Opens the rows held under this token and returns them; whoever held them can save nothing any more."""
-    ids = list(session.scalars(select(model.id).where(held(model, token))))
-    transition(session, model, OPEN, held(model, token))
+def release(session: Session, model: type[Row], lost: Lost) -> list[Row]:
+    """Opens the rows of a lost lease and returns them; whoever held them can save nothing any more."""
+    ids = list(session.scalars(select(model.id).where(held(model, lost.token))))
+    transition(session, model, OPEN, held(model, lost.token), deaths=model.deaths + int(lost.alone))
     return list(session.scalars(select(model).where(model.id.in_(ids), model.state == OPEN)))
+
+
+def is_poison(deaths: int, attempt: int, limit: int) -> bool:
+    """Whether the ``attempt``-th beginning of a row is one too many: it killed its process, or there are no ends in sight."""
+    return deaths >= limit or attempt > 10 * limit

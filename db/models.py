@@ -51,8 +51,12 @@ class Leased:
 
     attempts: Mapped[int] = mapped_column(default=0)
     """How often it was begun."""
+    deaths: Mapped[int] = mapped_column(default=0)
+    """How often the process that held it died alone, so that it may be to blame."""
     worker: Mapped[str | None]
     """Who holds or last held it: ``host:pid:start``."""
+    parent: Mapped[str | None]
+    """The process that had forked that one, likewise."""
     lease_token: Mapped[str | None] = mapped_column(String(36))
     """Proof of being the holder; new with every claim."""
     lease_until: Mapped[datetime | None]

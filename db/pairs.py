@@ -32,10 +32,11 @@ class NewPair:
 
 @dataclass(frozen=True)
 class Claimed:
-    """A pair to certify now; ``attempt`` counts from 1."""
+    """A pair to certify now; ``attempt`` counts from 1, ``deaths`` is how often it may have killed its process."""
 
     index: int
     attempt: int
+    deaths: int
 
 
 @dataclass(frozen=True)
@@ -141,17 +142,17 @@ def batches(pairs: Sequence[tuple[int, float]], seconds: float) -> list[list[int
 
 
 def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds: float) -> Claim | None:
-    """Claims the next batch of the job's open pairs, or one that was begun before (its worker died, perhaps because of it) alone.
+    """Claims the next batch of the job's open pairs, or alone one that may have killed its process.
 
     None when no pair is open. The caller holds the job's lock.
     """
     rows = session.scalars(select(PairRow).where(PairRow.job_id == job.id, PairRow.state == PairState.OPEN).order_by(PairRow.id)).all()
     if not rows:
         return None
-    fresh = {row.pair_index: row for row in rows if row.attempts == 0}
+    fresh = {row.pair_index: row for row in rows if row.deaths == 0}
     groups = batches([(index, row.forecast_seconds) for index, row in fresh.items()], batch_seconds)
     chosen = [fresh[index] for index in groups[0]] if groups else rows[:1]
-    pairs = tuple(Claimed(row.pair_index, row.attempts + 1) for row in chosen)
+    pairs = tuple(Claimed(row.pair_index, row.attempts + 1, row.deaths) for row in chosen)
     jobs.charge(session, job, sum(row.forecast_seconds for row in chosen))
     token = leases.take(session, PairRow, chosen, seconds=lease_seconds)
     return Claim(token, job.id, job.scene_id, chosen[0].iteration, pairs)

@@ -52,7 +52,7 @@ class Settings(BaseSettings):
     lease_seconds: float = 60.0
     """How long a claim lasts without being renewed; its holder renews it four times as often."""
     max_attempts: int = 3
-    """How often a pair or step is begun before it counts as poison and ends as an error."""
+    """How often the process of a pair or step dies, alone, before that counts as poison and ends as an error."""
     sweep_seconds: float = 2.0
     """Pause between two rounds of the sweeper."""
     webhook_private: bool = False

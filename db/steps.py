@@ -20,7 +20,7 @@ UNFINISHED = unfinished(STEP)
 
 @dataclass(frozen=True)
 class Claim:
-    """A step held under a token, with what is needed to do it; ``attempt`` counts from 1."""
+    """A step held under a token, with what is needed to do it; ``attempt`` and ``deaths`` as for db.pairs.Claimed."""
 
     token: str
     step_id: int
@@ -30,6 +30,7 @@ class Claim:
     kind: StepKind
     input: dict[str, Any]
     attempt: int
+    deaths: int
 
 
 def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any], due_at: datetime | None = None) -> StepRow:
@@ -47,9 +48,9 @@ def claim(session: Session, job: JobRow, kinds: Collection[StepKind], *, lease_s
     step = session.scalar(query.order_by(StepRow.turn.desc()).limit(1))
     if step is None:
         return None
-    attempt = step.attempts + 1
+    attempt, deaths = step.attempts + 1, step.deaths
     token = leases.take(session, StepRow, [step], seconds=lease_seconds)
-    return Claim(token, step.id, job.id, job.scene_id, job.options, StepKind(step.kind), step.input, attempt)
+    return Claim(token, step.id, job.id, job.scene_id, job.options, StepKind(step.kind), step.input, attempt, deaths)
 
 
 def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any], seconds: float) -> bool:

@@ -25,6 +25,7 @@ from workers.transaction import persistently
 
 log = logging.getLogger(__name__)
 
+LOST = "its process died {deaths} times (killed, crashed, out of memory or over the time limit) in {attempts} attempts at"
 SAVE_SECONDS = 0.5
 """Results are saved together until this much time has gone into them."""
 
@@ -55,9 +56,9 @@ def _certify_and_save(claim: pairs.Claim) -> bool:
 
 
 def _certify(claim: pairs.Claim, pair: pairs.Claimed) -> pairs.Result:
-    limit, start = settings().max_attempts, time.perf_counter()
-    if pair.attempt > limit:
-        problem = f"the worker died {limit} times while certifying this pair (killed, crashed, out of memory or over the time limit)"
+    start = time.perf_counter()
+    if leases.is_poison(pair.deaths, pair.attempt, settings().max_attempts):
+        problem = f"{LOST.format(deaths=pair.deaths, attempts=pair.attempt - 1)} this pair"
         return _error(pair, CirisError("worker_lost", problem), start)
     try:
         found = _certification(claim.scene_id, claim.job_id, claim.iteration).certify(pair.index)

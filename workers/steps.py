@@ -27,6 +27,7 @@ from db.settings import settings
 from db.states import IterationState, JobState, StepKind, StepState
 from db.types import utcnow
 from workers.app import send_coordinate, send_work
+from workers.pairs import LOST
 from workers.scenes import load_scene
 from workers.transaction import persistently
 
@@ -72,9 +73,8 @@ def _save(claim: steps.Claim, state: StepState, done: Done, seconds: float) -> b
 
 
 def _do(claim: steps.Claim) -> Done:
-    limit = settings().max_attempts
-    if claim.attempt > limit:
-        problem = f"the worker died {limit} times during the step {claim.kind} (killed, crashed, out of memory or over the time limit)"
+    if leases.is_poison(claim.deaths, claim.attempt, settings().max_attempts):
+        problem = f"{LOST.format(deaths=claim.deaths, attempts=claim.attempt - 1)} the step {claim.kind}"
         raise CirisError("worker_lost", problem)
     scene = load_scene(claim.scene_id)
     match claim.kind:

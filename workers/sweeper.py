@@ -83,7 +83,7 @@ def _release_lost(model: type[leases.Row], by_time: bool) -> None:
     for lease in lost:
         with writing() as (session, afterwards):
             job = jobs.lock(session, lease.job_id)
-            if rows := leases.release(session, model, lease.token):
+            if rows := leases.release(session, model, lease):
                 events.emit(session, job, "lost", {"worker": lease.worker, "reason": lease.reason, **_what(rows)})
                 afterwards.append(partial(send_work, len(rows)))
 

@@ -123,11 +123,11 @@ def test_a_lease_that_ran_out_is_released_and_its_result_is_then_refused(db: Dat
     with db.write() as session:
         assert leases.lost(session, PairRow, by_time=False) == []
         (lease,) = leases.lost(session, PairRow, by_time=True)
-        assert lease == leases.Lost(job_id, first.token, ELSEWHERE, "its lease ran out")
-        assert [row.pair_index for row in leases.release(session, PairRow, lease.token)] == [0]
+        assert lease == leases.Lost(job_id, first.token, ELSEWHERE, "its lease ran out", alone=False)
+        assert [row.pair_index for row in leases.release(session, PairRow, lease)] == [0]
     second = claim(db, job_id)
     assert second is not None
-    assert second.pairs == (pairs.Claimed(0, attempt=2),)
+    assert second.pairs == (pairs.Claimed(0, attempt=2, deaths=0),)
     assert not save(db, first, [certified(0)]).held
     assert save(db, second, [certified(0)]).finished
 
@@ -145,7 +145,14 @@ def test_a_lease_of_this_host_ends_with_its_process(db: Database) -> None:
     process.join()
     with db.read() as session:
         (lease,) = leases.lost(session, PairRow, by_time=False)
-    assert (lease.job_id, lease.worker, lease.reason) == (job_id, worker, "its process died")
+    assert (lease.job_id, lease.worker, lease.reason, lease.alone) == (job_id, worker, "its process died", True)
+    with db.write() as session:
+        session.scalars(select(PairRow)).one().parent = worker
+    with db.write() as session:
+        (lease,) = leases.lost(session, PairRow, by_time=False)
+        assert (lease.reason, lease.alone) == ("its worker ended", False)
+        leases.release(session, PairRow, lease)
+        assert session.scalars(select(PairRow)).one().deaths == 0
     assert leases.is_alive(leases.this_worker()) is True
     assert leases.is_alive(ELSEWHERE) is None
 
@@ -161,10 +168,10 @@ def test_another_process_space_of_the_same_name_is_another_host(monkeypatch: pyt
         leases._host.cache_clear()
 
 
-def test_what_was_begun_before_is_claimed_alone(db: Database) -> None:
+def test_what_may_have_killed_its_process_is_claimed_alone(db: Database) -> None:
     with db.write() as session:
         job_id = a_running_job(session, 4).id
-        session.execute(update(PairRow).where(PairRow.pair_index < 2).values(attempts=1))
+        session.execute(update(PairRow).where(PairRow.pair_index < 2).values(attempts=1, deaths=1))
     claimed = []
     while (held := claim(db, job_id, batch_seconds=5)) is not None:
         claimed.append([(pair.index, pair.attempt) for pair in held.pairs])

@@ -42,7 +42,7 @@ def check_record(job_id: str) -> None:
 
     done = Counter(step.kind for step in did if step.state == StepState.DONE)
     assert Counter(event.data["kind"] for event in events if event.kind == "step" and event.data["state"] == "done") == done
-    assert {step.state for step in did} <= {StepState.DONE, StepState.SKIPPED}
+    assert {step.state for step in did} <= {StepState.DONE, StepState.SKIPPED}, [step.report for step in did]
     assert sorted(event.data["region_id"] for event in events if event.kind == "region") == sorted(region.id for region in stored)
     assert len(stored) == done[StepKind.ACCEPT]
 

@@ -30,7 +30,7 @@ def test_a_pair_that_kills_its_process_every_time_ends_as_an_error(arm: tuple[Sc
         kill_holder(job_id, index=2, attempt=attempt)
     job = ended(job_id)
     assert (job.state, job.outcome) == ("failed", "error")
-    assert "the worker died 3 times" in (job.error or {})["message"]
+    assert "its process died 3 times" in (job.error or {})["message"]
     assert [row.state for row in pairs_of(job_id)] == ["certified", "certified", "error", "certified"]
 
 

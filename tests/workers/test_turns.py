@@ -97,7 +97,7 @@ def test_a_deadline_ends_the_job_with_what_it_has(job_id: str) -> None:
 
 def test_a_poison_pair_ends_as_an_error_with_its_cause(job_id: str) -> None:
     with database().write() as session:
-        session.execute(update(PairRow).where(PairRow.pair_index == 1).values(attempts=3))
+        session.execute(update(PairRow).where(PairRow.pair_index == 1).values(deaths=3))
     work_all()
     coordinate(job_id)
     assert [row.state for row in pairs_of(job_id)] == ["certified", "error", "certified"]
@@ -157,7 +157,7 @@ def test_a_step_whose_worker_dies_each_time_ends_the_job_with_its_cause() -> Non
     coordinate(job_id)
     with database().write() as session:
         (step,) = steps.of_job(session, job_id)
-        step.attempts = 3
+        step.deaths = 3
     work_all()
     coordinate(job_id)
     job = job_of(job_id)

@@ -1,4 +1,4 @@
-"""A fair order of work: priority and service of jobs, no messages bound to rows
+"""A fair order of work: priority and service of jobs, no messages bound to rows, whose fault a death was
 
 Revision: 0003, follows 0002.
 """
@@ -20,6 +20,8 @@ def upgrade() -> None:
         batch_op.add_column(sa.Column("served", sa.Double(), nullable=False, server_default="0"))
     for table in ("pairs", "steps"):
         with op.batch_alter_table(table, schema=None) as batch_op:
+            batch_op.add_column(sa.Column("deaths", sa.Integer(), nullable=False, server_default="0"))
+            batch_op.add_column(sa.Column("parent", sa.Text(), nullable=True))
             batch_op.drop_column("task_id")
             batch_op.drop_column("sent_at")
             batch_op.create_index(batch_op.f(f"ix_{table}_job_id_state"), ["job_id", "state"], unique=False)
@@ -35,6 +37,8 @@ def downgrade() -> None:
             batch_op.drop_index(batch_op.f(f"ix_{table}_job_id_state"))
             batch_op.add_column(sa.Column("sent_at", sa.DateTime(timezone=True), nullable=True))
             batch_op.add_column(sa.Column("task_id", sa.String(length=36), nullable=True))
+            batch_op.drop_column("parent")
+            batch_op.drop_column("deaths")
     with op.batch_alter_table("jobs", schema=None) as batch_op:
         batch_op.drop_column("served")
         batch_op.drop_column("priority")
