@@ -29,6 +29,7 @@ pytestmark = pytest.mark.slow
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 KILLS = 50
+LIMIT_SECONDS = 3600.0
 JOBS_AT_A_TIME = 3
 BETWEEN_KILLS = (0.1, 0.7)
 """In lengths of an undisturbed job, so that slow machines get on as fast ones do."""
@@ -118,6 +119,7 @@ def test_every_job_ends_as_if_nothing_had_died(running: tuple[Service, Queue], p
         began, killer = time.monotonic(), Killer(service, queue, random.Random(seed), length)
         names, running_jobs, ended = cycle(requests), dict[str, str](), 0
         while killer.killed.total() < KILLS or running_jobs:
+            assert time.monotonic() - began < LIMIT_SECONDS, f"{running_jobs} do not end"
             killer.act()
             while killer.killed.total() < KILLS and len(running_jobs) < JOBS_AT_A_TIME:
                 name = next(names)
@@ -151,6 +153,6 @@ def _requests(client: Client) -> dict[str, dict[str, Any]]:
 
 def _run(client: Client, request: dict[str, Any]) -> str:
     job_id = str(ask(client.create_job, request)[0]["id"])
-    eventually(lambda: ask(client.job, job_id)["ended"], "the job ends undisturbed")
+    eventually(lambda: ask(client.job, job_id)["ended"], "the job ends undisturbed", 600)
     check_record(job_id)
     return job_id
