@@ -46,8 +46,6 @@ class Settings(BaseSettings):
     """How many requests one key (or one address without a key) may make for long; for a short while, twice as many."""
     solve_processes: int = Field(default_factory=_cores, ge=1)
     """Processes that solve pairs, one thread each."""
-    solve_niceness: int = Field(default=10, ge=0, le=19)
-    """How far they give way to everything else on the machine; 0 where nothing else must go first."""
 
     batch_seconds: float = 0.5
     """Pairs are certified together until their forecasts sum to this many seconds."""

@@ -30,7 +30,7 @@ def main() -> None:
     from workers.tasks import register
 
     if queue == SOLVE:
-        give_way(settings().solve_niceness)  # on a busy machine the API answers and the coordinator decides first
+        give_way()  # on a busy machine the API answers and the coordinator decides first
     app = celery_app()
     register(app, queue)
     pool = ["--pool=threads", "--concurrency=2"] if queue == CONTROL else ["--pool=prefork", f"--concurrency={settings().solve_processes}"]

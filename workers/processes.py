@@ -11,6 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1
+NICENESS = 10
 
 
 def die_with_parent(sig: int = signal.SIGKILL) -> None:
@@ -19,11 +20,11 @@ def die_with_parent(sig: int = signal.SIGKILL) -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, sig)
 
 
-def give_way(niceness: int) -> None:
-    """Lets other processes go first: by niceness, and by that of the session, which is what Linux' autogroups compare."""
-    os.nice(niceness)
+def give_way() -> None:
+    """Lets every other process go first: by niceness, and by that of the session, which is what Linux' autogroups compare."""
+    os.nice(NICENESS)
     with suppress(OSError):
-        Path("/proc/self/autogroup").write_text(str(niceness))
+        Path("/proc/self/autogroup").write_text(str(NICENESS))
 
 
 def queue_server_command(directory: Path, socket: Path) -> list[str]:

@@ -51,9 +51,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         url = postgres.new_database()
         migrate.upgrade(url)
         near = {"CIRIS_DATABASE_URL": url, "CIRIS_REDIS_URL": f"redis://127.0.0.1:{ports[REDIS]}/0"}
-        stack.enter_context(
-            environment(**near, CIRIS_LEASE_SECONDS=str(LEASE_SECONDS), CIRIS_SWEEP_SECONDS="0.5", CIRIS_SOLVE_NICENESS="0")
-        )
+        stack.enter_context(environment(**near, CIRIS_LEASE_SECONDS=str(LEASE_SECONDS), CIRIS_SWEEP_SECONDS="0.5"))
         control = Service(directory)
         stack.callback(control.stop)
         control.start("control")
