@@ -25,12 +25,10 @@ def main() -> None:
     from db import logs
     from db.session import database
     from db.settings import settings
-    from workers.app import CONTROL, SOLVE, celery_app
-    from workers.processes import die_with_parent, give_way
+    from workers.app import CONTROL, celery_app
+    from workers.processes import die_with_parent
     from workers.tasks import register
 
-    if queue == SOLVE:
-        give_way()  # on a busy machine the API answers and the coordinator decides first
     app = celery_app()
     register(app, queue)
     pool = ["--pool=threads", "--concurrency=2"] if queue == CONTROL else ["--pool=prefork", f"--concurrency={settings().solve_processes}"]

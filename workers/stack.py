@@ -23,14 +23,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from types import FrameType
 
 from certifier.errors import CirisError
 from db import keys, logs, migrate
 from db.settings import Settings
-from workers.processes import die_with_parent, queue_server_command, queue_url
+from workers.processes import die_with_parent, give_way, queue_server_command, queue_url
 
 log = logging.getLogger(__name__)
 
@@ -48,11 +47,16 @@ STOP_SECONDS = 8.0
 
 @dataclass
 class Child:
-    """One supervised process, in a process group of its own, so that Ctrl-C reaches only the supervisor."""
+    """One supervised process, in a session of its own, so that Ctrl-C reaches only the supervisor.
+
+    Attributes:
+        background: it computes; on a busy machine the others answer first.
+    """
 
     name: str
     command: list[str]
     stop_signal: int
+    background: bool = False
     process: subprocess.Popen[bytes] | None = None
     started: float = 0.0
     backoff: float = 0.0
@@ -66,9 +70,15 @@ class Child:
                 stderr=output,
                 env=environment,
                 start_new_session=True,
-                preexec_fn=partial(die_with_parent, self.stop_signal),
+                preexec_fn=self._prepare,
             )
         self.started = time.monotonic()
+
+    def _prepare(self) -> None:
+        """In the child, before it becomes its program."""
+        die_with_parent(self.stop_signal)
+        if self.background:
+            give_way()
 
     @property
     def dead(self) -> bool:
@@ -135,7 +145,7 @@ def _children(settings: Settings, data: Path, queue_socket: Path) -> list[Child]
     """The processes, in the order of starting."""
     children = [
         Child("control", [sys.executable, "-m", "workers", "control"], signal.SIGQUIT),
-        Child("solve", [sys.executable, "-m", "workers", "solve"], signal.SIGQUIT),
+        Child("solve", [sys.executable, "-m", "workers", "solve"], signal.SIGQUIT, background=True),
         Child("api", [sys.executable, "-m", "api"], signal.SIGTERM),
     ]
     if not settings.redis_url:
