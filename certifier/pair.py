@@ -41,7 +41,8 @@ class PairResult:
         detail: a sentence for people; empty when the outcome says it all.
         witness_s: (n,) a configuration in contact, when refuted.
         proof: a verified :class:`certifier.proof.PairProof` as bytes, when certified.
-        weak_points: (w, n) configurations near which no plane of this degree works, when not certifiable.
+        weak_points: (w, n) configurations near which no plane of this degree works, when not certifiable; the witness, when refuted.
+        spread: (n,) how far around them, along each joint between the bodies, when not certifiable.
     """
 
     outcome: Outcome
@@ -52,6 +53,7 @@ class PairResult:
     witness_s: Array | None = None
     proof: bytes | None = None
     weak_points: Array | None = None
+    spread: Array | None = None
 
 
 class Certification:
@@ -112,15 +114,15 @@ class Certification:
             if more == sides.faces:
                 break
             sides = self._sides(more)
-        weak = self._weak_points(frame, sides, solution)
+        weak, spread = self._weak_points(frame, sides, solution)
         witness = self._contact(pair, frame, np.concatenate([self._screen, weak[self._faces.contains(weak)]]))
         if isinstance(witness, _Witness):
             return PairResult(Outcome.REFUTED, Stage.SOS, witness_s=witness.s)
         if solution.status is Status.INFEASIBLE:
             detail = f"no plane affine in s, in the frame of {frame.body}"
-            return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, weak_points=weak)
+            return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, weak_points=weak, spread=spread)
         detail = f"{solution.status.value} after {solution.iterations} iterations"
-        return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak)
+        return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak, spread=spread)
 
     def _sides(self, faces: tuple[int, ...]) -> Sides:
         return Sides(self._kinematics, self._faces, self._box, faces, self.center, self._samples)
@@ -185,11 +187,12 @@ class Certification:
             self.scene.hash, pair.a, pair.b, frame.body, self.ground, plane, solution.t, kappa, sides.faces, (factors[0], factors[1])
         )
 
-    def _weak_points(self, frame: Frame, sides: Sides, solution: Solution) -> Array:
-        """Means of the pseudo-moments that carry weight, (w, n)."""
+    def _weak_points(self, frame: Frame, sides: Sides, solution: Solution) -> tuple[Array, Array]:
+        """Means (w, n) of the pseudo-moments that carry weight, and how far they spread along each joint of the pair, (n,)."""
         found = [sides.means(chain, x) for chain, x in zip((frame.chain_a, frame.chain_b), solution.x[:2], strict=True)]
-        means, mass = np.concatenate([m for m, _ in found]), np.concatenate([w for _, w in found])
-        return means[mass > 0.15 * mass.max()]
+        means, deviations, mass = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        heavy = mass > 0.15 * mass.max()
+        return means[heavy], deviations[heavy].max(axis=0)
 
 
 @dataclass(frozen=True)
