@@ -22,7 +22,8 @@ from certifier.model import Array, Geometry, Pair, Polytope, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.polytope import bound_multipliers, chebyshev_center, check, drop_redundant
 from certifier.program import Box, Sides, build
-from certifier.proof import BITS, Ground, PairProof, ProofError, Side
+from certifier.proof import BITS, Ground, PairProof, Side, Volume
+from certifier.proof_file import ProofError
 from certifier.sampling import hit_and_run
 from certifier.verify.pair import PairCheck, check_ground
 
@@ -181,9 +182,8 @@ class Certification:
         for chain, Q in zip((frame.chain_a, frame.chain_b), solution.Q[:2], strict=True):
             monomial = np.sqrt(3.0) ** subsets(len(chain)).sum(axis=1)
             factors.append(Side.from_gram(chain, Q * (monomial[:, None] * monomial) / sides.scales[:, None, None], kind))
-        return PairProof(
-            self.scene.hash, pair.a, pair.b, frame.body, self.ground, plane, solution.t, kappa, sides.faces, (factors[0], factors[1])
-        )
+        volumes = (Volume.of(self.scene.geometry(pair.a)), Volume.of(self.scene.geometry(pair.b)))
+        return PairProof(self.scene, volumes, frame.body, self.ground, plane, solution.t, kappa, sides.faces, (factors[0], factors[1]))
 
     def _weak_points(self, frame: Frame, sides: Sides, solution: Solution) -> Array:
         """Means of the pseudo-moments that carry weight, (w, n)."""
