@@ -109,7 +109,7 @@ class Sides:
     def means(self, chain: tuple[int, ...], x: Array) -> tuple[Array, Array]:
         """Means of s under pseudo-moments x, (R, N) -> (R, n), and their masses x(1), (R,)."""
         space, outside = basis(len(chain)), self.outside(chain)
-        first, rest = x[:, : len(space.points)], x[:, len(space.points) :].reshape(len(x), len(outside), -1)
+        first, rest = x[:, : len(space.points)], x[:, len(space.points) :].reshape(len(x), len(outside), space.grid)
         mass = first.sum(axis=1)
         u = np.zeros((len(x), self.kinematics.scene.n))
         u[:, list(chain)] = first @ space.points / mass[:, None]

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from certifier.model import Array
+from certifier.proof_file import ProofError
 
 BITS = 16
 BASE = float(1 << BITS)
@@ -66,11 +67,11 @@ def product(A: Array, B: Array) -> Array:
     """Limbs, not normal, of the matrix product of normal A, (a, r, s), and normal B, (b, s, c): (a + b - 1, r, c), below 2^48.
 
     Raises:
-        OverflowError: so many terms that a sum might round.
+        ProofError: so many terms that a sum might round.
     """
     (a, r, s), (b, _, c) = A.shape, B.shape
     if s * min(a, b) > MAX_TERMS:
-        raise OverflowError(f"{s * min(a, b)} products of limbs in one sum")
+        raise ProofError("proof_too_large", f"sums of {s * min(a, b)} products, more than {MAX_TERMS}")
     blocks = (A.reshape(a * r, s) @ B.transpose(1, 0, 2).reshape(s, b * c)).reshape(a, r, b, c).transpose(0, 2, 1, 3)
     limbs = np.zeros((a + b - 1, r, c))
     for i, block in enumerate(blocks):
@@ -86,8 +87,17 @@ def difference(A: Array, B: Array) -> Array:
     return limbs
 
 
+def integers(x: Array) -> list[list[int]]:
+    """The integers X of shape (r, c), for limbs (w, r, c), normal or not."""
+    return [[_integer(x[:, i, j]) for j in range(x.shape[2])] for i in range(x.shape[1])]
+
+
 def absolute_sums(x: Array) -> list[int]:
     """Sums of |X| over the last axis, for X of shape (r, c) in limbs (w, r, c) below 2^52: r integers."""
     limbs = normal(x)
     sums = np.where(limbs[-1] < 0, -limbs, limbs).sum(axis=-1)
-    return [sum(int(limb) << BITS * i for i, limb in enumerate(row)) for row in sums.T]
+    return [_integer(row) for row in sums.T]
+
+
+def _integer(limbs: Array) -> int:
+    return sum(int(limb) << BITS * i for i, limb in enumerate(limbs))

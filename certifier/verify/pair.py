@@ -78,22 +78,28 @@ def check_ground(scene: Scene, ground: Ground) -> None:
         raise ProofError("proof_box", "the multipliers do not prove the box around the polytope")
 
 
+def faces_of(ground: Ground) -> list[list[fmpq]]:
+    """Coefficients in [1, u], (m + 2n, n + 1), of the ground's faces d_j - c_j's, then of 1 + u_i, then of 1 - u_i."""
+    mid, half = [exact(x) for x in ground.mid], [exact(x) for x in ground.half]
+    faces = []
+    for c, d in zip(ground.C, ground.d, strict=True):
+        terms = [exact(x) for x in c]
+        constant = exact(d) - sum((x * m for x, m in zip(terms, mid, strict=True)), fmpq(0))
+        faces.append([constant, *(-x * h for x, h in zip(terms, half, strict=True))])
+    n, one = len(mid), fmpq(1)
+    for sign in (one, -one):
+        faces += [[one, *(sign * int(i == j) for i in range(n))] for j in range(n)]
+    return faces
+
+
 class PairCheck:
     """Checks proofs that share one ground, which :func:`check_ground` has accepted."""
 
     def __init__(self, scene: Scene, ground: Ground) -> None:
         self._scene, self._ground = scene, ground
-        n, one = scene.n, fmpq(1)
-        ring = fmpq_mpoly_ctx.get([f"u{i}" for i in range(n)], Ordering.lex)
+        ring = fmpq_mpoly_ctx.get([f"u{i}" for i in range(scene.n)], Ordering.lex)
         self._kinematics = ExactKinematics(scene, ring, ground.mid, ground.half)
-        mid, half = [exact(x) for x in ground.mid], [exact(x) for x in ground.half]
-        self._faces = []
-        for c, d in zip(ground.C, ground.d, strict=True):
-            terms = [exact(x) for x in c]
-            constant = exact(d) - sum((x * m for x, m in zip(terms, mid, strict=True)), fmpq(0))
-            self._faces.append([constant, *(-x * h for x, h in zip(terms, half, strict=True))])
-        for sign in (one, -one):
-            self._faces += [[one, *(sign * int(i == j) for i in range(n))] for j in range(n)]
+        self._faces = faces_of(ground)
         self._numerators: dict[tuple[str, str], Numerators] = {}
         self._contained: dict[int, Volume] = {}
 

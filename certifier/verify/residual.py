@@ -88,9 +88,8 @@ def largest_residual(
     if max(map(abs, exponents)) > 2 * MAX_EXPONENT:
         raise ProofError("proof_malformed", "a Gram factor is out of range")
 
-    vertex_bits, plane_bits, weight_bits = _bits(vertices), _bits(plane), _bits(weights)
+    (places, vertex_bits), plane_bits, weight_bits = dyadic(vertices), _bits(plane), _bits(weights)
     unit = max(POSITION_BITS + vertex_bits + plane_bits, weight_bits - min(exponents))
-    places = _integers(vertices, [vertex_bits] * len(vertices))
     normal = _integers(plane, [unit - POSITION_BITS - vertex_bits] * 4)
     faces = _integers(weights, [unit + e for e in exponents])
 
@@ -103,8 +102,14 @@ def largest_residual(
     return fmpq(max(_coefficient_sums(missed, side.chain)) + rounding) / fmpq(2) ** unit
 
 
+def dyadic(rows: Sequence[Sequence[fmpq]]) -> tuple[list[list[int]], int]:
+    """Integers X and the least e >= 0 such that the rows are 2^-e X."""
+    bits = _bits(rows)
+    return _integers(rows, [bits] * len(rows)), bits
+
+
 def _bits(values: Sequence[Sequence[fmpq]]) -> int:
-    """The least e for which all 2^e x are integers."""
+    """The least e >= 0 for which all 2^e x are integers."""
     return max(int(x.q).bit_length() for row in values for x in row) - 1
 
 
