@@ -43,7 +43,8 @@ class PairResult:
         margin: certified lower bound in metres of the distance between the padded bodies; None unless certified.
         detail: a sentence for people; empty when the outcome says it all.
         witness_s: (n,) a configuration in contact, when refuted.
-        proof: as bytes and verified, a :class:`certifier.proof.PairProof` when certified, a :class:`certifier.proof.DualProof` when not certifiable.
+        proof: verified, as bytes: a :class:`certifier.proof.PairProof` when certified, a :class:`certifier.proof.DualProof` when not
+            certifiable.
         weak_points: (w, n) configurations near which no plane of this degree works, when not certifiable.
     """
 

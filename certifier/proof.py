@@ -172,8 +172,8 @@ class DualProof:
     Attributes:
         frame: body whose frame the planes are expressed in.
         moments: of a's and of b's vertices, (V, N): values on the monomials in the order of certifier.verify.moments.
-        equations: which of the K that have to vanish are solved exactly: 4 (n + 1), row by row of R, or the n + 1 of b where a radius is involved.
-        entries: (K, 3) int64 the moments that are changed for it: side, vertex, monomial.
+        equations: K of those that have to vanish, the 4 (n + 1) entries of R row by row, or its n + 1 of b where a radius is involved.
+        entries: (K, 3) int64 the moments whose change makes them vanish: side, vertex, monomial.
         normal: Yaa (3, 3) and Ybb (n + 1, n + 1); empty where no radius is involved.
     """
 

@@ -1,21 +1,21 @@
 """Rigorous check of a dual proof: no certificate of a pair in this frame, with the given polytope's faces, can exist.
 
-A certificate gives, for every vertex v of a body, +-(a'p_v + b den) - (r kappa + t) den = sum_j g_j rho'Q_j rho, Q_j psd, t > 0. Let x_v be
-functionals with every localising matrix Lambda_j(x_v) = x_v(g_j rho rho') psd, and R = sum_v +-x_v(p_v (x) [1, u]), (4, n + 1). Applied to the
-identities and added up, they give
+A certificate gives, for every vertex v of a body, +-(a'p_v + b den) - (r kappa + t) den = sum_j g_j rho'Q_j rho, Q_j psd, t > 0.
+Let x_v be functionals whose localising matrices Lambda_j(x_v) = x_v(g_j rho rho') are all psd, and R = sum_v +-x_v(p_v (x) [1, u]),
+(4, n + 1). Applied to the identities and added up, they give
 
-    0 <= <Z, R> - kappa sum_v r_v x_v(den) - t sum_v x_v(den).                                                     (*)
+    0 <= <Z, R> - kappa sum_v r_v x_v(den) - t sum_v x_v(den).
 
-Where no radius is involved and R = 0, it follows that t <= 0. Where one is, the rows of R that belong to a need not vanish: with
-Y = [[Yaa, -R_a/2], [-R_a'/2, Ybb]] psd, Ybb_ii <= Ybb_00 and tr Yaa + Ybb_00 <= sum_v r_v x_v(den), the matrix inequality by which kappa bounds |a|
-(certifier.program) gives <Z_a, R_a> <= kappa sum_v r_v x_v(den).
+Where no radius is involved and R = 0, it follows that t <= 0. Where one is, the rows R_a of R that belong to a need not vanish: with
+Y = [[Yaa, -R_a/2], [-R_a'/2, Ybb]] psd, Ybb_ii <= Ybb_00 and tr Yaa + Ybb_00 <= sum_v r_v x_v(den), the matrix inequality by which
+kappa bounds |a| (certifier.program) gives <Z_a, R_a> <= kappa sum_v r_v x_v(den).
 
-R never vanishes in floating point. The proof names as many moments as R has entries to vanish; changing these by c, G c = -R, makes R zero, and
-balls (certifier.verify.kinematics, flint's arb) bound |c|. Every matrix is then shown to be positive definite in spite of any change of the
-moments named by |c|: it is reduced by the rounding of its own entries and by what such a change can do (Gershgorin), and by 2^-40 of its
-trace, far more than the rounding of any Cholesky factorisation of its size; if that succeeds, the matrix is positive definite (Rump,
-*Verification of positive definiteness*, BIT 46, 2006). Where the columns are dependent, as for two balls, fewer equations are solved; what is left of the
-others bounds t relative to the plane's coefficients, the ``slack``.
+R never vanishes in floating point. The proof names as many moments as R has entries to vanish; changing them by c, G c = -R, makes R
+zero, and |c| is bounded by ball arithmetic. Every matrix is then shown to be positive definite whatever such a change does: it is reduced
+by the rounding of its entries and by the most that the change can do (Gershgorin), and by 2^-40 of its trace, far more than the rounding
+of any Cholesky factorisation of its size. If that succeeds, the matrix is positive definite (Rump, *Verification of positive
+definiteness*, BIT 46, 2006). Where the equations are dependent, as for two balls, fewer are solved; what is left of the others bounds t
+relative to the plane's coefficients, the ``slack``.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ class _Check:
         return DualStatement(self._proof.pair, self._proof.frame, slack)
 
     def _correction(self, R: list[list[arb]]) -> tuple[float, arb]:
-        """A bound of the change of the moments named that makes the equations named vanish, and of the sum of what is left of the others."""
+        """Bounds of the change that makes the equations named vanish, and of the sum of what is left of the others."""
         proof, named = self._proof, self._proof.equations
         if len(set(named)) != len(named) or len(named) != len(proof.entries) or not all(0 <= k < len(self._vanishing) for k in named):
             raise ProofError("proof_malformed", "the equations and the moments that meet them do not fit")
@@ -224,7 +224,7 @@ def _check_positive(values: Array, errors: Array) -> None:
     reduced = values.copy()
     np.einsum("sii->si", reduced)[:] -= 1.001 * errors.sum(axis=2) + CHOLESKY_ROUNDING * trace[:, None]
     try:
-        positive = np.isfinite(np.linalg.cholesky(reduced)).all()
+        positive = bool(np.isfinite(np.linalg.cholesky(reduced)).all())
     except np.linalg.LinAlgError:
         positive = False
     if not positive:

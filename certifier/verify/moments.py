@@ -1,8 +1,8 @@
 """Pseudo-moments: linear functionals on the polynomials of one side of a pair, by their values on monomials.
 
-With k chain joints out of n, m the 3^k monomials of coordinate degree <= 2 in the chain's coordinates, every polynomial of the program is a
-combination of u_e m, e = 0 .. n, u_0 = 1. The distinct ones among them, N = 3^k + k 3^(k-1) + (n - k) 3^k, in this order: the m, prod u_i^e_i
-at sum_i e_i 3^i; for every chain joint those with its exponent 3, at the same sum over the others; for every other joint its products with the m.
+With k chain joints out of n and m the 3^k monomials of coordinate degree <= 2 in the chain's coordinates, every polynomial of the program
+is a combination of u_e m, e = 0 .. n, u_0 = 1. The distinct ones, N = 3^k + k 3^(k-1) + (n - k) 3^k, in this order: the m, prod u_i^e_i at
+sum_i e_i 3^i; for every chain joint those with its exponent 3, at the same sum over the others; for every other joint u_l m.
 """
 
 from __future__ import annotations
