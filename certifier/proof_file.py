@@ -18,6 +18,8 @@ from certifier.model import Array
 FORMAT = 2
 MAX_BYTES = 1 << 30
 TYPES = ("float64", "int32", "int64")
+LARGEST = 1e100
+"""Numbers above it stand for nothing real; sums and products of a few below it do not overflow."""
 
 
 class ProofError(CirisError):
@@ -57,7 +59,7 @@ def npy(array: np.ndarray) -> bytes:
 
 
 def unpack(data: bytes, kind: str) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Header and arrays of a file of this kind; every double is finite.
+    """Header and arrays of a file of this kind; every double is at most LARGEST in magnitude.
 
     Raises:
         ProofError: not such a file of this format, or one that unpacks to more than MAX_BYTES.
@@ -84,7 +86,7 @@ def _array(data: bytes) -> np.ndarray:
     if fortran_order or dtype.name not in TYPES or math.prod(shape) * dtype.itemsize != len(data) - stream.tell():
         raise ValueError(f"an array of {dtype} with shape {shape} in {len(data)} bytes")
     array = np.frombuffer(data, dtype, offset=stream.tell()).reshape(shape)
-    if dtype.kind == "f" and not np.isfinite(array).all():
+    if dtype.kind == "f" and not (np.abs(array) <= LARGEST).all():
         raise ValueError("a number is not finite")
     return array
 

@@ -33,6 +33,7 @@ from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.moments import localised, table
 from certifier.verify.pair import check_ground, faces_of
 from certifier.verify.residual import POSITION_BITS, Numerators, dyadic
+from certifier.verify.scene import check_scene
 
 PRECISION = 256
 ENTRY_ROUNDING = 2.0**-45
@@ -62,6 +63,7 @@ def verify_dual(proof: DualProof) -> DualStatement:
         ProofError: it does not hold; the code says which part.
     """
     scene = proof.scene
+    check_scene(scene)
     if proof.pair not in scene.pairs or proof.frame not in scene.bodies:
         raise ProofError("proof_pair", "the proof is about no pair, or no body, of the scene")
     check_ground(scene, proof.ground)

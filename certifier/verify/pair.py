@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from flint import Ordering, fmpq, fmpq_mpoly_ctx
+from flint import Ordering, arb, fmpq, fmpq_mpoly_ctx
 
 from certifier.model import Pair, Scene
 from certifier.proof import Ground, PairProof, Volume
@@ -24,6 +24,7 @@ from certifier.proof_file import ProofError
 from certifier.verify.box import check_box
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.residual import Numerators, largest_residual
+from certifier.verify.scene import check_scene
 from certifier.verify.volume import check_volume
 
 MAX_CORNER_JOINTS = 16
@@ -48,6 +49,7 @@ def verify_pair(proof: PairProof) -> PairStatement:
     Raises:
         ProofError: the proof does not hold; the code says which part.
     """
+    check_scene(proof.scene)
     check_ground(proof.scene, proof.ground)
     return PairCheck(proof.scene, proof.ground).verify(proof)
 
@@ -141,7 +143,7 @@ class PairCheck:
             residuals.append(largest_residual(self._between(proof.frame, volume.body), volume, side, rows, weights))
         margin = t - max(residuals)
         if not margin > 0:
-            eaten = f"the residual {float(max(residuals)):.3g} eats up the margin {proof.t:.3g}"
+            eaten = f"the residual {arb(max(residuals)).str(3, radius=False)} eats up the margin {proof.t:.3g}"
             raise ProofError("proof_residual", f"{_names(proof)}: {eaten}")
         return PairStatement(proof.pairs, _lower_root(4 * margin * margin / norm))
 

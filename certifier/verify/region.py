@@ -12,6 +12,7 @@ from certifier.proof_file import ProofError
 from certifier.verify.archimedean import check_archimedean
 from certifier.verify.kinematics import exact
 from certifier.verify.pair import PairCheck, check_ground
+from certifier.verify.scene import check_scene
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,7 @@ def verify_region(data: bytes) -> RegionStatement:
     """
     proof = RegionProof.from_bytes(data)
     scene = proof.scene
+    check_scene(scene)
     _check_polytope(proof)
     checks: dict[int, PairCheck] = {}
     gaps: dict[Pair, float] = {}
@@ -91,11 +93,7 @@ def _check_polytope(proof: RegionProof) -> None:
     for c, d in zip(proof.C, proof.d, strict=True):
         if not sum(exact(x) * s for x, s in zip(c, point, strict=True)) < exact(d):
             raise ProofError("proof_interior", "the interior point is not strictly inside the region")
-    try:
-        archimedean = check_archimedean(proof.C, proof.d, proof.archimedean)
-    except (ValueError, IndexError) as error:
-        raise ProofError("proof_malformed", f"the Archimedean multipliers do not fit: {error}") from error
-    if not archimedean:
+    if not check_archimedean(proof.C, proof.d, proof.archimedean):
         raise ProofError("proof_archimedean", "the multipliers do not prove the region Archimedean")
 
 
