@@ -2,7 +2,7 @@
 
 centre or a sample in contact                        -> refuted, with the configuration
 program (11) feasible, proof verified exactly        -> certified, with the proof
-program (11) infeasible by a dual point              -> not_certifiable, with the points where no plane of this degree works
+program (11) infeasible, dual proof verified         -> not_certifiable, with the proof and the points where no plane of this degree works
 anything else                                        -> inconclusive, with the reason
 """
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from certifier.basis import subsets
 from certifier.closest import Closest, closest
+from certifier.dual import dual_proof
 from certifier.frames import Frame, choose_frame
 from certifier.interior_point import Solution, Status, solve
 from certifier.kinematics import Kinematics
@@ -22,8 +23,10 @@ from certifier.model import Array, Geometry, Pair, Polytope, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.polytope import bound_multipliers, chebyshev_center, check, drop_redundant
 from certifier.program import Box, Sides, build
-from certifier.proof import BITS, Ground, PairProof, ProofError, Side
+from certifier.proof import BITS, DualProof, Ground, PairProof, Side, Volume
+from certifier.proof_file import ProofError
 from certifier.sampling import hit_and_run
+from certifier.verify.dual import verify_dual
 from certifier.verify.pair import PairCheck, check_ground
 
 SCREEN_SAMPLES = 64
@@ -40,8 +43,9 @@ class PairResult:
         margin: certified lower bound in metres of the distance between the padded bodies; None unless certified.
         detail: a sentence for people; empty when the outcome says it all.
         witness_s: (n,) a configuration in contact, when refuted.
-        proof: a verified :class:`certifier.proof.PairProof` as bytes, when certified.
-        weak_points: (w, n) configurations near which no plane of this degree works, when not certifiable; the witness, when refuted.
+        proof: verified, as bytes: a :class:`certifier.proof.PairProof` when certified, a :class:`certifier.proof.DualProof` when not
+            certifiable.
+        weak_points: (w, n) configurations near which no plane of this degree works, when not certifiable.
         spread: (n,) how far around them, along each joint between the bodies, when not certifiable.
     """
 
@@ -102,7 +106,8 @@ class Certification:
         sides = self._first
         while True:
             try:
-                solution = solve(build(sides, pair, frame), max_iterations)
+                blocks = build(sides, pair, frame)
+                solution = solve(blocks, max_iterations)
             except np.linalg.LinAlgError as error:
                 if sides.faces == self._every:
                     return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"numerical trouble: {error}")
@@ -119,8 +124,7 @@ class Certification:
         if isinstance(witness, _Witness):
             return PairResult(Outcome.REFUTED, Stage.SOS, witness_s=witness.s)
         if solution.status is Status.INFEASIBLE:
-            detail = f"no plane affine in s, in the frame of {frame.body}"
-            return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, weak_points=weak, spread=spread)
+            return self._disprove(dual_proof(sides, pair, frame, self.ground, blocks, solution.x), weak, spread)
         detail = f"{solution.status.value} after {solution.iterations} iterations"
         return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak, spread=spread)
 
@@ -158,6 +162,15 @@ class Certification:
             return PairResult(Outcome.CERTIFIED, Stage.SOS, margin=statement.gap, proof=proof.to_bytes())
         return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"the proof found does not hold: {failure}")
 
+    def _disprove(self, proof: DualProof, weak: Array, spread: Array) -> PairResult:
+        try:
+            statement = verify_dual(proof)
+        except ProofError as error:
+            detail = f"the dual proof found does not hold: {error}"
+            return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak, spread=spread)
+        detail = f"no plane affine in s, in the frame of {statement.frame}"
+        return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, proof=proof.to_bytes(), weak_points=weak, spread=spread)
+
     def _points(self, geometry: Geometry, frame: Frame, s: Array) -> Array:
         return self._kinematics.points(frame.body, geometry.body, geometry.vertices, s)
 
@@ -183,9 +196,8 @@ class Certification:
         for chain, Q in zip((frame.chain_a, frame.chain_b), solution.Q[:2], strict=True):
             monomial = np.sqrt(3.0) ** subsets(len(chain)).sum(axis=1)
             factors.append(Side.from_gram(chain, Q * (monomial[:, None] * monomial) / sides.scales[:, None, None], kind))
-        return PairProof(
-            self.scene.hash, pair.a, pair.b, frame.body, self.ground, plane, solution.t, kappa, sides.faces, (factors[0], factors[1])
-        )
+        volumes = (Volume.of(self.scene.geometry(pair.a)), Volume.of(self.scene.geometry(pair.b)))
+        return PairProof(self.scene, volumes, frame.body, self.ground, plane, solution.t, kappa, sides.faces, (factors[0], factors[1]))
 
     def _weak_points(self, frame: Frame, sides: Sides, solution: Solution) -> tuple[Array, Array]:
         """Means (w, n) of the pseudo-moments that carry weight, and how far they spread along each joint of the pair, (n,)."""

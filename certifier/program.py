@@ -109,7 +109,7 @@ class Sides:
     def means(self, chain: tuple[int, ...], x: Array) -> tuple[Array, Array, Array]:
         """Means of s under pseudo-moments x, (R, N) -> (R, n), standard deviations of the chain's joints (R, n), masses x(1), (R,)."""
         space, inside, outside = basis(len(chain)), list(chain), self.outside(chain)
-        first, rest = x[:, : len(space.points)], x[:, len(space.points) :].reshape(len(x), len(outside), -1)
+        first, rest = x[:, : len(space.points)], x[:, len(space.points) :].reshape(len(x), len(outside), space.grid)
         mass = first.sum(axis=1)
         u, deviation = np.zeros((len(x), self.kinematics.scene.n)), np.zeros((len(x), self.kinematics.scene.n))
         u[:, inside] = first @ space.points / mass[:, None]

@@ -38,7 +38,7 @@ def certified_region(
     Args:
         C, d: (m, n), (m,) half-spaces with the joint limits among them.
         center: (n,) the seed, or None for the Chebyshev centre.
-        proofs: pair index -> proof file, for every pair of the scene.
+        proofs: pair index -> proof file, for every pair of the scene; one that covers several pairs stands at each of them.
         provenance: options, seeds, versions, seconds, growth curve.
 
     Raises:
@@ -48,8 +48,8 @@ def certified_region(
     polytope = Polytope(C, d)
     interior = chebyshev_center(polytope)[0] if center is None else center
     bound = archimedean(polytope)
-    parts = [PairProof.from_bytes(proofs[index]) for index in range(len(scene.pairs))]
-    data = RegionProof(scene, C, d, interior, bound, tuple(parts)).to_bytes()
+    parts = tuple(PairProof.from_bytes(data, scene) for data in dict.fromkeys(proofs[index] for index in range(len(scene.pairs))))
+    data = RegionProof(scene, C, d, interior, bound, parts).to_bytes()
     statement = verify_region(data)
     ellipsoid = inscribed_ellipsoid(polytope)
     size, error = volume(polytope, seed=0)
@@ -72,8 +72,8 @@ def certified_region(
         "volume": {"ellipsoid": ellipsoid.volume, "polytope": size, "polytope_stderr": error},
         "seed": None if center is None else scene.to_q(np.asarray(center)).tolist(),
         "pairs": [
-            {"a": s.a, "b": s.b, "outcome": "certified", "margin": s.gap, "proof_digest": digest(proofs[index])}
-            for index, s in enumerate(statement.pairs)
+            {"a": p.a, "b": p.b, "outcome": "certified", "margin": statement.gaps[p], "proof_digest": digest(proofs[index])}
+            for index, p in enumerate(scene.pairs)
         ],
         "ignored": [{"a": i.a, "b": i.b, "reason": i.reason} for i in scene.ignored],
         "padding": scene.padding,

@@ -129,7 +129,7 @@ def certify(args: Namespace) -> int:
 
 
 def verify(args: Namespace) -> int:
-    from certifier.proof import ProofError
+    from certifier.proof_file import ProofError
     from certifier.verify.region import verify_region
 
     data = Path(args.proof).read_bytes()

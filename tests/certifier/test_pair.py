@@ -31,7 +31,7 @@ def test_free_arm_is_certified_and_its_twin_refuted(links, kind, shape):
     for index in range(len(free.pairs)):
         result = shared.certify(index)
         assert result.outcome is Outcome.CERTIFIED, result
-        statement = verify_pair(free, PairProof.from_bytes(result.proof))
+        statement = verify_pair(PairProof.from_bytes(result.proof, free))
         assert result.margin == statement.gap
         assert 0 < statement.gap <= _sampled_distance(free, index, region)
     blocked = planar_arm(links, obstacle(0.1, shape), kind=kind)
@@ -122,5 +122,5 @@ def test_chosen_faces_give_the_verdict_of_all_faces(half, monkeypatch):
     monkeypatch.setattr("certifier.pair.FACES_AT_A_TIME", 10**6)
     every = [Certification(scene, region, np.zeros(3)).certify(i) for i in range(3)]
     assert [result.outcome for result in chosen] == [result.outcome for result in every]
-    used = [len(PairProof.from_bytes(result.proof).faces) for result in chosen if result.proof]
+    used = [len(PairProof.from_bytes(result.proof, scene).faces) for result in chosen if result.proof]
     assert all(count < 40 for count in used)

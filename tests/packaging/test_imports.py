@@ -58,7 +58,7 @@ class Absent:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 sys.meta_path.insert(0, Absent())
-from certifier.proof import ProofError
+from certifier.proof_file import ProofError
 from certifier.verify.region import verify_region
 
 try:
