@@ -31,7 +31,7 @@ from certifier.verify.pair import PairCheck, check_ground
 
 SCREEN_SAMPLES = 64
 CONE_SAMPLES = 300
-FACES_AT_A_TIME = 4
+FACES_AT_A_TIME = 8
 """A polytope with many faces is first replaced by its box; then this many faces are added at a time, as the dual asks for them."""
 
 

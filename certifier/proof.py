@@ -227,12 +227,22 @@ class DualProof:
 
 
 @dataclass(frozen=True)
+class Implied:
+    """Half-spaces that contain a polytope of m faces, with the multipliers that prove it: (h, n), (h,), (h, m)."""
+
+    C: Array
+    d: Array
+    Y: Array
+
+
+@dataclass(frozen=True)
 class RegionProof:
     """Everything needed to check that a region is free of collision for every pair of its scene.
 
     Attributes:
-        C, d: the region's half-spaces, joint limits included.
+        C, d: (m, n), (m,) the region's half-spaces, joint limits included.
         interior: (n,) a point strictly inside.
+        implied: half-spaces around the region that are redundant to it, but faces of some ground.
         proofs: they cover every pair of the scene; each ground contains the region.
     """
 
@@ -240,6 +250,7 @@ class RegionProof:
     C: Array
     d: Array
     interior: Array
+    implied: Implied
     archimedean: Archimedean
     proofs: tuple[PairProof, ...] = field(repr=False)
 
@@ -248,6 +259,7 @@ class RegionProof:
         pool = _Pool(self.scene)
         headers = [pool.add(proof) for proof in self.proofs]
         arrays: dict[str, np.ndarray] = {"region/C": self.C, "region/d": self.d, "region/interior": self.interior}
+        arrays |= {f"implied/{name}": value for name, value in vars(self.implied).items()}
         arrays |= {f"archimedean/{name}": np.asarray(value) for name, value in vars(self.archimedean).items()}
         header = {"format": FORMAT, "kind": "region", "scene": self.scene.to_document(), **pool.header(), "proofs": headers}
         return pack(header, arrays | pool.arrays)
@@ -269,6 +281,7 @@ class RegionProof:
                 C=floats(arrays["region/C"]),
                 d=floats(arrays["region/d"]),
                 interior=floats(arrays["region/interior"]),
+                implied=Implied(*(floats(arrays[f"implied/{name}"]) for name in ("C", "d", "Y"))),
                 archimedean=Archimedean(values.pop("N").item(), **values),
                 proofs=_Stored(scene, header, arrays).proofs(),
             )

@@ -10,6 +10,7 @@ from certifier.model import Pair, Scene
 from certifier.proof import Ground, RegionProof
 from certifier.proof_file import ProofError
 from certifier.verify.archimedean import check_archimedean
+from certifier.verify.box import holds
 from certifier.verify.kinematics import exact
 from certifier.verify.pair import PairCheck, check_ground
 from certifier.verify.scene import check_scene
@@ -65,6 +66,7 @@ def verify_region(data: bytes) -> RegionStatement:
     scene = proof.scene
     check_scene(scene)
     _check_polytope(proof)
+    _check_implied(proof)
     checks: dict[int, PairCheck] = {}
     gaps: dict[Pair, float] = {}
     for part in proof.proofs:
@@ -87,7 +89,7 @@ def _check_polytope(proof: RegionProof) -> None:
     if proof.C.ndim != 2 or proof.C.shape[1] != n or proof.d.shape != (len(proof.C),) or proof.interior.shape != (n,):
         raise ProofError("proof_malformed", "the region's arrays do not fit the scene")
     limits = scene.polytope(np.zeros((0, n)), np.zeros(0))
-    if not _implied(proof, limits.C, limits.d):
+    if not _among(proof.C, proof.d, limits.C, limits.d):
         raise ProofError("proof_limits", "the joint limits are not among the region's half-spaces")
     point = [exact(x) for x in proof.interior]
     for c, d in zip(proof.C, proof.d, strict=True):
@@ -97,14 +99,26 @@ def _check_polytope(proof: RegionProof) -> None:
         raise ProofError("proof_archimedean", "the multipliers do not prove the region Archimedean")
 
 
+def _check_implied(proof: RegionProof) -> None:
+    """The multipliers prove the implied half-spaces."""
+    implied, n = proof.implied, proof.scene.n
+    if implied.C.shape != (len(implied.d), n) or implied.Y.shape != (len(implied.d), len(proof.d)):
+        raise ProofError("proof_malformed", "the implied half-spaces do not fit the region")
+    for c, d, y in zip(implied.C, implied.d, implied.Y, strict=True):
+        if not holds(proof.C, proof.d, c, float(d), y):
+            raise ProofError("proof_implied", "the multipliers do not prove a half-space around the region")
+
+
 def _check_inside(proof: RegionProof, ground: Ground) -> None:
-    """Every face of the ground is a half-space of the region, or one moved outwards."""
-    if not _implied(proof, ground.C, ground.d):
+    """Every face of the ground is a half-space of the region or an implied one, or one of them moved outwards."""
+    C, d = np.concatenate([proof.C, proof.implied.C]), np.concatenate([proof.d, proof.implied.d])
+    if not _among(C, d, ground.C, ground.d):
         raise ProofError("proof_ground", "a pair's proof is about a polytope that does not contain the region")
 
 
-def _implied(proof: RegionProof, C: np.ndarray, d: np.ndarray) -> bool:
+def _among(C: np.ndarray, d: np.ndarray, rows: np.ndarray, offsets: np.ndarray) -> bool:
+    """Whether every row is one of C's with an offset that is no smaller."""
     least: dict[bytes, float] = {}
-    for c, offset in zip(proof.C + 0.0, proof.d, strict=True):
+    for c, offset in zip(C + 0.0, d, strict=True):
         least[c.tobytes()] = min(offset, least.get(c.tobytes(), np.inf))
-    return all(least.get(c.tobytes(), np.inf) <= offset for c, offset in zip(C + 0.0, d, strict=True))
+    return all(least.get(c.tobytes(), np.inf) <= offset for c, offset in zip(rows + 0.0, offsets, strict=True))
