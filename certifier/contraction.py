@@ -125,7 +125,7 @@ def _face(ellipsoid: Measure, keep: Array, failure: Failure) -> tuple[Array, Arr
             best = distance, point, nearest
     assert best is not None
     distance, point, nearest = best
-    if distance < 1 and failure.spread.any():
+    if distance == 0 or (distance < 1 and failure.spread.any()):
         return None
     backoff = min(LARGEST_BACKOFF, BACKOFF * BACKOFF_GROWTH**failure.attempts)
     normal = root.T @ root @ (point - nearest)
@@ -141,10 +141,8 @@ def _shorter_range(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: A
     spread = failure.spread if len(failure.points) else (upper - lower) / 2
     center = ellipsoid.center
     turn = np.where(scene.revolute, 2 * (np.arctan(center + spread) - np.arctan(center - spread)), 2 * spread)
-    if failure.attempts < PATIENCE:
-        joints = [max(failure.joints, key=lambda i: float(turn[i]))]
-    else:
-        joints = list(failure.joints)
+    widest = max(failure.joints, key=lambda i: float(turn[i]))
+    joints = [widest] if failure.attempts < PATIENCE else list(failure.joints)
     width = (upper - lower)[joints]
     if width.min() < SMALLEST_RANGE:
         return None
