@@ -15,10 +15,10 @@ import numpy as np
 
 from certifier.basis import subsets
 from certifier.closest import Closest, closest
-from certifier.disproof import DualProof, WitnessProof
+from certifier.disproof import WitnessProof
 from certifier.dual import dual_proof
 from certifier.frames import Frame, choose_frame
-from certifier.interior_point import Solution, Status, solve
+from certifier.interior_point import Block, Solution, Status, solve
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Geometry, Pair, Polytope, Scene
 from certifier.outcome import Outcome, Stage
@@ -126,7 +126,7 @@ class Certification:
         if isinstance(witness, _Witness):
             return self._refute(pair, witness, Stage.SOS)
         if solution.status is Status.INFEASIBLE:
-            return self._disprove(dual_proof(sides, pair, frame, self.ground, blocks, solution.x), weak, spread)
+            return replace(self._disprove(pair, frame, sides, blocks, solution), weak_points=weak, spread=spread)
         detail = f"{solution.status.value} after {solution.iterations} iterations"
         return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak, spread=spread)
 
@@ -172,14 +172,14 @@ class Certification:
             return PairResult(Outcome.INCONCLUSIVE, stage, detail=f"the contact found does not hold: {error}")
         return PairResult(Outcome.REFUTED, stage, witness_s=witness.s, proof=proof.to_bytes())
 
-    def _disprove(self, proof: DualProof, weak: Array, spread: Array) -> PairResult:
+    def _disprove(self, pair: Pair, frame: Frame, sides: Sides, blocks: list[Block], solution: Solution) -> PairResult:
         try:
+            proof = dual_proof(sides, pair, frame, self.ground, blocks, solution.x)
             statement = verify_dual(proof)
-        except ProofError as error:
-            detail = f"the dual proof found does not hold: {error}"
-            return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak, spread=spread)
+        except (ProofError, np.linalg.LinAlgError) as error:
+            return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"the dual proof found does not hold: {error}")
         detail = f"no plane affine in s, in the frame of {statement.frame}"
-        return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, proof=proof.to_bytes(), weak_points=weak, spread=spread)
+        return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, proof=proof.to_bytes())
 
     def _points(self, geometry: Geometry, frame: Frame, s: Array) -> Array:
         return self._kinematics.points(frame.body, geometry.body, geometry.vertices, s)

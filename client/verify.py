@@ -6,26 +6,21 @@ import sys
 from argparse import Namespace
 from pathlib import Path
 
-from certifier.proof_file import ProofError
-from certifier.verify.file import verify_file
+from certifier.errors import CirisError
+from certifier.verify.file import answer
 from client.output import print_json
 
 HOLDS, DOES_NOT = 0, 1
 
 
 def verify(args: Namespace) -> int:
-    data = Path(args.proof).read_bytes()
-    try:
-        statement = verify_file(data)
-    except ProofError as error:
-        if args.json:
-            print_json({"holds": False, "error": error.to_document()})
-        print("error:", " ".join(f"{args.proof}: the proof does not hold: {error}".split()), file=sys.stderr)
-        return DOES_NOT
+    found = answer(Path(args.proof).read_bytes())
     if args.json:
-        scene = {"name": statement.scene.name, "hash": statement.scene.hash}
-        guarantee = statement.guarantee.value
-        print_json({"holds": True, "kind": statement.kind, "scene": scene, "statement": list(statement.lines), "guarantee": guarantee})
-    else:
-        print("the proof holds:", *statement.lines, sep="\n  ")
-    return HOLDS
+        print_json(found)
+    elif found["holds"]:
+        print("the proof holds:", *found["statement"], sep="\n  ")
+    if found["holds"]:
+        return HOLDS
+    problem = CirisError.from_document(found["error"])
+    print("error:", " ".join(f"{args.proof}: the proof does not hold: {problem}".split()), file=sys.stderr)
+    return DOES_NOT

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from certifier.disproof import DualProof, WitnessProof
 from certifier.model import Scene
 from certifier.outcome import Guarantee
-from certifier.proof import PairProof
+from certifier.proof import PairProof, RegionProof
 from certifier.proof_file import ProofError, header_of, malformed
 from certifier.verify.dual import verify_dual
 from certifier.verify.pair import verify_pair
@@ -52,6 +56,37 @@ def verify_file(data: bytes) -> FileStatement:
     found, guarantee = _READERS[kind](data, scene)
     padding = f"padding {scene.padding:g} m around every body"
     return FileStatement(kind, scene, (f"scene {scene.name}, hash {scene.hash}", padding, *found, guarantee_line(guarantee)), guarantee)
+
+
+def answer(data: bytes) -> dict[str, Any]:
+    """The statement of a proof file, or why there is none, as JSON-able data; stable keys."""
+    try:
+        statement = verify_file(data)
+    except ProofError as error:
+        return {"holds": False, "error": error.to_document()}
+    return {
+        "holds": True,
+        "kind": statement.kind,
+        "scene": {"name": statement.scene.name, "hash": statement.scene.hash},
+        "statement": list(statement.lines),
+        "guarantee": statement.guarantee.value,
+    }
+
+
+def answer_about_region(payload: dict[str, Any]) -> dict[str, Any]:
+    """The answer about a stored proof, as a child process gives it (certifier.child): it has to be of that very region.
+
+    Args:
+        payload: ``proof`` in base 64; ``scene_hash``, ``C`` and ``d`` of the region.
+    """
+    data = base64.b64decode(payload["proof"])
+    found = answer(data)
+    if found["holds"]:
+        proof = RegionProof.from_bytes(data)
+        same = np.array_equal(proof.C, payload["C"]) and np.array_equal(proof.d, payload["d"])
+        if proof.scene.hash != payload["scene_hash"] or not same:
+            return {"holds": False, "error": ProofError("proof_region", "the proof is about another region").to_document()}
+    return found
 
 
 def guarantee_line(guarantee: Guarantee) -> str:
