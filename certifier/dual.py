@@ -11,11 +11,12 @@ import numpy as np
 from scipy.linalg import qr
 
 from certifier.basis import basis
+from certifier.disproof import DualProof
 from certifier.frames import Frame
 from certifier.interior_point import Block
 from certifier.model import Array, Pair
 from certifier.program import Sides
-from certifier.proof import DualProof, Ground
+from certifier.proof import Ground
 from certifier.verify.moments import monomials, table
 
 RANK_TOLERANCE = 1e-9

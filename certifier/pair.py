@@ -1,6 +1,6 @@
 """Certification of a polytope, pair by pair: screens, the program (11), the proof and its verification.
 
-centre or a sample in contact                        -> refuted, with the configuration
+centre or a sample in contact, verified              -> refuted, with the configuration
 program (11) feasible, proof verified exactly        -> certified, with the proof
 program (11) infeasible, dual proof verified         -> not_certifiable, with the proof and the points where no plane of this degree works
 anything else                                        -> inconclusive, with the reason
@@ -15,19 +15,21 @@ import numpy as np
 
 from certifier.basis import subsets
 from certifier.closest import Closest, closest
+from certifier.disproof import WitnessProof
 from certifier.dual import dual_proof
 from certifier.frames import Frame, choose_frame
-from certifier.interior_point import Solution, Status, solve
+from certifier.interior_point import Block, Solution, Status, solve
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Geometry, Pair, Polytope, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.polytope import bound_multipliers, chebyshev_center, check, drop_redundant
 from certifier.program import Box, Sides, build
-from certifier.proof import BITS, DualProof, Ground, PairProof, Side, Volume
+from certifier.proof import BITS, Ground, PairProof, Side, Volume
 from certifier.proof_file import ProofError
 from certifier.sampling import hit_and_run
 from certifier.verify.dual import verify_dual
 from certifier.verify.pair import PairCheck, check_ground
+from certifier.verify.witness import verify_witness
 
 SCREEN_SAMPLES = 64
 CONE_SAMPLES = 300
@@ -43,8 +45,8 @@ class PairResult:
         margin: certified lower bound in metres of the distance between the padded bodies; None unless certified.
         detail: a sentence for people; empty when the outcome says it all.
         witness_s: (n,) a configuration in contact, when refuted.
-        proof: verified, as bytes: a :class:`certifier.proof.PairProof` when certified, a :class:`certifier.proof.DualProof` when not
-            certifiable.
+        proof: verified, as bytes: a :class:`certifier.proof.PairProof` when certified, a :class:`certifier.disproof.WitnessProof` when
+            refuted, a :class:`certifier.disproof.DualProof` when not certifiable.
         weak_points: (w, n) configurations near which no plane of this degree works, when not certifiable.
         spread: (n,) how far around them, along each joint between the bodies, when not certifiable.
     """
@@ -102,7 +104,7 @@ class Certification:
         frame = choose_frame(self._kinematics, pair)
         contact = self._contact(pair, frame, self._screen[:SCREEN_SAMPLES])
         if isinstance(contact, _Witness):
-            return PairResult(Outcome.REFUTED, Stage.SCREEN, witness_s=contact.s)
+            return self._refute(pair, contact, Stage.SCREEN)
         sides = self._first
         while True:
             try:
@@ -122,9 +124,9 @@ class Certification:
         weak, spread = self._weak_points(frame, sides, solution)
         witness = self._contact(pair, frame, np.concatenate([self._screen, weak[self._faces.contains(weak)]]))
         if isinstance(witness, _Witness):
-            return PairResult(Outcome.REFUTED, Stage.SOS, witness_s=witness.s)
+            return self._refute(pair, witness, Stage.SOS)
         if solution.status is Status.INFEASIBLE:
-            return self._disprove(dual_proof(sides, pair, frame, self.ground, blocks, solution.x), weak, spread)
+            return replace(self._disprove(pair, frame, sides, blocks, solution), weak_points=weak, spread=spread)
         detail = f"{solution.status.value} after {solution.iterations} iterations"
         return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak, spread=spread)
 
@@ -162,14 +164,22 @@ class Certification:
             return PairResult(Outcome.CERTIFIED, Stage.SOS, margin=statement.gap, proof=proof.to_bytes())
         return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"the proof found does not hold: {failure}")
 
-    def _disprove(self, proof: DualProof, weak: Array, spread: Array) -> PairResult:
+    def _refute(self, pair: Pair, witness: _Witness, stage: Stage) -> PairResult:
+        proof = WitnessProof(self.scene, pair, self.ground.C, self.ground.d, witness.s, witness.weights)
         try:
-            statement = verify_dual(proof)
+            verify_witness(proof)
         except ProofError as error:
-            detail = f"the dual proof found does not hold: {error}"
-            return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak, spread=spread)
+            return PairResult(Outcome.INCONCLUSIVE, stage, detail=f"the contact found does not hold: {error}")
+        return PairResult(Outcome.REFUTED, stage, witness_s=witness.s, proof=proof.to_bytes())
+
+    def _disprove(self, pair: Pair, frame: Frame, sides: Sides, blocks: list[Block], solution: Solution) -> PairResult:
+        try:
+            proof = dual_proof(sides, pair, frame, self.ground, blocks, solution.x)
+            statement = verify_dual(proof)
+        except (ProofError, np.linalg.LinAlgError) as error:
+            return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"the dual proof found does not hold: {error}")
         detail = f"no plane affine in s, in the frame of {statement.frame}"
-        return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, proof=proof.to_bytes(), weak_points=weak, spread=spread)
+        return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, proof=proof.to_bytes())
 
     def _points(self, geometry: Geometry, frame: Frame, s: Array) -> Array:
         return self._kinematics.points(frame.body, geometry.body, geometry.vertices, s)
@@ -184,7 +194,7 @@ class Certification:
         for i in np.flatnonzero(gaps <= reach):
             found = closest(A[i], B[i])
             if found.gap <= reach:
-                return _Witness(s[i])
+                return _Witness(s[i], found.weights)
         return first
 
     def _proof(self, pair: Pair, frame: Frame, sides: Sides, solution: Solution, kind: str) -> PairProof:
@@ -210,6 +220,7 @@ class Certification:
 @dataclass(frozen=True)
 class _Witness:
     s: Array
+    weights: tuple[Array, Array]
 
 
 def certify_pair(scene: Scene, index: int, polytope: Polytope, center: Array | None = None, seed: int = 0) -> PairResult:

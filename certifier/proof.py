@@ -161,69 +161,8 @@ class PairProof:
         """
         header, arrays = unpack(data, "pair")
         with malformed():
-            _same_scene(header, scene)
+            same_scene(header, scene)
             return _Stored(scene, header, arrays).proofs()[0]
-
-
-@dataclass(frozen=True)
-class DualProof:
-    """Functionals that exclude every certificate of one pair on a polytope, in one frame (certifier.verify.dual says how).
-
-    Attributes:
-        frame: body whose frame the planes are expressed in.
-        moments: of a's and of b's vertices, (V, N): values on the monomials in the order of certifier.verify.moments.
-        equations: K of those that have to vanish, the 4 (n + 1) entries of R row by row, or its n + 1 of b where a radius is involved.
-        entries: (K, 3) int64 the moments whose change makes them vanish: side, vertex, monomial.
-        normal: Yaa (3, 3) and Ybb (n + 1, n + 1); empty where no radius is involved.
-    """
-
-    scene: Scene
-    pair: Pair
-    frame: str
-    ground: Ground
-    moments: tuple[Array, Array]
-    equations: tuple[int, ...]
-    entries: np.ndarray
-    normal: tuple[Array, Array]
-
-    def to_bytes(self) -> bytes:
-        """The proof as a file."""
-        header = {
-            "format": FORMAT,
-            "kind": "dual",
-            "scene_hash": self.scene.hash,
-            "pair": [self.pair.a, self.pair.b],
-            "frame": self.frame,
-            "equations": list(self.equations),
-        }
-        arrays = {f"ground/0/{name}": value for name, value in vars(self.ground).items()}
-        arrays |= {"moments0": self.moments[0], "moments1": self.moments[1], "entries": self.entries}
-        return pack(header, {**arrays, "normal/aa": self.normal[0], "normal/bb": self.normal[1]})
-
-    @classmethod
-    def from_bytes(cls, data: bytes, scene: Scene) -> DualProof:
-        """Inverse of :meth:`to_bytes`.
-
-        Raises:
-            ProofError: not a dual proof, or one about another scene.
-        """
-        header, arrays = unpack(data, "dual")
-        with malformed():
-            _same_scene(header, scene)
-            a, b = header["pair"]
-            moments = [floats(arrays[f"moments{i}"]) for i in range(2)]
-            if arrays["entries"].dtype != np.int64 or arrays["entries"].shape[1:] != (3,):
-                raise ProofError("proof_malformed", "the entries of a dual proof are not triples of integers")
-            return cls(
-                scene=scene,
-                pair=Pair(a, b),
-                frame=str(header["frame"]),
-                ground=_ground(arrays, 0),
-                moments=(moments[0], moments[1]),
-                equations=tuple(index(k) for k in header["equations"]),
-                entries=arrays["entries"],
-                normal=(floats(arrays["normal/aa"]), floats(arrays["normal/bb"])),
-            )
 
 
 @dataclass(frozen=True)
@@ -345,7 +284,7 @@ class _Stored:
 
     def __init__(self, scene: Scene, header: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
         self._scene, self._headers, self._arrays = scene, header["proofs"], arrays
-        self._grounds = [_ground(arrays, i) for i in range(header["grounds"])]
+        self._grounds = [ground_of(arrays, i) for i in range(header["grounds"])]
         self._volumes = [self._volume(i, volume) for i, volume in enumerate(header["volumes"])]
 
     def proofs(self) -> tuple[PairProof, ...]:
@@ -385,12 +324,19 @@ def digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _same_scene(header: dict[str, Any], scene: Scene) -> None:
+def same_scene(header: dict[str, Any], scene: Scene) -> None:
+    """Raises ProofError, proof_scene, for the header of a proof about another scene."""
     if header["scene_hash"] != scene.hash:
         raise ProofError("proof_scene", "the proof is about another scene")
 
 
-def _ground(arrays: dict[str, np.ndarray], i: int) -> Ground:
+def ground_arrays(ground: Ground, i: int) -> dict[str, np.ndarray]:
+    """The arrays of a file's ground i."""
+    return {f"ground/{i}/{name}": value for name, value in vars(ground).items()}
+
+
+def ground_of(arrays: dict[str, np.ndarray], i: int) -> Ground:
+    """Ground i of a file."""
     return Ground(*(floats(arrays[f"ground/{i}/{name}"]) for name in ("C", "d", "mid", "half", "Y_lower", "Y_upper")))
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from certifier.errors import CirisError
-from certifier.model import Array
+from certifier.model import Array, Scene
 
 FORMAT = 2
 MAX_BYTES = 1 << 30
@@ -64,16 +64,38 @@ def unpack(data: bytes, kind: str) -> tuple[dict[str, Any], dict[str, np.ndarray
     Raises:
         ProofError: not such a file of this format, or one that unpacks to more than MAX_BYTES.
     """
+    with _opened(data) as (archive, header):
+        if header["kind"] != kind:
+            raise ProofError("proof_malformed", f"the proof is of a {header['kind']}, not of a {kind}")
+        names = [name for name in archive.namelist() if name.endswith(".npy")]
+        return header, {name.removesuffix(".npy"): _array(archive.read(name)) for name in names}
+
+
+def header_of(data: bytes) -> dict[str, Any]:
+    """The header of a file of any kind.
+
+    Raises:
+        ProofError: not a file of this format.
+    """
+    with _opened(data) as (_, header):
+        return header
+
+
+def with_scene(data: bytes, scene: Scene) -> bytes:
+    """The file with the scene itself instead of its hash: whoever has it can check it."""
+    header, arrays = unpack(data, header_of(data)["kind"])
+    return pack({**header, "scene": scene.to_document()}, arrays)
+
+
+@contextmanager
+def _opened(data: bytes) -> Iterator[tuple[zipfile.ZipFile, dict[str, Any]]]:
     with malformed(), zipfile.ZipFile(io.BytesIO(data)) as archive:
         if sum(info.file_size for info in archive.infolist()) > MAX_BYTES:
             raise ProofError("proof_too_large", f"the proof file unpacks to more than {MAX_BYTES} bytes")
         header = json.loads(archive.read("header.json"))
         if header["format"] != FORMAT:
             raise ProofError("proof_malformed", f"the proof file is of format {header['format']!r}, not {FORMAT}")
-        if header["kind"] != kind:
-            raise ProofError("proof_malformed", f"the proof is of a {header['kind']}, not of a {kind}")
-        names = [name for name in archive.namelist() if name.endswith(".npy")]
-        return header, {name.removesuffix(".npy"): _array(archive.read(name)) for name in names}
+        yield archive, header
 
 
 def _array(data: bytes) -> np.ndarray:

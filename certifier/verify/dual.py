@@ -25,8 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 from flint import Ordering, arb, arb_mat, ctx, fmpq, fmpq_mpoly_ctx
 
+from certifier.disproof import DualProof
 from certifier.model import Array, Pair
-from certifier.proof import DualProof, Volume
+from certifier.proof import Volume
 from certifier.proof_file import ProofError
 from certifier.verify import limbs
 from certifier.verify.kinematics import ExactKinematics, exact

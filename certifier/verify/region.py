@@ -52,7 +52,7 @@ class RegionStatement:
             f"{len(self.gaps)} pairs of bodies separated at every configuration of it; padding {scene.padding:g} m around every body",
             *([f"least distance at least {self.gap:.3g} m: {closest.a} and {closest.b}"] if closest else []),
             *(f"not covered: {i.a} and {i.b} ({i.reason})" for i in scene.ignored),
-            "guarantee: exact (rational arithmetic; the parsed model's numbers taken as they are)",
+            "guarantee: exact (rigorous arithmetic; the parsed model's numbers taken as they are)",
         ]
 
 

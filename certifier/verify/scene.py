@@ -66,9 +66,11 @@ def _check_joint(scene: Scene, joint: Joint) -> None:
     if joint.index is None:
         return
     _require(joint.axis.shape == (3,) and abs(np.linalg.norm(joint.axis) - 1) < RIGID, f"the axis of {joint.name}")
-    _require(_finite(joint.lower, joint.upper) and joint.lower < joint.upper, f"the limits of {joint.name}")
+    _require(_finite(joint.lower, joint.upper), f"the limits of {joint.name}")
+    lower, upper = np.array([joint.lower, joint.upper], dtype=float)
+    _require(lower < upper, f"the limits of {joint.name}")
     if joint.kind is JointKind.REVOLUTE:
-        reach = np.abs(np.array([joint.lower, joint.upper]) - scene.q_star[joint.index])
+        reach = np.abs(np.array([lower, upper]) - scene.q_star[joint.index])
         _require(reach.max() < math.pi, f"{joint.name} may turn more than half a turn away from q*")
 
 

@@ -19,54 +19,23 @@ import numpy as np
 import pytest
 
 from certifier.closest import closest
+from certifier.disproof import DualProof
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Pair, Scene
 from certifier.outcome import Outcome
 from certifier.pair import Certification
 from certifier.polytope import chebyshev_center
-from certifier.proof import DualProof, PairProof, RegionProof, Volume
+from certifier.proof import RegionProof, Volume
 from certifier.proof_file import ProofError, pack, unpack
-from certifier.region import certified_region
 from certifier.sampling import hit_and_run
 from certifier.verify.dual import verify_dual
 from certifier.verify.region import RegionStatement, verify_region
-from tests.certifier.scenes import ball, box, cube, planar_arm
+from certifier.verify.witness import verify_witness
+from tests.certifier.proofs import dual, region, scene, witness
+from tests.certifier.scenes import box, cube
 
 CAMPAIGN = 1000
 LONG_CAMPAIGN = 20_000
-
-
-@cache
-def scene() -> Scene:
-    """A two-link arm with a ball at its tip before two blocks, padded."""
-    blocks = [box(f"world/block{i}", WORLD, (0.15, 0.3, 0.3), (0.7 + 0.2 * i, 1.0, 0.0)) for i in range(2)]
-    base = planar_arm(2, blocks[0], padding=0.01, q_star=(0.05, -0.1))
-    tip = ball("arm/link2/tip", "arm/link2", 0.05, (1.0, 0.0, 0.0))
-    links = [geometry.name for geometry in base.geometries[:2]]
-    pairs = tuple(Pair(a, block.name) for a in (*links, tip.name) for block in blocks)
-    return replace(base, geometries=(*base.geometries, blocks[1], tip), pairs=pairs)
-
-
-@cache
-def region() -> bytes:
-    """Both blocks share the proofs of the links; the tip has one for each block. The proofs lie on two different grounds."""
-    group = box("world/blocks", WORLD, (0.4, 0.3, 0.3), (0.8, 1.0, 0.0))
-    names = tuple(g.name for g in scene().geometries)
-    grouped = replace(
-        scene(),
-        geometries=(*scene().geometries, group),
-        pairs=tuple(Pair(name, group.name) for name in names[:2]) + scene().pairs[4:],
-    )
-    polytope, larger = cube(scene(), 0.0, 0.1), cube(scene(), 0.0, 0.12)
-    proofs: dict[int, bytes] = {}
-    for index, pair in enumerate(grouped.pairs):
-        shared = Certification(grouped, larger if index % 2 else polytope, np.zeros(2))
-        found = PairProof.from_bytes(shared.certify(index).proof, grouped)
-        volumes = [replace(v, geometries=("world/block0", "world/block1")) if v.geometries == (group.name,) else v for v in found.volumes]
-        data = replace(found, scene=scene(), volumes=tuple(volumes)).to_bytes()
-        covered = [i for i, p in enumerate(scene().pairs) if p.a == pair.a and pair.b in (p.b, group.name)]
-        proofs |= dict.fromkeys(covered, data)
-    return certified_region(scene(), polytope.C, polytope.d, np.zeros(2), proofs, {}).proof
 
 
 def distances(world: Scene, C: np.ndarray, d: np.ndarray, count: int) -> dict[Pair, float]:
@@ -341,21 +310,6 @@ def test_every_ground_must_hold_the_region(index):
             verify_region(replace(proof, proofs=tuple(parts)).to_bytes())
 
 
-@cache
-def dual() -> tuple[Scene, DualProof]:
-    """The tip before a block that it would have to pass on both sides."""
-    world = planar_arm(2, box("world/block", WORLD, (0.1, 0.1, 0.1), (1.2, 1.0, 0.0)), limit=2.5)
-    tip = ball("arm/link2/tip", "arm/link2", 0.05, (1.0, 0.0, 0.0))
-    world = replace(world, geometries=(*world.geometries, tip), pairs=(*world.pairs, Pair(tip.name, "world/block")))
-    for half in np.arange(0.2, 1.2, 0.1):
-        shared = Certification(world, cube(world, 0.0, half), np.zeros(2))
-        for index in range(len(world.pairs)):
-            result = shared.certify(index)
-            if result.outcome is Outcome.NOT_CERTIFIABLE:
-                return world, DualProof.from_bytes(result.proof, world)
-    raise AssertionError("none of the pairs is not certifiable")
-
-
 def test_random_single_changes_of_a_dual_proof():
     world, original = dual()
     data, rng, outcomes = original.to_bytes(), np.random.default_rng(0), Counter()
@@ -403,3 +357,22 @@ def test_a_volume_that_is_too_small_for_its_group():
         verify_region(replace(proof, proofs=tuple(shrunk if p is part else p for p in proof.proofs)).to_bytes())
     assert refusal.value.code == "proof_volume"
     assert json.loads(json.dumps(refusal.value.to_document()))["code"] == "proof_volume"
+
+
+def test_a_witness_must_be_in_the_polytope_and_in_both_bodies():
+    world, proof = witness()
+    verify_witness(proof)
+    apart = replace(world, padding=0.0, geometries=(*world.geometries[:2], box("world/block", WORLD, (0.1, 0.1, 0.1), (1.2, 0.2, 0.0))))
+    turned = (proof.weights[0][::-1], proof.weights[1][::-1])
+    for changed in (
+        replace(proof, s=proof.s + 0.2),
+        replace(proof, d=proof.d - 0.2),
+        replace(proof, scene=apart),
+        replace(proof, weights=turned),
+        replace(proof, weights=(-proof.weights[0], proof.weights[1])),
+        replace(proof, weights=(0 * proof.weights[0], proof.weights[1])),
+        replace(proof, weights=proof.weights[:1] * 2, s=proof.s[:1]),
+        replace(proof, pair=Pair("arm/link1/bar", "arm/link2/bar")),
+    ):
+        with pytest.raises(ProofError):
+            verify_witness(changed)
