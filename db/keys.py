@@ -151,7 +151,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     adding.add_argument("name")
     adding.add_argument("--scope", type=Scope, choices=list(Scope), required=True)
     verbs.add_parser("ls", help="list the keys, without what is secret").add_argument("--json", action="store_true")
-    verbs.add_parser("revoke", help="end a key at once").add_argument("name")
+    verbs.add_parser("revoke", help="end a key within a second").add_argument("name")
     given = parser.parse_args(arguments)
     settings = Settings() if given.data is None else Settings(data_dir=given.data)
     migrate.upgrade(settings.database)

@@ -61,7 +61,7 @@ class Result:
     margin: float | None = None
     detail: str = ""
     witness_s: list[float] | None = None
-    weak_points: list[list[float]] | None = None
+    weak_points: dict[str, Any] | None = None
     proof: bytes | None = None
     error: dict[str, Any] | None = None
 
@@ -124,15 +124,13 @@ def add_iteration(
 
 
 def batches(pairs: Sequence[tuple[int, float]], seconds: float) -> list[list[int]]:
-    """Groups (pair index, forecast in seconds) into pieces of work, those to do first first.
+    """Groups (pair index, forecast in seconds), in their order, into pieces of work of at most ``seconds`` or one pair each.
 
-    Pairs expected to take ``seconds`` or more are on their own, longest first; the others keep their order and go together until
-    they fill that time. Taking the first group away leaves the other groups as they are.
+    Taking the first group away leaves the other groups as they are.
     """
-    big = sorted((pair for pair in pairs if pair[1] >= seconds), key=lambda pair: -pair[1])
-    groups = [[index] for index, _ in big]
+    groups: list[list[int]] = []
     filled = inf
-    for index, forecast in (pair for pair in pairs if pair[1] < seconds):
+    for index, forecast in pairs:
         if filled + forecast > seconds:
             groups.append([])
             filled = 0.0

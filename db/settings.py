@@ -55,12 +55,14 @@ class Settings(BaseSettings):
     """How often the process of a pair or step dies, alone, before that counts as poison and ends as an error."""
     sweep_seconds: float = 2.0
     """Pause between two rounds of the sweeper."""
+    verify_timeout_seconds: float = 600.0
+    """Limit of one check of a stored proof on request."""
     webhook_private: bool = False
     """Let webhooks go to addresses that are not public, as in a network of one's own."""
     time_limit_seconds: float = Field(default=3600.0, gt=0)
     """Hard limit of one batch of pairs or one step; its process is then killed. A job with a pair that would need longer is refused."""
     child_memory_bytes: int = 16 << 30
-    """Limit of the address space of the process that runs a seeding or polytope step."""
+    """Limit of the address space of the process that runs a seeding, a polytope step or a check on request."""
     pair_memory_bytes: int = Field(default_factory=_memory_of_a_process)
     """A job with a pair that would need more memory is refused. Default: this machine's memory, divided by its cores."""
     max_jobs_per_key: int = Field(default=1000, ge=1)

@@ -17,7 +17,8 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from certifier.errors import SceneError
-from certifier.scene.bundle import BundleLimits, pack_bundle, unpack
+from certifier.scene.bundle import BundleLimits, pack_bundle
+from certifier.scene.unpack import unpack
 from tests.api.conftest import PROBLEM
 from tests.scene.workshop import ARM, BOX, LIMIT, ROOM, SCENE
 
@@ -160,7 +161,7 @@ def test_entities(client: TestClient, kind: str, file: str) -> None:
 @pytest.mark.parametrize("file", ELEMENTS)
 def test_uris_that_lead_elsewhere(tmp_path_factory: pytest.TempPathFactory, file: str) -> None:
     """Through the check that the child makes; one of each goes through HTTP below."""
-    from certifier.scene.bundle import check_bundle
+    from certifier.scene.unpack import check_bundle
 
     for uri in URIS:
         root = tmp_path_factory.mktemp("uri").resolve()

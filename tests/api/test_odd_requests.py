@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 
 import pytest
 from fastapi.testclient import TestClient
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from sqlalchemy.exc import OperationalError
 
 from api import guard
+from api.access import KEYS_SECONDS
 from api.app import create_app
 from certifier.model import Scene
 from db import jobs
@@ -120,5 +122,6 @@ def test_a_database_that_is_away_is_no_error_of_the_program(
         answer = client.get("/v1/jobs")
         assert (answer.status_code, answer.json()["code"], answer.headers["retry-after"]) == (503, "database_unavailable", "5")
         assert "secret" not in answer.text
-        monkeypatch.setattr("db.keys.exist", fail)
+        monkeypatch.setattr("db.keys.ring", fail)
+        time.sleep(KEYS_SECONDS)
         assert client.get("/v1/scenes").status_code == 503, "the guard itself needs the database"

@@ -64,10 +64,11 @@ def begin(database: Database, scene: Scene, job_id: str) -> None:
 
 def settle(database: Database, job_id: str, index: int) -> None:
     with database.write() as session:
-        claim = pairs.claim(session, job_id, 0, [index], task_id=None, lease_seconds=60)
+        claim = pairs.claim(session, jobs.lock(session, job_id), lease_seconds=60, batch_seconds=0)
         assert claim is not None
+        assert [pair.index for pair in claim.pairs] == [index]
         result = pairs.Result(index, pairs.PairState.CERTIFIED, seconds=0.1, stage="sos", margin=0.01, proof=b"proof")
-        pairs.save(session, claim, [result], worth_stopping=1)
+        pairs.save(session, claim, [result])
 
 
 def test_a_job_is_followed_live_to_its_end(page: Any, url: str, database: Database, scene: Scene, job_id: str) -> None:
@@ -111,6 +112,13 @@ def test_the_region_is_two_links_away_by_keyboard(page: Any, url: str, region: s
     assert Path(download.value.path()).stat().st_size > 0
 
 
+def test_the_proof_is_checked_again_from_the_page(page: Any, url: str, region: str) -> None:
+    page.goto(f"{url}/regions/{region}")
+    page.get_by_role("button", name="Verify here").click()
+    page.get_by_text("The proof holds:").wait_for()
+    assert "guarantee: exact" in page.locator("#statement").text_content()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_no_page_is_wider_than_a_phone(browser: Any, url: str, region: str, scheme: str) -> None:
     context = browser.new_context(**PHONE, color_scheme=scheme)
@@ -119,6 +127,9 @@ def test_no_page_is_wider_than_a_phone(browser: Any, url: str, region: str, sche
     job, scene = (page.locator(f"a[href^='/{kind}/']").first.get_attribute("href") for kind in ("jobs", "scenes"))
     for path in ("/", job, scene, f"/regions/{region}"):
         page.goto(f"{url}{path}")
+        if path.startswith("/regions/"):
+            page.get_by_role("button", name="Verify here").click()
+            page.get_by_text("The proof holds:").wait_for()
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), path
         light = page.evaluate("getComputedStyle(document.body).backgroundColor").split("(")[1].split(",")[0]
         assert (int(light) > 128) == (scheme == "light")
