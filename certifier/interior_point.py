@@ -81,9 +81,13 @@ class Solution:
         return float(self.y[-1])
 
 
-def solve(blocks: list[Block], max_iterations: int = 60) -> Solution:
-    """Solve the program over ``blocks``."""
-    method = _Method(blocks)
+def solve(blocks: list[Block], max_iterations: int = 60, gap: float = np.inf) -> Solution:
+    """Solve the program over ``blocks``.
+
+    Args:
+        gap: a certificate is taken once the gap is below this multiple of its margin: inf for the first one, 1 for one near the middle.
+    """
+    method = _Method(blocks, gap)
     for iteration in range(max_iterations):
         try:
             status = method.iterate()
@@ -95,7 +99,8 @@ def solve(blocks: list[Block], max_iterations: int = 60) -> Solution:
 
 
 class _Method:
-    def __init__(self, blocks: list[Block]) -> None:
+    def __init__(self, blocks: list[Block], gap: float) -> None:
+        self.gap = gap
         self.blocks, self.p = blocks, blocks[0].columns.shape[2]
         self.degree = sum(len(b.columns) * b.cone.degree for b in blocks)
         self.target = np.append(np.zeros(self.p - 1), -1.0)
@@ -198,6 +203,8 @@ class _Method:
         leaves it psd becomes the margin.
         """
         z = np.append(y[:-1], 0.0)
+        if self._inner(Q, self.Z) > self.gap * y[-1]:
+            return False
         whole, margin = [], np.inf
         for b, given in zip(self.blocks, Q, strict=True):
             candidate = given + y[-1] * b.centre.Q

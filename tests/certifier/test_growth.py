@@ -170,17 +170,3 @@ def test_bad_options_are_named(document, field):
 def test_bad_polytopes_are_refused(seed):
     with pytest.raises(RegionError):
         begin(SCENE, GrowthOptions(kind="certify", seed=seed))
-
-
-def test_the_polytope_step_grows_the_ellipsoid_and_what_it_proposes_certifies():
-    region = cube(SCENE, 0.0, 0.05)
-    for _ in range(3):
-        shared = PairCertification(SCENE, region, np.zeros(2))
-        proofs = {i: shared.certify(i).proof for i in range(len(SCENE.pairs))}
-        assert all(proofs.values())
-        moved = step(SCENE, region, proofs)
-        assert moved.growth > 0.05
-        assert inscribed_ellipsoid(type(region)(moved.C, moved.d)).volume >= inscribed_ellipsoid(region).volume
-        region = type(region)(moved.C, moved.d)
-    final = PairCertification(SCENE, region)
-    assert all(final.certify(i).outcome is Outcome.CERTIFIED for i in range(len(SCENE.pairs)))

@@ -1,0 +1,230 @@
+"""The polytope step (12): against Clarabel, on the region it proposes, and with its proofs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydrake.solvers import ClarabelSolver, MathematicalProgram
+
+import certifier.polytope_step as polytope_step
+from certifier.certificates import Certificates, face_multipliers
+from certifier.errors import RegionError
+from certifier.face_terms import EPSILON, Objective
+from certifier.kinematics import Kinematics
+from certifier.model import WORLD, JointKind, Polytope
+from certifier.outcome import Outcome
+from certifier.pair import Certification
+from certifier.polytope import Ellipsoid, inscribed_ellipsoid
+from certifier.polytope_step import step, trust_box
+from certifier.program import Box
+from certifier.proof import PairProof
+from certifier.verify.pair import verify_pair
+from tests.certifier.scenes import ball, box, cube, planar_arm
+
+SCENES = {
+    "revolute": planar_arm(),
+    "prismatic": planar_arm(kind=JointKind.PRISMATIC, obstacle=box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (2.9, 0.0, 0.0))),
+    "ball": planar_arm(obstacle=ball("world/obstacle", WORLD, 0.2, (1.5, 0.6, 0.0)), padding=0.01),
+    "three joints": planar_arm(3),
+}
+
+
+def certified(scene, polytope, box=None):
+    shared = Certification(scene, polytope, box=box)
+    results = {i: shared.certify(i) for i in range(len(scene.pairs))}
+    assert all(result.outcome is Outcome.CERTIFIED for result in results.values())
+    return {i: result.proof for i, result in results.items()}
+
+
+def crosscut(scene, half):
+    """A cube with its corners cut off, and the joint limits."""
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * scene.n)).reshape(scene.n, -1).T
+    small = cube(scene, 0.0, half)
+    rows = len(small.d) - 2 * scene.n
+    return scene.polytope(
+        np.concatenate([small.C[:rows], signs]), np.concatenate([small.d[:rows], np.full(len(signs), 0.8 * half * scene.n)])
+    )
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_what_the_step_proposes_is_larger_and_certifies(name):
+    scene = SCENES[name]
+    region = crosscut(scene, 0.05)
+    for _ in range(3):
+        moved = step(scene, region, certified(scene, region))
+        assert moved.growth > 0.05
+        before, region = inscribed_ellipsoid(region), Polytope(moved.C, moved.d)
+        after = inscribed_ellipsoid(region)
+        assert after.volume >= before.volume * (1 + moved.growth) * (1 - 1e-6)
+        assert (np.linalg.norm(region.C @ before.shape, axis=1) <= region.d - region.C @ before.center + 1e-9).all()
+    final = Certification(scene, region)
+    assert all(final.certify(i).outcome is Outcome.CERTIFIED for i in range(len(scene.pairs)))
+
+
+@settings(max_examples=10, deadline=None)
+@given(
+    half=st.floats(0.02, 0.12),
+    trust=st.floats(1.0, 2.0),
+    objective=st.sampled_from(Objective),
+    normals=st.booleans(),
+    seed=st.integers(0, 99),
+)
+def test_the_ellipsoid_and_the_witnesses_stay_inside(half, trust, objective, normals, seed):
+    scene = SCENES["revolute"]
+    region = crosscut(scene, half)
+    witnesses = np.random.default_rng(seed).uniform(-half, half, (50, scene.n))
+    witnesses = witnesses[region.contains(witnesses)]
+    moved = step(scene, region, certified(scene, region), objective=objective, normals=normals, witnesses=witnesses, trust=trust)
+    ellipsoid = inscribed_ellipsoid(region)
+    assert moved.growth > -1e-6
+    for share in (0.5, 1.0):
+        C, d = (1 - share) * moved.base_C + share * moved.C, (1 - share) * moved.base_d + share * moved.d
+        assert (C @ witnesses.T <= d[:, None] + 1e-9).all()
+        assert (np.linalg.norm(C @ ellipsoid.shape, axis=1) <= d - C @ ellipsoid.center + 1e-9).all()
+
+
+def test_with_d_alone_the_normals_stand():
+    scene = SCENES["revolute"]
+    region = crosscut(scene, 0.08)
+    moved = step(scene, region, certified(scene, region), normals=False)
+    assert moved.growth > 0
+    assert moved.C == pytest.approx(moved.base_C)
+
+
+def test_a_witness_outside_is_refused():
+    scene, region = SCENES["revolute"], crosscut(SCENES["revolute"], 0.05)
+    with pytest.raises(RegionError) as refusal:
+        step(scene, region, certified(scene, region), witnesses=np.array([[1.0, 1.0]]))
+    assert refusal.value.code == "witness_outside"
+
+
+def test_proofs_that_hold_on_the_trust_box_hold_on_the_moved_polytope():
+    scene, region = SCENES["revolute"], crosscut(SCENES["revolute"], 0.05)
+    box = trust_box(scene, region, inscribed_ellipsoid(region))
+    proofs = certified(scene, region, box)
+    moved = step(scene, region, proofs)
+    assert moved.proofs == proofs
+    assert moved.info["coupled_pairs"] == 0
+    corner = np.concatenate([box.upper[:1], box.lower[1:]])
+    assert Polytope(moved.C, moved.d).contains(corner)
+    for data in moved.proofs.values():
+        proof = PairProof.from_bytes(data, scene)
+        verify_pair(proof)
+        assert (proof.ground.C @ corner <= proof.ground.d).all()
+
+
+def test_a_certificate_that_is_not_feasible_on_the_trust_box_is_refused(monkeypatch):
+    scene, region = SCENES["revolute"], crosscut(SCENES["revolute"], 0.3)
+    monkeypatch.setattr(polytope_step, "MARGIN_SHARE", 50.0)
+    with pytest.raises(RegionError) as refusal:
+        step(scene, region, certified(scene, region))
+    assert refusal.value.code == "step_failed"
+
+
+def test_an_exception_of_the_progress_ends_the_step():
+    scene, region, said = SCENES["revolute"], crosscut(SCENES["revolute"], 0.3), []
+
+    class Cancelled(Exception):
+        pass
+
+    def progress(text):
+        said.append(text)
+        if "iteration 2" in text:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        step(scene, region, certified(scene, region), progress=progress)
+    assert any("on the trust box" in text for text in said)
+
+
+def groups_of(scene, region, proofs, box):
+    """The groups of all proofs, every face of the region a face of the step."""
+    rows = len(region.d) - 2 * scene.n
+    eye = np.eye(scene.n)
+    faces = Polytope(np.concatenate([region.C[:rows], eye, -eye]), np.concatenate([region.d[:rows], box.upper, -box.lower]))
+    ellipsoid = inscribed_ellipsoid(region)
+    scale = 0.9 / np.linalg.norm(region.C[:rows] @ ellipsoid.shape, axis=1)
+    certificates = Certificates(scene, box, ellipsoid, scale, polytope_step.MARGIN_SHARE)
+    return [certificates.group(proof, face_multipliers(proof, faces, box)) for proof in proofs], ellipsoid, scale
+
+
+@pytest.mark.parametrize("name", ["revolute", "ball"])
+def test_identities_are_the_polynomials_of_the_proofs(name):
+    """alpha_v - t' den - sum_j lambda_j g_j, from the proof's own numbers at points of the chain's basis in s."""
+    scene, region = SCENES[name], crosscut(SCENES[name], 0.1)
+    box = Box(np.full(scene.n, 0.01), np.full(scene.n, 0.2))
+    kinematics, rng = Kinematics(scene), np.random.default_rng(0)
+    for data in certified(scene, region).values():
+        proof = PairProof.from_bytes(data, scene)
+        ((group,), ellipsoid, scale) = groups_of(scene, region, [proof], box)
+        c, d = rng.normal(size=(len(scale), scene.n)), rng.normal(size=len(scale))
+        y = np.column_stack([c, d, rng.normal(size=len(scale))]).ravel()
+        z = group.start
+        first = 0
+        for body in points_of(scene, proof):
+            chain = list(body.side.chain)
+            values = np.concatenate([b.columns()[0] + b.columns()[1] @ z + b.columns()[2] @ y[b.coupled] for b in group.blocks[first:]])
+            grid = 3 ** len(chain)
+            points = (1 + len(chain) / 3) * grid
+            u = np.zeros((int(points), scene.n))
+            from certifier.basis import basis
+
+            u[:, chain] = basis(len(chain)).points
+            s = box.mid + box.half * u
+            X = kinematics.numerators(proof.frame, body.body, s)
+            plane = z[: 4 * (scene.n + 1)].reshape(4, -1)
+            ab = np.column_stack([np.ones(len(u)), u]) @ plane.T
+            w = (s - ellipsoid.center) @ np.linalg.inv(ellipsoid.shape).T
+            for v, vertex in enumerate(body.vertices):
+                alpha = body.sign * np.einsum("ni,ni->n", ab, X @ np.append(vertex, 1.0))
+                expected = alpha - polytope_step.MARGIN_SHARE * proof.t * X[:, 3, 3]
+                if len(z) > 4 * (scene.n + 1):
+                    expected -= body.radius * z[-1] * X[:, 3, 3]
+                L = np.zeros((len(proof.faces), 2 ** len(chain), 2 ** len(chain)))
+                rows, cols = np.tril_indices(2 ** len(chain))
+                L[:, rows, cols] = np.ldexp(body.side.mantissa[v, 1:].astype(float), body.side.exponent[v, 1:, None])
+                own = ((s - proof.ground.mid) / proof.ground.half)[:, chain]
+                monomials = np.array([[np.prod(p[np.array(e, dtype=bool)]) for e in np.ndindex(*[2] * len(chain))] for p in own])
+                for j, factor in zip(proof.faces, L, strict=True):
+                    assert j < len(scale)
+                    expected -= np.square(monomials @ factor).sum(axis=1) * (d - w @ c.T)[:, j] / scale[j]
+                assert values[v, : len(u)] == pytest.approx(expected, abs=1e-9)
+            first += -(-len(body.vertices) // max(len(b) for b in group.blocks[first:]))
+
+
+def clarabel(scene, groups, faces, objective):
+    """The optimum of (12) by Clarabel, every Gram matrix a variable: sum of the logarithms, or of the margins."""
+    n, m = scene.n, len(faces)
+    program = MathematicalProgram()
+    y = program.NewContinuousVariables(m * (n + 2))
+    for group in groups:
+        z = program.NewContinuousVariables(len(group.start))
+        for block in group.blocks:
+            cone = block.cone
+            for constant, local, coupled in zip(*block.columns(), strict=True):
+                columns, variables = [], []
+                for j in range(cone.K):
+                    Q = program.NewSymmetricContinuousVariables(cone.L) if cone.L > 1 else program.NewContinuousVariables(1, 1)
+                    program.AddPositiveSemidefiniteConstraint(Q) if cone.L > 1 else program.AddBoundingBoxConstraint(0, np.inf, Q)
+                    for row, col in np.ndindex(cone.L, cone.L):
+                        unit = np.zeros((1, cone.K, cone.L, cone.L))
+                        unit[0, j, row, col] = 1.0
+                        columns.append(cone.values(unit)[0])
+                        variables.append(Q[row, col])
+                matrix = np.column_stack([*columns, -local, -coupled])
+                program.AddLinearEqualityConstraint(matrix, constant, np.concatenate([variables, z, y[block.coupled]]))
+    v = y.reshape(m, n + 2)
+    for c, d, delta in zip(v[:, :n], v[:, n], v[:, n + 1], strict=True):
+        program.AddLorentzConeConstraint(np.concatenate([[1.0], c]))
+        program.AddLorentzConeConstraint(np.concatenate([[d - delta], c]))
+    program.AddBoundingBoxConstraint(0, np.inf, v[:, n + 1])
+    if objective is Objective.SUM:
+        program.AddLinearCost(-np.ones(m), v[:, n + 1])
+    else:
+        program.AddMaximizeGeometricMeanCost(np.eye(m), np.full(m, EPSILON), v[:, n + 1])
+    result = ClarabelSolver().Solve(program)
+    assert result.is_success()
+    delta = result.GetSolution(v)[:, n + 1]
+    return delta.sum() if objective is Objective.SUM else np.log(delta + EPSILON).sum()
