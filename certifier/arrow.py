@@ -3,10 +3,10 @@
     minimise  f(y) + sum_r F*_r(constant_r + local_r z_p + coupled_r y) + sum_p b_p(z_p)    over y, z_1, z_2, ...
 
 for rationals r in groups p. F* is the barrier of the cone K_r that is conjugate to the barrier F of its dual cone (certifier.cone):
-F*(s) = max over x of -s'x - F(x), with gradient -x and Hessian H(x)^-1, where x is found by Newton's method from the last one; f is a weighted
-objective with a barrier of y, and b_p is a barrier of z_p. Newton's method in (y, z): in its system every z_p meets y alone, so a group is
-eliminated as soon as its rationals have been added up. A rational is formed, factored, added and forgotten; what is kept of it is its x and, as
-far as a fixed amount of memory goes, its factor. Every iterate is feasible.
+F*(s) = max over x of -s'x - F(x), with gradient -x and Hessian H(x)^-1, where x is found by Newton's method from the last one; f is a
+weighted objective with a barrier of y, b_p a barrier of z_p. Newton's method in (y, z): in its system every z_p meets y alone, so a group
+is eliminated as soon as its rationals have been added up. A rational is formed, factored, added and forgotten; what is kept of it is its x
+and, as far as a fixed amount of memory goes, its factor. Every iterate is feasible.
 Papp and Yildiz (2019) for the cones, Nesterov and Nemirovskii (1994) for the method.
 """
 
@@ -23,8 +23,9 @@ from certifier.cone import Cone, Factor, conjugate
 from certifier.model import Array
 
 CENTRED = 0.2
-"""A rational's x is good enough within this distance of the centre, in the norm of its Hessian; the Newton step from there is used as well."""
+"""A rational's x is good enough this close to the centre, in the norm of its Hessian; the Newton step from there is used as well."""
 MAX_CENTRING = 200
+"""Newton steps for one rational, after which it is taken to be outside its cone."""
 BOUNDARY = 0.9
 """Share of the way to the nearest boundary that a step may go."""
 MAX_ITERATIONS = 80

@@ -88,14 +88,16 @@ def solve(blocks: list[Block], max_iterations: int = 60, gap: float = np.inf) ->
         gap: a certificate is taken once the gap is below this multiple of its margin: inf for the first one, 1 for one near the middle.
     """
     method = _Method(blocks, gap)
-    for iteration in range(max_iterations):
+    status, iteration = None, 0
+    while status is None and iteration < max_iterations:
         try:
             status = method.iterate()
         except np.linalg.LinAlgError:
             status = Status.NUMERICAL
-        if status is not None:
-            return method.solution(status, iteration)
-    return method.solution(Status.ITERATION_LIMIT, max_iterations)
+        iteration += status is None
+    if status not in (Status.FEASIBLE, Status.INFEASIBLE) and method.settles():
+        status = Status.FEASIBLE
+    return method.solution(status or Status.ITERATION_LIMIT, iteration)
 
 
 class _Method:
@@ -128,6 +130,11 @@ class _Method:
     def _moments(self) -> Array:
         """sum_r B_r' x_r, (p,)."""
         return np.sum([np.einsum("rnp,rn->p", b.columns, x) for b, x in zip(self.blocks, self.x, strict=True)], axis=0)
+
+    def settles(self) -> bool:
+        """Whether the present point is a certificate, however wide the gap; if so, it is the solution."""
+        self.gap = np.inf
+        return self.y[-1] > 0 and self._settle(self.y, self.Q)
 
     def solution(self, status: Status, iterations: int) -> Solution:
         return Solution(status, self.y, self.lam, self.Q, self.x, iterations)

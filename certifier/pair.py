@@ -34,6 +34,9 @@ CONE_SAMPLES = 300
 FACES_AT_A_TIME = 4
 """A polytope with many faces is first replaced by its box; then this many faces are added at a time, as the dual asks for them."""
 
+MIDDLE = 1.0
+"""Gap of a certificate near the middle, relative to its margin."""
+
 
 @dataclass(frozen=True)
 class PairResult:
@@ -109,7 +112,9 @@ class Certification:
         while True:
             try:
                 blocks = build(sides, pair, frame)
-                solution = solve(blocks, max_iterations)
+                # Multipliers of P's own faces are what the polytope step holds fixed: they should come from the middle.
+                gap = MIDDLE if self._whole and sides is not self._first else np.inf
+                solution = solve(blocks, max_iterations, gap)
             except np.linalg.LinAlgError as error:
                 if sides.faces == self._every:
                     return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"numerical trouble: {error}")

@@ -9,10 +9,10 @@ faces (C, d), the margins delta, every plane z_p, and the multipliers of 1 and o
 
 {E u + s_E} the inscribed ellipsoid and t_p a share of the pair's present margin, so that (11) is strictly feasible on what comes out.
 |E c_j| <= 1 where the paper has |c_j| <= 1: margins are measured against the ellipsoid, whatever the units of the joints.
-A pair that holds on all of B constrains nothing and is left out, and a face that no pair needs is dropped, B standing in for it. Before that,
-(11) is tried against the faces of B for every proof that does not hold there, so that few pairs ask for few faces.
-The program is an arrow (certifier.arrow). The current polytope is feasible, so the ellipsoid cannot shrink; what comes out is a proposal that
-has to be certified by (11), but for the pairs whose proofs hold on B.
+A pair that holds on all of B constrains nothing and is left out, and a face that no pair needs is dropped, B standing in for it. Before
+that, (11) is tried against the faces of B for every proof that does not hold there, so that few pairs ask for few faces.
+The program is an arrow (certifier.arrow). The current polytope is feasible, so the ellipsoid cannot shrink; what comes out is a proposal
+that has to be certified by (11), but for the pairs whose proofs hold on B.
 """
 
 from __future__ import annotations

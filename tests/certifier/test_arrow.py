@@ -176,7 +176,7 @@ def test_memory_does_not_grow_with_the_groups(monkeypatch):
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_the_conjugate_barrier_has_the_gradient_that_it_states(seed):
-    cone, one, centre = box_cone(1, 2)
+    cone, _, centre = box_cone(1, 2)
     rng = np.random.default_rng(seed)
     Q = rng.normal(size=(1, cone.K, cone.L, cone.L))
     s = cone.values(Q @ np.swapaxes(Q, -1, -2) + 0.05 * np.eye(cone.L))

@@ -24,10 +24,7 @@ from certifier.growth import (
 )
 from certifier.model import WORLD
 from certifier.outcome import Outcome
-from certifier.pair import Certification as PairCertification
-from certifier.polytope import inscribed_ellipsoid
-from certifier.polytope_step import step
-from tests.certifier.scenes import box, cube, planar_arm
+from tests.certifier.scenes import box, planar_arm
 
 SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
 PROPOSAL = Proposed([[1.0, 0.0], [-1.0, 0.0], [0.0, 2.0], [0.0, -2.0]], [1.0, 1.0, 2.0, 2.0], [0.0, 0.0], {})
