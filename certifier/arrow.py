@@ -22,7 +22,7 @@ from scipy.linalg import cho_factor, cho_solve
 from certifier.cone import Cone, Factor, conjugate
 from certifier.model import Array
 
-CENTRED = 0.2
+CENTRED = 0.3
 """A rational's x is good enough this close to the centre, in the norm of its Hessian; the Newton step from there is used as well."""
 MAX_CENTRING = 200
 """Newton steps for one rational, after which it is taken to be outside its cone."""

@@ -43,7 +43,7 @@ PUSH = 0.5
 """Share of the way to the first boundary by which all faces are moved out first, to have delta > 0."""
 WEIGHT = 512.0
 """Of the objective against the barriers: large enough to come close to the optimum, small enough to stay off the boundary."""
-TOLERANCE = 0.002
+TOLERANCE = 0.005
 """Of the objective, per face."""
 
 Progress = Callable[[str], None]
