@@ -13,7 +13,7 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgram
 import certifier.arrow
 import certifier.polytope_step as polytope_step
 from certifier.basis import basis
-from certifier.certificates import Certificates, face_multipliers, points_of
+from certifier.certificates import Certificates, face_multipliers
 from certifier.errors import RegionError
 from certifier.face_terms import EPSILON, Objective
 from certifier.kinematics import Kinematics
@@ -37,9 +37,9 @@ SCENES = {
 
 def certified(scene, polytope, box=None):
     shared = Certification(scene, polytope, box=box)
-    proofs = {i: shared.certify(i).proof for i in range(len(scene.pairs))}
-    assert all(proofs.values())
-    return proofs
+    results = {i: shared.certify(i) for i in range(len(scene.pairs))}
+    assert all(result.outcome is Outcome.CERTIFIED for result in results.values())
+    return {i: result.proof for i, result in results.items()}
 
 
 def crosscut(scene, half):
@@ -114,8 +114,8 @@ def test_proofs_that_hold_on_the_trust_box_hold_on_the_moved_polytope():
     corner = np.concatenate([box.upper[:1], box.lower[1:]])
     assert Polytope(moved.C, moved.d).contains(corner)
     for data in moved.proofs.values():
-        proof = PairProof.from_bytes(data)
-        verify_pair(scene, proof)
+        proof = PairProof.from_bytes(data, scene)
+        verify_pair(proof)
         assert (proof.ground.C @ corner <= proof.ground.d).all()
 
 
@@ -161,14 +161,14 @@ def test_identities_are_the_polynomials_of_the_proofs(name):
     n, box = scene.n, Box(np.full(scene.n, 0.01), np.full(scene.n, 0.2))
     kinematics, rng = Kinematics(scene), np.random.default_rng(0)
     for data in certified(scene, region).values():
-        proof = PairProof.from_bytes(data)
+        proof = PairProof.from_bytes(data, scene)
         ((group,), ellipsoid, scale) = groups_of(scene, region, [proof], box)
         v = rng.normal(size=(len(scale), n + 2))
         blocks = iter(group.blocks)
         Y = face_multipliers(proof, Polytope(region.C, region.d), box)
         assert Y.any()
-        for body in points_of(scene, proof):
-            block, chain = next(blocks), list(body.side.chain)
+        for body, side, sign in zip(proof.volumes, proof.sides, (1.0, -1.0), strict=True):
+            block, chain = next(blocks), list(side.chain)
             constant, local, coupled = block.columns()
             values = constant + local @ group.start + coupled @ v.ravel()[block.coupled]
             u = np.zeros((len(basis(len(chain)).points), n))
@@ -178,16 +178,13 @@ def test_identities_are_the_polynomials_of_the_proofs(name):
             ab = np.column_stack([np.ones(len(u)), (s - proof.ground.mid) / proof.ground.half]) @ proof.plane.T
             g = v[:, n] - (s - ellipsoid.center) @ np.linalg.inv(ellipsoid.shape).T @ v[:, :n].T
             kappa = group.start[-1] if len(group.start) > 4 * (n + 1) else 0.0
-            lower = np.tril_indices(2 ** len(chain))
             own = ((s - proof.ground.mid) / proof.ground.half)[:, chain]
             rho = np.array([[np.prod(p[np.array(e, dtype=bool)]) for e in np.ndindex(*[2] * len(chain))] for p in own])
             assert len(block) == len(body.vertices)
-            for vertex, mantissa, exponent, found in zip(body.vertices, body.side.mantissa, body.side.exponent, values, strict=True):
-                expected = body.sign * np.einsum("ni,ni->n", ab, X @ np.append(vertex, 1.0))
-                expected -= (body.radius * kappa + polytope_step.MARGIN_SHARE * proof.t) * X[:, 3, 3]
-                for used, factor, power in zip(Y, mantissa[1:], exponent[1:], strict=True):
-                    L = np.zeros((2 ** len(chain), 2 ** len(chain)))
-                    L[lower] = np.ldexp(factor.astype(float), power)
+            for vertex, factors, found in zip(body.vertices, side.factors, values, strict=True):
+                expected = sign * np.einsum("ni,ni->n", ab, X @ np.append(vertex, 1.0))
+                expected -= ((body.radius + scene.padding) * kappa + polytope_step.MARGIN_SHARE * proof.t) * X[:, 3, 3]
+                for used, L in zip(Y, factors[1:], strict=True):
                     expected -= np.square(rho @ L).sum(axis=1) * (g @ (used / scale))
                 assert found[: len(u)] == pytest.approx(expected, abs=1e-9)
 
@@ -198,7 +195,7 @@ def test_faces_handed_on_lie_below_those_of_the_proof(reach):
     scene = SCENES["three joints"]
     n, small = scene.n, crosscut(SCENES["three joints"], 0.04)
     box = Box(np.zeros(n), np.full(n, reach))
-    proof = PairProof.from_bytes(certified(scene, crosscut(scene, 0.05))[0])
+    proof = PairProof.from_bytes(certified(scene, crosscut(scene, 0.05))[0], scene)
     proof = replace(proof, faces=tuple(range(len(proof.ground.d) + 2 * n)))
     Y = face_multipliers(proof, small, box)
     s = np.random.default_rng(0).uniform(-min(reach, 0.04), min(reach, 0.04), (2000, n))
@@ -255,7 +252,7 @@ def test_the_optimum_is_clarabels(objective, monkeypatch):
     """Both from the same identities, which another test checks; a barrier of degree nu and weight w ends within nu/w of the optimum."""
     scene, region = SCENES["revolute"], crosscut(SCENES["revolute"], 0.15)
     proofs = certified(scene, region, trust_box(scene, region, inscribed_ellipsoid(region)))
-    coupled = {i: data for i, data in proofs.items() if not PairProof.from_bytes(data).needs_box_alone}
+    coupled = {i: data for i, data in proofs.items() if not PairProof.from_bytes(data, scene).needs_box_alone}
     assert coupled
     original, terms, found = polytope_step.Method.minimise, polytope_step.face_barrier, {}
 
