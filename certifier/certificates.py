@@ -38,12 +38,6 @@ def holds_on(proof: PairProof, box: Box, faces: Iterable[int]) -> bool:
     return not _cut(*_face_rows(proof, faces), box).any()
 
 
-def contains(scene: Scene, proof: PairProof, box: Box) -> bool:
-    """Whether the proof's box contains another, within the joint limits and to the last bit."""
-    own = Box(proof.ground.mid, proof.ground.half)
-    return bool((np.minimum(box.upper, scene.s_upper) <= own.upper).all() and (np.maximum(box.lower, scene.s_lower) >= own.lower).all())
-
-
 def face_multipliers(proof: PairProof, faces: Polytope, box: Box) -> Array:
     """Weights Y, (f, m), that hand the multipliers of the proof's f faces on to the region's m faces; 0 where the trust box does.
 

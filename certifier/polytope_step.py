@@ -12,7 +12,7 @@ faces (C, d), the margins delta, every plane z_p, and the multipliers of 1 and o
 A pair that holds on all of B constrains nothing and is left out, and a face that no pair needs is dropped, B standing in for it. Before
 that, (11) is tried against the faces of B for every proof that does not hold there, so that few pairs ask for few faces.
 The program is an arrow (certifier.arrow). The current polytope is feasible, so the ellipsoid cannot shrink; what comes out is a proposal
-that has to be certified by (11), but for the pairs whose proofs hold on B.
+that has to be certified by (11).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from certifier.arrow import Method, Term
-from certifier.certificates import Certificates, contains, face_multipliers, holds_on
+from certifier.certificates import Certificates, face_multipliers, holds_on
 from certifier.errors import RegionError
 from certifier.face_terms import Objective, face_barrier, objective_term
 from certifier.model import Array, Polytope, Scene
@@ -58,7 +58,6 @@ class Step:
         base_C, base_d: the current polytope without the rows that no pair needs, within the trust box; what lies between the two is
             feasible in (12) as well.
         growth: relative growth of the inscribed ellipsoid's volume, from the polytope that was given.
-        proofs: pair index -> proof that holds on all of the trust box and so on the moved polytope.
     """
 
     C: Array
@@ -67,7 +66,6 @@ class Step:
     base_C: Array
     base_d: Array
     growth: float
-    proofs: dict[int, bytes]
     info: dict[str, Any]
 
 
@@ -112,7 +110,7 @@ def step(
     box = trust_box(scene, polytope, before, trust)
     kept = drop_redundant(polytope, fixed=2 * n)[: -2 * n]
     current = _within(box, polytope.C[kept], polytope.d[kept])
-    held, needed = _sort(scene, polytope, before.center, current, proofs, box, progress)
+    needed = _coupled(scene, polytope, before.center, current, proofs, box, progress)
     used = np.flatnonzero(sum(Y.sum(axis=0) for _, Y in needed) > 0) if needed else np.zeros(0, dtype=int)
     base = scene.polytope(*_rows(scene, box, current.C[used], current.d[used]))
     start = inscribed_ellipsoid(base)
@@ -142,15 +140,14 @@ def step(
     moved = scene.polytope(*_rows(scene, box, C, d))
     after = inscribed_ellipsoid(moved)
     info |= {"volume_before": before.volume, "volume_after": after.volume}
-    return Step(moved.C, moved.d, after.center, base.C, base.d, after.volume / before.volume - 1, held, info)
+    return Step(moved.C, moved.d, after.center, base.C, base.d, after.volume / before.volume - 1, info)
 
 
-def _sort(
+def _coupled(
     scene: Scene, polytope: Polytope, center: Array, current: Polytope, proofs: dict[int, bytes], box: Box, progress: Progress
-) -> tuple[dict[int, bytes], list[tuple[PairProof, Array]]]:
-    """The proofs that hold on all of the box, and the others with the faces they need; (11) is tried for these first."""
+) -> list[tuple[PairProof, Array]]:
+    """The proofs that do not hold on all of the box, with the faces they need; (11) is tried with those of the box first."""
     trusted: Certification | None = None
-    held: dict[int, bytes] = {}
     needed: dict[bytes, tuple[PairProof, Array]] = {}
     for count, (index, data) in enumerate(proofs.items()):
         proof = PairProof.from_bytes(data, scene)
@@ -163,14 +160,12 @@ def _sort(
             if result.outcome is Outcome.CERTIFIED and result.proof:
                 data = result.proof
                 proof = PairProof.from_bytes(data, scene)
-        if proof.needs_box_alone and contains(scene, proof, box):
-            held[index] = proof.on_its_box().to_bytes()
         # A proof may stand for many pairs.
         if data not in needed:
             Y = face_multipliers(proof, current, box)
             if Y.any():
                 needed[data] = proof, Y
-    return held, list(needed.values())
+    return list(needed.values())
 
 
 def _within(box: Box, C: Array, d: Array) -> Polytope:
