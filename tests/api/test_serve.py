@@ -14,7 +14,8 @@ ROOT = Path(__file__).parents[2]
 
 
 def serve(directory: Path, module: str = "api", **variables: str) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "CIRIS_HOST": "0.0.0.0", "CIRIS_DATA_DIR": str(directory), "PYTHONPATH": str(ROOT), **variables}
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")}
+    environment = {**clean, "CIRIS_HOST": "0.0.0.0", "CIRIS_DATA_DIR": str(directory), "PYTHONPATH": str(ROOT), **variables}
     command = [sys.executable, "-m", module]
     return subprocess.run(command, env=environment, cwd=directory, capture_output=True, text=True, timeout=60, check=False)
 
