@@ -6,6 +6,7 @@ from celery import Celery, Task
 from structlog.contextvars import bound_contextvars
 
 from workers.app import CONTROL, COORDINATE, WORK
+from workers.messages import Acknowledged
 
 
 def register(app: Celery, queue: str) -> None:
@@ -13,7 +14,7 @@ def register(app: Celery, queue: str) -> None:
     if queue == CONTROL:
         from workers.turns import coordinate
 
-        @app.task(name=COORDINATE)
+        @app.task(name=COORDINATE, Request=Acknowledged)
         def _coordinate(job_id: str) -> None:
             with bound_contextvars(job=job_id):
                 coordinate(job_id)
@@ -23,7 +24,7 @@ def register(app: Celery, queue: str) -> None:
     from workers.solver import work
     from workers.sweeper import release_lost
 
-    @app.task(name=WORK, bind=True)
+    @app.task(name=WORK, bind=True, Request=Acknowledged)
     def _work(self: Task) -> None:
         if self.request.delivery_info.get("redelivered"):
             release_lost(by_time=False)  # whoever had this message has died
