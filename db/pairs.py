@@ -1,4 +1,8 @@
-"""Iterations and their pairs: made together, claimed in batches, saved with their proofs, ended early by the first failure."""
+"""Iterations and their pairs: made together, claimed in batches, saved with their proofs, ended early by the first failure.
+
+The order in which an iteration's pairs were added is the order in which they are claimed, and the failure that counts is the first in
+that order, not the first in time: what a job comes to depends neither on how many workers there are nor on what befalls them.
+"""
 
 from __future__ import annotations
 
@@ -71,7 +75,7 @@ class Saved:
     """What saving changed.
 
     Attributes:
-        held: False when some of the pairs were not held any more; their results were dropped.
+        held: False when no pair of the claim is held any more; results of pairs that were not held were dropped.
         finished: True for the one saving after which the iteration has no open or running pair.
     """
 
@@ -159,7 +163,7 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
 def save(session: Session, claim: Claim, results: Sequence[Result]) -> Saved:
     """Saves results with their proofs, in one transaction, if they are still held.
 
-    A first failure skips the iteration's other pairs, where it was asked for; whoever holds one of them stops (leases.kept).
+    A failure skips the pairs after it, where the iteration ends early; whoever holds one of them stops (leases.kept).
     """
     job = jobs.lock(session, claim.job_id)
     where = (PairRow.job_id == claim.job_id, PairRow.iteration == claim.iteration, leases.held(PairRow, claim.token))
@@ -181,15 +185,17 @@ def save(session: Session, claim: Claim, results: Sequence[Result]) -> Saved:
     label, stop_at_first_failure = session.execute(
         select(IterationRow.label, IterationRow.stop_at_first_failure).where(*_iteration(job.id, claim.iteration))
     ).one()
-    if stop_at_first_failure and any(result.state != PairState.CERTIFIED for result in saved):
-        skip(session, claim.job_id)
+    failed = [held[result.index].id for result in saved if result.state != PairState.CERTIFIED]
+    if stop_at_first_failure and failed:
+        skip(session, claim.job_id, PairRow.id > min(failed))
     finished = _finish_iteration(session, job, claim.iteration, label)
-    return Saved(held=len(saved) == len(results), finished=finished)
+    still_held = session.scalar(select(PairRow.id).where(leases.held(PairRow, claim.token)).limit(1)) is not None
+    return Saved(still_held, finished)
 
 
-def skip(session: Session, job_id: str) -> None:
-    """Skips the job's unfinished pairs."""
-    transition(session, PairRow, PairState.SKIPPED, PairRow.job_id == job_id, PairRow.state.in_(UNFINISHED))
+def skip(session: Session, job_id: str, *which: ColumnElement[bool]) -> None:
+    """Skips the job's unfinished pairs, all or those that fit the conditions."""
+    transition(session, PairRow, PairState.SKIPPED, PairRow.job_id == job_id, PairRow.state.in_(UNFINISHED), *which)
 
 
 def _finish_iteration(session: Session, job: JobRow, index: int, label: str) -> bool:
@@ -207,6 +213,15 @@ def _finish_iteration(session: Session, job: JobRow, index: int, label: str) -> 
 def skip_iterations(session: Session, job_id: str) -> None:
     """Ends the job's running iterations as skipped; their pairs are seen to by :func:`skip`."""
     transition(session, IterationRow, IterationState.SKIPPED, IterationRow.job_id == job_id, finished_at=utcnow())
+
+
+def reached(session: Session, iteration: IterationRow) -> Sequence[PairRow]:
+    """The settled pairs of an iteration in their order; up to the first failure where that ended it, though others were settled too."""
+    rows = session.scalars(_pairs(iteration.job_id, iteration.index).where(PairRow.state != PairState.SKIPPED).order_by(PairRow.id)).all()
+    if iteration.stop_at_first_failure:
+        first = next((place for place, row in enumerate(rows, start=1) if row.state != PairState.CERTIFIED), None)
+        rows = rows[:first]
+    return rows
 
 
 def of_iteration(session: Session, job_id: str, iteration: int) -> Sequence[PairRow]:

@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from certifier.growth import Certification, Failed, GrowthOptions, Proposed, Report, Stepped, Transition, advance, begin
+from certifier.growth import Failed, GrowthOptions, Proposed, Report, Stepped, Transition, advance, begin
 from certifier.model import Scene
 from certifier.outcome import Outcome
-from db.states import JobKind, JobState, PairState, StepKind, StepState
-
-SETTLED = {state.value: Outcome(state.value) for state in PairState if state.value in set(Outcome)}
+from db.states import JobKind, JobState, StepKind, StepState
 
 
 def next_transition(scene: Scene, options: dict[str, Any], state: dict[str, Any] | None, report: Report | None) -> Transition:
@@ -25,11 +23,6 @@ def next_transition(scene: Scene, options: dict[str, Any], state: dict[str, Any]
     if report is None:
         raise ValueError("a job that has begun advances with a report")
     return advance(scene, state, report)
-
-
-def certification_report(iteration: int, states: dict[int, str], weak: dict[int, dict[str, Any]]) -> Certification:
-    """The report of a certification from its pairs' final states and where they fail; skipped pairs are left out."""
-    return Certification(iteration, {index: SETTLED[state] for index, state in states.items() if state in SETTLED}, weak)
 
 
 def step_report(kind: StepKind, state: StepState, report: dict[str, Any]) -> Report:

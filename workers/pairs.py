@@ -32,7 +32,7 @@ SAVE_SECONDS = 0.5
 
 
 def certify_pairs(claim: pairs.Claim) -> None:
-    """Certifies and saves the claimed pairs, until one of them turns out not to be held any more."""
+    """Certifies and saves the claimed pairs, for as long as any is held."""
     bound = bound_contextvars(job=claim.job_id, iteration=claim.iteration)
     with bound, leases.kept(database(), PairRow, claim.token, settings().lease_seconds, [JobState.RUNNING]):
         finished = _certify_and_save(claim)

@@ -16,7 +16,7 @@ from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
 from certifier.forecast import PairCost, forecast
-from certifier.growth import Certify, Finish, Propose, Report, Step, Transition, action_from_document, action_to_document
+from certifier.growth import Certification, Certify, Finish, Propose, Report, Step, Transition, action_from_document, action_to_document
 from certifier.outcome import Outcome
 from db import jobs, leases, pairs, steps, work
 from db.models import IterationRow, JobRow
@@ -26,7 +26,7 @@ from db.states import JOB, STEP, IterationState, JobState, StepKind, StepState, 
 from db.types import utcnow
 from workers import admission
 from workers.app import send_work
-from workers.coordinator import certification_report, ending, next_transition, step_report
+from workers.coordinator import ending, next_transition, step_report
 from workers.scenes import load_scene
 from workers.transaction import Afterwards, persistently, writing
 
@@ -112,9 +112,9 @@ def _report(session: Session, job: JobRow) -> Report | None:
         iteration = session.get_one(IterationRow, (job.id, action.iteration))
         if iteration.state == IterationState.RUNNING:
             return None
-        rows = pairs.of_iteration(session, job.id, action.iteration)
+        rows = pairs.reached(session, iteration)
         weak = {row.pair_index: row.weak_points for row in rows if row.weak_points is not None}
-        return certification_report(action.iteration, {row.pair_index: row.state for row in rows}, weak)
+        return Certification(action.iteration, {row.pair_index: Outcome(row.state) for row in rows}, weak)
     step = steps.of_turn(session, job, StepKind(action.kind))
     if step is None or step.state in unfinished(STEP):
         return None

@@ -75,8 +75,8 @@ def use(machine: dict[str, str], admin: str, reader: str, directory: Path) -> No
     assert added.status == 0, added.stderr
     assert run(machine, "scene", "add", PLANAR, CIRIS_API_KEY=reader).status == 2
     url = json.loads((directory / "data" / "stack.json").read_text())["url"]
-    seed = {"method": "box", "q": [0.0, 0.0]}
-    body: dict[str, Any] = {"kind": "grow", "scene": added.json["id"], "seed": seed, "options": {"max_rounds": 0, "bisection_steps": 0}}
+    box = {"C": [[1, 0], [-1, 0], [0, 1], [0, -1]], "d": [0.01] * 4}
+    body: dict[str, Any] = {"kind": "certify", "scene": added.json["id"], "polytope": box}
     hook = {"url": "http://127.0.0.1:9/nobody-listens", "secret": WEBHOOK_SECRET}
     with httpx2.Client(base_url=url, trust_env=False, headers={"Authorization": f"Bearer {admin}"}) as http:
         job = http.post("/v1/jobs", json=body | {"webhook": hook}).json()

@@ -36,6 +36,10 @@ def save(db: Database, held: pairs.Claim, results: list[pairs.Result]) -> pairs.
         return pairs.save(session, held, results)
 
 
+def refuted(index: int) -> pairs.Result:
+    return pairs.Result(index, PairState.REFUTED, seconds=0.1, stage="screen", witness_s=[0.5])
+
+
 def claim_and_certify(url: str, job_id: str, out: multiprocessing.Queue) -> None:  # type: ignore[type-arg]
     """Takes single pairs until none is left; runs in several processes at once."""
     db = Database(url)
@@ -80,23 +84,35 @@ def test_a_claim_is_refused_when_the_job_is_not_running(db: Database) -> None:
     assert claim(db, job_id) is None
 
 
-def test_the_first_failure_skips_the_rest(db: Database) -> None:
+def test_the_first_failure_in_the_order_of_the_pairs_counts_whenever_it_comes(db: Database) -> None:
     with db.write() as session:
-        job_id = a_running_job(session, 4).id
-    first, second = claim(db, job_id, batch_seconds=2.5), claim(db, job_id)
+        job_id = a_running_job(session, 5).id
+    first, second, third = claim(db, job_id, batch_seconds=2.5), claim(db, job_id), claim(db, job_id)
     assert first is not None
     assert second is not None
-    witness = pairs.Result(0, PairState.REFUTED, seconds=0.1, stage="screen", witness_s=[0.5])
-    assert save(db, first, [witness]) == pairs.Saved(held=True, finished=True)
+    assert third is not None
+    assert save(db, second, [refuted(2)]) == pairs.Saved(held=False, finished=False)
     with db.read() as session:
-        rows = pairs.of_job(session, job_id)
-        assert [row.state for row in rows] == ["refuted", "skipped", "skipped", "skipped"]
-        assert rows[0].witness_s == [0.5]
-        assert session.get_one(IterationRow, (job_id, 0)).state == IterationState.FAILED
+        assert [row.state for row in pairs.of_job(session, job_id)] == ["running", "running", "refuted", "skipped", "skipped"]
+    assert save(db, third, [certified(3)]) == pairs.Saved(held=False, finished=False)
+    assert save(db, first, [certified(0)]) == pairs.Saved(held=True, finished=False)
+    assert save(db, first, [refuted(1)]) == pairs.Saved(held=False, finished=True)
+    with db.read() as session:
+        rows, iteration = pairs.of_job(session, job_id), session.get_one(IterationRow, (job_id, 0))
+        assert [row.state for row in rows] == ["certified", "refuted", "refuted", "skipped", "skipped"]
+        assert [row.pair_index for row in pairs.reached(session, iteration)] == [0, 1]
+        assert rows[1].witness_s == [0.5]
+        assert iteration.state == IterationState.FAILED
         assert [e.kind for e in events.since(session, job_id)][-2:] == ["pairs", "iteration"]
-    assert save(db, second, [certified(2)]) == pairs.Saved(held=False, finished=False)
-    with db.read() as session:
-        assert session.scalars(select(ProofRow)).all() == []
+        assert len(session.scalars(select(ProofRow)).all()) == 1
+
+
+def test_a_failure_ends_the_batch_that_it_is_in(db: Database) -> None:
+    with db.write() as session:
+        job_id = a_running_job(session, 3).id
+    held = claim(db, job_id, batch_seconds=5)
+    assert held is not None
+    assert save(db, held, [refuted(0)]) == pairs.Saved(held=False, finished=True)
 
 
 def test_without_early_end_every_pair_gets_its_verdict(db: Database) -> None:
@@ -109,6 +125,7 @@ def test_without_early_end_every_pair_gets_its_verdict(db: Database) -> None:
     with db.read() as session:
         assert [row.state for row in pairs.of_job(session, job_id)] == ["not_certifiable", "certified"]
         assert set(pairs.proving(session, job_id, {0: 0, 1: 0})) == {1}
+        assert [row.pair_index for row in pairs.reached(session, session.get_one(IterationRow, (job_id, 0)))] == [0, 1]
 
 
 def test_a_lease_that_ran_out_is_released_and_its_result_is_then_refused(db: Database) -> None:

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from certifier.growth import Certification, Failed, Proposed
+from certifier.growth import Failed, Proposed
 from certifier.outcome import Outcome
 from db.states import JobState, StepKind, StepState
 from tests.scenes import slider
 from tests.workers.options import box_around
-from workers.coordinator import certification_report, ending, next_transition, step_report
-
-
-def test_skipped_pairs_are_not_reported() -> None:
-    states = {0: "certified", 1: "skipped", 2: "refuted", 3: "error"}
-    weak = {2: {"points": [[0.5]], "spread": [0.0]}}
-    expected = Certification(5, {0: Outcome.CERTIFIED, 2: Outcome.REFUTED, 3: Outcome.ERROR}, weak)
-    assert certification_report(5, states, weak) == expected
+from workers.coordinator import ending, next_transition, step_report
 
 
 def test_the_report_of_a_step_is_what_it_found_or_its_error() -> None:
