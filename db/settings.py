@@ -62,7 +62,7 @@ class Settings(BaseSettings):
     time_limit_seconds: float = Field(default=3600.0, gt=0)
     """Hard limit of one batch of pairs or one step; its process is then killed. A job with a pair that would need longer is refused."""
     child_memory_bytes: int = 16 << 30
-    """Limit of the address space of the process that runs a seeding, a polytope step or a check on request."""
+    """Limit of the address space of the process that runs a seeding or a check on request."""
     pair_memory_bytes: int = Field(default_factory=_memory_of_a_process)
     """A job with a pair that would need more memory is refused. Default: this machine's memory, divided by its cores."""
     max_jobs_per_key: int = Field(default=1000, ge=1)

@@ -87,7 +87,10 @@ def _do(claim: steps.Claim) -> Done:
 
 
 def _propose(scene: Scene, claim: steps.Claim) -> Done:
-    return Done(_in_child("propose_in_child", {"scene": scene.to_document(), "seed": claim.input["seed"]}))
+    """Seeds in a process of its own: Drake may abort the process, hang, or want too much memory, and that fails the step, nothing else."""
+    limits, payload = settings(), {"scene": scene.to_document(), "seed": claim.input["seed"]}
+    timeout, memory = limits.time_limit_seconds, limits.child_memory_bytes
+    return Done(run_in_child("workers.steps:propose_in_child", payload, timeout_s=timeout, memory_bytes=memory))
 
 
 def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:
@@ -97,29 +100,17 @@ def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:
 
 
 def _step(scene: Scene, claim: steps.Claim) -> Done:
-    return Done(_in_child("step_in_child", {"job_id": claim.job_id, "scene_id": claim.scene_id, **claim.input}))
-
-
-def step_in_child(payload: dict[str, Any]) -> dict[str, Any]:
-    """The polytope step on an accepted polytope, as its child process runs it: the action and ids in, the report out."""
-    job_id, iteration = payload["job_id"], payload["iteration"]
+    """The polytope step on an accepted polytope with its proofs."""
+    action = claim.input
 
     def read() -> dict[int, bytes]:
         with database().read() as session:
-            accepted = next(row.input for row in steps.accepted(session, job_id) if row.input["iteration"] == iteration)
-            return _proofs(session, job_id, accepted["proofs"])
+            rows = steps.accepted(session, claim.job_id)
+            accepted = next(row.input for row in rows if row.input["iteration"] == action["iteration"])
+            return _proofs(session, claim.job_id, accepted["proofs"])
 
-    held = persistently(read)
-    return asdict(stepped(polytope_step(load_scene(payload["scene_id"]), Polytope(np.array(payload["C"]), np.array(payload["d"])), held)))
-
-
-def _in_child(function: str, payload: dict[str, Any]) -> dict[str, Any]:
-    """A report computed by a process of its own: native code that dies, hangs or wants too much memory fails the step, nothing else."""
-    limits = settings()
-    report: dict[str, Any] = run_in_child(
-        f"workers.steps:{function}", payload, timeout_s=limits.time_limit_seconds, memory_bytes=limits.child_memory_bytes
-    )
-    return report
+    polytope = Polytope(np.array(action["C"]), np.array(action["d"]))
+    return Done(asdict(stepped(polytope_step(scene, polytope, persistently(read)))))
 
 
 def _accept(scene: Scene, claim: steps.Claim) -> Done:
