@@ -8,6 +8,7 @@ from certifier.basis import dimension
 from certifier.frames import choose_frame
 from certifier.kinematics import Kinematics
 from certifier.model import Scene
+from certifier.proof import Volume
 
 _SECONDS_PER_FLOP = 1.0e-10
 _SECONDS_PER_RATIONAL = 5e-4
@@ -48,8 +49,9 @@ def forecast(scene: Scene) -> list[PairCost]:
     kinematics = Kinematics(scene)
     costs = []
     for pair in scene.pairs:
-        frame = choose_frame(kinematics, pair)
-        vertices = [len(scene.geometry(name).vertices) for name in (pair.a, pair.b)]
+        volumes = (Volume.of(scene.geometry(pair.a)), Volume.of(scene.geometry(pair.b)))
+        frame = choose_frame(kinematics, volumes)
+        vertices = [len(volume.vertices) for volume in volumes]
         lengths = [len(frame.chain_a), len(frame.chain_b)]
         N = [dimension(k, scene.n) for k in lengths]
         flops = sum(
