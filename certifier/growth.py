@@ -87,6 +87,8 @@ class GrowthOptions:
             value = getattr(options, name)
             if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= upper:
                 raise RegionError("option_value", f"{name} must be an integer from 0 to {upper}", field=f"options.{name}")
+        if options.contraction == "uniform" and options.seed.get("contain"):
+            raise RegionError("option_value", "only targeted contraction keeps points inside", field="options.contraction")
         if not (isinstance(options.tolerance, (int, float)) and 0 < options.tolerance < 10):
             raise RegionError("option_value", "tolerance must be a number between 0 and 10", field="options.tolerance")
         return options
@@ -126,12 +128,17 @@ class Certify:
 
 @dataclass(frozen=True)
 class Step:
-    """Run the polytope step (12) on the last accepted polytope with its proofs; report Stepped or Failed."""
+    """Run the polytope step (12) on the last accepted polytope with its proofs; report Stepped or Failed.
+
+    Attributes:
+        contain: (k, n) points that stay inside.
+    """
 
     iteration: int
     C: list[list[float]]
     d: list[float]
     center: list[float]
+    contain: list[list[float]]
     kind: Literal["step"] = "step"
 
 
@@ -165,11 +172,12 @@ def action_from_document(document: dict[str, Any]) -> Action:
 
 @dataclass(frozen=True)
 class Proposed:
-    """A proposal: its faces without the joint limits, a point inside, and what the seeding has to say of itself."""
+    """A proposal: faces without the joint limits, the seed and what else the region has to contain, and what the seeding says of itself."""
 
     C: list[list[float]]
     d: list[float]
     center: list[float]
+    contain: list[list[float]]
     info: dict[str, Any]
 
 
@@ -330,8 +338,9 @@ def _proposed(scene: Scene, state: dict[str, Any], report: Proposed) -> Transiti
     rows = Polytope(limited.C / norms[:, None], limited.d / norms)
     state |= {"rows": {"C": rows.C.tolist(), "d": rows.d.tolist()}, "seed": report.center, "proposal": report.info}
     if state["options"]["contraction"] == "targeted":
-        return _trim(scene, state, "contract", rows)
+        return _trim(scene, {**state, "keep": [report.center, *report.contain]}, "contract", rows)
     center, radius = chebyshev_center(rows)
+    state["keep"] = [center.tolist()]
     uniform = {"center": center.tolist(), "radius": radius, "holds": {}, "steps": state["options"]["bisection_steps"]}
     return _shrink(scene, {**state, "uniform": uniform}, 1.0)
 
@@ -341,7 +350,7 @@ def _trim(scene: Scene, state: dict[str, Any], label: str, polytope: Polytope, t
     if label == "push" and inscribed_ellipsoid(polytope).volume < state["best"]["volume"] * (1 + state["options"]["tolerance"]):
         return _push_less(scene, state)
     trim = trim or {"holds": {}, "attempts": {}}
-    center = measure(polytope, np.array(state["seed"])).center
+    center = measure(polytope, np.array(state["keep"][0])).center
     holds = {int(index): iteration for index, iteration in trim["holds"].items()}
     return _certify(scene, {**state, "trim": trim}, label, polytope.C, polytope.d, center.tolist(), holds)
 
@@ -385,14 +394,14 @@ def _cut(scene: Scene, state: dict[str, Any], action: Certify, report: Certifica
     trim = state["trim"]
     attempts = dict(trim["attempts"])
     holds = trim["holds"] | {str(i): action.iteration for i, outcome in report.outcomes.items() if outcome is Outcome.CERTIFIED}
-    polytope, seed = Polytope(np.array(action.C), np.array(action.d)), np.array(state["seed"])
+    polytope, keep = Polytope(np.array(action.C), np.array(action.d)), np.array(state["keep"])
     found = []
     for index in failures:
         weak = report.weak.get(index, {"points": [], "spread": []})
         points, spread = np.array(weak["points"]).reshape(-1, scene.n), np.array(weak["spread"])
         found.append(Failure(_joints(scene, index), points, spread, attempts.get(str(index), 0)))
         attempts[str(index)] = attempts.get(str(index), 0) + 1
-    smaller = contract(scene, polytope, measure(polytope, seed), seed[None], found)
+    smaller = contract(scene, polytope, measure(polytope, keep[0]), keep, found)
     if smaller is None or max(attempts.values()) > MAX_ATTEMPTS:
         return _no_smaller(scene, state, failures, list(report.outcomes.values()))
     return _trim(scene, state, action.label, smaller, {"holds": holds, "attempts": attempts})
@@ -453,7 +462,8 @@ def _step(state: dict[str, Any]) -> Transition:
     if rounds >= state["options"]["max_rounds"]:
         return Transition(state, Finish(Outcome.CERTIFIED, "certified; the limit of rounds was reached" if rounds else "certified"))
     best = state["best"]
-    return Transition({**state, "phase": "step", "rounds": rounds + 1}, Step(best["iteration"], best["C"], best["d"], best["center"]))
+    action = Step(best["iteration"], best["C"], best["d"], best["center"], state["keep"])
+    return Transition({**state, "phase": "step", "rounds": rounds + 1}, action)
 
 
 def _alternate(scene: Scene, state: dict[str, Any], accepted: bool) -> Transition:

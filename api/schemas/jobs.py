@@ -35,6 +35,7 @@ class Seed(Request):
 
     method: Method = Method.IRIS_NP2
     q: Vector | None = Field(None, description="Joint positions, radians or metres, in position order; for every method but `polytope`.")
+    contain: Rows | None = Field(None, description="More joint positions that the region has to contain, as where it meets another one.")
     C: Rows | None = Field(None, description="Faces of the first polytope, in s; for the method `polytope`.")
     d: Offsets | None = None
     center: Vector | None = Field(None, description="A point inside that polytope, in s.")

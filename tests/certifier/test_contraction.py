@@ -18,7 +18,7 @@ from certifier.polytope import inscribed_ellipsoid
 from tests.certifier.scenes import box, cube, planar_arm
 
 SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
-PROPOSAL = Proposed([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [1.0] * 4, [0.0, 0.0], {})
+PROPOSAL = Proposed([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [1.0] * 4, [0.0, 0.0], [], {})
 OPTIONS = GrowthOptions(seed={}, pushes=0, max_rounds=0)
 
 
