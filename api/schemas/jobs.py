@@ -22,6 +22,9 @@ class GrowOptions(Request):
     contraction: Annotated[
         Literal["targeted", "uniform"], Field(description="Faces where pairs fail, or every face moved in by as much.")
     ] = "targeted"
+    contractions: Annotated[
+        int, Field(ge=1, le=3, description="Targeted contractions, each cutting in another way; the largest region counts.")
+    ] = 2
     bisection_steps: Annotated[int, Field(ge=0, le=60, description="Certifications spent on uniform contraction after its two ends.")] = 6
     pushes: Annotated[int, Field(ge=0, le=1000, description="How often the faces are pushed out after the contraction.")] = 3
     max_rounds: Annotated[int, Field(ge=0, le=1000, description="Rounds of the polytope step; 0 ends after contraction.")] = 3

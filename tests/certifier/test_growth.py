@@ -146,6 +146,7 @@ def test_a_given_polytope_is_certified_once_with_every_pair():
         ({"kind": "shrink"}, "options.kind"),
         ({"contraction": "hope"}, "options.contraction"),
         ({"pushes": -1}, "options.pushes"),
+        ({"contractions": 0}, "options.contractions"),
         ({"bisection_steps": -1}, "options.bisection_steps"),
         ({"max_rounds": True}, "options.max_rounds"),
         ({"tolerance": 0}, "options.tolerance"),
