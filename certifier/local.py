@@ -131,13 +131,17 @@ def certify(scene: Scene, C: Array, d: Array, center: Array | None = None, progr
     assert isinstance(action, Certify)
     run = _Run(scene, options.random_seed, progress)
     run.certify(action)
-    results = run.results[action.iteration]
+    return document(scene, run.results[action.iteration], Guarantee.EXACT, time.perf_counter() - start)
+
+
+def document(scene: Scene, results: dict[int, PairResult], guarantee: Guarantee, seconds: float) -> dict[str, Any]:
+    """The results of all pairs with stable keys; ``guarantee`` is what it is worth that every pair is certified."""
     outcome = combine([result.outcome for result in results.values()])
     return {
         "scene": {"name": scene.name, "hash": scene.hash},
         "outcome": outcome.value,
-        "guarantee": (Guarantee.EXACT if outcome is Outcome.CERTIFIED else Guarantee.NONE).value,
-        "seconds": time.perf_counter() - start,
+        "guarantee": (guarantee if outcome is Outcome.CERTIFIED else Guarantee.NONE).value,
+        "seconds": seconds,
         "pairs": [pair_document(scene, index, results[index]) for index in sorted(results)],
     }
 

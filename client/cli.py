@@ -109,6 +109,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     certify.add_argument("--watch", action="store_true", help="a line for every pair as it is settled")
     certify.add_argument("--local", action="store_true", help="in this process, without a service")
+    certify.add_argument("--backend", choices=["ciris", "drake"], default="ciris", help="drake: Drake's own program, a cross-check")
+    certify.add_argument("--solver", metavar="NAME", help="Drake's solver: clarabel (default), scs, csdp or mosek")
     certify.set_defaults(run=commands.certify)
 
     verify = verbs.add_parser("verify", parents=[json], help="check a proof file offline; says what was proved")
