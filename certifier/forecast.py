@@ -1,18 +1,23 @@
-"""What certifying each pair will cost, before it is done: dimensions, memory and a time that orders and batches the work."""
+"""What certifying each pair will cost, before it is done: dimensions, memory and a time that orders and batches the work.
+
+The time is a sum of what grows with the pair's size: :func:`terms`, each with its seconds in ``SECONDS``. They were fitted, nonnegative and
+by relative error, to the mean processor time, verification included, of every size class (n, k_A, k_B, vertices of A and of B) among
+the certified pairs of the catalogue's scenes: ``python -m benchmarks.calibrate`` measures and fits again. Pairs that are refuted take less.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from certifier.basis import dimension
 from certifier.frames import choose_frame
 from certifier.kinematics import Kinematics
-from certifier.model import Scene
+from certifier.model import Array, Scene
 
-_SECONDS_PER_FLOP = 1.0e-10
-_SECONDS_PER_RATIONAL = 5e-4
-_ITERATIONS = 9
-_FACES = 14
+SECONDS = np.array([1.6e-2, 1.1e-4, 5.2e-5, 2.4e-5, 5.4e-11])
+"""Of the terms, on one thread of a 2.5 GHz core (docs/benchmarks.md)."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +57,18 @@ def forecast(scene: Scene) -> list[PairCost]:
         vertices = [len(scene.geometry(name).vertices) for name in (pair.a, pair.b)]
         lengths = [len(frame.chain_a), len(frame.chain_b)]
         N = [dimension(k, scene.n) for k in lengths]
-        flops = sum(
-            v * (n**3 / 3 + 2 * n**2 * (4 * scene.n + 5) + 4 * _FACES * dimension(k, k) ** 2 * 2**k)
-            for v, n, k in zip(vertices, N, lengths, strict=True)
-        )
         memory = sum(8 * v * n * (n + 2 * (4 * scene.n + 5)) for v, n in zip(vertices, N, strict=True))
-        seconds = _ITERATIONS * (flops * _SECONDS_PER_FLOP + sum(vertices) * _SECONDS_PER_RATIONAL)
+        seconds = float(terms(scene.n, vertices, N) @ SECONDS)
         gram_a, gram_b = (2**k for k in lengths)
         costs.append(
             PairCost(pair.a, pair.b, frame.body, frame.chain_a, frame.chain_b, gram_a, gram_b, N[0], N[1], sum(vertices), seconds, memory)
         )
     return costs
+
+
+def terms(n: int, vertices: list[int], N: list[int]) -> Array:
+    """What the time of a pair is a sum of, (5,): the pair; its rationals; the corners of P's box, at which the verifier bounds the normal;
+    the coefficients of the rationals; their factorisations.
+    """
+    rationals = np.array(vertices) @ np.power.outer(np.array(N, dtype=float), [0, 1, 3])
+    return np.array([1.0, rationals[0], 2.0**n, rationals[1], rationals[2]])

@@ -82,6 +82,7 @@ class ReferenceResult:
         status: the solver's name, how Drake says that it ended, and its own word for it.
         frame: the body whose frame Drake expressed the plane in.
         build_seconds, solve_seconds: processor time of making and of solving the program.
+        stopped: whether the time limit ended the solution.
     """
 
     outcome: Outcome
@@ -89,6 +90,7 @@ class ReferenceResult:
     frame: str
     build_seconds: float
     solve_seconds: float
+    stopped: bool
 
 
 class Reference:
@@ -111,7 +113,7 @@ class Reference:
             wrong = "is not available or not licensed" if solver in list(Solver) else "is unknown"
             raise CirisError("solver_unavailable", f"{solver} {wrong}", field="solver", hint=f"available: {', '.join(available())}")
         self.scene, self._solver, self._answers = scene, solver, _SOLVERS[Solver(solver)]
-        self._options = SolverOptions()
+        self._options, self._time_limit = SolverOptions(), time_limit
         if time_limit is not None:
             if self._answers.time_limit is None:
                 raise CirisError("solver_option", f"{solver} knows no time limit", field="solver")
@@ -132,13 +134,14 @@ class Reference:
         first, second = sorted((self._ids[pair.a], self._ids[pair.b]), key=lambda i: i.get_value())
         start = time.process_time()
         program = self._polytopes.MakeIsGeometrySeparableProgram((first, second), np.asfortranarray(C[:, self._order]), d)
-        built = time.process_time()
+        built, begun = time.process_time(), time.monotonic()
         result = self._answers.make().Solve(program.prog(), None, self._options)
-        solved = time.process_time()
+        solved, ended = time.process_time(), time.monotonic()
         plane = self._polytopes.separating_planes()[program.plane_index]
         frame = self._diagram.plant().get_body(plane.expressed_body).name()
         outcome, status = self._outcome(result)
-        return ReferenceResult(outcome, status, frame, built - start, solved - built)
+        stopped = outcome is Outcome.INCONCLUSIVE and self._time_limit is not None and ended - begun >= self._time_limit
+        return ReferenceResult(outcome, status, frame, built - start, solved - built, stopped)
 
     def _outcome(self, result: MathematicalProgramResult) -> tuple[Outcome, str]:
         """The outcome and the words for it. Drake takes "almost solved" for success, so the solver's own word counts as well."""

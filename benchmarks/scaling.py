@@ -1,0 +1,113 @@
+"""How the cost of a certification grows with the number of obstacles, of joints and of faces: data, and a picture of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from benchmarks import catalogue, machine, measure
+from benchmarks.arms import box, serial_arm
+from benchmarks.catalogue import Region, cube, tangent
+from benchmarks.measure import Progress
+from benchmarks.svg import Panel, draw
+from certifier.closest import closest
+from certifier.kinematics import Kinematics
+from certifier.model import WORLD, Array, Geometry, Scene
+
+OBSTACLES = (10, 30, 100, 300, 1000)
+JOINTS = range(2, 8)
+FACES = range(10, 61, 10)
+HALF_WIDTH = 0.03
+"""Of the cubes, and the radius of the ball."""
+ROOM, CLEARANCE = 3.0, 0.2
+"""Obstacles lie within this many metres of the base, and at least that far from the arm."""
+
+
+def curves(progress: Progress, obstacles: tuple[int, ...] = OBSTACLES) -> dict[str, Any]:
+    """Measure all three curves; the document of ``ciris bench scaling``.
+
+    obstacles: boxes scattered around an arm of three joints, all pairs. joints: the last link of an arm against one box. The polytope of both is
+    a cube about the arm bent a little. faces: link 5 of iiwa_shelf against a board, on a regular simplex with more and more planes cutting its
+    corners off; all planes touch one ball, so none is redundant.
+    """
+    _obstacles(1)  # loads the compiled kernels
+    return {
+        "benchmark": "scaling",
+        "machine": machine.describe(),
+        "obstacles": [_told(_obstacles(count), progress) for count in obstacles],
+        "joints": [_told(_joints(n), progress) for n in JOINTS],
+        "faces": [_told(_faces(count), progress) for count in FACES],
+    }
+
+
+def picture(document: dict[str, Any]) -> str:
+    """The three curves as SVG."""
+    panels = []
+    for name, title in (("obstacles", "obstacles around 3 joints"), ("joints", "joints, last link"), ("faces", "faces, link 5 of 7")):
+        points = document[name]
+        series = {
+            kind: [(point["n"], point[f"{kind}_seconds"]) for point in points if point[f"{kind}_seconds"] > 0] for kind in ("solve", "verify")
+        }
+        panels.append(Panel(title, series))
+    return draw(panels, "seconds")
+
+
+def _obstacles(count: int) -> dict[str, Any]:
+    s = np.full(3, 0.2)
+    scene = serial_arm(3, list(_scattered(np.random.default_rng(count), count, s)))
+    return _point(count, scene, Region(*cube(s, HALF_WIDTH), s), range(len(scene.pairs)))
+
+
+def _joints(n: int) -> dict[str, Any]:
+    s = np.full(n, 0.2)
+    tip = _bodies(serial_arm(n, []), s)[-1].max(axis=0)
+    scene = serial_arm(n, [box("world/box", WORLD, np.full(3, 0.2), tip + CLEARANCE + 0.1)])
+    return _point(n, scene, Region(*cube(s, HALF_WIDTH), s), [n - 1])
+
+
+def _faces(count: int) -> dict[str, Any]:
+    instance = catalogue.instances()["iiwa_shelf/link_5-upper/simplex"]
+    center, n = instance.region.center, instance.scene.n
+    corners = np.concatenate([np.eye(n), np.full((1, n), (1 - np.sqrt(n + 1)) / n)])
+    C = corners - corners.mean(axis=0)
+    C /= np.linalg.norm(C, axis=1, keepdims=True)
+    cut, _ = tangent(np.random.default_rng(0), center, count - len(C), HALF_WIDTH)
+    C = np.concatenate([C, cut])
+    return _point(count, instance.scene, Region(C, C @ center + HALF_WIDTH, center), [0])
+
+
+def _scattered(rng: np.random.Generator, count: int, s: Array) -> Iterator[Geometry]:
+    """Boxes with edges of 5 to 20 cm, none near the arm of three joints at s."""
+    links, made = _bodies(serial_arm(3, []), s), 0
+    while made < count:
+        obstacle = box(f"world/box{made}", WORLD, rng.uniform(0.05, 0.2, 3), rng.uniform(-ROOM, ROOM, 3))
+        if all(closest(link, obstacle.vertices).gap > CLEARANCE for link in links):
+            made += 1
+            yield obstacle
+
+
+def _bodies(scene: Scene, s: Array) -> list[Array]:
+    """The vertices of every body in the world when the arm is at s."""
+    kinematics = Kinematics(scene)
+    return [kinematics.points(WORLD, body.body, body.vertices, s[None])[0] for body in scene.geometries]
+
+
+def _point(n: int, scene: Scene, region: Region, indices: range | list[int]) -> dict[str, Any]:
+    run = measure.ours(scene, region, list(indices), lambda _: None)
+    pairs = run.pairs.values()
+    return {
+        "n": n,
+        "pairs": len(pairs),
+        "outcomes": dict(Counter(pair.result.outcome.value for pair in pairs)),
+        "setup_seconds": run.setup_seconds,
+        "solve_seconds": sum(pair.solve_seconds for pair in pairs),
+        "verify_seconds": sum(pair.verify_seconds for pair in pairs),
+    }
+
+
+def _told(point: dict[str, Any], progress: Progress) -> dict[str, Any]:
+    progress(f"n = {point['n']}: {point['pairs']} pairs, {point['outcomes']}, {point['solve_seconds'] + point['verify_seconds']:.3f} s")
+    return point
