@@ -25,6 +25,7 @@ _STATUS_OF_CODE = {
     "job_not_retryable": HTTPStatus.CONFLICT,
     "too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
     "bundle_too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+    **dict.fromkeys(("child_timeout", "child_memory", "child_died"), HTTPStatus.SERVICE_UNAVAILABLE),
     "cross_site": HTTPStatus.FORBIDDEN,
     "unknown_host": HTTPStatus.MISDIRECTED_REQUEST,
 }

@@ -1,6 +1,6 @@
 """The agreement campaign: our verdicts against Drake's, on pairs that are feasible and on their infeasible twins.
 
-Drake chooses the frame of a pair its own way. Where ours is another one of the same cost, naming the two bodies the other way round makes ours
+Drake chooses the frame of a pair its own way. Where ours is another one of equal cost, naming the two bodies the other way round makes ours
 Drake's, and the two programs the same; what remains is said in the verdict. Every answer of ours is checked by other hands: a proof by
 the exact verifier, from its bytes; a collision by Drake's distance query.
 """
@@ -19,6 +19,7 @@ from benchmarks.arms import random_arm, random_faces
 from benchmarks.catalogue import Region
 from benchmarks.measure import Progress
 from benchmarks.verdicts import Verdict, verdict
+from certifier.disproof import DualProof
 from certifier.drake_model import build_diagram, geometry_name
 from certifier.frames import choose_frame
 from certifier.kinematics import Kinematics
@@ -27,6 +28,7 @@ from certifier.outcome import Outcome
 from certifier.pair import PairResult, certify_pair
 from certifier.proof import PairProof
 from certifier.reference import Reference
+from certifier.verify.dual import verify_dual
 from certifier.verify.pair import verify_pair
 
 BOXES, ROUND = 45, 25
@@ -136,9 +138,12 @@ def _evidence(scene: Scene, result: PairResult) -> str:
         ProofError: the proof does not hold.
         AssertionError: Drake sees no collision at the configuration that refutes the pair.
     """
-    if result.proof is not None:
-        verify_pair(scene, PairProof.from_bytes(result.proof))
+    if result.outcome is Outcome.CERTIFIED and result.proof:
+        verify_pair(PairProof.from_bytes(result.proof, scene))
         return "proof verified exactly"
+    if result.outcome is Outcome.NOT_CERTIFIABLE and result.proof:
+        verify_dual(DualProof.from_bytes(result.proof, scene))
+        return "dual proof verified"
     if result.witness_s is not None:
         distance = _distance(scene, scene.to_q(result.witness_s))
         assert distance <= 1e-6, f"Drake finds the bodies {distance} m apart where they are said to touch"

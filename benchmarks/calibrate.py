@@ -1,4 +1,4 @@
-"""Measures how long pairs of every size class take and fits the constants of certifier.forecast to it; ``python -m benchmarks.calibrate``."""
+"""Measures how long pairs of every size class take and fits certifier.forecast to it; ``python -m benchmarks.calibrate``."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def main() -> None:
 
 def _report(name: str, ratio: Array) -> None:
     least, low, median, high, most = np.quantile(ratio, [0, 0.1, 0.5, 0.9, 1])
-    print(f"{name}: forecast/measured of {len(ratio)} size classes: median {median:.2f}, 80 % within {low:.2f} .. {high:.2f}, all {least:.2f} .. {most:.2f}")
+    print(f"{name}: median {median:.2f}, 80 % within {low:.2f} .. {high:.2f}, all {least:.2f} .. {most:.2f}")
 
 
 if __name__ == "__main__":

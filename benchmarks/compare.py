@@ -19,7 +19,6 @@ from certifier.frames import choose_frame
 from certifier.kinematics import Kinematics
 from certifier.model import Scene
 from certifier.outcome import Outcome
-from certifier.proof import PairProof
 from certifier.reference import ReferenceResult
 
 
@@ -118,7 +117,9 @@ def _task(task: Task, reference: Reference | None, repeat: int, progress: Progre
         "digest": task.digest,
         "faces": len(task.region.d),
         "setup": {"ciris": ours.setup_seconds, "drake": theirs.setup_seconds if theirs else None},
-        "pairs": [_row(task.scene, kinematics, index, ours.pairs[index], theirs.pairs[index] if theirs else None) for index in task.indices],
+        "pairs": [
+            _row(task.scene, kinematics, index, ours.pairs[index], theirs.pairs[index] if theirs else None) for index in task.indices
+        ],
     }
 
 
@@ -146,8 +147,7 @@ def _row(scene: Scene, kinematics: Kinematics, index: int, ours: Ours, theirs: R
     }
     if theirs is None:
         return row
-    used = PairProof.from_bytes(result.proof).frame if result.proof else frame.body
-    same_program = used == theirs.frame and not any(geometry.radius for geometry in geometries)
+    same_program = frame.body == theirs.frame and not any(geometry.radius for geometry in geometries)
     return row | {
         "drake": {**vars(theirs), "outcome": theirs.outcome.value},
         "verdict": verdict(result.outcome, theirs.outcome, same_program).value,

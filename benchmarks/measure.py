@@ -11,6 +11,7 @@ from typing import Generic, TypeVar
 
 from benchmarks.catalogue import Region
 from certifier.model import Scene
+from certifier.outcome import Outcome
 from certifier.pair import Certification, PairResult
 from certifier.proof import PairProof
 from certifier.reference import Reference, ReferenceResult
@@ -59,7 +60,11 @@ def ours(scene: Scene, region: Region, indices: list[int], progress: Progress) -
         results[index] = result, time.process_time() - last
         progress(_line("ciris", scene, index, len(results), len(indices), result.outcome, results[index][1]))
         last = time.process_time()
-    verification = dict(_verify(scene, {index: result.proof for index, (result, _) in results.items() if result.proof is not None}))
+    verification = dict(
+        _verify(
+            scene, {index: result.proof for index, (result, _) in results.items() if result.outcome is Outcome.CERTIFIED and result.proof}
+        )
+    )
     return Run(setup, {index: Ours(result, seconds, verification.get(index, 0.0)) for index, (result, seconds) in results.items()})
 
 
@@ -76,7 +81,7 @@ def _verify(scene: Scene, proofs: dict[int, bytes]) -> Iterator[tuple[int, float
         if data in done:
             continue
         done.add(data)
-        proof = PairProof.from_bytes(data)
+        proof = PairProof.from_bytes(data, scene)
         ground = b"".join(array.tobytes() for array in vars(proof.ground).values())
         if ground not in checks:
             checks[ground] = PairCheck(scene, proof.ground)

@@ -29,8 +29,8 @@ ROOM, CLEARANCE = 3.0, 0.2
 def curves(progress: Progress, obstacles: tuple[int, ...] = OBSTACLES) -> dict[str, Any]:
     """Measure all three curves; the document of ``ciris bench scaling``.
 
-    obstacles: boxes scattered around an arm of three joints, all pairs. joints: the last link of an arm against one box. The polytope of both is
-    a cube about the arm bent a little. faces: link 5 of iiwa_shelf against a board, on a regular simplex with more and more planes cutting its
+    obstacles: boxes scattered around an arm of three joints, all pairs. joints: the last link of an arm against one box, both on
+    a cube. faces: link 5 of iiwa_shelf against a board, on a regular simplex with more and more planes cutting its
     corners off; all planes touch one ball, so none is redundant.
     """
     _obstacles(1)  # loads the compiled kernels
@@ -49,7 +49,8 @@ def picture(document: dict[str, Any]) -> str:
     for name, title in (("obstacles", "obstacles around 3 joints"), ("joints", "joints, last link"), ("faces", "faces, link 5 of 7")):
         points = document[name]
         series = {
-            kind: [(point["n"], point[f"{kind}_seconds"]) for point in points if point[f"{kind}_seconds"] > 0] for kind in ("solve", "verify")
+            kind: [(point["n"], point[f"{kind}_seconds"]) for point in points if point[f"{kind}_seconds"] > 0]
+            for kind in ("solve", "verify")
         }
         panels.append(Panel(title, series))
     return draw(panels, "seconds")

@@ -28,11 +28,10 @@ class Panel:
 def draw(panels: list[Panel], unit: str) -> str:
     """The panels side by side, the colours named in the first; ``unit`` is what all ordinates are in."""
     body = "\n".join(line for i, panel in enumerate(panels) for line in _panel(panel, i * WIDTH, unit, named=i == 0))
+    white = '<rect width="100%" height="100%" fill="#fff"/>'
     size = f'width="{len(panels) * WIDTH}" height="{HEIGHT}" viewBox="0 0 {len(panels) * WIDTH} {HEIGHT}"'
     style = "text { font: 11px sans-serif; fill: #333 } .grid { stroke: #ddd } .frame { stroke: #888; fill: none }"
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" {size}>\n<style>{style}</style>\n<rect width="100%" height="100%" fill="#fff"/>\n{body}\n</svg>\n'
-    )
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>\n<style>{style}</style>\n{white}\n{body}\n</svg>\n'
 
 
 def _panel(panel: Panel, x0: float, unit: str, named: bool) -> Iterator[str]:

@@ -15,7 +15,7 @@ class Verdict(StrEnum):
     UNDECIDED = "undecided"
     """One side, or both, could not tell."""
     PROGRAMS_DIFFER = "programs differ"
-    """One side found a plane, the other shows that there is none in another frame or with another relaxation of balls: both may be right."""
+    """One side found a plane, the other shows that there is none in another frame or with another relaxation of balls."""
     CONTRADICTION = "contradiction"
     """One side certified what the other refutes, or what it proves infeasible as the very same program: one of them is wrong."""
 

@@ -18,7 +18,7 @@ class Closest:
     """Nearest points p_a, p_b (3,) of conv(A) and conv(B), their distance, and the gap that the direction between them proves.
 
     ``gap`` = min over A of n'v - max over B of n'v for the unit n from p_b to p_a: a lower bound of the distance whatever
-    the accuracy of the points, negative when n separates nothing.
+    the accuracy of the points, negative when n separates nothing. ``weights`` are the convex weights of either's vertices, not normalised.
     """
 
     p_a: Array
@@ -26,6 +26,7 @@ class Closest:
     distance: float
     normal: Array
     gap: float
+    weights: tuple[Array, Array]
 
 
 def closest(A: Array, B: Array) -> Closest:
@@ -41,4 +42,4 @@ def closest(A: Array, B: Array) -> Closest:
     p_a, p_b = wa @ A / wa.sum(), wb @ B / wb.sum()
     distance = float(np.linalg.norm(p_a - p_b))
     normal = (p_a - p_b) / distance if distance > 0 else np.zeros(3)
-    return Closest(p_a, p_b, distance, normal, float((A @ normal).min() - (B @ normal).max()))
+    return Closest(p_a, p_b, distance, normal, float((A @ normal).min() - (B @ normal).max()), (wa, wb))

@@ -19,6 +19,9 @@ from certifier.basis import Basis
 from certifier.kernels import cholesky_inverse, schur
 from certifier.model import Array
 
+MAX_NEWTON = 12
+NEWTON_TOLERANCE = 1e-3
+
 
 class Cone:
     """The cone of one side.
@@ -125,35 +128,42 @@ def symmetrise(X: Array) -> Array:
 
 
 class Centre:
-    """The point x of the dual cone with -grad F(x) = w, for an interior w of the cone: Newton's method with exact line search.
+    """An interior point x of the dual cone whose polynomial w = -grad F(x) resembles ``unit``: some of Newton's method towards it.
+
+    Any interior point would do; the nearer w is to the unit in which the margin is wanted, the better the margin. On wide polytopes the
+    way is long, and the rest of it not worth the time.
+
+    Args:
+        unit: (N,) an interior polynomial of the cone; start: (N,) an interior point of the dual cone.
 
     Attributes:
-        x: (N,).
-        Q: (K, L, L) = Lambda(x)^-1, so that values(Q) = w to rounding.
-        factor: Cholesky factor of the Hessian at x.
+        x: (N,) the point; w: (N,) = values(Q).
+        Q: (K, L, L) = Lambda(x)^-1.
+        factor: Cholesky factor of the Hessian H at x.
+        unit_Q: (K, L, L) with values(unit_Q) = unit, the smallest in the metric of x.
 
     Raises:
-        np.linalg.LinAlgError: Newton's method did not converge; w is not interior or the cone is degenerate.
+        np.linalg.LinAlgError: the cone is numerically degenerate.
     """
 
-    def __init__(self, cone: Cone, w: Array, start: Array, max_iterations: int = 50) -> None:
-        x = start * (cone.degree / (w @ start))
-        for _ in range(max_iterations):
+    def __init__(self, cone: Cone, unit: Array, start: Array) -> None:
+        x = start * (cone.degree / (unit @ start))
+        for iteration in range(MAX_NEWTON + 1):
             inverse_chol = inverse_cholesky(cone.adjoint(x[None]))
             Q = np.swapaxes(inverse_chol, -1, -2) @ inverse_chol
-            residual = cone.values(Q)[0] - w
+            w = cone.values(Q)[0]
             factor = Factor(cone.schur(Q, Q))
-            step = factor.solve(residual[None, :, None])[0, :, 0]
-            decrement = float(np.sqrt(max(residual @ step, 0.0)))
-            if decrement < 1e-6:
-                self.x, self.Q, self.factor = x, Q[0], factor
-                return
+            step = factor.solve((w - unit)[None, :, None])[0, :, 0]
+            decrement = float(np.sqrt(max((w - unit) @ step, 0.0)))
+            if decrement < NEWTON_TOLERANCE or iteration == MAX_NEWTON:
+                break
             if decrement < 0.1:
                 x = x + step
             else:
                 curvature = np.linalg.eigvalsh(inverse_chol @ cone.adjoint(step[None]) @ np.swapaxes(inverse_chol, -1, -2)).ravel()
-                x = x + _line_search(curvature, float(w @ step)) * step
-        raise np.linalg.LinAlgError("centring did not converge")
+                x = x + _line_search(curvature, float(unit @ step)) * step
+        self.x, self.Q, self.w, self.factor = x, Q[0], w, factor
+        self.unit_Q = self.Q @ cone.adjoint(self.solve(unit[None]))[0] @ self.Q
 
     def solve(self, v: Array) -> Array:
         """H^-1 v, (R, N) -> (R, N)."""

@@ -1,12 +1,14 @@
-"""Growing a region as a pure state machine: seed, contract until certified, alternate (11) with (12).
+"""Growing a region as a pure state machine: seed, contract until certified, push the faces out again, alternate (11) with (12).
 
 Appendix B.4 and Algorithm 1 of C-IRIS. :func:`begin` and :func:`advance` decide what to do next and compute nothing heavy:
 whoever drives them (the service's coordinator, or :mod:`certifier.local`) carries out the :class:`Action` and reports back.
 State, actions and reports are JSON-able, so a job can be resumed from its rows alone.
 
-Contraction. Trial sigma is {c_j s <= c_j s0 + sigma (d_j - c_j s0)}, the proposal shrunk about the seed s0: B.4 with delta_j in
-proportion to the face's distance from the seed instead of one delta for all, which keeps the shape. The trials are nested, always contain
-the seed, and end in a tiny polytope that is certifiable whenever the seed is free with some room.
+Contraction, targeted: faces are added where pairs fail (:mod:`certifier.contraction`) until every pair is certified. What was certified
+stays so, since the polytope only shrinks.
+Contraction, uniform (B.4): the largest {C s <= d - delta} that certifies, by bisection; it keeps its Chebyshev centre and shrinks to it.
+Pushing: all faces of the certified polytope move out from its centre, within the proposal, and the result is contracted by targeted faces;
+it counts when the ellipsoid has grown.
 """
 
 from __future__ import annotations
@@ -17,12 +19,19 @@ from typing import Any, Literal
 
 import numpy as np
 
+from certifier.contraction import Failure, contract, measure
 from certifier.errors import CirisError, RegionError
-from certifier.model import Array, Scene
+from certifier.kinematics import Kinematics
+from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, combine
+from certifier.polytope import chebyshev_center, drop_redundant
 
 SMALLEST_SCALE = 1e-3
-"""The last trial of the contraction, relative to the proposal."""
+"""The last trial of the uniform contraction, relative to the proposal."""
+MAX_ATTEMPTS = 60
+"""Faces added for one pair before the targeted contraction gives up."""
+PUSH, SMALLEST_PUSH = 1.5, 0.1
+"""Factor by which faces are pushed out from the centre at first, and the least growth of it that is tried."""
 
 
 @dataclass(frozen=True)
@@ -32,16 +41,20 @@ class GrowthOptions:
     Attributes:
         kind: ``grow`` a region from a seed, or ``certify`` a given polytope as it is.
         seed: the document of :class:`certifier.seeding.SeedOptions`; for ``certify`` its ``C``, ``d`` and optional ``center``.
-        bisection_steps: certifications spent on contraction after the two ends are known.
-        max_rounds: rounds of the polytope step (12); 0 ends after contraction.
-        tolerance: relative growth of the inscribed ellipsoid's volume under which the alternation stops.
+        contraction: ``targeted`` or ``uniform``.
+        bisection_steps: certifications spent on uniform contraction after the two ends are known.
+        pushes: how often the faces are pushed out after the contraction; each push that fails is followed by a shorter one.
+        max_rounds: rounds of the polytope step (12) after the pushes.
+        tolerance: relative growth of the ellipsoid's volume that is still worth a push or a round.
         backoff: how many times a stepped polytope that fails to certify is halved towards the last certified one.
         random_seed: seeds every random choice of the certification.
     """
 
     kind: Literal["grow", "certify"] = "grow"
     seed: dict[str, Any] = field(default_factory=dict)
+    contraction: Literal["targeted", "uniform"] = "targeted"
     bisection_steps: int = 6
+    pushes: int = 3
     max_rounds: int = 3
     tolerance: float = 0.02
     backoff: int = 2
@@ -67,7 +80,10 @@ class GrowthOptions:
         options = cls(**document)
         if options.kind not in ("grow", "certify"):
             raise RegionError("option_value", "kind is 'grow' or 'certify'", field="options.kind")
-        for name, upper in (("bisection_steps", 60), ("max_rounds", 1000), ("backoff", 20), ("random_seed", 2**63 - 1)):
+        if options.contraction not in ("targeted", "uniform"):
+            raise RegionError("option_value", "contraction is 'targeted' or 'uniform'", field="options.contraction")
+        integers = (("bisection_steps", 60), ("pushes", 1000), ("max_rounds", 1000), ("backoff", 20), ("random_seed", 2**63 - 1))
+        for name, upper in integers:
             value = getattr(options, name)
             if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= upper:
                 raise RegionError("option_value", f"{name} must be an integer from 0 to {upper}", field=f"options.{name}")
@@ -90,7 +106,7 @@ class Certify:
 
     Attributes:
         iteration: number of this certification within the job, from 0.
-        label: what it is for: ``given``, ``contract`` or ``round``.
+        label: what it is for: ``given``, ``contract``, ``push`` or ``round``.
         center: interior point, (n,); None for the Chebyshev centre.
         pairs: indices into ``scene.pairs`` to certify, most likely failures first.
         reuse: pair index -> earlier iteration whose proof, on a superset, serves here too.
@@ -159,10 +175,15 @@ class Proposed:
 
 @dataclass(frozen=True)
 class Certification:
-    """Outcome of each pair that was reached; reused pairs are left out."""
+    """Outcome of each pair that was reached; reused pairs are left out.
+
+    Attributes:
+        weak: pair index -> where it fails, ``points`` (w, n) and ``spread`` (n,); pairs of which nothing is known are left out.
+    """
 
     iteration: int
     outcomes: dict[int, Outcome]
+    weak: dict[int, dict[str, Any]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -197,13 +218,16 @@ Report = Proposed | Certification | Stepped | Failed
 class Accepted:
     """A polytope all of whose pairs are certified: store it as a region now.
 
-    ``proofs`` maps every pair index to the iteration that holds its proof.
+    Attributes:
+        center: a point inside; seed: the one that the region was grown around, None for a given polytope.
+        proofs: pair index -> iteration that holds its proof.
     """
 
     iteration: int
     C: list[list[float]]
     d: list[float]
     center: list[float] | None
+    seed: list[float] | None
     proofs: dict[int, int]
 
 
@@ -280,80 +304,150 @@ def _certify(
     reuse: dict[int, int] | None = None,
     stop: bool = True,
 ) -> Transition:
-    """Certify {C s <= d}, the pairs that failed last first."""
+    """Certify {C s <= d}: the pairs that failed last first, then those with few joints between them, which are cheap and fail early."""
     reuse = reuse or {}
     suspects = [i for i in state.get("suspects", []) if i not in reuse]
-    pairs = suspects + [i for i in range(len(scene.pairs)) if i not in reuse and i not in set(suspects)]
-    action = Certify(state["next"], label, C.tolist(), d.tolist(), center, pairs, reuse, stop)
+    others = [i for i in _by_joints(scene) if i not in reuse and i not in set(suspects)]
+    action = Certify(state["next"], label, C.tolist(), d.tolist(), center, suspects + others, reuse, stop)
     state = {**state, "phase": label, "next": action.iteration + 1, "current": action_to_document(action)}
     return Transition(state, action)
+
+
+def _joints(scene: Scene, index: int) -> tuple[int, ...]:
+    kinematics = Kinematics(scene)
+    a, b = (scene.geometry(name).body for name in (scene.pairs[index].a, scene.pairs[index].b))
+    return tuple(sorted(kinematics.chain(a, b)))
+
+
+def _by_joints(scene: Scene) -> list[int]:
+    return sorted(range(len(scene.pairs)), key=lambda i: len(_joints(scene, i)))
 
 
 def _proposed(scene: Scene, state: dict[str, Any], report: Proposed) -> Transition:
     """Rows to contract: the proposal's faces and the joint limits, all scaled to |c| = 1."""
     limited = scene.polytope(report.C, report.d)
     norms = np.linalg.norm(limited.C, axis=1)
-    state |= {
-        "rows": {"C": (limited.C / norms[:, None]).tolist(), "d": (limited.d / norms).tolist(), "seed": report.center},
-        "proposal": report.info,
-        "holds": {},
-        "steps": state["options"]["bisection_steps"],
-    }
-    return _contract(scene, state, 1.0)
+    rows = Polytope(limited.C / norms[:, None], limited.d / norms)
+    state |= {"rows": {"C": rows.C.tolist(), "d": rows.d.tolist()}, "seed": report.center, "proposal": report.info}
+    if state["options"]["contraction"] == "targeted":
+        return _trim(scene, state, "contract", rows)
+    center, radius = chebyshev_center(rows)
+    uniform = {"center": center.tolist(), "radius": radius, "holds": {}, "steps": state["options"]["bisection_steps"]}
+    return _shrink(scene, {**state, "uniform": uniform}, 1.0)
 
 
-def _contract(scene: Scene, state: dict[str, Any], scale: float) -> Transition:
-    """Certify a trial; a pair certified on a larger trial is certified on this one."""
-    C, d, seed = (np.array(state["rows"][name]) for name in ("C", "d", "seed"))
-    limited = scene.polytope(C, C @ seed + scale * (d - C @ seed))
-    reuse = {int(index): iteration for index, (iteration, held) in state["holds"].items() if held >= scale}
-    return _certify(scene, {**state, "scale": scale}, "contract", limited.C, limited.d, state["rows"]["seed"], reuse)
+def _trim(scene: Scene, state: dict[str, Any], label: str, polytope: Polytope, trim: dict[str, Any] | None = None) -> Transition:
+    """Certify what the targeted contraction has come to; a pair certified on a larger polytope is certified on this one."""
+    trim = trim or {"holds": {}, "attempts": {}}
+    center = measure(polytope, np.array(state["seed"])).center
+    holds = {int(index): iteration for index, iteration in trim["holds"].items()}
+    return _certify(scene, {**state, "trim": trim}, label, polytope.C, polytope.d, center.tolist(), holds)
+
+
+def _shrink(scene: Scene, state: dict[str, Any], scale: float) -> Transition:
+    """Certify the uniform trial delta = (1 - scale) times the largest ball's radius."""
+    uniform = state["uniform"] | {"scale": scale}
+    limited = scene.polytope(state["rows"]["C"], np.array(state["rows"]["d"]) - (1 - scale) * uniform["radius"])
+    reuse = {int(index): iteration for index, (iteration, held) in uniform["holds"].items() if held >= scale}
+    return _certify(scene, {**state, "uniform": uniform}, "contract", limited.C, limited.d, uniform["center"], reuse)
 
 
 def _certified(scene: Scene, state: dict[str, Any], report: Certification) -> Transition:
     action = action_from_document(state["current"])
     assert isinstance(action, Certify)
-    failures = {index: outcome for index, outcome in report.outcomes.items() if outcome is not Outcome.CERTIFIED}
-    state["suspects"] = [*failures, *(i for i in state.get("suspects", []) if i not in failures)]
+    failures = [index for index, outcome in report.outcomes.items() if outcome is not Outcome.CERTIFIED]
     complete = not failures and len(report.outcomes) == len(action.pairs)
     accepted = None
     if complete:
         proofs = {**dict.fromkeys(action.pairs, action.iteration), **action.reuse}
-        accepted = Accepted(action.iteration, action.C, action.d, action.center, proofs)
+        accepted = Accepted(action.iteration, action.C, action.d, action.center, state.get("seed"), proofs)
         state["best"] = {"iteration": action.iteration, "C": action.C, "d": action.d, "center": action.center}
     if action.label == "given":
         transition = Transition(state, Finish(combine(list(report.outcomes.values())), "the given polytope, every pair"))
-    elif action.label == "contract":
+    elif action.label == "round":
+        state["suspects"] = [*failures, *(i for i in state.get("suspects", []) if i not in failures)]
+        transition = _alternate(scene, state, complete)
+    elif state["options"]["contraction"] == "uniform" and action.label == "contract":
+        state["suspects"] = [*failures, *(i for i in state.get("suspects", []) if i not in failures)]
         transition = _bisect(scene, state, action, report, complete)
     else:
-        transition = _alternate(scene, state, complete)
+        transition = _push(scene, state) if complete else _cut(scene, state, action, report, failures)
     return Transition(transition.state, transition.action, accepted)
+
+
+def _cut(scene: Scene, state: dict[str, Any], action: Certify, report: Certification, failures: list[int]) -> Transition:
+    """Targeted contraction: faces for the pairs that failed."""
+    trim = state["trim"]
+    attempts = dict(trim["attempts"])
+    holds = trim["holds"] | {str(i): action.iteration for i, outcome in report.outcomes.items() if outcome is Outcome.CERTIFIED}
+    polytope, seed = Polytope(np.array(action.C), np.array(action.d)), np.array(state["seed"])
+    found = []
+    for index in failures:
+        weak = report.weak.get(index, {"points": [], "spread": []})
+        points, spread = np.array(weak["points"]).reshape(-1, scene.n), np.array(weak["spread"])
+        found.append(Failure(_joints(scene, index), points, spread, attempts.get(str(index), 0)))
+        attempts[str(index)] = attempts.get(str(index), 0) + 1
+    smaller = contract(scene, polytope, measure(polytope, seed), seed[None], found)
+    if smaller is None or max(attempts.values()) > MAX_ATTEMPTS:
+        return _no_smaller(scene, state, failures, list(report.outcomes.values()))
+    if action.label == "push" and measure(smaller, seed).log_volume < _goal(state):
+        return _push_less(scene, state)
+    return _trim(scene, state, action.label, smaller, {"holds": holds, "attempts": attempts})
+
+
+def _no_smaller(scene: Scene, state: dict[str, Any], failures: list[int], outcomes: list[Outcome]) -> Transition:
+    if state["best"] is not None:
+        return _push_less(scene, state)
+    pair = scene.pairs[failures[0]]
+    reason = f"not even a small region around the seed can be certified: {pair.a} and {pair.b} are too close there"
+    return Transition(state, Finish(combine(outcomes), reason))
+
+
+def _goal(state: dict[str, Any]) -> float:
+    """The log volume that makes a push worth it."""
+    best = Polytope(np.array(state["best"]["C"]), np.array(state["best"]["d"]))
+    return measure(best, np.array(state["seed"])).log_volume + math.log1p(state["options"]["tolerance"])
+
+
+def _push(scene: Scene, state: dict[str, Any], reach: float = PUSH) -> Transition:
+    """The next push from the best region, or the alternation when there were enough."""
+    pushes = state.get("pushes", 0)
+    if pushes >= state["options"]["pushes"] or reach - 1 < SMALLEST_PUSH:
+        return _step(state)
+    best, rows = state["best"], state["rows"]
+    limits = 2 * scene.n
+    C, d, center = np.array(best["C"])[:-limits], np.array(best["d"])[:-limits], np.array(best["center"])
+    pushed = Polytope(np.concatenate([C, rows["C"]]), np.concatenate([C @ center + reach * (d - C @ center), rows["d"]]))
+    kept = drop_redundant(pushed, fixed=limits)
+    return _trim(scene, {**state, "pushes": pushes + 1, "reach": reach}, "push", Polytope(pushed.C[kept], pushed.d[kept]))
+
+
+def _push_less(scene: Scene, state: dict[str, Any]) -> Transition:
+    return _push(scene, state, 1 + (state["reach"] - 1) / 2)
 
 
 def _bisect(scene: Scene, state: dict[str, Any], action: Certify, report: Certification, complete: bool) -> Transition:
     """B.4: the largest trial that certifies, by bisection (of the logarithm) between one that did and one that did not."""
-    scale = state["scale"]
-    holds = dict(state["holds"])
+    uniform = dict(state["uniform"])
+    scale, holds = uniform["scale"], dict(uniform["holds"])
     for index, outcome in report.outcomes.items():
         if outcome is Outcome.CERTIFIED and (str(index) not in holds or holds[str(index)][1] < scale):
             holds[str(index)] = [action.iteration, scale]
-    state["holds"] = holds
-    if complete:
-        state["certified_scale"] = scale
-        if scale == 1.0:
-            return _step(state)
-    else:
-        state["failed_scale"] = scale
-    if "certified_scale" not in state:
+    uniform["holds"] = holds
+    uniform["certified" if complete else "failed"] = scale
+    state = {**state, "uniform": uniform}
+    if complete and scale == 1.0:
+        return _push(scene, state)
+    if "certified" not in uniform:
         if scale == SMALLEST_SCALE:
             pair = scene.pairs[next(i for i, outcome in report.outcomes.items() if outcome is not Outcome.CERTIFIED)]
-            reason = f"not even the smallest region around the seed can be certified: {pair.a} and {pair.b} are too close there"
+            reason = f"not even the smallest of the uniform contractions can be certified: {pair.a} and {pair.b} are too close there"
             return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
-        return _contract(scene, state, SMALLEST_SCALE)
-    if state["steps"] == 0:
-        return _step(state)
-    state["steps"] -= 1
-    return _contract(scene, state, math.sqrt(state["certified_scale"] * state["failed_scale"]))
+        return _shrink(scene, state, SMALLEST_SCALE)
+    if uniform["steps"] == 0:
+        return _push(scene, state)
+    uniform["steps"] -= 1
+    return _shrink(scene, state, math.sqrt(uniform["certified"] * uniform["failed"]))
 
 
 def _step(state: dict[str, Any]) -> Transition:

@@ -56,8 +56,8 @@ class Block:
 
     Attributes:
         cone: the cone of all R.
-        columns: (R, N, p) the linear map y -> A_r z - t w_r; the last column is -w.
-        centre: the centre of the cone for w.
+        columns: (R, N, p) the linear map y -> A_r z - t w; the last column is -w.
+        centre: the point of the dual cone that belongs to w.
     """
 
     cone: Cone
@@ -192,23 +192,27 @@ class _Method:
         return None
 
     def _settle(self, y: Array, Q: list[Array]) -> bool:
-        """Whether the residuals at (y, Q) fit into half of the margin: Q + (t/2) Q_w + dQ with values(dQ) = residual is psd.
+        """Whether (y, Q) with t > 0 is a certificate once its residuals are absorbed; if so, it is the solution.
 
-        If so, it is taken as the solution, with margin t/2.
+        Q + t Q_w + dQ with values(dQ) = residual is a Gram matrix of A_r z itself; half of the largest multiple of the unit that
+        leaves it psd becomes the margin.
         """
-        y = np.append(y[:-1], y[-1] / 2)
-        repaired = []
+        z = np.append(y[:-1], 0.0)
+        whole, margin = [], np.inf
         for b, given in zip(self.blocks, Q, strict=True):
-            candidate = symmetrise(given + y[-1] * b.centre.Q)
-            # Twice: the first correction is only as exact as the centre.
-            for _ in range(2):
-                candidate = symmetrise(candidate + _correction(b, b.columns @ y - b.cone.values(candidate)))
+            candidate = given + y[-1] * b.centre.Q
+            candidate = symmetrise(candidate + _correction(b, b.columns @ z - b.cone.values(candidate)))
             try:
-                inverse_cholesky(candidate)
+                inverse_chol = inverse_cholesky(candidate)
             except np.linalg.LinAlgError:
                 return False
-            repaired.append(candidate)
-        self.y, self.Q = y, repaired
+            margin = min(margin, _longest(inverse_chol, np.broadcast_to(-b.centre.unit_Q, candidate.shape)))
+            whole.append(candidate)
+        t = margin / 2
+        if not np.isfinite(t):
+            return False
+        self.y = np.append(y[:-1], t)
+        self.Q = [symmetrise(W - t * b.centre.unit_Q) for b, W in zip(self.blocks, whole, strict=True)]
         return True
 
     @staticmethod

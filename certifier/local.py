@@ -59,7 +59,9 @@ class _Run:
             )
             if action.stop_at_first_failure and found[index].outcome is not Outcome.CERTIFIED:
                 break
-        return Certification(action.iteration, {index: result.outcome for index, result in found.items()})
+        return Certification(
+            action.iteration, {i: r.outcome for i, r in found.items()}, {i: w for i, r in found.items() if (w := weakness(r))}
+        )
 
     def proofs(self, accepted: Accepted) -> dict[int, bytes]:
         return {index: self.results[iteration][index].proof or b"" for index, iteration in accepted.proofs.items()}
@@ -75,6 +77,15 @@ class _Run:
         self.progress("polytope step")
         found = step(self.scene, Polytope(np.array(action.C), np.array(action.d)), self.proofs(self.accepted))
         return stepped(found)
+
+
+def weakness(result: PairResult) -> dict[str, Any] | None:
+    """Where a pair failed, for the report of its certification; None when nothing is known."""
+    if result.witness_s is not None:
+        return {"points": [result.witness_s.tolist()], "spread": [0.0] * len(result.witness_s)}
+    if result.weak_points is None or result.spread is None:
+        return None
+    return {"points": result.weak_points.tolist(), "spread": result.spread.tolist()}
 
 
 def stepped(found: PolytopeStep) -> Stepped:
@@ -115,8 +126,7 @@ def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: No
         "seconds": time.perf_counter() - start,
     }
     accepted = run.accepted
-    center = None if accepted.center is None else np.array(accepted.center)
-    return certified_region(scene, np.array(accepted.C), np.array(accepted.d), center, run.proofs(accepted), provenance)
+    return certified_region(scene, accepted, run.proofs(accepted), provenance)
 
 
 def certify(scene: Scene, C: Array, d: Array, center: Array | None = None, progress: Progress = lambda _: None) -> dict[str, Any]:

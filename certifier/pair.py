@@ -1,8 +1,8 @@
 """Certification of a polytope, pair by pair: screens, the program (11), the proof and its verification.
 
-centre or a sample in contact                        -> refuted, with the configuration
+centre or a sample in contact, verified              -> refuted, with the configuration
 program (11) feasible, proof verified exactly        -> certified, with the proof
-program (11) infeasible by a dual point              -> not_certifiable, with the points where no plane of this degree works
+program (11) infeasible, dual proof verified         -> not_certifiable, with the proof and the points where no plane of this degree works
 anything else                                        -> inconclusive, with the reason
 """
 
@@ -15,20 +15,25 @@ import numpy as np
 
 from certifier.basis import subsets
 from certifier.closest import Closest, closest
+from certifier.disproof import WitnessProof
+from certifier.dual import dual_proof
 from certifier.frames import Frame, choose_frame
-from certifier.interior_point import Solution, Status, solve
+from certifier.interior_point import Block, Solution, Status, solve
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Geometry, Pair, Polytope, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.polytope import bound_multipliers, chebyshev_center, check, drop_redundant
 from certifier.program import Box, Sides, build
-from certifier.proof import BITS, Ground, PairProof, ProofError, Side
+from certifier.proof import BITS, Ground, PairProof, Side, Volume
+from certifier.proof_file import ProofError
 from certifier.sampling import hit_and_run
+from certifier.verify.dual import verify_dual
 from certifier.verify.pair import PairCheck, check_ground
+from certifier.verify.witness import verify_witness
 
 SCREEN_SAMPLES = 64
 CONE_SAMPLES = 300
-FACES_AT_A_TIME = 4
+FACES_AT_A_TIME = 8
 """A polytope with many faces is first replaced by its box; then this many faces are added at a time, as the dual asks for them."""
 
 
@@ -40,8 +45,10 @@ class PairResult:
         margin: certified lower bound in metres of the distance between the padded bodies; None unless certified.
         detail: a sentence for people; empty when the outcome says it all.
         witness_s: (n,) a configuration in contact, when refuted.
-        proof: a verified :class:`certifier.proof.PairProof` as bytes, when certified.
+        proof: verified, as bytes: a :class:`certifier.proof.PairProof` when certified, a :class:`certifier.disproof.WitnessProof` when
+            refuted, a :class:`certifier.disproof.DualProof` when not certifiable.
         weak_points: (w, n) configurations near which no plane of this degree works, when not certifiable.
+        spread: (n,) how far around them, along each joint between the bodies, when not certifiable.
     """
 
     outcome: Outcome
@@ -52,6 +59,7 @@ class PairResult:
     witness_s: Array | None = None
     proof: bytes | None = None
     weak_points: Array | None = None
+    spread: Array | None = None
 
 
 class Certification:
@@ -96,11 +104,12 @@ class Certification:
         frame = choose_frame(self._kinematics, pair)
         contact = self._contact(pair, frame, self._screen[:SCREEN_SAMPLES])
         if isinstance(contact, _Witness):
-            return PairResult(Outcome.REFUTED, Stage.SCREEN, witness_s=contact.s)
+            return self._refute(pair, contact, Stage.SCREEN)
         sides = self._first
         while True:
             try:
-                solution = solve(build(sides, pair, frame), max_iterations)
+                blocks = build(sides, pair, frame)
+                solution = solve(blocks, max_iterations)
             except np.linalg.LinAlgError as error:
                 if sides.faces == self._every:
                     return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"numerical trouble: {error}")
@@ -112,15 +121,14 @@ class Certification:
             if more == sides.faces:
                 break
             sides = self._sides(more)
-        weak = self._weak_points(frame, sides, solution)
+        weak, spread = self._weak_points(frame, sides, solution)
         witness = self._contact(pair, frame, np.concatenate([self._screen, weak[self._faces.contains(weak)]]))
         if isinstance(witness, _Witness):
-            return PairResult(Outcome.REFUTED, Stage.SOS, witness_s=witness.s)
+            return self._refute(pair, witness, Stage.SOS)
         if solution.status is Status.INFEASIBLE:
-            detail = f"no plane affine in s, in the frame of {frame.body}"
-            return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, weak_points=weak)
+            return replace(self._disprove(pair, frame, sides, blocks, solution), weak_points=weak, spread=spread)
         detail = f"{solution.status.value} after {solution.iterations} iterations"
-        return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak)
+        return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak, spread=spread)
 
     def _sides(self, faces: tuple[int, ...]) -> Sides:
         return Sides(self._kinematics, self._faces, self._box, faces, self.center, self._samples)
@@ -156,6 +164,23 @@ class Certification:
             return PairResult(Outcome.CERTIFIED, Stage.SOS, margin=statement.gap, proof=proof.to_bytes())
         return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"the proof found does not hold: {failure}")
 
+    def _refute(self, pair: Pair, witness: _Witness, stage: Stage) -> PairResult:
+        proof = WitnessProof(self.scene, pair, self.ground.C, self.ground.d, witness.s, witness.weights)
+        try:
+            verify_witness(proof)
+        except ProofError as error:
+            return PairResult(Outcome.INCONCLUSIVE, stage, detail=f"the contact found does not hold: {error}")
+        return PairResult(Outcome.REFUTED, stage, witness_s=witness.s, proof=proof.to_bytes())
+
+    def _disprove(self, pair: Pair, frame: Frame, sides: Sides, blocks: list[Block], solution: Solution) -> PairResult:
+        try:
+            proof = dual_proof(sides, pair, frame, self.ground, blocks, solution.x)
+            statement = verify_dual(proof)
+        except (ProofError, np.linalg.LinAlgError) as error:
+            return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"the dual proof found does not hold: {error}")
+        detail = f"no plane affine in s, in the frame of {statement.frame}"
+        return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, proof=proof.to_bytes())
+
     def _points(self, geometry: Geometry, frame: Frame, s: Array) -> Array:
         return self._kinematics.points(frame.body, geometry.body, geometry.vertices, s)
 
@@ -169,7 +194,7 @@ class Certification:
         for i in np.flatnonzero(gaps <= reach):
             found = closest(A[i], B[i])
             if found.gap <= reach:
-                return _Witness(s[i])
+                return _Witness(s[i], found.weights)
         return first
 
     def _proof(self, pair: Pair, frame: Frame, sides: Sides, solution: Solution, kind: str) -> PairProof:
@@ -181,20 +206,21 @@ class Certification:
         for chain, Q in zip((frame.chain_a, frame.chain_b), solution.Q[:2], strict=True):
             monomial = np.sqrt(3.0) ** subsets(len(chain)).sum(axis=1)
             factors.append(Side.from_gram(chain, Q * (monomial[:, None] * monomial) / sides.scales[:, None, None], kind))
-        return PairProof(
-            self.scene.hash, pair.a, pair.b, frame.body, self.ground, plane, solution.t, kappa, sides.faces, (factors[0], factors[1])
-        )
+        volumes = (Volume.of(self.scene.geometry(pair.a)), Volume.of(self.scene.geometry(pair.b)))
+        return PairProof(self.scene, volumes, frame.body, self.ground, plane, solution.t, kappa, sides.faces, (factors[0], factors[1]))
 
-    def _weak_points(self, frame: Frame, sides: Sides, solution: Solution) -> Array:
-        """Means of the pseudo-moments that carry weight, (w, n)."""
+    def _weak_points(self, frame: Frame, sides: Sides, solution: Solution) -> tuple[Array, Array]:
+        """Means (w, n) of the pseudo-moments that carry weight, and how far they spread along each joint of the pair, (n,)."""
         found = [sides.means(chain, x) for chain, x in zip((frame.chain_a, frame.chain_b), solution.x[:2], strict=True)]
-        means, mass = np.concatenate([m for m, _ in found]), np.concatenate([w for _, w in found])
-        return means[mass > 0.15 * mass.max()]
+        means, deviations, mass = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        heavy = mass > 0.15 * mass.max()
+        return means[heavy], deviations[heavy].max(axis=0)
 
 
 @dataclass(frozen=True)
 class _Witness:
     s: Array
+    weights: tuple[Array, Array]
 
 
 def certify_pair(scene: Scene, index: int, polytope: Polytope, center: Array | None = None, seed: int = 0) -> PairResult:

@@ -66,7 +66,7 @@ def step(scene: Scene, polytope: Polytope, proofs: dict[int, bytes]) -> Step:
     kept = drop_redundant(polytope, fixed=2 * n)
     faces = Polytope(polytope.C[kept[: -2 * n]], polytope.d[kept[: -2 * n]])
     ellipsoid = inscribed_ellipsoid(polytope)
-    pairs = [PairProof.from_bytes(data) for data in proofs.values()]
+    pairs = [PairProof.from_bytes(data, scene) for data in dict.fromkeys(proofs.values())]
     rows = sum(len(side.mantissa) * _rows(side, n) for proof in pairs for side in proof.sides)
     if rows > MAX_ROWS:
         raise RegionError("step_too_large", f"the polytope step would have {rows} equations, more than {MAX_ROWS}")
@@ -115,18 +115,17 @@ class _Identities:
         """Both sides of one pair, with a plane of its own."""
         n, program = self.scene.n, self.program
         plane = program.NewContinuousVariables(4, n + 1, "plane")
-        radii = [self.scene.geometry(name).radius + self.scene.padding for name in (proof.a, proof.b)]
+        radii = [volume.radius + self.scene.padding for volume in proof.volumes]
         kappa = program.NewContinuousVariables(1, "kappa")[0]
         if max(radii) > 0:
             self._bound_normal(plane, kappa)
-        for name, radius, side, sign in ((proof.a, radii[0], proof.sides[0], 1.0), (proof.b, radii[1], proof.sides[1], -1.0)):
-            geometry = self.scene.geometry(name)
+        for volume, radius, side, sign in zip(proof.volumes, radii, proof.sides, (1.0, -1.0), strict=True):
             space, chain = basis(len(side.chain)), list(side.chain)
             u = np.zeros((len(space.points), n))
             u[:, chain] = space.points
-            X = self.kinematics.numerators(proof.frame, geometry.body, proof.ground.mid + proof.ground.half * u)
+            X = self.kinematics.numerators(proof.frame, volume.body, proof.ground.mid + proof.ground.half * u)
             squares = _face_multipliers(proof, side, space)
-            for v, vertex in enumerate(geometry.vertices):
+            for v, vertex in enumerate(volume.vertices):
                 p = sign * (X @ np.append(vertex, 1.0))
                 constant = -MARGIN_SHARE * proof.t * X[:, 3, 3]
                 self._identity(proof, space, chain, u, plane, p, kappa, -radius * X[:, 3, 3], constant, squares[v])
@@ -224,9 +223,5 @@ def _face_multipliers(proof: PairProof, side: Side, space: Basis) -> Array:
 
 def _squares(side: Side, space: Basis) -> Array:
     """Values of |L_j' rho|^2 at the points for 1 and the faces used, (V, f + 1, N_A)."""
-    length = 2 ** len(side.chain)
-    rows, columns = np.tril_indices(length)
-    L = np.zeros((*side.exponent.shape, length, length))
-    L[:, :, rows, columns] = np.ldexp(side.mantissa.astype(float), side.exponent[:, :, None])
     monomials = rho(space.points) / np.sqrt(3.0) ** subsets(len(side.chain)).sum(axis=1)
-    return np.square(np.einsum("nl,vjlk->vjnk", monomials, L)).sum(axis=3)
+    return np.square(np.einsum("nl,vjlk->vjnk", monomials, side.factors)).sum(axis=3)

@@ -87,7 +87,7 @@ class Sides:
         return [i for i in range(self.kinematics.scene.n) if i not in chain]
 
     def cone(self, chain: tuple[int, ...]) -> tuple[Cone, Centre]:
-        """The chain's cone and its centre for w = den.
+        """The chain's cone and its centre near den.
 
         Raises:
             np.linalg.LinAlgError: the cone is numerically degenerate.
@@ -97,22 +97,31 @@ class Sides:
             cone = self.cone_of(chain, self.faces)
             revolute = self.kinematics.scene.revolute[inside]
             s = self.box.mid[inside] + self.box.half[inside] * space.points
-            w = np.zeros(cone.N)
-            w[: len(s)] = np.prod(np.where(revolute, 1 + s**2, 1.0), axis=1)
+            unit = np.zeros(cone.N)
+            unit[: len(s)] = _denominator(s, revolute)
             functional, grid = space.functional(self._u[:, inside])
-            start = np.concatenate([functional.mean(axis=0), *((self._u[:, [i]] * grid).mean(axis=0) for i in outside)])
-            self._centres[chain] = cone, Centre(cone, w, start)
+            # Towards the centre the denominator counts alike everywhere; so it does at the start.
+            mass = 1 / _denominator(self.box.mid[inside] + self.box.half[inside] * self._u[:, inside], revolute)
+            start = np.concatenate([mass @ functional, *((mass * self._u[:, i]) @ grid for i in outside)])
+            self._centres[chain] = cone, Centre(cone, unit, start)
         return self._centres[chain]
 
-    def means(self, chain: tuple[int, ...], x: Array) -> tuple[Array, Array]:
-        """Means of s under pseudo-moments x, (R, N) -> (R, n), and their masses x(1), (R,)."""
-        space, outside = basis(len(chain)), self.outside(chain)
-        first, rest = x[:, : len(space.points)], x[:, len(space.points) :].reshape(len(x), len(outside), -1)
+    def means(self, chain: tuple[int, ...], x: Array) -> tuple[Array, Array, Array]:
+        """Means of s under pseudo-moments x, (R, N) -> (R, n), standard deviations of the chain's joints (R, n), masses x(1), (R,)."""
+        space, inside, outside = basis(len(chain)), list(chain), self.outside(chain)
+        first, rest = x[:, : len(space.points)], x[:, len(space.points) :].reshape(len(x), len(outside), space.grid)
         mass = first.sum(axis=1)
-        u = np.zeros((len(x), self.kinematics.scene.n))
-        u[:, list(chain)] = first @ space.points / mass[:, None]
+        u, deviation = np.zeros((len(x), self.kinematics.scene.n)), np.zeros((len(x), self.kinematics.scene.n))
+        u[:, inside] = first @ space.points / mass[:, None]
         u[:, outside] = rest.sum(axis=2) / mass[:, None]
-        return self.box.mid + self.box.half * u, mass
+        deviation[:, inside] = np.sqrt(np.maximum(first @ space.points**2 / mass[:, None] - u[:, inside] ** 2, 0.0))
+        return self.box.mid + self.box.half * u, self.box.half * deviation, mass
+
+
+def _denominator(s: Array, revolute: Array) -> Array:
+    """prod (1 + s_i^2) over revolute joints, (S, k) -> (S,)."""
+    product: Array = np.prod(np.where(revolute, 1 + s**2, 1.0), axis=1)
+    return product
 
 
 def build(sides: Sides, pair: Pair, frame: Frame) -> list[Block]:
@@ -143,7 +152,7 @@ def build(sides: Sides, pair: Pair, frame: Frame) -> list[Block]:
         B[:, :, : 4 * (n + 1)] = plane.reshape(len(p), cone.N, -1)
         if rounded:
             B[:, : len(u), 4 * (n + 1)] = -radius * X[:, 3, 3]
-        B[:, : len(u), -1] = -X[:, 3, 3]
+        B[:, :, -1] = -centre.w
         blocks.append(Block(cone, B, centre))
     return blocks + (_norm_blocks(n, sides.u_c, columns) if rounded else [])
 
@@ -175,4 +184,7 @@ def _norm_blocks(n: int, u_c: Array, columns: int) -> list[Block]:
     signs = np.zeros((n, 1, columns))
     signs[np.arange(n), 0, 4 * (n + 1) + 1 + np.arange(n)] = 1.0
     signs[:, 0, -1] = -1.0
-    return [Block(lmi, B, Centre(lmi, -B[0, :, -1], x_identity)), Block(line, signs, Centre(line, np.ones(1), np.ones(1)))]
+    blocks = [Block(lmi, B, Centre(lmi, -B[0, :, -1], x_identity)), Block(line, signs, Centre(line, np.ones(1), np.ones(1)))]
+    for block in blocks:
+        block.columns[:, :, -1] = -block.centre.w
+    return blocks

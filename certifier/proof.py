@@ -1,40 +1,30 @@
 """Proofs as data: what a certificate of a pair, or of a region, consists of, and its portable file.
 
 A pair's proof on P = {s : C s <= d} holds, in the frame F and the coordinates u = (s - mid)/half of a box around P,
-the plane [a; b] = Z [1; u], a margin t, a bound kappa of |a|, and for every vertex v of either body Gram factors L_j with
+the plane [a; b] = Z [1; u], a margin t, a bound kappa of |a|, and for every vertex v of either volume Gram factors L_j with
 
-    +-(a'p_v + b den) - r kappa den - t den - |L_0' rho|^2 - sum_j g_j |L_j' rho|^2  ~  0,
+    +-(a'p_v + b den) - (r kappa + t) den - sigma (|L_0' rho|^2 + sum_j g_j |L_j' rho|^2)  ~  0,
 
 the g_j some of P's faces d_j - c_j's and of its box's, 1 + u_i and 1 - u_i, rho the 2^k products of the chain's coordinates u_i
-(plain monomials). The factors are fixed-point numbers, one exponent a matrix, of 30 bits or, where rounding would eat up the margin,
-of 48. Nothing here decides whether a proof holds: certifier.verify does.
-The file is a zip of plain arrays and one JSON header (docs/algorithm.md, "Proof file").
+(plain monomials). The factors are fixed-point numbers, one exponent a face, of 30 bits or, where rounding would eat up the margin,
+of 48. Nothing here decides whether a proof holds: certifier.verify does. The file is described in docs/proofs.md.
 """
 
 from __future__ import annotations
 
 import hashlib
-import io
 import json
-import zipfile
 from dataclasses import dataclass, field
 from typing import Any
-from zlib import error as zlib_error
 
 import numpy as np
 
-from certifier.errors import CirisError
-from certifier.model import Array, Scene
+from certifier.model import Array, Geometry, Pair, Scene
+from certifier.proof_file import FORMAT, ProofError, floats, index, malformed, npy, pack, unpack
 from certifier.verify.archimedean import Archimedean
 
-FORMAT = 1
 BITS = {"int32": 30, "int64": 48}
 """Bits of a Gram factor's mantissa by its type."""
-MAX_BYTES = 1 << 30
-
-
-class ProofError(CirisError):
-    """The proof does not hold, or the file is not one."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +46,45 @@ class Ground:
 
 
 @dataclass(frozen=True)
-class Side:
-    """Gram factors of one body's vertices: factor = mantissa 2^exponent, lower triangles row by row.
+class Volume:
+    """A convex body conv(vertices) + ball(radius), fixed to a link, that contains every geometry it names and stands for all of them.
 
     Attributes:
-        chain: position indices of the joints between F and the body; rho's coordinates in this order.
+        geometries: names.
+        body: whose frame the vertices are in; the geometries' own bodies are welded to it, or it is theirs.
+        vertices: (V, 3) metres.
+        radius: metres; the scene's padding comes on top.
+    """
+
+    geometries: tuple[str, ...]
+    body: str
+    vertices: Array
+    radius: float
+
+    @classmethod
+    def of(cls, geometry: Geometry) -> Volume:
+        """The geometry itself."""
+        return cls((geometry.name,), geometry.body, geometry.vertices, geometry.radius)
+
+    def is_geometry_of(self, scene: Scene) -> bool:
+        """Whether it is exactly the one geometry that it names."""
+        geometry = scene.geometry(self.geometries[0])
+        return (
+            len(self.geometries) == 1
+            and self.body == geometry.body
+            and self.radius == geometry.radius
+            and np.array_equal(self.vertices, geometry.vertices)
+        )
+
+
+@dataclass(frozen=True)
+class Side:
+    """Gram factors of one volume's vertices: factor = mantissa 2^exponent, lower triangles row by row.
+
+    Attributes:
+        chain: position indices of the joints between F and the body, ascending; rho's coordinates in this order.
         mantissa: (V, f + 1, L (L + 1) / 2) int32 or int64, L = 2^k, for 1 and the f faces used.
-        exponent: (V, f + 1) int32.
+        exponent: (f + 1,) int32.
     """
 
     chain: tuple[int, ...]
@@ -77,28 +99,38 @@ class Side:
             np.linalg.LinAlgError: a matrix is not positive definite.
         """
         factor = np.linalg.cholesky(Q)
-        exponent = np.frexp(np.abs(factor).max(axis=(2, 3)))[1].astype(np.int32) - BITS[kind]
+        exponent = np.frexp(np.abs(factor).max(axis=(0, 2, 3)))[1].astype(np.int32) - BITS[kind]
         rows, columns = np.tril_indices(Q.shape[-1])
-        mantissa = np.rint(np.ldexp(factor[:, :, rows, columns], -exponent[:, :, None])).astype(kind)
+        mantissa = np.rint(np.ldexp(factor[:, :, rows, columns], -exponent[:, None])).astype(kind)
         return cls(chain, mantissa, exponent)
+
+    @property
+    def factors(self) -> Array:
+        """The lower triangular factors, (V, f + 1, L, L)."""
+        length = 2 ** len(self.chain)
+        rows, columns = np.tril_indices(length)
+        L = np.zeros((*self.mantissa.shape[:2], length, length))
+        L[:, :, rows, columns] = np.ldexp(self.mantissa.astype(float), self.exponent[:, None])
+        return L
 
 
 @dataclass(frozen=True)
 class PairProof:
-    """A separating plane for one pair on a polytope, with the sums of squares that prove it.
+    """A plane that separates two volumes on a polytope, with the sums of squares that prove it.
+
+    It covers every pair of the scene with one geometry in the first volume and the other in the second.
 
     Attributes:
-        a, b: geometry names.
+        volumes: on the positive and on the negative side of the plane.
         frame: body whose frame the plane is expressed in.
         plane: Z, (4, n + 1).
         t, kappa: margin and bound of |a(u)| on the box (0 where no radius is involved).
         faces: the f faces used: j for the ground's face j, m + i for 1 + u_i, m + n + i for 1 - u_i.
-        sides: of a and b.
+        sides: of the volumes.
     """
 
-    scene_hash: str
-    a: str
-    b: str
+    scene: Scene
+    volumes: tuple[Volume, Volume]
     frame: str
     ground: Ground
     plane: Array
@@ -107,31 +139,39 @@ class PairProof:
     faces: tuple[int, ...]
     sides: tuple[Side, Side]
 
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """The pairs of the scene that are covered."""
+        first, second = (set(volume.geometries) for volume in self.volumes)
+        return tuple(p for p in self.scene.pairs if (p.a in first and p.b in second) or (p.a in second and p.b in first))
+
     def to_bytes(self) -> bytes:
         """The proof as a file."""
-        header = {"format": FORMAT, "kind": "pair", "scene_hash": self.scene_hash, "pairs": [self._header(0)]}
-        return _pack(header, {**_ground_arrays("ground/0", self.ground), **self._arrays("pair/0")})
+        pool = _Pool(self.scene)
+        headers = [pool.add(self)]
+        header = {"format": FORMAT, "kind": "pair", "scene_hash": self.scene.hash, **pool.header(), "proofs": headers}
+        return pack(header, pool.arrays)
 
     @classmethod
-    def from_bytes(cls, data: bytes) -> PairProof:
+    def from_bytes(cls, data: bytes, scene: Scene) -> PairProof:
         """Inverse of :meth:`to_bytes`.
 
         Raises:
-            ProofError: not a pair's proof.
+            ProofError: not a pair's proof, or one about another scene.
         """
-        header, arrays = _unpack(data, "pair")
-        with _malformed():
-            return _pair(header["scene_hash"], header["pairs"][0], [_ground("ground/0", arrays)], "pair/0", arrays)
+        header, arrays = unpack(data, "pair")
+        with malformed():
+            same_scene(header, scene)
+            return _Stored(scene, header, arrays).proofs()[0]
 
-    def _header(self, ground: int) -> dict[str, Any]:
-        chains = [list(side.chain) for side in self.sides]
-        return {"a": self.a, "b": self.b, "frame": self.frame, "ground": ground, "faces": list(self.faces), "chains": chains}
 
-    def _arrays(self, prefix: str) -> dict[str, np.ndarray]:
-        arrays = {f"{prefix}/plane": self.plane, f"{prefix}/scalars": np.array([self.t, self.kappa])}
-        for i, side in enumerate(self.sides):
-            arrays[f"{prefix}/mantissa{i}"], arrays[f"{prefix}/exponent{i}"] = side.mantissa, side.exponent
-        return arrays
+@dataclass(frozen=True)
+class Implied:
+    """Half-spaces that contain a polytope of m faces, with the multipliers that prove it: (h, n), (h,), (h, m)."""
+
+    C: Array
+    d: Array
+    Y: Array
 
 
 @dataclass(frozen=True)
@@ -139,34 +179,29 @@ class RegionProof:
     """Everything needed to check that a region is free of collision for every pair of its scene.
 
     Attributes:
-        C, d: the region's half-spaces, joint limits included.
+        C, d: (m, n), (m,) the region's half-spaces, joint limits included.
         interior: (n,) a point strictly inside.
-        pairs: one proof for every pair of the scene; each ground contains the region.
+        implied: half-spaces around the region that are redundant to it, but faces of some ground.
+        proofs: they cover every pair of the scene; each ground contains the region.
     """
 
     scene: Scene
     C: Array
     d: Array
     interior: Array
+    implied: Implied
     archimedean: Archimedean
-    pairs: tuple[PairProof, ...] = field(repr=False)
+    proofs: tuple[PairProof, ...] = field(repr=False)
 
     def to_bytes(self) -> bytes:
-        """The proof as a file; grounds that several pairs share are stored once."""
-        grounds: dict[bytes, int] = {}
+        """The proof as a file; grounds and volumes that several proofs share are stored once."""
+        pool = _Pool(self.scene)
+        headers = [pool.add(proof) for proof in self.proofs]
         arrays: dict[str, np.ndarray] = {"region/C": self.C, "region/d": self.d, "region/interior": self.interior}
+        arrays |= {f"implied/{name}": value for name, value in vars(self.implied).items()}
         arrays |= {f"archimedean/{name}": np.asarray(value) for name, value in vars(self.archimedean).items()}
-        headers = []
-        for i, pair in enumerate(self.pairs):
-            own = _ground_arrays("", pair.ground)
-            key = hashlib.sha256(b"".join(a.tobytes() for a in own.values())).digest()
-            if key not in grounds:
-                grounds[key] = len(grounds)
-                arrays |= {f"ground/{grounds[key]}{name}": value for name, value in own.items()}
-            headers.append(pair._header(grounds[key]))
-            arrays |= pair._arrays(f"pair/{i}")
-        header = {"format": FORMAT, "kind": "region", "scene": self.scene.to_document(), "grounds": len(grounds), "pairs": headers}
-        return _pack(header, arrays)
+        header = {"format": FORMAT, "kind": "region", "scene": self.scene.to_document(), **pool.header(), "proofs": headers}
+        return pack(header, arrays | pool.arrays)
 
     @classmethod
     def from_bytes(cls, data: bytes) -> RegionProof:
@@ -175,20 +210,113 @@ class RegionProof:
         Raises:
             ProofError: not a region's proof.
         """
-        header, arrays = _unpack(data, "region")
-        with _malformed():
+        header, arrays = unpack(data, "region")
+        with malformed():
             scene = Scene.from_document(header["scene"])
-            grounds = [_ground(f"ground/{i}", arrays) for i in range(header["grounds"])]
             fields = ("N", "lower", "upper", "Y_lower", "Y_upper", "y")
-            values = {name: _floats(arrays[f"archimedean/{name}"]) for name in fields}
+            values = {name: floats(arrays[f"archimedean/{name}"]) for name in fields}
             return cls(
                 scene=scene,
-                C=_floats(arrays["region/C"]),
-                d=_floats(arrays["region/d"]),
-                interior=_floats(arrays["region/interior"]),
+                C=floats(arrays["region/C"]),
+                d=floats(arrays["region/d"]),
+                interior=floats(arrays["region/interior"]),
+                implied=Implied(*(floats(arrays[f"implied/{name}"]) for name in ("C", "d", "Y"))),
                 archimedean=Archimedean(values.pop("N").item(), **values),
-                pairs=tuple(_pair(scene.hash, h, grounds, f"pair/{i}", arrays) for i, h in enumerate(header["pairs"])),
+                proofs=_Stored(scene, header, arrays).proofs(),
             )
+
+
+class _Pool:
+    """The arrays of several proofs, with what they share stored once."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self.arrays: dict[str, np.ndarray] = {}
+        self._volumes: list[dict[str, Any]] = []
+        self._known: dict[str, int] = {}
+        self._proofs = 0
+
+    def add(self, proof: PairProof) -> dict[str, Any]:
+        """Takes the proof's arrays in; returns its header."""
+        ground, prefix = self._ground(proof.ground), f"proof/{self._proofs}"
+        self._proofs += 1
+        self.arrays |= {f"{prefix}/plane": proof.plane, f"{prefix}/scalars": np.array([proof.t, proof.kappa])}
+        for i, side in enumerate(proof.sides):
+            self.arrays |= {f"{prefix}/mantissa{i}": side.mantissa, f"{prefix}/exponent{i}": side.exponent}
+        return {
+            "volumes": [self._volume(volume) for volume in proof.volumes],
+            "frame": proof.frame,
+            "ground": ground,
+            "faces": list(proof.faces),
+            "chains": [list(side.chain) for side in proof.sides],
+        }
+
+    def header(self) -> dict[str, Any]:
+        """The grounds' number and the volumes, for the file's header."""
+        return {"grounds": sum(name.endswith("/mid") for name in self.arrays), "volumes": self._volumes}
+
+    def _ground(self, ground: Ground) -> int:
+        return self._once("ground", {}, vars(ground))
+
+    def _volume(self, volume: Volume) -> int:
+        header: dict[str, Any] = {"geometries": list(volume.geometries)}
+        arrays = {}
+        if not volume.is_geometry_of(self._scene):
+            header["body"] = volume.body
+            arrays = {"vertices": volume.vertices, "radius": np.array(volume.radius)}
+        index = self._once("volume", header, arrays)
+        if index == len(self._volumes):
+            self._volumes.append(header)
+        return index
+
+    def _once(self, kind: str, header: dict[str, Any], arrays: dict[str, np.ndarray]) -> int:
+        """The number of these arrays among those of their kind, stored if they are new."""
+        content = hashlib.sha256(b"".join(npy(a) for a in arrays.values())).hexdigest()
+        key = f"{kind} {json.dumps(header)} {content}"
+        if key not in self._known:
+            self._known[key] = index = sum(known.startswith(f"{kind} ") for known in self._known)
+            self.arrays |= {f"{kind}/{index}/{name}": value for name, value in arrays.items()}
+        return self._known[key]
+
+
+class _Stored:
+    """The proofs of a file."""
+
+    def __init__(self, scene: Scene, header: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
+        self._scene, self._headers, self._arrays = scene, header["proofs"], arrays
+        self._grounds = [ground_of(arrays, i) for i in range(header["grounds"])]
+        self._volumes = [self._volume(i, volume) for i, volume in enumerate(header["volumes"])]
+
+    def proofs(self) -> tuple[PairProof, ...]:
+        return tuple(self._proof(f"proof/{i}", header) for i, header in enumerate(self._headers))
+
+    def _volume(self, i: int, header: dict[str, Any]) -> Volume:
+        names = tuple(str(name) for name in header["geometries"])
+        if "body" not in header:
+            (name,) = names
+            return Volume.of(self._scene.geometry(name))
+        vertices, radius = (floats(self._arrays[f"volume/{i}/{name}"]) for name in ("vertices", "radius"))
+        return Volume(names, str(header["body"]), vertices, radius.item())
+
+    def _proof(self, prefix: str, header: dict[str, Any]) -> PairProof:
+        arrays = self._arrays
+        t, kappa = floats(arrays[f"{prefix}/scalars"]).tolist()
+        first, second = (self._volumes[index(i)] for i in header["volumes"])
+        side_a, side_b = (
+            Side(tuple(index(i) for i in chain), _factors(arrays[f"{prefix}/mantissa{i}"]), arrays[f"{prefix}/exponent{i}"])
+            for i, chain in enumerate(header["chains"])
+        )
+        return PairProof(
+            scene=self._scene,
+            volumes=(first, second),
+            frame=str(header["frame"]),
+            ground=self._grounds[index(header["ground"])],
+            plane=floats(arrays[f"{prefix}/plane"]),
+            t=t,
+            kappa=kappa,
+            faces=tuple(index(j) for j in header["faces"]),
+            sides=(side_a, side_b),
+        )
 
 
 def digest(data: bytes) -> str:
@@ -196,92 +324,23 @@ def digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-class _malformed:
-    """Turns whatever a broken file makes the parser raise into a ProofError."""
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        if isinstance(error, (KeyError, IndexError, TypeError, ValueError, AttributeError, CirisError)) and not isinstance(
-            error, ProofError
-        ):
-            raise ProofError("proof_malformed", f"the proof file is malformed: {type(error).__name__}: {error}") from error
+def same_scene(header: dict[str, Any], scene: Scene) -> None:
+    """Raises ProofError, proof_scene, for the header of a proof about another scene."""
+    if header["scene_hash"] != scene.hash:
+        raise ProofError("proof_scene", "the proof is about another scene")
 
 
-def _ground_arrays(prefix: str, ground: Ground) -> dict[str, np.ndarray]:
-    return {f"{prefix}/{name}": value for name, value in vars(ground).items()}
+def ground_arrays(ground: Ground, i: int) -> dict[str, np.ndarray]:
+    """The arrays of a file's ground i."""
+    return {f"ground/{i}/{name}": value for name, value in vars(ground).items()}
 
 
-def _ground(prefix: str, arrays: dict[str, np.ndarray]) -> Ground:
-    return Ground(*(_floats(arrays[f"{prefix}/{name}"]) for name in ("C", "d", "mid", "half", "Y_lower", "Y_upper")))
+def ground_of(arrays: dict[str, np.ndarray], i: int) -> Ground:
+    """Ground i of a file."""
+    return Ground(*(floats(arrays[f"ground/{i}/{name}"]) for name in ("C", "d", "mid", "half", "Y_lower", "Y_upper")))
 
 
-def _floats(array: np.ndarray) -> Array:
-    if array.dtype != np.float64 or not np.isfinite(array).all():
-        raise ProofError("proof_malformed", "a number in the proof file is not a finite double")
-    return array
-
-
-def _integers(array: np.ndarray) -> np.ndarray:
+def _factors(array: np.ndarray) -> np.ndarray:
     if array.dtype.name not in BITS:
         raise ProofError("proof_malformed", f"a Gram factor in the proof file is of {array.dtype.name}")
     return array
-
-
-def _pair(scene_hash: str, header: dict[str, Any], grounds: list[Ground], prefix: str, arrays: dict[str, np.ndarray]) -> PairProof:
-    t, kappa = _floats(arrays[f"{prefix}/scalars"])
-    faces = tuple(int(j) for j in header["faces"])
-    chain_a, chain_b = (tuple(int(i) for i in chain) for chain in header["chains"])
-    side_a, side_b = (
-        Side(chain, _integers(arrays[f"{prefix}/mantissa{i}"]), _integers(arrays[f"{prefix}/exponent{i}"]))
-        for i, chain in enumerate((chain_a, chain_b))
-    )
-    plane = _floats(arrays[f"{prefix}/plane"])
-    names = (header["a"], header["b"], header["frame"])
-    return PairProof(scene_hash, *names, grounds[header["ground"]], plane, float(t), float(kappa), faces, (side_a, side_b))
-
-
-def _pack(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> bytes:
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in [
-            ("header.json", json.dumps(header, sort_keys=True).encode()),
-            *((f"{n}.npy", _npy(a)) for n, a in arrays.items()),
-        ]:
-            archive.writestr(zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), content, zipfile.ZIP_DEFLATED)
-    return buffer.getvalue()
-
-
-def _npy(array: np.ndarray) -> bytes:
-    buffer = io.BytesIO()
-    np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
-    return buffer.getvalue()
-
-
-def _unpack(data: bytes, kind: str) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            if sum(info.file_size for info in archive.infolist()) > MAX_BYTES:
-                raise ProofError("proof_too_large", f"the proof file unpacks to more than {MAX_BYTES} bytes")
-            header = json.loads(archive.read("header.json"))
-            arrays = {
-                name.removesuffix(".npy"): np.lib.format.read_array(io.BytesIO(archive.read(name)), allow_pickle=False)
-                for name in archive.namelist()
-                if name.endswith(".npy")
-            }
-    except (
-        zipfile.BadZipFile,
-        zipfile.LargeZipFile,
-        KeyError,
-        ValueError,
-        EOFError,
-        OSError,
-        NotImplementedError,
-        RuntimeError,
-        zlib_error,
-    ) as error:
-        raise ProofError("proof_malformed", f"not a proof file: {error}") from error
-    if not isinstance(header, dict) or header.get("format") != FORMAT or header.get("kind") != kind:
-        raise ProofError("proof_malformed", f"not a {kind}'s proof of format {FORMAT}")
-    return header, arrays

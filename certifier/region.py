@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from certifier.archimedean import archimedean
-from certifier.model import SCHEMA_VERSION, Array, Polytope, Scene
+from certifier.growth import Accepted
+from certifier.model import SCHEMA_VERSION, Polytope, Scene
 from certifier.outcome import Guarantee
-from certifier.polytope import chebyshev_center, inscribed_ellipsoid, volume
-from certifier.proof import PairProof, RegionProof, digest
+from certifier.polytope import chebyshev_center, inscribed_ellipsoid, support, volume
+from certifier.proof import Implied, PairProof, RegionProof, digest
 from certifier.verify.region import RegionStatement, verify_region
 
 
@@ -30,26 +31,23 @@ class Region:
     statement: RegionStatement
 
 
-def certified_region(
-    scene: Scene, C: Array, d: Array, center: Array | None, proofs: dict[int, bytes], provenance: dict[str, Any]
-) -> Region:
+def certified_region(scene: Scene, accepted: Accepted, proofs: dict[int, bytes], provenance: dict[str, Any]) -> Region:
     """Assemble a region from its pairs' proofs, verify the whole, and describe it.
 
     Args:
-        C, d: (m, n), (m,) half-spaces with the joint limits among them.
-        center: (n,) the seed, or None for the Chebyshev centre.
-        proofs: pair index -> proof file, for every pair of the scene.
+        proofs: pair index -> proof file, for every pair of the scene; one that covers several pairs stands at each of them.
         provenance: options, seeds, versions, seconds, growth curve.
 
     Raises:
         ProofError: the proof does not hold; nothing may be served as certified then.
         RegionError: the polytope is empty or unbounded.
     """
+    C, d = np.array(accepted.C), np.array(accepted.d)
     polytope = Polytope(C, d)
-    interior = chebyshev_center(polytope)[0] if center is None else center
+    interior = chebyshev_center(polytope)[0] if accepted.center is None else np.array(accepted.center)
     bound = archimedean(polytope)
-    parts = [PairProof.from_bytes(proofs[index]) for index in range(len(scene.pairs))]
-    data = RegionProof(scene, C, d, interior, bound, tuple(parts)).to_bytes()
+    parts = tuple(PairProof.from_bytes(data, scene) for data in dict.fromkeys(proofs[index] for index in range(len(scene.pairs))))
+    data = RegionProof(scene, C, d, interior, _implied(polytope, parts), bound, parts).to_bytes()
     statement = verify_region(data)
     ellipsoid = inscribed_ellipsoid(polytope)
     size, error = volume(polytope, seed=0)
@@ -70,10 +68,10 @@ def certified_region(
         "interior_point": interior.tolist(),
         "inscribed_ellipsoid": {"center": ellipsoid.center.tolist(), "shape": ellipsoid.shape.tolist()},
         "volume": {"ellipsoid": ellipsoid.volume, "polytope": size, "polytope_stderr": error},
-        "seed": None if center is None else scene.to_q(np.asarray(center)).tolist(),
+        "seed": None if accepted.seed is None else scene.to_q(np.array(accepted.seed)).tolist(),
         "pairs": [
-            {"a": s.a, "b": s.b, "outcome": "certified", "margin": s.gap, "proof_digest": digest(proofs[index])}
-            for index, s in enumerate(statement.pairs)
+            {"a": p.a, "b": p.b, "outcome": "certified", "margin": statement.gaps[p], "proof_digest": digest(proofs[index])}
+            for index, p in enumerate(scene.pairs)
         ],
         "ignored": [{"a": i.a, "b": i.b, "reason": i.reason} for i in scene.ignored],
         "padding": scene.padding,
@@ -82,3 +80,16 @@ def certified_region(
         "provenance": provenance,
     }
     return Region(manifest, data, statement)
+
+
+def _implied(polytope: Polytope, proofs: tuple[PairProof, ...]) -> Implied:
+    """The grounds' faces that are not, or no longer, faces of the region."""
+    own = {c.tobytes() for c in polytope.C + 0.0}
+    rows = {c.tobytes(): c for proof in proofs for c in proof.ground.C + 0.0 if c.tobytes() not in own}
+    found = [(c, *support(polytope, c)) for c in rows.values()]
+    m, n = polytope.C.shape
+    return Implied(
+        np.array([c for c, _, _ in found]).reshape(-1, n),
+        np.array([bound for _, bound, _ in found]),
+        np.array([y for _, _, y in found]).reshape(-1, m),
+    )

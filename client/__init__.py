@@ -1,5 +1,19 @@
 """The `ciris` command line and a small Python client for the service."""
 
-from client.http import Client
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from client.http import Client
 
 __all__ = ["Client"]
+
+
+def __getattr__(name: str) -> Any:
+    """``Client`` is imported when it is asked for: ``ciris verify`` runs where httpx2 is not installed."""
+    if name == "Client":
+        from client.http import Client
+
+        return Client
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

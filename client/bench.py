@@ -48,7 +48,9 @@ def agreement(args: Namespace) -> int:
             print()
             output.print_table(*table, right=NUMBERS)
         evidence = ", ".join(f"{kind}: {number}" for kind, number in document["evidence"].items())
-        print(f"\n{document['instances']} instances, {document['same_program']} of them the very same program. Evidence for ours: {evidence}.")
+        print(
+            f"\n{document['instances']} instances, {document['same_program']} of them the very same program. Evidence for ours: {evidence}."
+        )
     return CONTRADICTED if document["contradictions"] else OK
 
 

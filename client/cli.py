@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import os
 import re
 import sys
@@ -10,8 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from certifier.errors import CirisError
-from client import bench, commands
-from client.service import NEGATIVE
+from client.output import NEGATIVE
 
 EPILOG = """exit status: 0 success; 1 a negative answer (not certified, a proof that does not hold, a point outside);
 2 bad input or no service; 130 interrupted. An error is one line on standard error. --json prints one JSON document
@@ -30,9 +30,8 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
     parsed = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
-    run: Callable[[argparse.Namespace], int] = parsed.run
     try:
-        return run(parsed)
+        return _command(parsed.run)(parsed)
     except CirisError as error:
         return _fail(str(error), 1 if error.code in NEGATIVE else 2)
     except BrokenPipeError:
@@ -42,6 +41,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(f"{error.filename or ''}: {error.strerror or error}".removeprefix(": "), 2)
     except KeyboardInterrupt:
         return _fail("interrupted", INTERRUPTED)
+
+
+def _command(where: str) -> Callable[[argparse.Namespace], int]:
+    """The command at ``module:function``, imported now: checking a proof needs little of what the others do.
+
+    Raises:
+        CirisError: not_installed.
+    """
+    module, _, function = where.partition(":")
+    try:
+        command: Callable[[argparse.Namespace], int] = getattr(importlib.import_module(module), function)
+    except ModuleNotFoundError as error:
+        problem = f"this command needs {error.name}, which is not installed"
+        raise CirisError(
+            "not_installed", problem, hint="pip install '.[service]'; `ciris verify` needs no more than '.[verify]'"
+        ) from error
+    return command
 
 
 def _fail(message: str, status: int) -> int:
@@ -80,16 +96,16 @@ def _parser() -> argparse.ArgumentParser:
     up = verbs.add_parser("up", help="run the service on this machine until Ctrl-C")
     up.add_argument("--port", type=int, help="port of the API; default: CIRIS_PORT or 8643, or any free one when that is taken")
     up.add_argument("--data", metavar="DIR", help="data directory; default: CIRIS_DATA_DIR")
-    up.set_defaults(run=commands.up)
+    up.set_defaults(run="client.commands:up")
 
     scene = _group(verbs.add_parser("scene", help="add, list and show scenes"))
     add = scene.add_parser("add", parents=[remote, json], help="upload a scene file with all it refers to")
     add.add_argument("path", metavar="PATH.yaml")
-    add.set_defaults(run=commands.scene_add)
-    scene.add_parser("ls", parents=[remote, json], help="list scenes, newest first").set_defaults(run=commands.scene_ls)
+    add.set_defaults(run="client.commands:scene_add")
+    scene.add_parser("ls", parents=[remote, json], help="list scenes, newest first").set_defaults(run="client.commands:scene_ls")
     show = scene.add_parser("show", parents=[remote, json], help="a scene's joints, warnings and pairs")
     show.add_argument("scene", metavar="ID")
-    show.set_defaults(run=commands.scene_show)
+    show.set_defaults(run="client.commands:scene_show")
 
     grow = verbs.add_parser("grow", parents=[remote, json], help="grow a certified region around a configuration")
     grow.add_argument("scene", metavar="SCENE")
@@ -100,7 +116,7 @@ def _parser() -> argparse.ArgumentParser:
     grow.add_argument("--out", metavar="FILE", help="where the proof goes; default: named after scene and proof, here")
     grow.add_argument("--watch", action="store_true", help="a line for every pair as it is settled")
     grow.add_argument("--local", action="store_true", help="in this process, without a service")
-    grow.set_defaults(run=commands.grow)
+    grow.set_defaults(run="client.commands:grow")
 
     certify = verbs.add_parser("certify", parents=[remote, json], help="one outcome per pair for a given polytope")
     certify.add_argument("scene", metavar="SCENE")
@@ -111,53 +127,57 @@ def _parser() -> argparse.ArgumentParser:
     certify.add_argument("--local", action="store_true", help="in this process, without a service")
     certify.add_argument("--backend", choices=["ciris", "drake"], default="ciris", help="drake: Drake's own program, a cross-check")
     certify.add_argument("--solver", metavar="NAME", help="Drake's solver: clarabel (default), scs, csdp or mosek")
-    certify.set_defaults(run=commands.certify)
+    certify.set_defaults(run="client.commands:certify")
 
     verify = verbs.add_parser("verify", parents=[json], help="check a proof file offline; says what was proved")
     verify.add_argument("proof", metavar="PROOF")
-    verify.set_defaults(run=commands.verify)
+    verify.set_defaults(run="client.verify:verify")
 
     region = _group(verbs.add_parser("region", help="list, show and export regions"))
     ls = region.add_parser("ls", parents=[remote, json], help="list regions, newest first")
     ls.add_argument("--scene", help="only those of this scene")
-    ls.set_defaults(run=commands.region_ls)
+    ls.set_defaults(run="client.commands:region_ls")
     show = region.add_parser("show", parents=[remote, json], help="a region's manifest")
     show.add_argument("region", metavar="ID")
-    show.set_defaults(run=commands.region_show)
+    show.set_defaults(run="client.commands:region_show")
     export = region.add_parser("export", parents=[remote], help="a region as a file")
     export.add_argument("region", metavar="ID")
     export.add_argument("--format", choices=["json", "npz", "drake-yaml", "proof"], default="json")
     export.add_argument("--out", metavar="FILE", help="default: standard output")
-    export.set_defaults(run=commands.region_export)
+    export.set_defaults(run="client.commands:region_export")
 
     contains = verbs.add_parser("contains", parents=[remote, json], help="which certified regions hold a configuration")
     contains.add_argument("scene", metavar="SCENE")
     contains.add_argument("--q", metavar='"0,0.3,..."', required=True, action="append", help="joint positions; may be given several times")
-    contains.set_defaults(run=commands.contains)
+    contains.set_defaults(run="client.commands:contains")
 
     _add_bench(verbs, json)
 
     doctor = verbs.add_parser("doctor", parents=[remote, json], help="what is installed, what works, what the machine can do")
-    doctor.set_defaults(run=commands.doctor)
+    doctor.set_defaults(run="client.commands:doctor")
     return parser
 
 
 def _add_bench(verbs: Any, json: argparse.ArgumentParser) -> None:
     kinds = _group(verbs.add_parser("bench", help="measure, side by side with Drake; exit status 1 when verdicts contradict each other"))
     against = _Parser(add_help=False)
-    against.add_argument("--against", metavar="drake|FILE", help="Drake with Clarabel here and now, or its side of an earlier --json document")
+    against.add_argument(
+        "--against", metavar="drake|FILE", help="Drake with Clarabel here and now, or its side of an earlier --json document"
+    )
     against.add_argument("--limit", type=float, metavar="SECONDS", help="stop Drake after this long on a pair and call it a bound")
     against.add_argument("--repeat", type=int, default=1, metavar="N", help="run ours this often; the fastest run counts")
     pairs = kinds.add_parser("pairs", parents=[json, against], help="named instances of benchmarks/catalogue.yaml, scene/pair/polytope")
     pairs.add_argument("names", metavar="NAME", nargs="*", help="default: the catalogue's ladder, small to hard")
-    pairs.set_defaults(run=bench.pairs)
+    pairs.set_defaults(run="client.bench:pairs")
     scene = kinds.add_parser("scene", parents=[json, against], help="the 7-joint arm against the bookcase, 70 pairs")
     scene.add_argument("--pairs", type=int, metavar="N", help="the N cheapest pairs alone")
-    scene.set_defaults(run=bench.scene)
-    kinds.add_parser("agreement", parents=[json], help="verdicts on hundreds of pairs, half an hour").set_defaults(run=bench.agreement)
+    scene.set_defaults(run="client.bench:scene")
+    kinds.add_parser("agreement", parents=[json], help="verdicts on hundreds of pairs, half an hour").set_defaults(
+        run="client.bench:agreement"
+    )
     scaling = kinds.add_parser("scaling", help="how the cost grows with obstacles, joints and faces, as JSON")
     scaling.add_argument("--svg", metavar="FILE", help="a picture of it")
-    scaling.set_defaults(run=bench.scaling)
+    scaling.set_defaults(run="client.bench:scaling")
 
 
 if __name__ == "__main__":

@@ -140,25 +140,6 @@ def _drake(args: Namespace) -> str | None:
     return args.solver or "clarabel"
 
 
-def verify(args: Namespace) -> int:
-    from certifier.proof import ProofError
-    from certifier.verify.region import verify_region
-
-    data = Path(args.proof).read_bytes()
-    try:
-        statement = verify_region(data)
-    except ProofError as error:
-        if args.json:
-            print_json({"holds": False, "error": error.to_document()})
-        print("error:", " ".join(f"{args.proof}: the proof does not hold: {error}".split()), file=sys.stderr)
-        return NO
-    if args.json:
-        print_json({"holds": True, "scene": {"name": statement.scene.name, "hash": statement.scene.hash}, "statement": statement.lines()})
-    else:
-        print("the proof holds:", *statement.lines(), sep="\n  ")
-    return OK
-
-
 def region_ls(args: Namespace) -> int:
     with _client(args) as client:
         regions = client.regions(scene=args.scene)

@@ -126,6 +126,14 @@ class Client:
         """A region's proof file."""
         return self._send("GET", f"/v1/regions/{region_id}/proof").content
 
+    def verify(self, region_id: str) -> Document:
+        """The service's own check of a region's stored proof: whether it holds, and what it proves."""
+        return self._json("POST", f"/v1/regions/{region_id}/verify")
+
+    def pair_proof(self, job_id: str, iteration: int, pair: int) -> bytes:
+        """The proof of what became of one pair of a job's iteration, its scene in it."""
+        return self._send("GET", f"/v1/jobs/{job_id}/pairs/{pair}/proof", params={"iteration": iteration}).content
+
     def export(self, region_id: str, format: str) -> bytes:
         """A region as ``json``, ``npz`` or ``drake-yaml``."""
         return self._send("GET", f"/v1/regions/{region_id}/export", params={"format": format}).content

@@ -10,6 +10,9 @@ from typing import Any
 
 Row = Sequence[str]
 
+NEGATIVE = {"not_grown"}
+"""Codes of errors that are answers: the input was fine, and the answer is no."""
+
 
 class Screen:
     """Progress on standard error: lines that stay, and on a terminal one line that is overwritten."""

@@ -11,10 +11,7 @@ from certifier.outcome import Guarantee, Outcome
 from client.follow import follow
 from client.http import Client, Document
 from client.inputs import PolytopeFile, is_scene_file
-from client.output import Screen
-
-NEGATIVE = {"not_grown"}
-"""Codes of errors that are answers: the input was fine, and the answer is no."""
+from client.output import NEGATIVE, Screen
 
 
 @dataclass(frozen=True)

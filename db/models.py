@@ -153,7 +153,7 @@ class PairRow(Leased, Base):
     seconds: Mapped[float | None]
     detail: Mapped[str | None]
     witness_s: Mapped[list[float] | None] = mapped_column(JSON(none_as_null=True))
-    weak_points: Mapped[list[list[float]] | None] = mapped_column(JSON(none_as_null=True))
+    weak_points: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     proof_digest: Mapped[str | None] = mapped_column(ForeignKey("proofs.digest"))
 
 

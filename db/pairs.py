@@ -59,7 +59,7 @@ class Result:
     margin: float | None = None
     detail: str = ""
     witness_s: list[float] | None = None
-    weak_points: list[list[float]] | None = None
+    weak_points: dict[str, Any] | None = None
     proof: bytes | None = None
     error: dict[str, Any] | None = None
 

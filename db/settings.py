@@ -52,8 +52,10 @@ class Settings(BaseSettings):
     """Work that nobody has claimed this long after it was sent, with the queue empty, is sent again."""
     step_timeout_seconds: float = 3600.0
     """Limit of one seeding or polytope step."""
+    verify_timeout_seconds: float = 600.0
+    """Limit of one check of a stored proof on request."""
     child_memory_bytes: int = 16 << 30
-    """Limit of the address space of the process that runs a seeding or polytope step."""
+    """Limit of the address space of the process that runs a seeding, a polytope step or a check on request."""
 
     @property
     def database(self) -> str:

@@ -29,9 +29,9 @@ def next_transition(scene: Scene, options: dict[str, Any], state: dict[str, Any]
     return advance(scene, state, report)
 
 
-def certification_report(iteration: int, states: dict[int, str]) -> Certification:
-    """The report of a certification from its pairs' final states; skipped pairs are left out."""
-    return Certification(iteration, {index: SETTLED[state] for index, state in states.items() if state in SETTLED})
+def certification_report(iteration: int, states: dict[int, str], weak: dict[int, dict[str, Any]]) -> Certification:
+    """The report of a certification from its pairs' final states and where they fail; skipped pairs are left out."""
+    return Certification(iteration, {index: SETTLED[state] for index, state in states.items() if state in SETTLED}, weak)
 
 
 def step_report(kind: StepKind, state: StepState, report: dict[str, Any]) -> Report:

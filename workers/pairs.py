@@ -9,6 +9,7 @@ from functools import lru_cache, partial
 
 from certifier.errors import CirisError
 from certifier.growth import GrowthOptions
+from certifier.local import weakness
 from certifier.model import Polytope
 from certifier.pair import Certification
 from db import jobs, leases, pairs
@@ -73,7 +74,7 @@ def _certify(claim: pairs.Claim, pair: pairs.Claimed) -> pairs.Result:
         seconds=found.seconds,
         detail=found.detail,
         witness_s=None if found.witness_s is None else found.witness_s.tolist(),
-        weak_points=None if found.weak_points is None else found.weak_points.tolist(),
+        weak_points=weakness(found),
         proof=found.proof,
     )
 

@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 
 from certifier.child import run_in_child
 from certifier.errors import CirisError
-from certifier.growth import Proposed
+from certifier.growth import Accepted, Proposed
 from certifier.local import stepped, versions
 from certifier.model import Polytope, Scene
 from certifier.polytope_step import step as polytope_step
@@ -117,8 +117,7 @@ def _accept(scene: Scene, claim: steps.Claim) -> Done:
     with database().read() as session:
         held = _proofs(session, claim.job_id, accepted["proofs"])
         provenance = _provenance(session, scene, jobs.get(session, claim.job_id))
-    center = None if accepted["center"] is None else np.array(accepted["center"])
-    region = certified_region(scene, np.array(accepted["C"]), np.array(accepted["d"]), center, held, provenance)
+    region = certified_region(scene, Accepted(**accepted), held, provenance)
 
     def save(session: Session, job: JobRow) -> None:
         regions.add(session, job, accepted["iteration"], region.manifest, region.proof)

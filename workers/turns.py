@@ -99,7 +99,8 @@ def _report(session: Session, job: JobRow) -> Report | None:
         if iteration.state == IterationState.RUNNING:
             return None
         rows = pairs.of_iteration(session, job.id, action.iteration)
-        return certification_report(action.iteration, {row.pair_index: row.state for row in rows})
+        weak = {row.pair_index: row.weak_points for row in rows if row.weak_points is not None}
+        return certification_report(action.iteration, {row.pair_index: row.state for row in rows}, weak)
     step = steps.of_turn(session, job, StepKind(action.kind))
     if step is None or step.state in unfinished(STEP):
         return None

@@ -16,9 +16,11 @@ from api import checks
 from api.access import Db
 from api.schemas.jobs import CertifyRequest, GrowRequest, GrowthCurve, GrowthPoint, Iteration, Job, JobPage, NewJob, PairCell, PairMatrix
 from api.schemas.scenes import PairInfo
+from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Stage
-from db import jobs, pairs, regions, scenes
+from certifier.proof_file import with_scene
+from db import jobs, pairs, proofs, regions, scenes
 from db.models import IterationRow, PairRow
 from db.states import IterationState, JobKind, JobState, PairState
 from db.types import utcnow
@@ -124,6 +126,20 @@ def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge
         iterations=[_iteration(row) for row in iterations],
         cells=[_cell(scene, row) for row in rows],
     )
+
+
+@router.get("/{job_id}/pairs/{pair}/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
+def download_pair_proof(job_id: str, pair: int, iteration: Annotated[int, Query(ge=0)], db: Db) -> Response:
+    """The proof of what became of a pair, its scene in it: certified, refuted or not certifiable; `ciris verify` checks it offline."""
+    with db.read() as session:
+        job = jobs.get(session, job_id)
+        row = next((row for row in pairs.of_iteration(session, job_id, iteration) if row.pair_index == pair), None)
+        if row is None or row.proof_digest is None:
+            raise CirisError("proof_not_found", f"there is no proof of pair {pair} in iteration {iteration}", field="pair")
+        data = proofs.get(session, row.proof_digest)
+        scene = Scene.from_document(scenes.get(session, job.scene_id).document)
+    headers = {"Content-Disposition": f'attachment; filename="{job_id}-{iteration}-{pair}.proof"'}
+    return Response(with_scene(data, scene), media_type="application/octet-stream", headers=headers)
 
 
 def _iteration(row: IterationRow) -> Iteration:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import time
 from enum import StrEnum
 from typing import Annotated
 
@@ -9,8 +11,10 @@ from fastapi import APIRouter, Query, Response, status
 
 from api import exports
 from api.access import Db
-from api.schemas.regions import RegionDetail, RegionPage, RegionSummary
+from api.schemas.regions import RegionDetail, RegionPage, RegionSummary, Verification
+from certifier.child import run_in_child
 from db import jobs, proofs, regions, scenes
+from db.settings import settings
 
 router = APIRouter(prefix="/v1/regions", tags=["regions"])
 
@@ -49,6 +53,27 @@ def download_region_proof(region_id: str, db: Db) -> Response:
         digest = regions.get(session, region_id).proof_digest
         data = proofs.get(session, digest)
     return _download(data, f"{region_id}.proof", "application/octet-stream", etag=digest)
+
+
+@router.post("/{region_id}/verify")
+def verify_region(region_id: str, db: Db) -> Verification:
+    """Check the stored proof again, whole, in a process of its own with limits on time and memory; what it proves, in plain words."""
+    with db.read() as session:
+        row = regions.get(session, region_id)
+        payload = {
+            "proof": base64.b64encode(proofs.get(session, row.proof_digest)).decode(),
+            "scene_hash": row.manifest["scene"]["hash"],
+            **row.arrays,
+        }
+    limits = settings()
+    began = time.perf_counter()
+    found = run_in_child(
+        "certifier.verify.file:answer_about_region",
+        payload,
+        timeout_s=limits.verify_timeout_seconds,
+        memory_bytes=limits.child_memory_bytes,
+    )
+    return Verification(region=region_id, seconds=time.perf_counter() - began, **found)
 
 
 @router.get(

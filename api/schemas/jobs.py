@@ -18,7 +18,11 @@ from db.states import IterationState, JobKind, JobState, PairState
 class GrowOptions(Request):
     """How far to go."""
 
-    bisection_steps: Annotated[int, Field(ge=0, le=60, description="Certifications spent on contraction after its two ends.")] = 6
+    contraction: Annotated[
+        Literal["targeted", "uniform"], Field(description="Faces where pairs fail, or every face moved in by as much.")
+    ] = "targeted"
+    bisection_steps: Annotated[int, Field(ge=0, le=60, description="Certifications spent on uniform contraction after its two ends.")] = 6
+    pushes: Annotated[int, Field(ge=0, le=1000, description="How often the faces are pushed out after the contraction.")] = 3
     max_rounds: Annotated[int, Field(ge=0, le=1000, description="Rounds of the polytope step; 0 ends after contraction.")] = 3
     tolerance: Annotated[Real, Field(gt=0, lt=10, description="Growth of the ellipsoid's volume under which the alternation stops.")] = 0.02
     backoff: Annotated[int, Field(ge=0, le=20, description="How often a step that fails to certify is halved.")] = 2

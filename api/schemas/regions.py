@@ -58,6 +58,17 @@ class RegionDetail(RegionSummary):
         return cls(**RegionSummary.of(row).model_dump(), manifest=row.manifest)
 
 
+class Verification(BaseModel):
+    """What the verifier says of a region's stored proof."""
+
+    region: str
+    holds: bool
+    statement: list[str] = Field([], description="What was proved, in plain words; empty when the proof does not hold.")
+    guarantee: Guarantee = Guarantee.NONE
+    error: Document | None = Field(None, description="Why the proof does not hold: code, message, field, hint.")
+    seconds: float
+
+
 class ContainsRequest(Request):
     """Points to look up: either joint positions `q` or tangent-space coordinates `s`."""
 

@@ -62,6 +62,12 @@ class ExactKinematics:
                 X = _multiply(X, factor)
         return X
 
+    def fixed_pose(self, frame: str, body: str) -> list[list[fmpq]] | None:
+        """(4, 4) X_FB of two bodies that are welded together, perhaps through others; None if a joint between them moves."""
+        if any(joint.index is not None for joint, _ in self.path(frame, body)):
+            return None
+        return [[entry.coefficient(0) if entry != 0 else fmpq(0) for entry in row] for row in self.pose(frame, body)]
+
     def scale(self, frame: str, body: str) -> fmpq:
         """prod (1 + tau_i^2) over the revolute joints of the path: the least value of the denominator."""
         revolute = [joint for joint, _ in self.path(frame, body) if joint.kind is JointKind.REVOLUTE]

@@ -6,11 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from certifier.model import Scene
-from certifier.proof import Ground, ProofError, RegionProof
+from certifier.model import Pair, Scene
+from certifier.proof import Ground, RegionProof
+from certifier.proof_file import ProofError
 from certifier.verify.archimedean import check_archimedean
+from certifier.verify.box import holds
 from certifier.verify.kinematics import exact
-from certifier.verify.pair import PairCheck, PairStatement, check_ground
+from certifier.verify.pair import PairCheck, check_ground
+from certifier.verify.scene import check_scene
 
 
 @dataclass(frozen=True)
@@ -19,19 +22,19 @@ class RegionStatement:
 
     Attributes:
         faces: number of half-spaces, joint limits included.
-        pairs: one statement for every pair of the scene.
+        gaps: for every pair of the scene, in its order, a lower bound in metres of the distance between the two (padded) bodies.
         N: |s|^2 <= N on the region (Archimedean, appendix A).
     """
 
     scene: Scene
     faces: int
-    pairs: tuple[PairStatement, ...]
+    gaps: dict[Pair, float]
     N: float
 
     @property
     def gap(self) -> float:
         """Least certified distance in metres over all pairs (0 when there is no pair)."""
-        return min((pair.gap for pair in self.pairs), default=0.0)
+        return min(self.gaps.values(), default=0.0)
 
     def lines(self) -> list[str]:
         """The statement in plain words."""
@@ -40,16 +43,16 @@ class RegionStatement:
             f"  {j.name}: {j.lower:g} to {j.upper:g} {'rad' if r else 'm'} (centre {q:g})"
             for j, r, q in zip(scene.moving, scene.revolute, scene.q_star, strict=True)
         ]
-        closest = min(self.pairs, key=lambda pair: pair.gap, default=None)
+        closest = min(self.gaps, key=self.gaps.__getitem__, default=None)
         return [
             f"scene {scene.name}, hash {scene.hash}",
             f"{scene.n} joints, within their limits:",
             *joints,
             f"a bounded, non-empty polytope of {self.faces} half-spaces in tangent space; |s|^2 <= {self.N:.6g}",
-            f"{len(self.pairs)} pairs of bodies separated at every configuration of it; padding {scene.padding:g} m around every body",
-            *([f"least distance at least {closest.gap:.3g} m: {closest.a} and {closest.b}"] if closest else []),
+            f"{len(self.gaps)} pairs of bodies separated at every configuration of it; padding {scene.padding:g} m around every body",
+            *([f"least distance at least {self.gap:.3g} m: {closest.a} and {closest.b}"] if closest else []),
             *(f"not covered: {i.a} and {i.b} ({i.reason})" for i in scene.ignored),
-            "guarantee: exact (rational arithmetic; the parsed model's numbers taken as they are)",
+            "guarantee: exact (rigorous arithmetic; the parsed model's numbers taken as they are)",
         ]
 
 
@@ -61,23 +64,23 @@ def verify_region(data: bytes) -> RegionStatement:
     """
     proof = RegionProof.from_bytes(data)
     scene = proof.scene
+    check_scene(scene)
     _check_polytope(proof)
-    stated = {frozenset((p.a, p.b)) for p in scene.pairs}
-    proved = {frozenset((p.a, p.b)) for p in proof.pairs}
-    if stated != proved:
-        missing = next(iter(stated - proved), None)
-        raise ProofError(
-            "proof_pairs", f"no proof for the pair {' and '.join(sorted(missing))}" if missing else "a proof is of no pair of the scene"
-        )
+    _check_implied(proof)
     checks: dict[int, PairCheck] = {}
-    statements = []
-    for pair in proof.pairs:
-        if id(pair.ground) not in checks:
-            check_ground(scene, pair.ground)
-            _check_inside(proof, pair.ground)
-            checks[id(pair.ground)] = PairCheck(scene, pair.ground)
-        statements.append(checks[id(pair.ground)].verify(pair))
-    return RegionStatement(scene, len(proof.d), tuple(statements), proof.archimedean.N)
+    gaps: dict[Pair, float] = {}
+    for part in proof.proofs:
+        ground = part.ground
+        if id(ground) not in checks:
+            check_ground(scene, ground)
+            _check_inside(proof, ground)
+            checks[id(ground)] = PairCheck(scene, ground)
+        statement = checks[id(ground)].verify(part)
+        gaps |= {pair: max(statement.gap, gaps.get(pair, 0.0)) for pair in statement.pairs}
+    missing = next((pair for pair in scene.pairs if pair not in gaps), None)
+    if missing:
+        raise ProofError("proof_pairs", f"no proof covers the pair {missing.a} and {missing.b}")
+    return RegionStatement(scene, len(proof.d), {pair: gaps[pair] for pair in scene.pairs}, proof.archimedean.N)
 
 
 def _check_polytope(proof: RegionProof) -> None:
@@ -86,28 +89,36 @@ def _check_polytope(proof: RegionProof) -> None:
     if proof.C.ndim != 2 or proof.C.shape[1] != n or proof.d.shape != (len(proof.C),) or proof.interior.shape != (n,):
         raise ProofError("proof_malformed", "the region's arrays do not fit the scene")
     limits = scene.polytope(np.zeros((0, n)), np.zeros(0))
-    if not _implied(proof, limits.C, limits.d):
+    if not _among(proof.C, proof.d, limits.C, limits.d):
         raise ProofError("proof_limits", "the joint limits are not among the region's half-spaces")
     point = [exact(x) for x in proof.interior]
     for c, d in zip(proof.C, proof.d, strict=True):
         if not sum(exact(x) * s for x, s in zip(c, point, strict=True)) < exact(d):
             raise ProofError("proof_interior", "the interior point is not strictly inside the region")
-    try:
-        archimedean = check_archimedean(proof.C, proof.d, proof.archimedean)
-    except (ValueError, IndexError) as error:
-        raise ProofError("proof_malformed", f"the Archimedean multipliers do not fit: {error}") from error
-    if not archimedean:
+    if not check_archimedean(proof.C, proof.d, proof.archimedean):
         raise ProofError("proof_archimedean", "the multipliers do not prove the region Archimedean")
 
 
+def _check_implied(proof: RegionProof) -> None:
+    """The multipliers prove the implied half-spaces."""
+    implied, n = proof.implied, proof.scene.n
+    if implied.C.shape != (len(implied.d), n) or implied.Y.shape != (len(implied.d), len(proof.d)):
+        raise ProofError("proof_malformed", "the implied half-spaces do not fit the region")
+    for c, d, y in zip(implied.C, implied.d, implied.Y, strict=True):
+        if not holds(proof.C, proof.d, c, float(d), y):
+            raise ProofError("proof_implied", "the multipliers do not prove a half-space around the region")
+
+
 def _check_inside(proof: RegionProof, ground: Ground) -> None:
-    """Every face of the ground is a half-space of the region, or one moved outwards."""
-    if not _implied(proof, ground.C, ground.d):
+    """Every face of the ground is a half-space of the region or an implied one, or one of them moved outwards."""
+    C, d = np.concatenate([proof.C, proof.implied.C]), np.concatenate([proof.d, proof.implied.d])
+    if not _among(C, d, ground.C, ground.d):
         raise ProofError("proof_ground", "a pair's proof is about a polytope that does not contain the region")
 
 
-def _implied(proof: RegionProof, C: np.ndarray, d: np.ndarray) -> bool:
+def _among(C: np.ndarray, d: np.ndarray, rows: np.ndarray, offsets: np.ndarray) -> bool:
+    """Whether every row is one of C's with an offset that is no smaller."""
     least: dict[bytes, float] = {}
-    for c, offset in zip(proof.C + 0.0, proof.d, strict=True):
+    for c, offset in zip(C + 0.0, d, strict=True):
         least[c.tobytes()] = min(offset, least.get(c.tobytes(), np.inf))
-    return all(least.get(c.tobytes(), np.inf) <= offset for c, offset in zip(C + 0.0, d, strict=True))
+    return all(least.get(c.tobytes(), np.inf) <= offset for c, offset in zip(rows + 0.0, offsets, strict=True))

@@ -51,6 +51,12 @@ function follow(events, url) {
   source.addEventListener("error", () => { connection.hidden = false; });
 }
 
+function say(place, answer) {
+  const lines = answer.holds ? ["The proof holds:", ...answer.statement] : ["The proof does not hold:", answer.error.message];
+  place.textContent = lines.join("\n");
+  place.hidden = false;
+}
+
 document.addEventListener("click", async (click) => {
   const button = click.target.closest("button[data-post]");
   if (!button) return;
@@ -58,6 +64,10 @@ document.addEventListener("click", async (click) => {
   const response = await fetch(button.dataset.post, { method: "POST" });
   const answer = await response.json();
   if (response.ok && button.dataset.follow) location.assign(button.dataset.follow + answer.id);
+  else if (response.ok && button.dataset.statement) {
+    say(document.getElementById(button.dataset.statement), answer);
+    button.disabled = false;
+  }
   else if (response.ok) refresh(live.dataset.refresh);
   else button.textContent = answer.detail;
 });

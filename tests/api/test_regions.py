@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from certifier.region import Region
+from certifier.model import Scene
+from certifier.pair import Certification
+from certifier.region import Region, certified_region
+from certifier.verify.file import verify_file
 from certifier.verify.region import verify_region
+from db import pairs, regions
+from db.models import ProofRow
+from db.session import Database
+from db.settings import settings
+from tests.scenes import slider
 
 
 def test_a_region_is_listed_and_shown_with_its_manifest(client: TestClient, region: str, certified: Region) -> None:
@@ -21,7 +29,54 @@ def test_the_proof_that_is_downloaded_holds(client: TestClient, region: str, cer
     answer = client.get(f"/v1/regions/{region}/proof")
     assert answer.content == certified.proof
     assert answer.headers["content-disposition"] == f'attachment; filename="{region}.proof"'
-    assert len(verify_region(answer.content).pairs) == 2
+    assert len(verify_region(answer.content).gaps) == 2
+
+
+def test_the_stored_proof_is_checked_again_on_request(client: TestClient, region: str, certified: Region) -> None:
+    answer = client.post(f"/v1/regions/{region}/verify").json()
+    assert (answer["region"], answer["holds"], answer["guarantee"], answer["error"]) == (region, True, "exact", None)
+    assert answer["statement"] == certified.statement.lines()
+    assert client.post("/v1/regions/none/verify").status_code == 404
+
+
+def test_a_stored_proof_that_was_tampered_with_does_not_hold(client: TestClient, region: str, database: Database) -> None:
+    """Another region's proof, and one that is none; the region's own would do."""
+    smaller = small_region()
+    for data, code in ((smaller, "proof_region"), (smaller[:-30], "proof_malformed")):
+        with database.write() as session:
+            row = session.get_one(ProofRow, regions.get(session, region).proof_digest)
+            row.data = data
+        answer = client.post(f"/v1/regions/{region}/verify").json()
+        assert (answer["holds"], answer["guarantee"], answer["statement"]) == (False, "none", [])
+        assert answer["error"]["code"] == code
+
+
+def test_the_proof_of_a_pair_carries_its_scene(client: TestClient, region: str, database: Database, scene: Scene) -> None:
+    job = client.get("/v1/jobs").json()["jobs"][0]["id"]
+    assert client.get(f"/v1/jobs/{job}/pairs/9/proof?iteration=0").json()["code"] == "proof_not_found"
+    found = Certification(scene, scene.polytope([[1.0], [-1.0]], [0.2, 0.3]), np.zeros(1)).certify(0)
+    with database.write() as session:
+        digest = pairs.of_iteration(session, job, 0)[0].proof_digest
+        session.get_one(ProofRow, digest).data = found.proof
+    data = client.get(f"/v1/jobs/{job}/pairs/0/proof?iteration=0").content
+    statement = verify_file(data)
+    assert (statement.kind, statement.scene.hash) == ("pair", scene.hash)
+
+
+def test_a_check_that_takes_too_long_is_stopped(client: TestClient, region: str, environment: pytest.MonkeyPatch) -> None:
+    environment.setenv("CIRIS_VERIFY_TIMEOUT_SECONDS", "0.01")
+    settings.cache_clear()
+    answer = client.post(f"/v1/regions/{region}/verify")
+    assert (answer.status_code, answer.json()["code"]) == (503, "child_timeout")
+
+
+def small_region() -> bytes:
+    """The proof of a part of the region."""
+    scene = slider(posts=2)
+    polytope = scene.polytope([[1.0], [-1.0]], [0.1, 0.1])
+    certification = Certification(scene, polytope, np.zeros(1))
+    proofs = {index: certification.certify(index).proof or b"" for index in range(2)}
+    return certified_region(scene, polytope.C, polytope.d, np.zeros(1), proofs, {"seconds": 1.0}).proof
 
 
 def test_the_manifest_and_the_arrays_are_exported(client: TestClient, region: str, certified: Region) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -31,6 +32,7 @@ from tests.certifier.scenes import box, cube, planar_arm
 
 SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
 PROPOSAL = Proposed([[1.0, 0.0], [-1.0, 0.0], [0.0, 2.0], [0.0, -2.0]], [1.0, 1.0, 2.0, 2.0], [0.0, 0.0], {})
+UNIFORM = GrowthOptions(seed={}, contraction="uniform", pushes=0, max_rounds=0)
 
 
 def drive(scene, options, verdict, limit=100):
@@ -68,7 +70,7 @@ def certified_if(limit):
 
 
 def test_a_proposal_that_certifies_is_taken_whole():
-    made, accepted, end = drive(SCENE, GrowthOptions(seed={}, max_rounds=0), certified_if(5.0))
+    made, accepted, end = drive(SCENE, UNIFORM, certified_if(5.0))
     assert [action.label for action in made] == ["contract"]
     assert accepted[-1].d[:4] == [1.0, 1.0, 1.0, 1.0]
     assert end.outcome is Outcome.CERTIFIED
@@ -76,7 +78,7 @@ def test_a_proposal_that_certifies_is_taken_whole():
 
 @pytest.mark.parametrize("limit", [0.02, 0.3, 0.77])
 def test_bisection_finds_the_largest_trial_and_never_loses_an_accepted_region(limit):
-    made, accepted, end = drive(SCENE, GrowthOptions(seed={}, max_rounds=0, bisection_steps=12), certified_if(limit))
+    made, accepted, end = drive(SCENE, replace(UNIFORM, bisection_steps=12), certified_if(limit))
     sizes = [region.d[0] for region in accepted]
     assert sizes == sorted(sizes)
     assert limit * SMALLEST_SCALE ** (1 / 2**11) <= sizes[-1] <= limit
@@ -88,7 +90,7 @@ def test_a_pair_certified_on_a_larger_trial_is_not_certified_again():
     def verdict(index, d):
         return Outcome.CERTIFIED if index == 0 or d[0] <= 0.1 else Outcome.INCONCLUSIVE
 
-    made, accepted, _ = drive(SCENE, GrowthOptions(seed={}, max_rounds=0, bisection_steps=4), verdict)
+    made, accepted, _ = drive(SCENE, replace(UNIFORM, bisection_steps=4), verdict)
     assert made[0].pairs == [0, 1]
     assert all(action.reuse == {0: 0} and action.pairs == [1] for action in made[1:])
     assert accepted[-1].proofs[0] == 0
@@ -96,14 +98,12 @@ def test_a_pair_certified_on_a_larger_trial_is_not_certified_again():
 
 
 def test_pairs_that_failed_last_come_first():
-    made, _, _ = drive(
-        SCENE, GrowthOptions(seed={}, max_rounds=0, bisection_steps=3), lambda i, d: certified_if(0.3)(i, d) if i else Outcome.CERTIFIED
-    )
+    made, _, _ = drive(SCENE, replace(UNIFORM, bisection_steps=3), lambda i, d: certified_if(0.3)(i, d) if i else Outcome.CERTIFIED)
     assert made[1].pairs[0] == 1
 
 
 def test_a_seed_that_cannot_be_certified_ends_with_the_pair_named():
-    made, accepted, end = drive(SCENE, GrowthOptions(seed={}), lambda index, d: Outcome.REFUTED)
+    made, accepted, end = drive(SCENE, UNIFORM, lambda index, d: Outcome.REFUTED)
     assert not accepted
     assert end.outcome is Outcome.REFUTED
     assert SCENE.pairs[0].a in end.reason
@@ -111,14 +111,14 @@ def test_a_seed_that_cannot_be_certified_ends_with_the_pair_named():
 
 
 def test_alternation_accepts_rounds_and_backs_off():
-    made, accepted, end = drive(SCENE, GrowthOptions(seed={}, max_rounds=3, bisection_steps=3, backoff=2), certified_if(1.15))
+    made, accepted, end = drive(SCENE, replace(UNIFORM, max_rounds=3, bisection_steps=3, backoff=2), certified_if(1.15))
     assert [action.label for action in made] == ["contract"] + 7 * ["round"]
     assert [round(region.d[0], 6) for region in accepted] == [1.0, 1.1, 1.1275]
     assert end.outcome is Outcome.CERTIFIED
 
 
 def test_a_failed_step_keeps_the_certified_region_and_a_failed_seeding_ends():
-    options = GrowthOptions(seed={})
+    options = replace(UNIFORM, max_rounds=3)
     first = begin(SCENE, options)
     assert isinstance(first.action, Propose)
     error = CirisError("seed_in_collision", "a and b touch").to_document()
@@ -146,6 +146,8 @@ def test_a_given_polytope_is_certified_once_with_every_pair():
     [
         ({"colour": 1}, "options.colour"),
         ({"kind": "shrink"}, "options.kind"),
+        ({"contraction": "hope"}, "options.contraction"),
+        ({"pushes": -1}, "options.pushes"),
         ({"bisection_steps": -1}, "options.bisection_steps"),
         ({"max_rounds": True}, "options.max_rounds"),
         ({"tolerance": 0}, "options.tolerance"),

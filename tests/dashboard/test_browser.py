@@ -110,6 +110,13 @@ def test_the_region_is_two_links_away_by_keyboard(page: Any, url: str, region: s
     assert Path(download.value.path()).stat().st_size > 0
 
 
+def test_the_proof_is_checked_again_from_the_page(page: Any, url: str, region: str) -> None:
+    page.goto(f"{url}/regions/{region}")
+    page.get_by_role("button", name="Verify here").click()
+    page.get_by_text("The proof holds:").wait_for()
+    assert "guarantee: exact" in page.locator("#statement").text_content()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_no_page_is_wider_than_a_phone(browser: Any, url: str, region: str, scheme: str) -> None:
     context = browser.new_context(**PHONE, color_scheme=scheme)
@@ -118,6 +125,9 @@ def test_no_page_is_wider_than_a_phone(browser: Any, url: str, region: str, sche
     job, scene = (page.locator(f"a[href^='/{kind}/']").first.get_attribute("href") for kind in ("jobs", "scenes"))
     for path in ("/", job, scene, f"/regions/{region}"):
         page.goto(f"{url}{path}")
+        if path.startswith("/regions/"):
+            page.get_by_role("button", name="Verify here").click()
+            page.get_by_text("The proof holds:").wait_for()
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), path
         light = page.evaluate("getComputedStyle(document.body).backgroundColor").split("(")[1].split(",")[0]
         assert (int(light) > 128) == (scheme == "light")

@@ -7,6 +7,8 @@ from pathlib import Path
 import grimp
 import pytest
 
+from tests.certifier.proofs import files
+
 ROOT = Path(__file__).parents[2]
 THIRD_PARTIES = {
     "certifier": {"flint", "numba", "numpy", "pydrake", "scipy", "yaml"},
@@ -48,23 +50,49 @@ assert threading.active_count() == 1
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_verifier_runs_where_only_numpy_and_flint_are_installed() -> None:
-    script = """
+VERIFY_ONLY = """
 import sys
 
 class Absent:
     def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] not in {"certifier", "flint", "numpy", *sys.stdlib_module_names}:
+        if name.partition(".")[0] not in {"certifier", "client", "flint", "numpy", *sys.stdlib_module_names}:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 sys.meta_path.insert(0, Absent())
-from certifier.proof import ProofError
-from certifier.verify.region import verify_region
+from client.cli import main
 
-try:
-    verify_region(b"no proof")
-except ProofError:
-    sys.exit(7)
+sys.exit(main(sys.argv[1:]))
 """
-    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (7, "")
+
+
+def ciris(*arguments: object) -> "subprocess.CompletedProcess[str]":
+    """The command where nothing is installed but what `pip install '.[verify]'` installs."""
+    return subprocess.run([sys.executable, "-c", VERIFY_ONLY, *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def test_every_proof_is_checked_where_only_numpy_and_flint_are_installed(tmp_path: Path) -> None:
+    words = {
+        "region": "6 pairs of bodies separated",
+        "pair": "are at least",
+        "dual": "no plane affine in s",
+        "witness": "touch at a configuration",
+    }
+    for kind, data in files().items():
+        path = tmp_path / f"{kind}.proof"
+        path.write_bytes(data)
+        done = ciris("verify", path)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert words[kind] in done.stdout
+        assert "padding" in done.stdout
+        assert f"guarantee: {'numeric' if kind == 'witness' else 'exact'}" in done.stdout
+        path.write_bytes(data[:-30])
+        done = ciris("verify", path)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert "the proof does not hold" in done.stderr
+
+
+def test_another_command_says_what_is_missing() -> None:
+    done = ciris("scene", "ls")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "httpx2" in done.stderr
+    assert "pip install" in done.stderr

@@ -25,7 +25,7 @@ def test_a_region_grows_is_stored_and_its_proof_holds(planar: Scene) -> None:
         proof = proofs.get(session, region.proof_digest)
         volumes = [row.ellipsoid_volume for row in pairs.iterations(session, job.id) if row.ellipsoid_volume]
     statement = verify_region(proof)
-    assert len(statement.pairs) == len(planar.pairs)
+    assert len(statement.gaps) == len(planar.pairs)
     assert np.all(region.arrays["C"] @ planar.to_s(SEED) <= region.arrays["d"])
     assert region.manifest["guarantee"] == region.guarantee == "exact"
     assert region.ellipsoid_volume == max(volumes)

@@ -1,0 +1,101 @@
+"""Dual proofs from the solver's dual points (certifier.verify.dual says what they prove).
+
+The solver ends with sum_r A_r'x_r = lam a, lam < 0, a a multiple of sum_r A_r'x_w, x_w the centre: an interior point of the dual cone. So
+x_r + mu x_w, mu > 0, is in the interior too, and its sum vanishes to rounding. What is left of it is made to vanish by changing a few
+moments; pivoted QR factorisations choose equations that are independent and moments that meet them well.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import qr
+
+from certifier.basis import basis
+from certifier.disproof import DualProof
+from certifier.frames import Frame
+from certifier.interior_point import Block
+from certifier.model import Array, Pair
+from certifier.program import Sides
+from certifier.proof import Ground
+from certifier.verify.moments import monomials, table
+
+RANK_TOLERANCE = 1e-9
+TRACE_SHARE = 1e-7
+"""Part of its size that Yaa is made smaller by, so that rounding does not make it too large."""
+
+
+def dual_proof(sides: Sides, pair: Pair, frame: Frame, ground: Ground, blocks: list[Block], x: list[Array]) -> DualProof:
+    """The proof from a dual point x of the pair's program; whether it holds, the verifier says.
+
+    Args:
+        blocks, x: the program (certifier.program.build) and the solver's x, a list over the blocks of (R, N).
+    """
+    scene, n = sides.kinematics.scene, sides.kinematics.scene.n
+    centres: Array = np.sum([np.einsum("rnp,n->p", b.columns, b.centre.x) for b in blocks], axis=0)[:-1]
+    sums: Array = np.sum([np.einsum("rnp,rn->p", b.columns, v) for b, v in zip(blocks, x, strict=True)], axis=0)[:-1]
+    mu = -(sums @ centres) / (centres @ centres)
+    x = [v + mu * b.centre.x for b, v in zip(blocks, x, strict=True)]
+    chains = (frame.chain_a, frame.chain_b)
+    moments = [_moments(sides, chain, v) for chain, v in zip(chains, x[:2], strict=True)]
+    rounded = len(blocks) > 2
+    A, where = _equations(sides, pair, frame, moments)
+    A = A[:, 3 * (n + 1) :] if rounded else A
+    equations, rows = _independent(A)
+    entries = where[rows]
+    values = np.concatenate([m.ravel() for m in moments])
+    change = np.linalg.solve(A[np.ix_(rows, equations)].T, -(values @ A)[equations])
+    for (side, vertex, monomial), c in zip(entries, change, strict=True):
+        moments[side][vertex, monomial] += c
+    normal = (np.zeros((0, 0)), np.zeros((0, 0)))
+    if rounded:
+        Y = blocks[2].cone.adjoint(x[2])[0, 0]
+        aa, bb = (Y[:3, :3] + Y[:3, :3].T) / 2, (Y[3:, 3:] + Y[3:, 3:].T) / 2
+        normal = (aa - TRACE_SHARE * np.trace(Y) * np.eye(3), bb)
+    return DualProof(scene, pair, frame.body, ground, (moments[0], moments[1]), tuple(int(k) for k in np.sort(equations)), entries, normal)
+
+
+def _moments(sides: Sides, chain: tuple[int, ...], x: Array) -> Array:
+    """Values on the monomials, (R, N), of functionals x in the sampled basis, (R, N)."""
+    space, outside = basis(len(chain)), sides.outside(chain)
+    exponents = monomials(chain, sides.kinematics.scene.n)
+    inside = np.prod(space.points[:, None, :] ** exponents[None, :, list(chain)], axis=2)
+    size = len(space.points)
+    moments = np.zeros(x.shape)
+    own = exponents[:, outside].sum(axis=1) == 0
+    moments[:, own] = x[:, :size] @ inside[:, own]
+    for place, joint in enumerate(outside):
+        others = exponents[:, joint] == 1
+        start = size + place * space.grid
+        moments[:, others] = x[:, start : start + space.grid] @ inside[: space.grid, others]
+    return moments
+
+
+def _equations(sides: Sides, pair: Pair, frame: Frame, moments: list[Array]) -> tuple[Array, np.ndarray]:
+    """What every moment adds to R, (moments, 4 (n + 1)), and which moment it is: side, vertex, monomial."""
+    scene, n = sides.kinematics.scene, sides.kinematics.scene.n
+    rows, where = [], []
+    for side, (name, chain, held) in enumerate(zip((pair.a, pair.b), (frame.chain_a, frame.chain_b), moments, strict=True)):
+        geometry, space, index = scene.geometry(name), basis(len(chain)), table(chain, n)
+        grid = np.arange(index.shape[1])[:, None] // 3 ** np.arange(len(chain)) % 3
+        u = sides.points(chain)[: space.grid]
+        X = sides.kinematics.numerators(frame.body, geometry.body, sides.box.mid + sides.box.half * u)
+        p = np.einsum("sij,vj->svi", X, np.column_stack([geometry.vertices, np.ones(len(geometry.vertices))]))
+        monomial_values = np.prod(u[:, None, list(chain)] ** grid[None], axis=2)
+        coefficients = np.linalg.solve(monomial_values, p.reshape(len(u), -1)).reshape(len(grid), len(held), 4)
+        A = np.zeros((len(held), held.shape[1], 4, n + 1))
+        for e in range(n + 1):
+            A[..., e][:, index[e]] += (1 - 2 * side) * np.swapaxes(coefficients, 0, 1)
+        rows.append(A.reshape(-1, 4 * (n + 1)))
+        vertex, monomial = np.divmod(np.arange(held.size), held.shape[1])
+        where.append(np.column_stack([np.full(held.size, side), vertex, monomial]))
+    return np.concatenate(rows), np.concatenate(where)
+
+
+def _independent(A: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Columns of A, (rows, K), that are independent, and as many rows in which they are, well-conditioned."""
+    columns = A / np.maximum(np.linalg.norm(A, axis=0), np.finfo(float).tiny)
+    _, R, order = qr(columns, mode="economic", pivoting=True)
+    diagonal = np.abs(np.diag(R))
+    equations = np.sort(order[: int((diagonal > RANK_TOLERANCE * diagonal[0]).sum())])
+    _, _, pivots = qr(A[:, equations].T, mode="economic", pivoting=True)
+    return equations, pivots[: len(equations)]

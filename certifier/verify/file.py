@@ -1,0 +1,127 @@
+"""Any proof file, checked: what it proves in plain words, and how much that is worth."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from certifier.disproof import DualProof, WitnessProof
+from certifier.model import Scene
+from certifier.outcome import Guarantee
+from certifier.proof import PairProof, RegionProof
+from certifier.proof_file import ProofError, header_of, malformed
+from certifier.verify.dual import verify_dual
+from certifier.verify.pair import verify_pair
+from certifier.verify.region import verify_region
+from certifier.verify.witness import TOLERANCE, verify_witness
+
+
+@dataclass(frozen=True)
+class FileStatement:
+    """What a valid file proves.
+
+    Attributes:
+        kind: ``region``, ``pair``, ``dual`` or ``witness``.
+        lines: the statement in plain words, the guarantee last.
+    """
+
+    kind: str
+    scene: Scene
+    lines: tuple[str, ...]
+    guarantee: Guarantee
+
+
+def verify_file(data: bytes) -> FileStatement:
+    """Check a proof file of any kind that carries its scene.
+
+    Raises:
+        ProofError: the file is malformed, carries no scene, or its proof does not hold.
+    """
+    header = header_of(data)
+    kind = header.get("kind")
+    if kind == "region":
+        statement = verify_region(data)
+        return FileStatement(kind, statement.scene, tuple(statement.lines()), Guarantee.EXACT)
+    if kind not in _READERS:
+        raise ProofError("proof_malformed", f"the file is a proof of kind {kind!r}, which is none")
+    if "scene" not in header:
+        hint = "a file that the service hands out carries it"
+        raise ProofError("proof_without_scene", "the file names its scene by its hash and does not carry it", hint=hint)
+    with malformed():
+        scene = Scene.from_document(header["scene"])
+    found, guarantee = _READERS[kind](data, scene)
+    padding = f"padding {scene.padding:g} m around every body"
+    return FileStatement(kind, scene, (f"scene {scene.name}, hash {scene.hash}", padding, *found, guarantee_line(guarantee)), guarantee)
+
+
+def answer(data: bytes) -> dict[str, Any]:
+    """The statement of a proof file, or why there is none, as JSON-able data; stable keys."""
+    try:
+        statement = verify_file(data)
+    except ProofError as error:
+        return {"holds": False, "error": error.to_document()}
+    return {
+        "holds": True,
+        "kind": statement.kind,
+        "scene": {"name": statement.scene.name, "hash": statement.scene.hash},
+        "statement": list(statement.lines),
+        "guarantee": statement.guarantee.value,
+    }
+
+
+def answer_about_region(payload: dict[str, Any]) -> dict[str, Any]:
+    """The answer about a stored proof, as a child process gives it (certifier.child): it has to be of that very region.
+
+    Args:
+        payload: ``proof`` in base 64; ``scene_hash``, ``C`` and ``d`` of the region.
+    """
+    data = base64.b64decode(payload["proof"])
+    found = answer(data)
+    if found["holds"]:
+        proof = RegionProof.from_bytes(data)
+        same = np.array_equal(proof.C, payload["C"]) and np.array_equal(proof.d, payload["d"])
+        if proof.scene.hash != payload["scene_hash"] or not same:
+            return {"holds": False, "error": ProofError("proof_region", "the proof is about another region").to_document()}
+    return found
+
+
+def guarantee_line(guarantee: Guarantee) -> str:
+    """What a guarantee means, in a line."""
+    meaning = {
+        Guarantee.EXACT: "exact (rigorous arithmetic; the parsed model's numbers taken as they are)",
+        Guarantee.NUMERIC: f"numeric (to {TOLERANCE:g} m)",
+    }
+    return f"guarantee: {meaning[guarantee]}"
+
+
+def _pair(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
+    proof = PairProof.from_bytes(data, scene)
+    statement = verify_pair(proof)
+    polytope = f"a polytope of {len(proof.ground.d)} half-spaces within the joint limits"
+    lines = [f"at every configuration of {polytope} these are at least {statement.gap:.3g} m apart:"]
+    return lines + [f"  {pair.a} and {pair.b}" for pair in statement.pairs], Guarantee.EXACT
+
+
+def _dual(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
+    proof = DualProof.from_bytes(data, scene)
+    statement = verify_dual(proof)
+    faces = f"the {len(proof.ground.d)} faces of the polytope and its box"
+    but = f", but for margins below {statement.slack:.3g} of its coefficients" if statement.slack else ""
+    lines = [
+        f"{statement.pair.a} and {statement.pair.b} are not certifiable with multipliers of this degree on {faces}:",
+        f"no plane affine in s, in the frame of {statement.frame}, separates them there{but}",
+    ]
+    return lines, Guarantee.EXACT
+
+
+def _witness(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
+    statement = verify_witness(WitnessProof.from_bytes(data, scene))
+    q = ", ".join(f"{x:.6g}" for x in scene.to_q(statement.s))
+    return [f"{statement.pair.a} and {statement.pair.b} touch at a configuration of the polytope: q = {q}"], Guarantee.NUMERIC
+
+
+_READERS: dict[str, Callable[[bytes, Scene], tuple[list[str], Guarantee]]] = {"pair": _pair, "dual": _dual, "witness": _witness}

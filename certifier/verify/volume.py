@@ -1,0 +1,98 @@
+"""Exact check that a proof's volume contains every geometry it stands for.
+
+A geometry conv(V) + ball(r) lies in conv(W) + ball(R) if each of its vertices v does with its ball, the latter being convex. For that
+
+    |v - p| <= R - r   for a point p of W, or of a segment between two of them,
+
+suffices, or, where W are the corners of a box along the axes, that v lies in the box with r - R (if positive) taken off every face. The
+vertices are taken into the volume's frame through welds; fixed frames are rigid motions, to the rounding of their doubles.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+from flint import fmpq
+
+from certifier.model import Array, Geometry, Scene
+from certifier.proof import Volume
+from certifier.proof_file import ProofError
+from certifier.verify.kinematics import ExactKinematics, exact
+
+Point = tuple[fmpq, ...]
+
+
+def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> None:
+    """Check that the volume is a body of the scene's and contains its geometries.
+
+    Raises:
+        ProofError: it does not; the message names the geometry.
+    """
+    known = {geometry.name for geometry in scene.geometries}
+    if not volume.geometries or not known.issuperset(volume.geometries):
+        raise ProofError("proof_volume", f"a volume stands for what is no geometry of the scene: {', '.join(volume.geometries)}")
+    if volume.is_geometry_of(scene):
+        return
+    if volume.vertices.ndim != 2 or volume.vertices.shape[1] != 3 or len(volume.vertices) == 0 or not volume.radius >= 0:
+        raise ProofError("proof_malformed", "a volume has no vertices or a negative radius")
+    if volume.body not in scene.bodies:
+        raise ProofError("proof_volume", f"the scene has no body {volume.body!r}")
+    corners = [tuple(exact(x) for x in vertex) for vertex in volume.vertices]
+    box = _box(volume.vertices)
+    for name in volume.geometries:
+        geometry = scene.geometry(name)
+        radius, reach = exact(geometry.radius), exact(volume.radius)
+        for v in _vertices(kinematics, volume.body, geometry):
+            if not (
+                _near_corner(v, corners, reach - radius)
+                or (box is not None and _in_box(v, box, max(radius - reach, fmpq(0))))
+                or _near_segment(v, corners, reach - radius)
+            ):
+                raise ProofError("proof_volume", f"{name} is not contained in the volume that stands for it")
+
+
+def _vertices(kinematics: ExactKinematics, body: str, geometry: Geometry) -> list[Point]:
+    """The geometry's vertices in the body's frame."""
+    vertices = [tuple(exact(x) for x in vertex) for vertex in geometry.vertices]
+    if geometry.body == body:
+        return vertices
+    X = kinematics.fixed_pose(body, geometry.body)
+    if X is None:
+        raise ProofError("proof_volume", f"{geometry.name} is not welded to {body}")
+    return [tuple(sum((X[i][j] * v[j] for j in range(3)), X[i][3]) for i in range(3)) for v in vertices]
+
+
+def _near_corner(v: Point, corners: Sequence[Point], distance: fmpq) -> bool:
+    return distance >= 0 and any(_dot(offset, offset) <= distance * distance for offset in (_minus(v, corner) for corner in corners))
+
+
+def _near_segment(v: Point, corners: Sequence[Point], distance: fmpq) -> bool:
+    """Whether v is within the distance of a point between two corners, by projection."""
+    for start, end in itertools.combinations(corners, 2):
+        offset, direction = _minus(v, start), _minus(end, start)
+        length, along = _dot(direction, direction), _dot(offset, direction)
+        if 0 < along < length and distance >= 0 and _dot(offset, offset) - along * along / length <= distance * distance:
+            return True
+    return False
+
+
+def _box(vertices: Array) -> tuple[Point, Point] | None:
+    """Lower and upper corner, if the vertices are exactly the eight corners of a box along the axes."""
+    lower, upper = vertices.min(axis=0), vertices.max(axis=0)
+    corners = set(itertools.product(*zip(lower.tolist(), upper.tolist(), strict=True)))
+    if corners != set(map(tuple, vertices.tolist())):
+        return None
+    return tuple(exact(x) for x in lower), tuple(exact(x) for x in upper)
+
+
+def _in_box(v: Point, box: tuple[Point, Point], inset: fmpq) -> bool:
+    return all(low + inset <= x <= high - inset for x, low, high in zip(v, *box, strict=True))
+
+
+def _minus(a: Point, b: Point) -> Point:
+    return tuple(x - y for x, y in zip(a, b, strict=True))
+
+
+def _dot(a: Point, b: Point) -> fmpq:
+    return sum((x * y for x, y in zip(a, b, strict=True)), fmpq(0))

@@ -1,0 +1,66 @@
+"""Check of a refutation: at a configuration of the polytope a point of one padded body lies in the other, to TOLERANCE.
+
+The configuration is rational, so the positions of the two points are exact; bodies that just touch do so at no rational configuration,
+which is what the tolerance is for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from flint import Ordering, fmpq, fmpq_mpoly_ctx
+
+from certifier.disproof import WitnessProof
+from certifier.model import Array, Pair
+from certifier.proof_file import ProofError
+from certifier.verify.kinematics import ExactKinematics, exact
+from certifier.verify.scene import check_scene
+
+TOLERANCE = 1e-6
+"""Metres."""
+
+
+@dataclass(frozen=True)
+class WitnessStatement:
+    """What a valid witness proves: at s, in the polytope, the padded bodies of the pair touch or come within TOLERANCE of it."""
+
+    pair: Pair
+    s: Array
+
+
+def verify_witness(proof: WitnessProof) -> WitnessStatement:
+    """Check a refutation.
+
+    Raises:
+        ProofError: it does not hold.
+    """
+    scene, s = proof.scene, proof.s
+    check_scene(scene)
+    n, m = scene.n, proof.d.size
+    if proof.C.shape != (m, n) or proof.d.shape != (m,) or s.shape != (n,):
+        raise ProofError("proof_malformed", "the arrays of the witness do not fit the scene")
+    if proof.pair not in scene.pairs:
+        raise ProofError("proof_pair", f"{proof.pair.a} and {proof.pair.b} are not a pair of the scene")
+    point = [exact(x) for x in s]
+    limited = scene.polytope(proof.C, proof.d)
+    for c, d in zip(limited.C, limited.d, strict=True):
+        if not sum((exact(x) * y for x, y in zip(c, point, strict=True)), fmpq(0)) <= exact(d):
+            raise ProofError("proof_witness", "the configuration is not in the polytope")
+    a, b = scene.geometry(proof.pair.a), scene.geometry(proof.pair.b)
+    kinematics = ExactKinematics(scene, fmpq_mpoly_ctx.get([f"u{i}" for i in range(n)], Ordering.lex), s, np.zeros(n))
+    X = [[entry.coefficient(0) if entry != 0 else fmpq(0) for entry in row] for row in kinematics.pose(a.body, b.body)]
+    p, other = (_mean(g.vertices, w) for g, w in zip((a, b), proof.weights, strict=True))
+    q = [sum((X[i][j] * other[j] for j in range(3)), X[i][3]) / X[3][3] for i in range(3)]
+    reach = exact(a.radius) + exact(b.radius) + 2 * exact(scene.padding) + exact(TOLERANCE)
+    if not sum(((x - y) ** 2 for x, y in zip(p, q, strict=True)), fmpq(0)) <= reach * reach:
+        raise ProofError("proof_witness", f"{a.name} and {b.name} do not touch at the configuration")
+    return WitnessStatement(proof.pair, s)
+
+
+def _mean(vertices: Array, weights: Array) -> list[fmpq]:
+    if weights.shape != (len(vertices),) or not (weights >= 0).all() or not weights.any():
+        raise ProofError("proof_malformed", "the weights of the witness are no convex weights")
+    exactly = [exact(w) for w in weights]
+    total = sum(exactly, fmpq(0))
+    return [sum((w * exact(v[i]) for w, v in zip(exactly, vertices, strict=True)), fmpq(0)) / total for i in range(3)]

@@ -1,0 +1,81 @@
+"""Valid proofs of every kind, made once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from certifier.disproof import DualProof, WitnessProof
+from certifier.model import WORLD, Pair, Scene
+from certifier.outcome import Outcome
+from certifier.pair import Certification
+from certifier.proof import PairProof
+from certifier.proof_file import with_scene
+from certifier.region import certified_region
+from tests.certifier.scenes import ball, box, cube, planar_arm
+
+
+@cache
+def scene() -> Scene:
+    """A two-link arm with a ball at its tip before two blocks, padded."""
+    blocks = [box(f"world/block{i}", WORLD, (0.15, 0.3, 0.3), (0.7 + 0.2 * i, 1.0, 0.0)) for i in range(2)]
+    base = planar_arm(2, blocks[0], padding=0.01, q_star=(0.05, -0.1))
+    tip = ball("arm/link2/tip", "arm/link2", 0.05, (1.0, 0.0, 0.0))
+    links = [geometry.name for geometry in base.geometries[:2]]
+    pairs = tuple(Pair(a, block.name) for a in (*links, tip.name) for block in blocks)
+    return replace(base, geometries=(*base.geometries, blocks[1], tip), pairs=pairs)
+
+
+@cache
+def region() -> bytes:
+    """Both blocks share the proofs of the links; the tip has one for each block. The proofs lie on two different grounds."""
+    group = box("world/blocks", WORLD, (0.4, 0.3, 0.3), (0.8, 1.0, 0.0))
+    names = tuple(g.name for g in scene().geometries)
+    grouped = replace(
+        scene(),
+        geometries=(*scene().geometries, group),
+        pairs=tuple(Pair(name, group.name) for name in names[:2]) + scene().pairs[4:],
+    )
+    polytope, larger = cube(scene(), 0.0, 0.1), cube(scene(), 0.0, 0.12)
+    proofs: dict[int, bytes] = {}
+    for index, pair in enumerate(grouped.pairs):
+        shared = Certification(grouped, larger if index % 2 else polytope, np.zeros(2))
+        found = PairProof.from_bytes(shared.certify(index).proof, grouped)
+        volumes = [replace(v, geometries=("world/block0", "world/block1")) if v.geometries == (group.name,) else v for v in found.volumes]
+        data = replace(found, scene=scene(), volumes=tuple(volumes)).to_bytes()
+        covered = [i for i, p in enumerate(scene().pairs) if p.a == pair.a and pair.b in (p.b, group.name)]
+        proofs |= dict.fromkeys(covered, data)
+    return certified_region(scene(), polytope.C, polytope.d, np.zeros(2), proofs, {}).proof
+
+
+@cache
+def dual() -> tuple[Scene, DualProof]:
+    """The tip before a block that it would have to pass on both sides."""
+    world = planar_arm(2, box("world/block", WORLD, (0.1, 0.1, 0.1), (1.2, 1.0, 0.0)), limit=2.5)
+    tip = ball("arm/link2/tip", "arm/link2", 0.05, (1.0, 0.0, 0.0))
+    world = replace(world, geometries=(*world.geometries, tip), pairs=(*world.pairs, Pair(tip.name, "world/block")))
+    for half in np.arange(0.2, 1.2, 0.1):
+        shared = Certification(world, cube(world, 0.0, half), np.zeros(2))
+        for index in range(len(world.pairs)):
+            result = shared.certify(index)
+            if result.outcome is Outcome.NOT_CERTIFIABLE:
+                return world, DualProof.from_bytes(result.proof, world)
+    raise AssertionError("none of the pairs is not certifiable")
+
+
+def witness() -> tuple[Scene, WitnessProof]:
+    """The bar in the block."""
+    world = planar_arm(2, box("world/block", WORLD, (0.1, 0.1, 0.1), (1.2, 0.0, 0.0)))
+    result = Certification(world, cube(world, 0.0, 0.1), np.zeros(2)).certify(1)
+    assert result.outcome is Outcome.REFUTED
+    return world, WitnessProof.from_bytes(result.proof, world)
+
+
+def files() -> dict[str, bytes]:
+    """A file of every kind, its scene in it."""
+    singles = {"dual": dual(), "witness": witness()}
+    world = planar_arm(2)
+    singles["pair"] = world, PairProof.from_bytes(Certification(world, cube(world, 0.0, 0.05), np.zeros(2)).certify(1).proof, world)
+    return {"region": region(), **{kind: with_scene(proof.to_bytes(), world) for kind, (world, proof) in singles.items()}}
