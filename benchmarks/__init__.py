@@ -1,1 +1,1 @@
-"""Measurements side by side with Drake, and the named instances that tests and measurements share. Nothing else imports this package."""
+"""Measurements: our certifier beside Drake's, verdict by verdict, and how it grows; ``ciris bench`` (docs/benchmarks.md)."""

@@ -1,21 +1,69 @@
-"""The named instances of catalogue.yaml: a pair of bodies on a polytope, with the answer where it is known."""
+"""The scenes that are measured, and the regions about their seeds."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import yaml
 
+from benchmarks.variants import variant
 from certifier.errors import CirisError
-from certifier.model import Array, Pair, Scene
-from certifier.outcome import Outcome
+from certifier.model import Array, Scene
 from certifier.scene import load_scene
 
-ROOT = Path(__file__).parent
+ROOT = Path(__file__).parents[1]
+EXAMPLES = ("planar_2dof", "arm_3dof", "ur3e_bin", "iiwa_shelf", "dual_ur3e")
+"""In the order of their cost."""
+FILES = {name: ROOT / "examples" / name / "scene.yaml" for name in EXAMPLES} | {"rail_arm": ROOT / "benchmarks/scenes/rail_arm/scene.yaml"}
+VARIANTS = {
+    f"iiwa_{figure}_{furniture or 'shelf'}": (figure, furniture)
+    for figure, furniture in (
+        ("box", "cupboard"),
+        ("box", "bins"),
+        ("box", "tables"),
+        ("sphere", None),
+        ("dense", "cupboard"),
+        ("primitive", "bins"),
+        ("polytope", "tables"),
+    )
+}
+SCENES = (*FILES, *VARIANTS)
+
+REGIONS = {
+    "tiny": "a cube of half-width 0.001",
+    "middle": "12 faces with random normals, 0.05 from the seed: a simplex-like polytope that reaches far where no face is",
+    "wide": "a cube of half-width 0.4",
+    "whole": "the joint limits alone",
+}
+"""Of s; the joint limits hold besides."""
+
+
+class Instance(NamedTuple):
+    """One pair of a scene on one of its regions."""
+
+    scene: str
+    a: str
+    b: str
+    region: str
+
+
+LADDER = [
+    Instance("planar_2dof", "arm/lower/bar", "obstacles/body/post", "middle"),
+    Instance("planar_2dof", "arm/lower/bar", "obstacles/body/post", "wide"),
+    Instance("arm_3dof", "arm/fore/rod", "obstacles/body/table", "middle"),
+    Instance("arm_3dof", "arm/fore/rod", "obstacles/body/table", "whole"),
+    Instance("iiwa_shelf", "iiwa/link_3/box", "shelf/boards/upper", "middle"),
+    Instance("iiwa_shelf", "iiwa/link_3/box", "shelf/boards/upper", "whole"),
+    Instance("iiwa_shelf", "iiwa/link_5/box", "shelf/boards/upper", "middle"),
+    Instance("iiwa_shelf", "iiwa/link_5/box", "shelf/boards/upper", "wide"),
+    Instance("iiwa_shelf", "iiwa/link_7/box", "shelf/boards/upper", "middle"),
+    Instance("iiwa_shelf", "iiwa/link_7/box", "shelf/boards/upper", "wide"),
+]
+"""What ``ciris bench pairs`` measures: growing chains, each pair on a region where it can be certified and on one where it cannot."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +72,7 @@ class Region:
 
     Attributes:
         C, d: (m, n), (m,); the joint limits are not among them.
-        center: (n,) the scene's seed.
+        center: (n,).
     """
 
     C: Array
@@ -32,95 +80,34 @@ class Region:
     center: Array
 
 
-@dataclass(frozen=True)
-class Instance:
-    """One pair on one polytope.
-
-    Attributes:
-        name: scene/pair/polytope.
-        pair: names of the two geometries.
-        answer: None where it is unknown.
-    """
-
-    name: str
-    scene_name: str
-    pair: Pair
-    polytope: str
-    answer: Outcome | None
-
-    @property
-    def scene(self) -> Scene:
-        """The scene with this pair alone."""
-        return replace(scene(self.scene_name), pairs=(self.pair,))
-
-    @property
-    def region(self) -> Region:
-        return region(self.scene_name, self.polytope)
-
-
 @cache
-def _document() -> dict[str, Any]:
-    document: dict[str, Any] = yaml.safe_load((ROOT / "catalogue.yaml").read_text(encoding="utf-8"))
-    return document
-
-
-@cache
-def instances() -> dict[str, Instance]:
-    """All instances by name."""
-    found = {}
-    for scene_name, entry in _document()["scenes"].items():
-        for pair_name, known in entry["pairs"].items():
-            for answer in (*Outcome, None):
-                for polytope in known.get(answer or "unknown", ()):
-                    name = f"{scene_name}/{pair_name}/{polytope}"
-                    found[name] = Instance(name, scene_name, Pair(*known["bodies"]), polytope, answer)
-    return found
-
-
-def named(names: list[str]) -> list[Instance]:
-    """The instances of these names; the catalogue's ladder if there are none.
+def scene(name: str) -> Scene:
+    """A scene of the catalogue with all its pairs.
 
     Raises:
-        CirisError: ``unknown_instance``.
+        CirisError: ``unknown_scene``.
     """
-    known = instances()
-    for name in names:
-        if name not in known:
-            hint = "ciris bench pairs --list names them all"
-            raise CirisError("unknown_instance", f"the catalogue has no instance {name!r}", field="NAMES", hint=hint)
-    return [known[name] for name in names or _document()["ladder"]]
+    if name in VARIANTS:
+        return variant(scene("iiwa_shelf"), *VARIANTS[name])
+    if name not in FILES:
+        raise CirisError("unknown_scene", f"the catalogue has no scene {name!r}", field="scene", hint=f"scenes: {', '.join(SCENES)}")
+    return load_scene(FILES[name])
 
 
-def scenes() -> list[str]:
-    """The names of the scenes."""
-    return list(_document()["scenes"])
+def seed(name: str) -> Array:
+    """The seed of a scene, joint positions (n,)."""
+    file = FILES["iiwa_shelf" if name in VARIANTS else name]
+    return np.array(yaml.safe_load((file.parent / "seed.yaml").read_text(encoding="utf-8"))["q"])
 
 
-def path(scene_name: str) -> Path:
-    """The scene file."""
-    return (ROOT / _document()["scenes"][scene_name]["file"]).resolve()
-
-
-@cache
-def scene(scene_name: str) -> Scene:
-    """The scene with all its pairs; read once."""
-    return load_scene(path(scene_name))
-
-
-def region(scene_name: str, polytope: str) -> Region:
-    """A polytope of the catalogue around a scene's seed."""
-    whole = scene(scene_name)
-    seed = yaml.safe_load((path(scene_name).parent / "seed.yaml").read_text(encoding="utf-8"))["q"]
-    center, made = whole.to_s(seed), _document()["polytopes"][polytope]
-    if "half_width" in made:
-        return Region(*cube(center, made["half_width"]), center)
-    if "faces" in made:
-        return Region(*tangent(np.random.default_rng(made["random_seed"]), center, made["faces"], made["distance"]), center)
-    if "proposal" in made:
-        with np.load(ROOT / "proposals" / f"{scene_name}.npz") as arrays:
-            C, d = arrays["C"], arrays["d"]
-        return Region(C, C @ center + made["proposal"] * (d - C @ center), center)
-    return Region(np.zeros((0, whole.n)), np.zeros(0), center)
+def region(name: str, kind: str) -> Region:
+    """One of REGIONS about the seed of a scene."""
+    center = scene(name).to_s(seed(name))
+    if kind == "middle":
+        return Region(*tangent(np.random.default_rng(0), center, 12, 0.05), center)
+    if kind == "whole":
+        return Region(np.zeros((0, len(center))), np.zeros(0), center)
+    return Region(*cube(center, {"tiny": 1e-3, "wide": 0.4}[kind]), center)
 
 
 def cube(center: Array, half_width: float) -> tuple[Array, Array]:

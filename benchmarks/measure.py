@@ -4,20 +4,42 @@ threads that a side might start do.
 
 from __future__ import annotations
 
+import os
+import platform
+import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Generic, TypeVar
 
 from benchmarks.catalogue import Region
+from certifier.disproof import DualProof, WitnessProof
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.pair import Certification, PairResult
 from certifier.proof import PairProof
 from certifier.reference import Reference, ReferenceResult
+from certifier.verify.dual import verify_dual
 from certifier.verify.pair import PairCheck
+from certifier.verify.witness import verify_witness
 
 Progress = Callable[[str], None]
+PACKAGES = ("drake", "numpy", "scipy", "numba", "python-flint")
+
+
+def machine() -> dict[str, Any]:
+    """Where and with what a measurement is made, JSON-able."""
+    path = Path("/proc/cpuinfo")
+    found = re.search(r"^model name\s*:\s*(.+)$", path.read_text(), re.MULTILINE) if path.exists() else None
+    return {
+        "processor": found[1] if found else platform.processor(),
+        "cores": os.cpu_count(),
+        "memory_gib": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1),
+        "python": platform.python_version(),
+        "versions": {package: version(package) for package in PACKAGES},
+    }
 
 
 @dataclass(frozen=True)
@@ -49,51 +71,46 @@ class Run(Generic[Answer]):
     pairs: dict[int, Answer]
 
 
-def ours(scene: Scene, region: Region, indices: list[int], progress: Progress) -> Run[Ours]:
-    """The pairs by our certifier, each proof verified."""
+def ours(scene: Scene, region: Region, indices: list[int], progress: Progress = lambda _: None) -> Run[Ours]:
+    """The pairs by our certifier; every proof is checked as it is made, and once more for its time.
+
+    Raises:
+        ProofError: a proof does not hold.
+    """
     start = time.process_time()
     certification = Certification(scene, scene.polytope(region.C, region.d), region.center)
-    setup = time.process_time() - start
-    results: dict[int, tuple[PairResult, float]] = {}
-    last = time.process_time()
-    for index, result in _certify(certification, indices):
-        results[index] = result, time.process_time() - last
-        progress(_line("ciris", scene, index, len(results), len(indices), result.outcome, results[index][1]))
-        last = time.process_time()
-    verification = dict(
-        _verify(
-            scene, {index: result.proof for index, (result, _) in results.items() if result.outcome is Outcome.CERTIFIED and result.proof}
-        )
-    )
-    return Run(setup, {index: Ours(result, seconds, verification.get(index, 0.0)) for index, (result, seconds) in results.items()})
-
-
-def _certify(certification: Certification, indices: list[int]) -> Iterator[tuple[int, PairResult]]:
+    setup, check, found = time.process_time() - start, PairCheck(scene, certification.ground), {}
     for index in indices:
-        yield index, certification.certify(index)
-
-
-def _verify(scene: Scene, proofs: dict[int, bytes]) -> Iterator[tuple[int, float]]:
-    """Seconds of checking every proof; one that serves several pairs is checked once."""
-    checks: dict[bytes, PairCheck] = {}
-    done: set[bytes] = set()
-    for index, data in proofs.items():
-        if data in done:
-            continue
-        done.add(data)
-        proof = PairProof.from_bytes(data, scene)
-        ground = b"".join(array.tobytes() for array in vars(proof.ground).values())
-        if ground not in checks:
-            checks[ground] = PairCheck(scene, proof.ground)
         start = time.process_time()
-        checks[ground].verify(proof)
-        yield index, time.process_time() - start
+        result = certification.certify(index)
+        certified = time.process_time()
+        verify(scene, result, check)
+        found[index] = answer = Ours(result, certified - start, time.process_time() - certified if result.proof else 0.0)
+        progress(_line("ciris", scene, index, len(found), len(indices), result.outcome, answer.seconds))
+    return Run(setup, found)
 
 
-def drake(scene: Scene, region: Region, indices: list[int], time_limit: float | None, progress: Progress) -> Run[ReferenceResult]:
+def verify(scene: Scene, result: PairResult, check: PairCheck) -> str:
+    """Check the proof of an outcome from its bytes; returns what was checked, empty where there is nothing.
+
+    Raises:
+        ProofError: it does not hold.
+    """
+    if result.proof is None:
+        return ""
+    if result.outcome is Outcome.CERTIFIED:
+        check.verify(PairProof.from_bytes(result.proof, scene))
+        return "certificate verified exactly"
+    if result.outcome is Outcome.NOT_CERTIFIABLE:
+        verify_dual(DualProof.from_bytes(result.proof, scene))
+        return "dual proof verified"
+    verify_witness(WitnessProof.from_bytes(result.proof, scene))
+    return "contact verified"
+
+
+def drake(scene: Scene, region: Region, indices: list[int], progress: Progress) -> Run[ReferenceResult]:
     """The pairs by Drake's program and Clarabel."""
-    reference = Reference(scene, time_limit=time_limit)
-    found = {}
+    reference, found = Reference(scene), {}
     for index in indices:
         found[index] = answer = reference.certify(index, region.C, region.d)
         seconds = answer.build_seconds + answer.solve_seconds

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from benchmarks import catalogue, machine, measure
+from benchmarks import catalogue, measure
 from benchmarks.arms import box, serial_arm
 from benchmarks.catalogue import Region, cube, tangent
 from benchmarks.measure import Progress
 from benchmarks.svg import Panel, draw
 from certifier.closest import closest
 from certifier.kinematics import Kinematics
-from certifier.model import WORLD, Array, Geometry, Scene
+from certifier.model import WORLD, Array, Geometry, Pair, Scene
 
 OBSTACLES = (10, 30, 100, 300, 1000)
 JOINTS = range(2, 8)
@@ -36,7 +37,7 @@ def curves(progress: Progress, obstacles: tuple[int, ...] = OBSTACLES) -> dict[s
     _obstacles(1)  # loads the compiled kernels
     return {
         "benchmark": "scaling",
-        "machine": machine.describe(),
+        "machine": measure.machine(),
         "obstacles": [_told(_obstacles(count), progress) for count in obstacles],
         "joints": [_told(_joints(n), progress) for n in JOINTS],
         "faces": [_told(_faces(count), progress) for count in FACES],
@@ -70,14 +71,14 @@ def _joints(n: int) -> dict[str, Any]:
 
 
 def _faces(count: int) -> dict[str, Any]:
-    instance = catalogue.instances()["iiwa_shelf/link_5-upper/simplex"]
-    center, n = instance.region.center, instance.scene.n
+    scene = replace(catalogue.scene("iiwa_shelf"), pairs=(Pair("iiwa/link_5/box", "shelf/boards/upper"),))
+    center, n = catalogue.region("iiwa_shelf", "whole").center, scene.n
     corners = np.concatenate([np.eye(n), np.full((1, n), (1 - np.sqrt(n + 1)) / n)])
     C = corners - corners.mean(axis=0)
     C /= np.linalg.norm(C, axis=1, keepdims=True)
     cut, _ = tangent(np.random.default_rng(0), center, count - len(C), HALF_WIDTH)
     C = np.concatenate([C, cut])
-    return _point(count, instance.scene, Region(C, C @ center + HALF_WIDTH, center), [0])
+    return _point(count, scene, Region(C, C @ center + HALF_WIDTH, center), [0])
 
 
 def _scattered(rng: np.random.Generator, count: int, s: Array) -> Iterator[Geometry]:
@@ -97,7 +98,7 @@ def _bodies(scene: Scene, s: Array) -> list[Array]:
 
 
 def _point(n: int, scene: Scene, region: Region, indices: range | list[int]) -> dict[str, Any]:
-    run = measure.ours(scene, region, list(indices), lambda _: None)
+    run = measure.ours(scene, region, list(indices))
     pairs = run.pairs.values()
     return {
         "n": n,

@@ -23,7 +23,6 @@ from pydrake.solvers import (
     ScsSolver,
     SolutionResult,
     SolverInterface,
-    SolverOptions,
 )
 
 from certifier.drake_model import build_diagram, geometry_name
@@ -57,14 +56,13 @@ class _Answers:
     status: str
     yes: Any
     no: Any
-    time_limit: str | None
 
 
 _SOLVERS = {
-    Solver.CLARABEL: _Answers(ClarabelSolver, "status", "Solved", "PrimalInfeasible", "time_limit"),
-    Solver.SCS: _Answers(ScsSolver, "scs_status", 1, -2, "time_limit_secs"),
-    Solver.CSDP: _Answers(CsdpSolver, "return_code", 0, 1, None),
-    Solver.MOSEK: _Answers(MosekSolver, "solution_status", 1, 5, "MSK_DPAR_OPTIMIZER_MAX_TIME"),
+    Solver.CLARABEL: _Answers(ClarabelSolver, "status", "Solved", "PrimalInfeasible"),
+    Solver.SCS: _Answers(ScsSolver, "scs_status", 1, -2),
+    Solver.CSDP: _Answers(CsdpSolver, "return_code", 0, 1),
+    Solver.MOSEK: _Answers(MosekSolver, "solution_status", 1, 5),
 }
 
 
@@ -82,7 +80,6 @@ class ReferenceResult:
         status: the solver's name, how Drake says that it ended, and its own word for it.
         frame: the body whose frame Drake expressed the plane in.
         build_seconds, solve_seconds: processor time of making and of solving the program.
-        stopped: whether the time limit ended the solution.
     """
 
     outcome: Outcome
@@ -90,7 +87,6 @@ class ReferenceResult:
     frame: str
     build_seconds: float
     solve_seconds: float
-    stopped: bool
 
 
 class Reference:
@@ -98,26 +94,20 @@ class Reference:
 
     Args:
         solver: the name of a :class:`Solver`, one of :func:`available`.
-        time_limit: seconds that one solution may take; None for no limit. A solution that takes longer is inconclusive.
 
     Attributes:
         setup_seconds: processor time that Drake took for the symbolic kinematics of all pairs.
 
     Raises:
-        CirisError: ``solver_unavailable``, or ``solver_option`` for a time limit that the solver does not know.
+        CirisError: ``solver_unavailable``.
         SceneError: ``unsupported_shape`` or ``unsupported_padding``.
     """
 
-    def __init__(self, scene: Scene, solver: str = Solver.CLARABEL, time_limit: float | None = None) -> None:
+    def __init__(self, scene: Scene, solver: str = Solver.CLARABEL) -> None:
         if solver not in available():
             wrong = "is not available or not licensed" if solver in list(Solver) else "is unknown"
             raise CirisError("solver_unavailable", f"{solver} {wrong}", field="solver", hint=f"available: {', '.join(available())}")
         self.scene, self._solver, self._answers = scene, solver, _SOLVERS[Solver(solver)]
-        self._options, self._time_limit = SolverOptions(), time_limit
-        if time_limit is not None:
-            if self._answers.time_limit is None:
-                raise CirisError("solver_option", f"{solver} knows no time limit", field="solver")
-            self._options.SetOption(self._answers.make().solver_id(), self._answers.time_limit, time_limit)
         if scene.padding:
             raise SceneError("unsupported_padding", "Drake's programs have no padding", field="padding", hint="set it to 0")
         start = time.process_time()
@@ -134,14 +124,26 @@ class Reference:
         first, second = sorted((self._ids[pair.a], self._ids[pair.b]), key=lambda i: i.get_value())
         start = time.process_time()
         program = self._polytopes.MakeIsGeometrySeparableProgram((first, second), np.asfortranarray(C[:, self._order]), d)
-        built, begun = time.process_time(), time.monotonic()
-        result = self._answers.make().Solve(program.prog(), None, self._options)
-        solved, ended = time.process_time(), time.monotonic()
+        built = time.process_time()
+        result = self._answers.make().Solve(program.prog())
+        solved = time.process_time()
         plane = self._polytopes.separating_planes()[program.plane_index]
         frame = self._diagram.plant().get_body(plane.expressed_body).name()
         outcome, status = self._outcome(result)
-        stopped = outcome is Outcome.INCONCLUSIVE and self._time_limit is not None and ended - begun >= self._time_limit
-        return ReferenceResult(outcome, status, frame, built - start, solved - built, stopped)
+        return ReferenceResult(outcome, status, frame, built - start, solved - built)
+
+    def alternate(self, C: Array, d: Array, max_rounds: int, tolerance: float) -> list[tuple[Array, Array]]:
+        """Drake's bilinear alternation between (11) and (12) from {C s <= d}; the polytope of every round, without the joint limits.
+
+        Empty when not even the first could be certified. Ends when the ellipsoid's volume grows by less than ``tolerance``.
+        """
+        options = CspaceFreePolytope.BilinearAlternationOptions()
+        options.max_iter, options.convergence_tol = max_rounds, tolerance
+        for program in (options.find_lagrangian_options, options.find_polytope_options):
+            program.solver_id = self._answers.make().solver_id()
+        found = self._polytopes.SearchWithBilinearAlternation(set(), np.asfortranarray(C[:, self._order]), d, options)
+        ours = np.argsort(self._order)
+        return [(result.C()[:, ours], result.d()) for result in found]
 
     def _outcome(self, result: MathematicalProgramResult) -> tuple[Outcome, str]:
         """The outcome and the words for it. Drake takes "almost solved" for success, so the solver's own word counts as well."""

@@ -151,33 +151,15 @@ def _parser() -> argparse.ArgumentParser:
     contains.add_argument("--q", metavar='"0,0.3,..."', required=True, action="append", help="joint positions; may be given several times")
     contains.set_defaults(run="client.commands:contains")
 
-    _add_bench(verbs, json)
+    bench = verbs.add_parser("bench", help="measure, side by side with Drake: ciris bench BENCHMARK --help")
+    kinds = ["pairs", "scene", "growth", "agreement", "scaling", "survey", "docs"]
+    bench.add_argument("benchmark", choices=kinds)
+    bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...")
+    bench.set_defaults(run="client.bench:bench")
 
     doctor = verbs.add_parser("doctor", parents=[remote, json], help="what is installed, what works, what the machine can do")
     doctor.set_defaults(run="client.commands:doctor")
     return parser
-
-
-def _add_bench(verbs: Any, json: argparse.ArgumentParser) -> None:
-    kinds = _group(verbs.add_parser("bench", help="measure, side by side with Drake; exit status 1 when verdicts contradict each other"))
-    against = _Parser(add_help=False)
-    against.add_argument(
-        "--against", metavar="drake|FILE", help="Drake with Clarabel here and now, or its side of an earlier --json document"
-    )
-    against.add_argument("--limit", type=float, metavar="SECONDS", help="stop Drake after this long on a pair and call it a bound")
-    against.add_argument("--repeat", type=int, default=1, metavar="N", help="run ours this often; the fastest run counts")
-    pairs = kinds.add_parser("pairs", parents=[json, against], help="named instances of benchmarks/catalogue.yaml, scene/pair/polytope")
-    pairs.add_argument("names", metavar="NAME", nargs="*", help="default: the catalogue's ladder, small to hard")
-    pairs.set_defaults(run="client.bench:pairs")
-    scene = kinds.add_parser("scene", parents=[json, against], help="the 7-joint arm against the bookcase, 70 pairs")
-    scene.add_argument("--pairs", type=int, metavar="N", help="the N cheapest pairs alone")
-    scene.set_defaults(run="client.bench:scene")
-    kinds.add_parser("agreement", parents=[json], help="verdicts on hundreds of pairs, half an hour").set_defaults(
-        run="client.bench:agreement"
-    )
-    scaling = kinds.add_parser("scaling", help="how the cost grows with obstacles, joints and faces, as JSON")
-    scaling.add_argument("--svg", metavar="FILE", help="a picture of it")
-    scaling.set_defaults(run="client.bench:scaling")
 
 
 if __name__ == "__main__":
