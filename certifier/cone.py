@@ -12,6 +12,8 @@ Shapes: R rationals, K weights, L = 2^k, N_A chain points, M = 3^k of them the g
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import blas, lapack
 
@@ -127,6 +129,55 @@ def symmetrise(X: Array) -> Array:
     return 0.5 * (X + np.swapaxes(X, -1, -2))
 
 
+@dataclass(frozen=True)
+class Conjugate:
+    """Where -grad F(x_r) = s_r, for R points s_r inside the cone: F*(s) = max over x of -s'x - F(x), with gradient -x and Hessian H(x)^-1.
+
+    Attributes:
+        x: (R, N), near the maximisers.
+        Q: (R, K, L, L) = Lambda(x)^-1.
+        step: (R, N) Newton's next step, not taken; decrement: (R,) its length in the metric of the Hessian.
+        factor: Cholesky factors of the Hessians at x.
+        value: (R,) F*(s) to second order in the step.
+    """
+
+    x: Array
+    Q: Array
+    step: Array
+    decrement: Array
+    factor: Factor
+    value: Array
+
+
+def conjugate(cone: Cone, s: Array, start: Array, tolerance: float, max_iterations: int) -> Conjugate:
+    """Newton's method with exact line search, (R, N) points s from (R, N) interior points of the dual cone.
+
+    It ends when all decrements are under the tolerance, or with the iterations; for an s outside the cone they do not fall.
+
+    Raises:
+        np.linalg.LinAlgError: a point is seen to be outside the cone, or the cone is numerically degenerate.
+    """
+    inner = np.einsum("rn,rn->r", s, start)
+    if not (inner > 0).all():
+        raise np.linalg.LinAlgError("the point is not in the cone")
+    x = start * (cone.degree / inner)[:, None]
+    for iteration in range(max_iterations + 1):
+        inverse_chol = inverse_cholesky(cone.adjoint(x))
+        Q = np.swapaxes(inverse_chol, -1, -2) @ inverse_chol
+        residual = cone.values(Q) - s
+        factor = Factor(cone.schur(Q, Q))
+        step = factor.solve(residual[:, :, None])[:, :, 0]
+        square = np.maximum(np.einsum("rn,rn->r", residual, step), 0.0)
+        decrement = np.sqrt(square)
+        if decrement.max() < tolerance or iteration == max_iterations:
+            break
+        relative = np.linalg.eigvalsh(inverse_chol @ cone.adjoint(step) @ np.swapaxes(inverse_chol, -1, -2)).reshape(len(x), -1)
+        lengths = np.where(decrement < 0.1, 1.0, _line_search(relative, np.einsum("rn,rn->r", s, step)))
+        x = x + lengths[:, None] * step
+    determinants = -2 * np.log(np.diagonal(inverse_chol, axis1=2, axis2=3)).sum(axis=(1, 2))
+    return Conjugate(x, Q, step, decrement, factor, determinants - np.einsum("rn,rn->r", s, x) + square / 2)
+
+
 class Centre:
     """An interior point x of the dual cone whose polynomial w = -grad F(x) resembles ``unit``: some of Newton's method towards it.
 
@@ -147,22 +198,9 @@ class Centre:
     """
 
     def __init__(self, cone: Cone, unit: Array, start: Array) -> None:
-        x = start * (cone.degree / (unit @ start))
-        for iteration in range(MAX_NEWTON + 1):
-            inverse_chol = inverse_cholesky(cone.adjoint(x[None]))
-            Q = np.swapaxes(inverse_chol, -1, -2) @ inverse_chol
-            w = cone.values(Q)[0]
-            factor = Factor(cone.schur(Q, Q))
-            step = factor.solve((w - unit)[None, :, None])[0, :, 0]
-            decrement = float(np.sqrt(max((w - unit) @ step, 0.0)))
-            if decrement < NEWTON_TOLERANCE or iteration == MAX_NEWTON:
-                break
-            if decrement < 0.1:
-                x = x + step
-            else:
-                curvature = np.linalg.eigvalsh(inverse_chol @ cone.adjoint(step[None]) @ np.swapaxes(inverse_chol, -1, -2)).ravel()
-                x = x + _line_search(curvature, float(unit @ step)) * step
-        self.x, self.Q, self.w, self.factor = x, Q[0], w, factor
+        found = conjugate(cone, unit[None], start[None], NEWTON_TOLERANCE, MAX_NEWTON)
+        self.x, self.Q, self.factor = found.x[0], found.Q[0], found.factor
+        self.w = cone.values(found.Q)[0]
         self.unit_Q = self.Q @ cone.adjoint(self.solve(unit[None]))[0] @ self.Q
 
     def solve(self, v: Array) -> Array:
@@ -170,16 +208,16 @@ class Centre:
         return self.factor.solve(v.T[None])[0].T
 
 
-def _line_search(eigenvalues: Array, slope: float) -> float:
-    """The minimiser over a of a slope - sum log(1 + a eigenvalue), by safeguarded Newton from 0."""
-    lowest = float(eigenvalues.min())
-    upper = 0.99 * (-1 / lowest) if lowest < 0 else 1e3
-    a = 0.0
+def _line_search(eigenvalues: Array, slope: Array) -> Array:
+    """The minimisers a, (R,), of a slope_r - sum_i log(1 + a eigenvalue_ri), by safeguarded Newton from 0."""
+    lowest = eigenvalues.min(axis=1)
+    upper = np.where(lowest < 0, -0.99 / np.minimum(lowest, -1e-300), 1e3)
+    a = np.zeros(len(slope))
     for _ in range(30):
-        terms = eigenvalues / (1 + a * eigenvalues)
-        change = (float(terms.sum()) - slope) / float(terms @ terms)
-        following = min(max(a + change, 0.0), a + 0.9 * (upper - a))
-        if abs(following - a) < 1e-3 * max(following, 1e-3):
+        terms = eigenvalues / (1 + a[:, None] * eigenvalues)
+        change = (terms.sum(axis=1) - slope) / np.square(terms).sum(axis=1)
+        following = np.minimum(np.maximum(a + change, 0.0), a + 0.9 * (upper - a))
+        if (np.abs(following - a) < 1e-3 * np.maximum(following, 1e-3)).all():
             return following
         a = following
     return a

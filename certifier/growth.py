@@ -24,7 +24,7 @@ from certifier.errors import CirisError, RegionError
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, combine
-from certifier.polytope import chebyshev_center, drop_redundant
+from certifier.polytope import chebyshev_center, drop_redundant, inscribed_ellipsoid
 
 SMALLEST_SCALE = 1e-3
 """The last trial of the uniform contraction, relative to the proposal."""
@@ -338,6 +338,8 @@ def _proposed(scene: Scene, state: dict[str, Any], report: Proposed) -> Transiti
 
 def _trim(scene: Scene, state: dict[str, Any], label: str, polytope: Polytope, trim: dict[str, Any] | None = None) -> Transition:
     """Certify what the targeted contraction has come to; a pair certified on a larger polytope is certified on this one."""
+    if label == "push" and inscribed_ellipsoid(polytope).volume < state["best"]["volume"] * (1 + state["options"]["tolerance"]):
+        return _push_less(scene, state)
     trim = trim or {"holds": {}, "attempts": {}}
     center = measure(polytope, np.array(state["seed"])).center
     holds = {int(index): iteration for index, iteration in trim["holds"].items()}
@@ -358,15 +360,18 @@ def _certified(scene: Scene, state: dict[str, Any], report: Certification) -> Tr
     failures = [index for index, outcome in report.outcomes.items() if outcome is not Outcome.CERTIFIED]
     complete = not failures and len(report.outcomes) == len(action.pairs)
     accepted = None
-    if complete:
+    size = 0.0
+    if complete and action.label != "given":
+        size = inscribed_ellipsoid(Polytope(np.array(action.C), np.array(action.d))).volume
+    if complete and (state["best"] is None or size > state["best"]["volume"]):
         proofs = {**dict.fromkeys(action.pairs, action.iteration), **action.reuse}
         accepted = Accepted(action.iteration, action.C, action.d, action.center, state.get("seed"), proofs)
-        state["best"] = {"iteration": action.iteration, "C": action.C, "d": action.d, "center": action.center}
+        state["best"] = {"iteration": action.iteration, "C": action.C, "d": action.d, "center": action.center, "volume": size}
     if action.label == "given":
         transition = Transition(state, Finish(combine(list(report.outcomes.values())), "the given polytope, every pair"))
     elif action.label == "round":
         state["suspects"] = [*failures, *(i for i in state.get("suspects", []) if i not in failures)]
-        transition = _alternate(scene, state, complete)
+        transition = _alternate(scene, state, accepted is not None)
     elif state["options"]["contraction"] == "uniform" and action.label == "contract":
         state["suspects"] = [*failures, *(i for i in state.get("suspects", []) if i not in failures)]
         transition = _bisect(scene, state, action, report, complete)
@@ -390,8 +395,6 @@ def _cut(scene: Scene, state: dict[str, Any], action: Certify, report: Certifica
     smaller = contract(scene, polytope, measure(polytope, seed), seed[None], found)
     if smaller is None or max(attempts.values()) > MAX_ATTEMPTS:
         return _no_smaller(scene, state, failures, list(report.outcomes.values()))
-    if action.label == "push" and measure(smaller, seed).log_volume < _goal(state):
-        return _push_less(scene, state)
     return _trim(scene, state, action.label, smaller, {"holds": holds, "attempts": attempts})
 
 
@@ -401,12 +404,6 @@ def _no_smaller(scene: Scene, state: dict[str, Any], failures: list[int], outcom
     pair = scene.pairs[failures[0]]
     reason = f"not even a small region around the seed can be certified: {pair.a} and {pair.b} are too close there"
     return Transition(state, Finish(combine(outcomes), reason))
-
-
-def _goal(state: dict[str, Any]) -> float:
-    """The log volume that makes a push worth it."""
-    best = Polytope(np.array(state["best"]["C"]), np.array(state["best"]["d"]))
-    return measure(best, np.array(state["seed"])).log_volume + math.log1p(state["options"]["tolerance"])
 
 
 def _push(scene: Scene, state: dict[str, Any], reach: float = PUSH) -> Transition:
@@ -459,9 +456,9 @@ def _step(state: dict[str, Any]) -> Transition:
     return Transition({**state, "phase": "step", "rounds": rounds + 1}, Step(best["iteration"], best["C"], best["d"], best["center"]))
 
 
-def _alternate(scene: Scene, state: dict[str, Any], complete: bool) -> Transition:
+def _alternate(scene: Scene, state: dict[str, Any], accepted: bool) -> Transition:
     """Algorithm 1: accept and go on, stop when the growth is small, or back off towards the last certified polytope."""
-    if complete:
+    if accepted:
         if state["growth"] < state["options"]["tolerance"]:
             return Transition(state, Finish(Outcome.CERTIFIED, "certified; growth is under the tolerance"))
         return _step(state)

@@ -81,21 +81,28 @@ class Solution:
         return float(self.y[-1])
 
 
-def solve(blocks: list[Block], max_iterations: int = 60) -> Solution:
-    """Solve the program over ``blocks``."""
-    method = _Method(blocks)
-    for iteration in range(max_iterations):
+def solve(blocks: list[Block], max_iterations: int = 60, gap: float = np.inf) -> Solution:
+    """Solve the program over ``blocks``.
+
+    Args:
+        gap: a certificate is taken once the gap is below this multiple of its margin: inf for the first one, 1 for one near the middle.
+    """
+    method = _Method(blocks, gap)
+    status, iteration = None, 0
+    while status is None and iteration < max_iterations:
         try:
             status = method.iterate()
         except np.linalg.LinAlgError:
             status = Status.NUMERICAL
-        if status is not None:
-            return method.solution(status, iteration)
-    return method.solution(Status.ITERATION_LIMIT, max_iterations)
+        iteration += status is None
+    if status not in (Status.FEASIBLE, Status.INFEASIBLE) and method.settles():
+        status = Status.FEASIBLE
+    return method.solution(status or Status.ITERATION_LIMIT, iteration)
 
 
 class _Method:
-    def __init__(self, blocks: list[Block]) -> None:
+    def __init__(self, blocks: list[Block], gap: float) -> None:
+        self.gap = gap
         self.blocks, self.p = blocks, blocks[0].columns.shape[2]
         self.degree = sum(len(b.columns) * b.cone.degree for b in blocks)
         self.target = np.append(np.zeros(self.p - 1), -1.0)
@@ -123,6 +130,11 @@ class _Method:
     def _moments(self) -> Array:
         """sum_r B_r' x_r, (p,)."""
         return np.sum([np.einsum("rnp,rn->p", b.columns, x) for b, x in zip(self.blocks, self.x, strict=True)], axis=0)
+
+    def settles(self) -> bool:
+        """Whether the present point is a certificate, however wide the gap; if so, it is the solution."""
+        self.gap = np.inf
+        return self.y[-1] > 0 and self._settle(self.y, self.Q)
 
     def solution(self, status: Status, iterations: int) -> Solution:
         return Solution(status, self.y, self.lam, self.Q, self.x, iterations)
@@ -198,6 +210,8 @@ class _Method:
         leaves it psd becomes the margin.
         """
         z = np.append(y[:-1], 0.0)
+        if self._inner(Q, self.Z) > self.gap * y[-1]:
+            return False
         whole, margin = [], np.inf
         for b, given in zip(self.blocks, Q, strict=True):
             candidate = given + y[-1] * b.centre.Q

@@ -36,6 +36,9 @@ CONE_SAMPLES = 300
 FACES_AT_A_TIME = 8
 """A polytope with many faces is first replaced by its box; then this many faces are added at a time, as the dual asks for them."""
 
+MIDDLE = 1.0
+"""Gap of a certificate near the middle, relative to its margin."""
+
 
 @dataclass(frozen=True)
 class PairResult:
@@ -69,19 +72,21 @@ class Certification:
         polytope: joint limits included.
         center: (n,) interior point; default the Chebyshev centre.
         seed: seeds the samples.
+        box: a box around P, to use its faces before P's and in place of those of the smallest one: what they prove holds on all of it.
 
     Raises:
         RegionError: the polytope is empty or unbounded, or the centre is not inside.
     """
 
-    def __init__(self, scene: Scene, polytope: Polytope, center: Array | None = None, seed: int = 0) -> None:
+    def __init__(self, scene: Scene, polytope: Polytope, center: Array | None = None, seed: int = 0, box: Box | None = None) -> None:
         check(polytope, tuple(joint.name for joint in scene.moving))
         self.scene = scene
         self.center = chebyshev_center(polytope)[0] if center is None else center
         kept = drop_redundant(polytope)
         self._faces = faces = Polytope(polytope.C[kept], polytope.d[kept])
         lower, upper, Y_lower, Y_upper = bound_multipliers(scene.polytope(faces.C, faces.d))
-        box = Box.around(lower, upper)
+        self._whole = None if box is None else PairCheck(scene, Ground.of_box(box.mid, box.half))
+        box = Box.around(lower, upper) if box is None else box
         self.ground = Ground(faces.C, faces.d, box.mid, box.half, Y_lower, Y_upper)
         check_ground(scene, self.ground)
         self._check = PairCheck(scene, self.ground)
@@ -92,7 +97,7 @@ class Certification:
         m = len(kept)
         self._every = tuple(range(m))
         few = tuple(range(m, m + 2 * scene.n))
-        self._first = self._sides(few if m > len(few) + FACES_AT_A_TIME else self._every)
+        self._first = self._sides(few if self._whole or m > len(few) + FACES_AT_A_TIME else self._every)
 
     def certify(self, index: int, max_iterations: int = 60) -> PairResult:
         """Certify pair ``scene.pairs[index]``."""
@@ -109,7 +114,9 @@ class Certification:
         while True:
             try:
                 blocks = build(sides, pair, frame)
-                solution = solve(blocks, max_iterations)
+                # Multipliers of P's own faces are what the polytope step holds fixed: they should come from the middle.
+                gap = MIDDLE if self._whole and sides is not self._first else np.inf
+                solution = solve(blocks, max_iterations, gap)
             except np.linalg.LinAlgError as error:
                 if sides.faces == self._every:
                     return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"numerical trouble: {error}")
@@ -155,9 +162,11 @@ class Certification:
         """The proof in as few bits as hold."""
         failure = ""
         for kind in BITS:
-            proof = self._proof(pair, frame, sides, solution, kind)
+            proof, check = self._proof(pair, frame, sides, solution, kind), self._check
+            if self._whole and proof.needs_box_alone:
+                proof, check = proof.on_its_box(), self._whole
             try:
-                statement = self._check.verify(proof)
+                statement = check.verify(proof)
             except ProofError as error:
                 failure = str(error)
                 continue

@@ -1,36 +1,52 @@
 """The polytope step (12) of C-IRIS: all pairs coupled, the faces move, the inscribed ellipsoid cannot shrink.
 
-The face multipliers lambda_rj of every rational r are fixed to those of the proofs; free are the faces (C, d), delta, every
-plane z_p, every lambda_r0 and the multipliers of the fixed joint limits. With {E u + s_E} the ellipsoid inscribed in the current
-polytope,
+The moved polytope is {C s <= d} within a *trust box* B around the current one. With the face multipliers of the proofs fixed, free are the
+faces (C, d), the margins delta, every plane z_p, and the multipliers of 1 and of the faces of B:
 
-    maximise  prod_j (delta_j + eps)
-    s.t.      A_r z_p - t_p den - sum_j lambda_rj (d_j - c_j's) = lambda_r0 + sum_k lambda_rk l_k     for every rational r,
-              |E c_j| <= d_j - c_j's_E - delta_j,   |c_j| <= 1,
+    maximise  sum_j log(delta_j + eps)   (or sum_j delta_j)
+    s.t.      A_r z_p - t_p den - sum_j lambda_rj (d_j - c_j's)  in  K_B            for every rational r (certifier.certificates),
+              |E c_j| <= d_j - c_j's_E - delta_j,   |E c_j| <= 1,   delta_j >= 0,   c_j's_k <= d_j for every witness s_k,
 
-where t_p is a share of the pair's present margin, so that (11) is strictly feasible on the new polytope. The current polytope
-is feasible with delta >= 0. What comes out is a proposal: it has to be certified by (11) before it is a region.
-The program is handed to Clarabel as it stands, so its size is limited.
+{E u + s_E} the inscribed ellipsoid and t_p a share of the pair's present margin, so that (11) is strictly feasible on what comes out.
+|E c_j| <= 1 where the paper has |c_j| <= 1: margins are measured against the ellipsoid, whatever the units of the joints.
+A pair that holds on all of B constrains nothing and is left out, and a face that no pair needs is dropped, B standing in for it. Before
+that, (11) is tried against the faces of B for every proof that does not hold there, so that few pairs ask for few faces.
+The program is an arrow (certifier.arrow). The current polytope is feasible, so the ellipsoid cannot shrink; what comes out is a proposal
+that has to be certified by (11).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
-from certifier.basis import Basis, basis, rho, subsets
+from certifier.arrow import Method, Term
+from certifier.certificates import Certificates, face_multipliers, holds_on
 from certifier.errors import RegionError
-from certifier.kinematics import Kinematics
+from certifier.face_terms import Objective, face_barrier, objective_term
 from certifier.model import Array, Polytope, Scene
-from certifier.polytope import drop_redundant, inscribed_ellipsoid
-from certifier.proof import PairProof, Side
+from certifier.outcome import Outcome
+from certifier.pair import Certification
+from certifier.polytope import Ellipsoid, bounds, drop_redundant, inscribed_ellipsoid
+from certifier.program import Box
+from certifier.proof import PairProof
 
+TRUST = 1.3
+"""How far the trust box reaches, relative to the smallest box around the current polytope."""
 MARGIN_SHARE = 0.25
-EPSILON = 1e-3
-MAX_ROWS = 30_000
+START_LENGTH = 0.9
+"""|E c_j| of the faces at the start, inside |E c_j| <= 1."""
+PUSH = 0.5
+"""Share of the way to the first boundary by which all faces are moved out first, to have delta > 0."""
+WEIGHT = 512.0
+"""Of the objective against the barriers: large enough to come close to the optimum, small enough to stay off the boundary."""
+TOLERANCE = 0.005
+"""Of the objective, per face."""
+
+Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -39,8 +55,9 @@ class Step:
 
     Attributes:
         C, d, center: the new rows and the centre of the ellipsoid, which stays inside.
-        base_C, base_d: the current polytope without its redundant rows.
-        growth: relative growth of the inscribed ellipsoid's volume.
+        base_C, base_d: the current polytope without the rows that no pair needs, within the trust box; what lies between the two is
+            feasible in (12) as well.
+        growth: relative growth of the inscribed ellipsoid's volume, from the polytope that was given.
     """
 
     C: Array
@@ -52,176 +69,150 @@ class Step:
     info: dict[str, Any]
 
 
-def step(scene: Scene, polytope: Polytope, proofs: dict[int, bytes]) -> Step:
+def trust_box(scene: Scene, polytope: Polytope, ellipsoid: Ellipsoid, trust: float = TRUST) -> Box:
+    """The smallest box around P, enlarged about the ellipsoid's centre and cut to the joint limits."""
+    lower, upper = bounds(polytope)
+    center = ellipsoid.center
+    return Box.around(
+        np.maximum(scene.s_lower, center + trust * (lower - center)), np.minimum(scene.s_upper, center + trust * (upper - center))
+    )
+
+
+def step(
+    scene: Scene,
+    polytope: Polytope,
+    proofs: dict[int, bytes],
+    *,
+    objective: Objective = Objective.GEOMETRIC_MEAN,
+    normals: bool = True,
+    witnesses: Array | None = None,
+    trust: float = TRUST,
+    progress: Progress = lambda _: None,
+) -> Step:
     """One polytope step from a certified polytope.
 
     Args:
         polytope: joint limits as the last 2n rows.
-        proofs: pair index -> proof file; proofs on a polytope that contains this one will do.
+        proofs: pair index -> proof file; proofs on a polytope that contains this one will do. Those made against the faces of
+            :func:`trust_box` (``Certification(..., box=...)``) are used as they are.
+        normals: whether C is free; else d alone.
+        witnesses: (k, n) points of the polytope that must stay inside.
+        progress: called many times with a sentence; an exception it raises ends the step.
 
     Raises:
-        RegionError: ``step_too_large`` or ``step_failed``; the current region stands.
+        RegionError: ``witness_outside``; ``step_failed``, and the current region stands.
     """
     n = scene.n
-    kept = drop_redundant(polytope, fixed=2 * n)
-    faces = Polytope(polytope.C[kept[: -2 * n]], polytope.d[kept[: -2 * n]])
-    ellipsoid = inscribed_ellipsoid(polytope)
-    pairs = [PairProof.from_bytes(data, scene) for data in dict.fromkeys(proofs.values())]
-    rows = sum(len(side.mantissa) * _rows(side, n) for proof in pairs for side in proof.sides)
-    if rows > MAX_ROWS:
-        raise RegionError("step_too_large", f"the polytope step would have {rows} equations, more than {MAX_ROWS}")
-    program = MathematicalProgram()
-    C = program.NewContinuousVariables(*faces.C.shape, "C")
-    d = program.NewContinuousVariables(len(faces.d), "d")
-    delta = program.NewContinuousVariables(len(faces.d), "delta")
-    identities = _Identities(scene, program, faces, C, d)
-    for proof in pairs:
-        identities.add(proof)
-    for c, offset, slack in zip(C, d, delta, strict=True):
-        _cone(program, offset - c @ ellipsoid.center - slack, ellipsoid.shape @ c)
-        _cone(program, 1.0, c)
-    program.AddBoundingBoxConstraint(0, np.inf, delta)
-    program.AddMaximizeGeometricMeanCost(np.eye(len(delta), order="F"), np.full(len(delta), EPSILON), delta)
-    result = ClarabelSolver().Solve(program)
-    status = result.get_solver_details().status
-    if not result.is_success():
-        raise RegionError("step_failed", f"the solver of the polytope step ended with {status}")
-    moved = scene.polytope(result.GetSolution(C), result.GetSolution(d))
+    points = np.zeros((0, n)) if witnesses is None else witnesses
+    if not polytope.contains(points).all():
+        raise RegionError("witness_outside", "a witness point is not in the polytope", field="witnesses")
+    before = inscribed_ellipsoid(polytope)
+    box = trust_box(scene, polytope, before, trust)
+    kept = drop_redundant(polytope, fixed=2 * n)[: -2 * n]
+    current = _within(box, polytope.C[kept], polytope.d[kept])
+    needed = _coupled(scene, polytope, before.center, current, proofs, box, progress)
+    used = np.flatnonzero(sum(Y.sum(axis=0) for _, Y in needed) > 0) if needed else np.zeros(0, dtype=int)
+    base = scene.polytope(*_rows(scene, box, current.C[used], current.d[used]))
+    start = inscribed_ellipsoid(base)
+    faces = _Faces(current.C[used], current.d[used], start)
+    certificates = Certificates(scene, box, start, faces.scale, MARGIN_SHARE)
+    info: dict[str, Any] = {"faces": len(used), "coupled_pairs": len(needed), "trust": trust}
+    C, d = faces.rows(faces.start)
+    base = scene.polytope(*_rows(scene, box, C, d))
+    if needed:
+        try:
+            method = Method(
+                [certificates.group(proof, Y[:, used]) for proof, Y in needed],
+                faces.start,
+                faces.free(normals),
+                lambda iteration: progress(f"polytope step: iteration {iteration}"),
+            )
+            method.shift(PUSH * min(1.0, method.reach(faces.push)) * faces.push)
+        except np.linalg.LinAlgError as error:
+            raise RegionError(
+                "step_failed", f"the proofs are not strictly feasible on the trust box: {error}", hint="a smaller trust"
+            ) from error
+        reach = float(np.linalg.norm(np.abs(box.mid - start.center) + box.half) / np.linalg.eigvalsh(start.shape)[0])
+        barrier = face_barrier(n, 2 * max(reach, float(faces.start.max())), np.linalg.solve(start.shape, (points - start.center).T).T)
+        method.minimise(_weighted(objective_term(objective, n), barrier), TOLERANCE * WEIGHT * len(used))
+        C, d = faces.rows(method.y)
+        info |= {"iterations": method.iterations, "rationals": sum(len(p) for group in method.groups for p in group.blocks)}
+    moved = scene.polytope(*_rows(scene, box, C, d))
     after = inscribed_ellipsoid(moved)
-    base = scene.polytope(faces.C, faces.d)
-    info = {"rows": rows, "status": str(status), "volume_before": ellipsoid.volume, "volume_after": after.volume}
-    return Step(moved.C, moved.d, after.center, base.C, base.d, after.volume / ellipsoid.volume - 1, info)
+    info |= {"volume_before": before.volume, "volume_after": after.volume}
+    return Step(moved.C, moved.d, after.center, base.C, base.d, after.volume / before.volume - 1, info)
 
 
-def _rows(side: Side, n: int) -> int:
-    k = len(side.chain)
-    return len(basis(k).points) + (n - k) * 3**k
+def _coupled(
+    scene: Scene, polytope: Polytope, center: Array, current: Polytope, proofs: dict[int, bytes], box: Box, progress: Progress
+) -> list[tuple[PairProof, Array]]:
+    """The proofs that do not hold on all of the box, with the faces they need; (11) is tried with those of the box first."""
+    trusted: Certification | None = None
+    needed: dict[bytes, tuple[PairProof, Array]] = {}
+    for count, (index, data) in enumerate(proofs.items()):
+        proof = PairProof.from_bytes(data, scene)
+        m = len(proof.ground.d)
+        if not (holds_on(proof, box, proof.faces) or holds_on(proof, box, range(m, m + 2 * scene.n))):
+            trusted = trusted or Certification(scene, polytope, center, box=box)
+            pair = scene.pairs[index]
+            progress(f"polytope step: {count + 1}/{len(proofs)} {pair.a} - {pair.b} on the trust box")
+            result = trusted.certify(index)
+            if result.outcome is Outcome.CERTIFIED and result.proof:
+                data = result.proof
+                proof = PairProof.from_bytes(data, scene)
+        # A proof may stand for many pairs.
+        if data not in needed:
+            Y = face_multipliers(proof, current, box)
+            if Y.any():
+                needed[data] = proof, Y
+    return list(needed.values())
 
 
-def _cone(program: MathematicalProgram, bound: Any, vector: Any) -> None:
-    """|vector| <= bound."""
-    program.AddLorentzConeConstraint(np.concatenate([[bound], vector]))
+def _within(box: Box, C: Array, d: Array) -> Polytope:
+    """The faces, then those of the box."""
+    eye = np.eye(len(box.mid))
+    return Polytope(np.concatenate([C, eye, -eye]), np.concatenate([d, box.upper, -box.lower]))
 
 
-class _Identities:
-    """The polynomial identities, in the coordinates of certifier.basis on each proof's own box."""
-
-    def __init__(self, scene: Scene, program: MathematicalProgram, faces: Polytope, C: Any, d: Any) -> None:
-        self.scene, self.program, self.faces, self.C, self.d = scene, program, faces, C, d
-        self.kinematics = Kinematics(scene)
-        self.index = {c.tobytes(): j for j, c in enumerate(faces.C)}
-
-    def add(self, proof: PairProof) -> None:
-        """Both sides of one pair, with a plane of its own."""
-        n, program = self.scene.n, self.program
-        plane = program.NewContinuousVariables(4, n + 1, "plane")
-        radii = [volume.radius + self.scene.padding for volume in proof.volumes]
-        kappa = program.NewContinuousVariables(1, "kappa")[0]
-        if max(radii) > 0:
-            self._bound_normal(plane, kappa)
-        for volume, radius, side, sign in zip(proof.volumes, radii, proof.sides, (1.0, -1.0), strict=True):
-            space, chain = basis(len(side.chain)), list(side.chain)
-            u = np.zeros((len(space.points), n))
-            u[:, chain] = space.points
-            X = self.kinematics.numerators(proof.frame, volume.body, proof.ground.mid + proof.ground.half * u)
-            squares = _face_multipliers(proof, side, space)
-            for v, vertex in enumerate(volume.vertices):
-                p = sign * (X @ np.append(vertex, 1.0))
-                constant = -MARGIN_SHARE * proof.t * X[:, 3, 3]
-                self._identity(proof, space, chain, u, plane, p, kappa, -radius * X[:, 3, 3], constant, squares[v])
-
-    def _identity(
-        self,
-        proof: PairProof,
-        space: Basis,
-        chain: list[int],
-        u: Array,
-        plane: Any,
-        p: Array,
-        kappa: Any,
-        rounding: Array,
-        offset: Array,
-        squares: Array,
-    ) -> None:
-        """plane'p (x) [1; u] + kappa rounding + offset - sum_j squares_j g_j - sum_k l_k rho'Q_k rho = rho'Q_0 rho."""
-        n, ground = self.scene.n, proof.ground
-        points, grid, outside = len(u), space.grid, [i for i in range(n) if i not in chain]
-        N = points + len(outside) * grid
-
-        def affine(weight: Array, constant: float, slopes: Array) -> Array:
-            """Coordinates (N,) of weight(u_A) (constant + slopes'u), for weight at the points."""
-            first = weight * (constant + u @ slopes)
-            return np.concatenate([first, *(slopes[i] * weight[:grid] for i in outside)])
-
-        columns, variables = [], []
-        unit = np.eye(n)
-        for component in range(4):
-            for e in range(n + 1):
-                columns.append(affine(p[:, component], 1.0 if e == 0 else 0.0, unit[e - 1] if e else np.zeros(n)))
-                variables.append(plane[component, e])
-        if rounding.any():
-            columns.append(affine(rounding, 1.0, np.zeros(n)))
-            variables.append(kappa)
-        right = -affine(offset, 1.0, np.zeros(n))
-        for c, square in zip(ground.C, squares, strict=True):
-            j = self.index.get(c.tobytes())
-            if j is None:
-                continue
-            columns.append(affine(-square, 1.0, np.zeros(n)))
-            variables.append(self.d[j])
-            for i in range(n):
-                columns.append(affine(square, ground.mid[i], ground.half[i] * unit[i]))
-                variables.append(self.C[j, i])
-        limits = self.scene.polytope(np.zeros((0, n)), np.zeros(0))
-        products = space.rho[:, :, None] * space.rho[:, None, :]
-        fixed = [(1.0, np.zeros(n))] + [(d - c @ ground.mid, -c * ground.half) for c, d in zip(limits.C, limits.d, strict=True)]
-        lower = np.tril_indices(space.rho.shape[1])
-        for constants, slopes in fixed:
-            scale = max(abs(constants) + np.abs(slopes).sum(), 1e-12)
-            Q = self._psd(space.rho.shape[1])
-            for row, k in zip(*lower, strict=True):
-                weight = products[:, row, k] * (1 if row == k else 2)
-                columns.append(affine(-weight, constants / scale, slopes / scale))
-                variables.append(Q[row, k])
-        matrix = np.stack(columns, axis=1)
-        assert matrix.shape[0] == N
-        self.program.AddLinearEqualityConstraint(matrix, right, np.array(variables))
-
-    def _psd(self, size: int) -> Any:
-        if size == 1:
-            Q = self.program.NewContinuousVariables(1, 1, "Q")
-            self.program.AddBoundingBoxConstraint(0, np.inf, Q)
-            return Q
-        Q = self.program.NewSymmetricContinuousVariables(size, "Q")
-        self.program.AddPositiveSemidefiniteConstraint(Q)
-        return Q
-
-    def _bound_normal(self, plane: Any, kappa: Any) -> None:
-        """|a| <= kappa at the corners of the box, |a| being convex."""
-        n = self.scene.n
-        for signs in np.array(np.meshgrid(*[[-1.0, 1.0]] * n)).reshape(n, -1).T:
-            _cone(self.program, kappa, plane[:3, 0] + plane[:3, 1:] @ signs)
+def _rows(scene: Scene, box: Box, C: Array, d: Array) -> tuple[Array, Array]:
+    """The faces, then those of the box that say more than the joint limits."""
+    inside = np.concatenate([box.upper < scene.s_upper, box.lower > scene.s_lower])
+    rows = _within(box, C, d)
+    keep = np.concatenate([np.ones(len(d), dtype=bool), inside])
+    return rows.C[keep], rows.d[keep]
 
 
-def _face_multipliers(proof: PairProof, side: Side, space: Basis) -> Array:
-    """Values of lambda_j at the points for every face of the ground, (V, m, N_A).
+def _weighted(objective: Term, barrier: Term) -> Term:
+    def term(y: Array) -> tuple[float, Array, Array]:
+        value, gradient, hessian = objective(y)
+        wall, slope, curvature = barrier(y)
+        return WEIGHT * value + wall, WEIGHT * gradient + slope, WEIGHT * hessian + curvature
 
-    A multiplier of a face of the box counts for the faces that imply it, half_i (1 -+ u_i) = sum_j y_j g_j + (a constant >= 0); what
-    falls to the constant and to the joint limits is free in (12) anyway.
+    return term
+
+
+class _Faces:
+    """Faces as unknowns, (c_j, d_j, delta_j) one after the other, in coordinates in which the ellipsoid is the unit ball.
+
+    Attributes:
+        scale: (m,) what the rows are multiplied by, for |E c_j| = START_LENGTH.
+        start: (m (n + 2),) the given faces, delta = 0; push: the direction in which all of them move out.
     """
-    ground, squares = proof.ground, _squares(side, space)[:, 1:]
-    m, n = ground.C.shape
-    multipliers = np.zeros((len(squares), m, squares.shape[2]))
-    for position, face in enumerate(proof.faces):
-        if face < m:
-            multipliers[:, face] += squares[:, position]
-        else:
-            i, Y = (face - m) % n, ground.Y_lower if face < m + n else ground.Y_upper
-            multipliers += (Y[i, :m] / ground.half[i])[:, None] * squares[:, position, None]
-    return multipliers
 
+    def __init__(self, C: Array, d: Array, ellipsoid: Ellipsoid) -> None:
+        self._ellipsoid = ellipsoid
+        self._n = C.shape[1]
+        normals, offsets = C @ ellipsoid.shape, d - C @ ellipsoid.center
+        self.scale = START_LENGTH / np.linalg.norm(normals, axis=1)
+        self.start = np.column_stack([normals * self.scale[:, None], offsets * self.scale, np.zeros(len(d))]).ravel()
+        self.push = np.tile(np.append(np.zeros(self._n), [1.0, 0.5]), len(d))
 
-def _squares(side: Side, space: Basis) -> Array:
-    """Values of |L_j' rho|^2 at the points for 1 and the faces used, (V, f + 1, N_A)."""
-    monomials = rho(space.points) / np.sqrt(3.0) ** subsets(len(side.chain)).sum(axis=1)
-    return np.square(np.einsum("nl,vjlk->vjnk", monomials, side.factors)).sum(axis=3)
+    def rows(self, y: Array) -> tuple[Array, Array]:
+        """C and d of unknowns."""
+        v = y.reshape(-1, self._n + 2)
+        C = np.linalg.solve(self._ellipsoid.shape, v[:, : self._n].T).T
+        return C, v[:, self._n] + C @ self._ellipsoid.center
+
+    def free(self, normals: bool) -> Array:
+        """Which unknowns may move."""
+        return np.tile(np.append(np.full(self._n, normals), [True, True]), len(self.scale))

@@ -40,6 +40,16 @@ class Box:
         mid = (lower + upper) / 2
         return cls(mid, np.nextafter(np.maximum(upper - mid, mid - lower) * (1 + 1e-12), np.inf))
 
+    @property
+    def lower(self) -> Array:
+        """The least doubles inside."""
+        return np.nextafter(self.mid - self.half, np.inf)
+
+    @property
+    def upper(self) -> Array:
+        """The largest doubles inside."""
+        return np.nextafter(self.mid + self.half, -np.inf)
+
     def to_u(self, s: Array) -> Array:
         return (s - self.mid) / self.half
 

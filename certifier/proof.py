@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -43,6 +43,13 @@ class Ground:
     half: Array
     Y_lower: Array
     Y_upper: Array
+
+    @classmethod
+    def of_box(cls, mid: Array, half: Array) -> Ground:
+        """A box as a polytope: its upper, then its lower faces, a rounding inside the exact ones."""
+        eye, unit = np.eye(len(mid)), np.eye(2 * len(mid), 4 * len(mid))
+        d = np.concatenate([np.nextafter(mid + half, -np.inf), -np.nextafter(mid - half, np.inf)])
+        return cls(np.concatenate([eye, -eye]), d, mid, half, unit[len(mid) :], unit[: len(mid)])
 
 
 @dataclass(frozen=True)
@@ -144,6 +151,17 @@ class PairProof:
         """The pairs of the scene that are covered."""
         first, second = (set(volume.geometries) for volume in self.volumes)
         return tuple(p for p in self.scene.pairs if (p.a in first and p.b in second) or (p.a in second and p.b in first))
+
+    @property
+    def needs_box_alone(self) -> bool:
+        """Whether it uses no face of the polytope but those of the box."""
+        return min(self.faces) >= len(self.ground.d)
+
+    def on_its_box(self) -> PairProof:
+        """The same proof, stated on all of its box; only if it needs no other face."""
+        ground = Ground.of_box(self.ground.mid, self.ground.half)
+        shift = len(ground.d) - len(self.ground.d)
+        return replace(self, ground=ground, faces=tuple(j + shift for j in self.faces))
 
     def to_bytes(self) -> bytes:
         """The proof as a file."""

@@ -19,6 +19,7 @@ from certifier.region import Region, certified_region
 from db import jobs, pairs, regions, scenes
 from db.session import Database
 from db.settings import settings
+from tests.certifier.scenes import accepted
 from tests.scenes import slider
 from tests.services import Queue
 from workers.app import celery_app
@@ -85,7 +86,7 @@ def certified() -> Region:
     certification = Certification(scene, polytope, np.zeros(1))
     results = [certification.certify(index) for index in range(len(scene.pairs))]
     proofs = {index: result.proof or b"" for index, result in enumerate(results)}
-    return certified_region(scene, polytope.C, polytope.d, np.zeros(1), proofs, {"seconds": 1.0})
+    return certified_region(scene, accepted(polytope, np.zeros(1)), proofs, {"seconds": 1.0})
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ from db import pairs, regions
 from db.models import ProofRow
 from db.session import Database
 from db.settings import settings
+from tests.certifier.scenes import accepted
 from tests.scenes import slider
 
 
@@ -76,7 +77,7 @@ def small_region() -> bytes:
     polytope = scene.polytope([[1.0], [-1.0]], [0.1, 0.1])
     certification = Certification(scene, polytope, np.zeros(1))
     proofs = {index: certification.certify(index).proof or b"" for index in range(2)}
-    return certified_region(scene, polytope.C, polytope.d, np.zeros(1), proofs, {"seconds": 1.0}).proof
+    return certified_region(scene, accepted(polytope, np.zeros(1)), proofs, {"seconds": 1.0}).proof
 
 
 def test_the_manifest_and_the_arrays_are_exported(client: TestClient, region: str, certified: Region) -> None:

@@ -14,7 +14,7 @@ from certifier.pair import Certification
 from certifier.proof import PairProof
 from certifier.proof_file import with_scene
 from certifier.region import certified_region
-from tests.certifier.scenes import ball, box, cube, planar_arm
+from tests.certifier.scenes import accepted, ball, box, cube, planar_arm
 
 
 @cache
@@ -47,7 +47,7 @@ def region() -> bytes:
         data = replace(found, scene=scene(), volumes=tuple(volumes)).to_bytes()
         covered = [i for i, p in enumerate(scene().pairs) if p.a == pair.a and pair.b in (p.b, group.name)]
         proofs |= dict.fromkeys(covered, data)
-    return certified_region(scene(), polytope.C, polytope.d, np.zeros(2), proofs, {}).proof
+    return certified_region(scene(), accepted(polytope, np.zeros(2)), proofs, {}).proof
 
 
 @cache

@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 
+from certifier.growth import Accepted
 from certifier.kinematics import rotation
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
 
@@ -73,3 +74,8 @@ def cube(scene, center, half):
     eye = np.eye(scene.n)
     center = np.broadcast_to(np.asarray(center, dtype=float), (scene.n,))
     return scene.polytope(np.concatenate([eye, -eye]), np.concatenate([center + half, half - center]))
+
+
+def accepted(polytope, center):
+    """What the growth says of a polytope whose pairs are all certified."""
+    return Accepted(0, polytope.C.tolist(), polytope.d.tolist(), list(center), None, {})

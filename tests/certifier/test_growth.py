@@ -25,10 +25,7 @@ from certifier.growth import (
 )
 from certifier.model import WORLD
 from certifier.outcome import Outcome
-from certifier.pair import Certification as PairCertification
-from certifier.polytope import inscribed_ellipsoid
-from certifier.polytope_step import step
-from tests.certifier.scenes import box, cube, planar_arm
+from tests.certifier.scenes import box, planar_arm
 
 SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
 PROPOSAL = Proposed([[1.0, 0.0], [-1.0, 0.0], [0.0, 2.0], [0.0, -2.0]], [1.0, 1.0, 2.0, 2.0], [0.0, 0.0], {})
@@ -172,17 +169,3 @@ def test_bad_options_are_named(document, field):
 def test_bad_polytopes_are_refused(seed):
     with pytest.raises(RegionError):
         begin(SCENE, GrowthOptions(kind="certify", seed=seed))
-
-
-def test_the_polytope_step_grows_the_ellipsoid_and_what_it_proposes_certifies():
-    region = cube(SCENE, 0.0, 0.05)
-    for _ in range(3):
-        shared = PairCertification(SCENE, region, np.zeros(2))
-        proofs = {i: shared.certify(i).proof for i in range(len(SCENE.pairs))}
-        assert all(proofs.values())
-        moved = step(SCENE, region, proofs)
-        assert moved.growth > 0.05
-        assert inscribed_ellipsoid(type(region)(moved.C, moved.d)).volume >= inscribed_ellipsoid(region).volume
-        region = type(region)(moved.C, moved.d)
-    final = PairCertification(SCENE, region)
-    assert all(final.certify(i).outcome is Outcome.CERTIFIED for i in range(len(SCENE.pairs)))

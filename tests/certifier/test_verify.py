@@ -17,7 +17,7 @@ from certifier.proof_file import ProofError
 from certifier.region import certified_region
 from certifier.verify.pair import verify_pair
 from certifier.verify.region import verify_region
-from tests.certifier.scenes import ball, box, cube, planar_arm
+from tests.certifier.scenes import accepted, ball, box, cube, planar_arm
 
 
 @cache
@@ -30,7 +30,7 @@ def instance() -> tuple[Scene, bytes]:
     region = cube(scene, 0.0, 0.1)
     shared = Certification(scene, region, np.zeros(2))
     proofs = {i: shared.certify(i).proof for i in range(len(scene.pairs))}
-    return scene, certified_region(scene, region.C, region.d, np.zeros(2), proofs, {}).proof
+    return scene, certified_region(scene, accepted(region, np.zeros(2)), proofs, {}).proof
 
 
 def pair_proof(index: int = 1) -> tuple[Scene, PairProof]:

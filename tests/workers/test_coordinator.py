@@ -42,8 +42,9 @@ def test_small_pairs_fill_a_batch() -> None:
 
 def test_skipped_pairs_are_not_reported() -> None:
     states = {0: "certified", 1: "skipped", 2: "refuted", 3: "error"}
-    expected = Certification(5, {0: Outcome.CERTIFIED, 2: Outcome.REFUTED, 3: Outcome.ERROR})
-    assert certification_report(5, states) == expected
+    weak = {2: {"points": [[0.5]], "spread": [0.0]}}
+    expected = Certification(5, {0: Outcome.CERTIFIED, 2: Outcome.REFUTED, 3: Outcome.ERROR}, weak)
+    assert certification_report(5, states, weak) == expected
 
 
 def test_the_report_of_a_step_is_what_it_found_or_its_error() -> None:
