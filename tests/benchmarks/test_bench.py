@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import agreement, catalogue, compare, report, survey
+from benchmarks import agreement, catalogue, compare, growth, report, survey
 from benchmarks.compare import Verdict, verdict
 from certifier.closest import closest
 from certifier.kinematics import Kinematics
@@ -43,17 +43,22 @@ def test_pairs_are_chosen_by_name_and_cost() -> None:
     assert all("link_5" in f"{task.scene.pairs[i].a} {task.scene.pairs[i].b}" for i in task.indices)
 
 
-def test_the_regions_of_a_cube_grow_as_large_as_drakes() -> None:
-    document = bench("growth", "planar_2dof", "--against", "drake")
-    assert {row["way"] for row in document["ways"]} == {
-        "uniform contraction",
-        "targeted contraction",
-        "targeted, then (12)",
-        "targeted, then pushes",
-        "default",
-    }
-    assert all(row["ellipsoid"] > 0 for row in document["ways"] + document["against"])
-    assert document["against"][0]["volume_ratio"] == 1
+def test_a_way_to_grow_is_a_row_with_its_region(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growth, "WAYS", {"pushes": {"max_rounds": 0}})
+    document = growth.growth(["planar_2dof"], against=False, progress=lambda _: None)
+    (row,) = document["ways"]
+    assert (row["scene"], row["way"]) == ("planar_2dof", "pushes")
+    assert row["ellipsoid"] > 0.1
+    assert row["polytope"] > row["ellipsoid"]
+    assert "planar_2dof" in report.text(document)
+
+
+def test_a_region_that_cannot_be_grown_is_a_row_that_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growth, "WAYS", {"nothing": {}})
+    monkeypatch.setattr(catalogue, "seed", lambda _: np.array([9.0, 0.0]))
+    (row,) = growth.growth(["planar_2dof"], against=False, progress=lambda _: None)["ways"]
+    assert row["ellipsoid"] == 0
+    assert "is at 9.0" in row["ended"]
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from certifier.errors import CirisError
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
 from certifier.outcome import Outcome
 from certifier.pair import certify_pair
+from certifier.polytope import inscribed_ellipsoid
 from certifier.reference import Reference, Solver, available
 from tests.certifier.scenes import ball, box, planar_arm, pose
 
@@ -82,6 +83,15 @@ def two_arms() -> Scene:
     pairs = (Pair("left/link2/bar", "world/near"), Pair("right/link2/bar", "world/far"))
     by_turns = (WORLD, "left/link1", "right/link1", "left/link2", "right/link2")
     return Scene("two arms", tuple(joints), by_turns, tuple(geometries), pairs, (), np.zeros(4))
+
+
+def test_drakes_alternation_grows_what_it_certifies() -> None:
+    scene = planar_arm(2)
+    rounds = Reference(scene).alternate(C, cube(0.05), max_rounds=3, tolerance=1e-3)
+    volumes = [inscribed_ellipsoid(scene.polytope(*polytope)).volume for polytope in [(C, cube(0.05)), *rounds]]
+    assert volumes == sorted(volumes)
+    assert volumes[-1] > 2 * volumes[0]
+    assert Reference(scene).alternate(C, cube(0.25), max_rounds=3, tolerance=1e-3) == []
 
 
 def test_columns_are_our_joints_on_a_branched_tree() -> None:
