@@ -158,6 +158,10 @@ def _largest_ball(polytope: Polytope, at_most: float | None) -> Any:
     return linprog(np.append(np.zeros(n), -1.0), A, polytope.d, bounds=box, method="highs-ds", options=_options())
 
 
+_CLEARLY = 1e-9
+"""Relative distance by which a row must be redundant to go, so that whoever proves it again succeeds as well."""
+
+
 def drop_redundant(polytope: Polytope, fixed: int = 0) -> NDArray[np.int64]:
     """Indices, ascending, of rows that suffice to describe P. Never enlarges the set: rows go only when strict dual bounds
     on P's bounding box prove them from the rows that stay, so some weakly redundant rows remain.
@@ -186,7 +190,7 @@ def drop_redundant(polytope: Polytope, fixed: int = 0) -> NDArray[np.int64]:
         tried = np.flatnonzero(~needed & ~idle)
         known, directions = Polytope(distinct.C[needed], distinct.d[needed]), distinct.C[tried]
         points, Y = _maximise(known, directions, list(zip(lo, hi, strict=True)))
-        proved = _proved_bounds(known, directions, Y, lo, hi) < distinct.d[tried]
+        proved = _proved_bounds(known, directions, Y, lo, hi) < distinct.d[tried] - _CLEARLY * (1 + np.abs(distinct.d[tried]))
         idle[tried[proved]] = True
         found = _left_through(distinct, center, points[~proved] - center) & ~needed
         needed |= found if found.any() else ~idle

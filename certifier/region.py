@@ -83,12 +83,12 @@ def certified_region(scene: Scene, accepted: Accepted, proofs: dict[int, bytes],
 
 
 def _implied(polytope: Polytope, proofs: tuple[PairProof, ...]) -> Implied:
-    """The grounds' faces that are not, or no longer, faces of the region; of those with its normals the region may be the looser one."""
+    """The grounds' faces that are not, or no longer, faces of the region; a joint limit may have the normal of one that went."""
     own: dict[bytes, float] = {}
     for c, d in zip(polytope.C + 0.0, polytope.d, strict=True):
         own[c.tobytes()] = min(d, own.get(c.tobytes(), np.inf))
-    faces = (face for proof in proofs for face in zip(proof.ground.C + 0.0, proof.ground.d, strict=True))
-    rows = {c.tobytes(): c for c, d in faces if not own.get(c.tobytes(), np.inf) <= d}
+    faces = ((c, d) for proof in proofs for c, d in zip(proof.ground.C + 0.0, proof.ground.d, strict=True))
+    rows = {c.tobytes(): c for c, d in faces if own.get(c.tobytes(), np.inf) > d}
     found = [(c, *support(polytope, c)) for c in rows.values()]
     m, n = polytope.C.shape
     return Implied(

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from certifier.model import WORLD, Scene
 from certifier.pair import Certification
-from certifier.proof import PairProof, RegionProof, Side, Volume
+from certifier.proof import Implied, PairProof, RegionProof, Side, Volume
 from certifier.proof_file import ProofError
 from certifier.region import certified_region
 from certifier.verify.pair import verify_pair
@@ -160,3 +160,32 @@ def test_numbers_that_are_not_finite_are_malformed():
     for value in (np.nan, np.inf):
         with pytest.raises(ProofError):
             verify_region(replace(region, interior=np.full(2, value)).to_bytes())
+
+
+def grown_in_two() -> RegionProof:
+    """A pair certified on a polytope whose face s_0 <= 0.1 went later, implied by others; the joint limit has its normal."""
+    scene, larger = instance()[0], cube(instance()[0], 0.0, 0.1)
+    shared = Certification(scene, larger, np.zeros(2))
+    proofs = {i: shared.certify(i).proof for i in range(len(scene.pairs))}
+    region = scene.polytope([[1.0, 1.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [0.05, 0.1, 0.1, 0.02])
+    return RegionProof.from_bytes(certified_region(scene, accepted(region, np.zeros(2)), proofs, {}).proof)
+
+
+def test_faces_of_a_ground_that_went_are_implied_by_those_that_stayed():
+    proof = grown_in_two()
+    assert len(proof.implied.d) == 1
+    assert len(verify_region(proof.to_bytes()).gaps) == len(proof.scene.pairs)
+
+
+@pytest.mark.parametrize("change", ["offset", "multipliers", "missing"])
+def test_implied_faces_that_are_not_proved_are_rejected(change):
+    proof = grown_in_two()
+    implied = proof.implied
+    if change == "offset":
+        implied = replace(implied, d=implied.d - 0.01)
+    elif change == "multipliers":
+        implied = replace(implied, Y=0.5 * implied.Y)
+    else:
+        implied = Implied(implied.C[:0], implied.d[:0], implied.Y[:0])
+    with pytest.raises(ProofError):
+        verify_region(replace(proof, implied=implied).to_bytes())
