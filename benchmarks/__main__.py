@@ -49,7 +49,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "scene": _scene,
     "growth": lambda args, screen: growth.growth(args.scenes, args.against is not None, screen.line),
     "agreement": lambda args, screen: agreement.campaign(agreement.questions(), screen.line),
-    "scaling": lambda args, screen: scaling.curves(screen.line),
+    "scaling": lambda args, screen: scaling.curves(args.against is not None, screen.line),
     "survey": lambda args, screen: survey.survey(args.scenes, screen.line),
 }
 
@@ -73,7 +73,7 @@ def _parser() -> ArgumentParser:
     grown = kinds.add_parser("growth", parents=[against], help="regions grown in several ways")
     grown.add_argument("scenes", nargs="*", metavar="EXAMPLE", default=list(catalogue.EXAMPLES), help="default: all")
     kinds.add_parser("agreement", parents=[json], help="verdicts on hundreds of pairs")
-    kinds.add_parser("scaling", parents=[json], help="how the cost grows with obstacles, joints and faces")
+    kinds.add_parser("scaling", parents=[against], help="how the cost grows with obstacles, joints and faces")
     surveyed = kinds.add_parser("survey", parents=[json], help="every pair of every scene on every region")
     surveyed.add_argument("scenes", nargs="*", metavar="SCENE", default=list(catalogue.SCENES), help="default: all")
     kinds.add_parser("docs", help="write the tables of docs/benchmarks.md from docs/benchmarks/*.json")

@@ -26,10 +26,12 @@ from certifier.pair import Certification, certify_pair
 from certifier.reference import Reference
 from certifier.verify.pair import PairCheck
 
-BOXES, ROUND = 45, 25
+BOXES, ROUND = 60, 40
 """Random arms with boxes alone, and with balls and capsules among them."""
-SCALES = (0.05, 0.15, 0.3, 0.6, 1.0)
-"""Sizes of the nested polytopes around a random arm; the last reaches to the joint limits."""
+SMALLEST, LARGEST = 0.05, 1.0
+"""Sizes of the nested polytopes around a random arm; the largest reaches to the joint limits."""
+BRACKET, APART = 1.02, 1.01
+"""How closely the size at which a pair ceases to be certifiable is bracketed, and how far on either side Drake is asked."""
 
 
 @dataclass(frozen=True)
@@ -43,28 +45,45 @@ class Question:
 
 
 def questions(boxes: int = BOXES, rounded: int = ROUND) -> Iterator[Question]:
-    """The whole campaign: arms of either kind, each at all scales."""
+    """The whole campaign: arms of either kind, each at four sizes."""
     yield from _questions("boxes", boxes, rounded=False)
     yield from _questions("round", rounded, rounded=True)
 
 
 def _questions(group: str, count: int, rounded: bool) -> Iterator[Question]:
-    """Arms of 2 to 4 joints with the first pair that is certified at the smallest scale and not at the largest: each has its twin."""
+    """Arms of 2 to 4 joints with the first pair that is certified at the smallest size and not at the largest: each has its twin."""
     made = seed = 0
     while made < count:
         rng = np.random.default_rng([seed, rounded])
         arm = random_arm(rng, 2 + seed % 3, rounded)
         center = rng.uniform(-0.3, 0.3, arm.n)
         C, d = random_faces(rng, center, 1.0)
-        nested = [Region(C, C @ center + scale * (d - C @ center), center) for scale in SCALES]
+        whole = Region(C, d, center)
         for pair in (arm.pairs[i] for i in rng.permutation(len(arm.pairs))):
             scene = replace(arm, pairs=(pair,))
-            smallest, largest = (certify_pair(scene, 0, scene.polytope(r.C, r.d), center).outcome for r in (nested[0], nested[-1]))
-            if smallest is Outcome.CERTIFIED and largest is not Outcome.CERTIFIED:
-                yield from (Question(f"{group} {seed} x {s}", group, scene, r) for s, r in zip(SCALES, nested, strict=True))
+            if _certifies(scene, _scaled(whole, SMALLEST)) and not _certifies(scene, _scaled(whole, LARGEST)):
+                for size in (SMALLEST, *_bracket(scene, whole), LARGEST):
+                    yield Question(f"{group} {seed} x {size:.3g}", group, scene, _scaled(whole, size))
                 made += 1
                 break
         seed += 1
+
+
+def _scaled(region: Region, size: float) -> Region:
+    return Region(region.C, region.C @ region.center + size * (region.d - region.C @ region.center), region.center)
+
+
+def _certifies(scene: Scene, region: Region) -> bool:
+    return certify_pair(scene, 0, scene.polytope(region.C, region.d), region.center).outcome is Outcome.CERTIFIED
+
+
+def _bracket(scene: Scene, region: Region) -> tuple[float, float]:
+    """Sizes just below and just above the one at which the pair ceases to be certifiable."""
+    certified, failed = SMALLEST, LARGEST
+    while failed > BRACKET * certified:
+        middle = float(np.sqrt(certified * failed))
+        certified, failed = (middle, failed) if _certifies(scene, _scaled(region, middle)) else (certified, middle)
+    return certified / APART, failed * APART
 
 
 def campaign(questions: Iterable[Question], progress: Progress) -> dict[str, Any]:

@@ -50,7 +50,7 @@ def machine(document: Document) -> str:
     here = document["machine"]
     versions = ", ".join(f"{package} {number}" for package, number in here["versions"].items())
     where = f"{here['processor']}, {here['cores']} cores, {here['memory_gib']} GiB; Python {here['python']}, {versions}"
-    return f"Measured on: {where}. Seconds of processor time, one thread."
+    return f"Measured on: {where}; one thread."
 
 
 def seconds(value: float) -> str:
@@ -110,13 +110,17 @@ def _compared(document: Document) -> list[str]:
 
 def _growth(document: Document) -> list[str]:
     def line(row: Document) -> list[str]:
-        return [row["scene"], row["way"], f"{row['ellipsoid']:.3g}", seconds(row["seconds"]), str(row["faces"]), str(row["rounds"])]
+        return [row["scene"], row["way"], f"{row['ellipsoid']:.3g}", seconds(row["seconds"]), str(row["faces"])]
 
-    header = ["example", "way", "ellipsoid", "seconds", "faces", "certified rounds"]
-    parts = [_table([*header, "ended"], ([*line(row), row["ended"]] for row in document["ways"]))]
+    header = ["example", "way", "ellipsoid", "seconds", "faces"]
+    rows = [[*line(row), str(len(row["curve"])), row["ended"]] for row in document["ways"]]
+    parts = [_table([*header, "certified regions", "ended"], rows)]
     if document["against"]:
-        rows = ([*line(row), _ratio(row["time_ratio"]), f"{row['volume_ratio']:.3g}"] for row in document["against"])
-        parts.append(_table([*header, "Drake's seconds / these", "volume / Drake's"], rows))
+        rows = []
+        for row in document["against"]:
+            reached = [seconds(row["reached_seconds"]), _ratio(row["time_ratio"])] if row["reached_seconds"] else ["never", ""]
+            rows.append([*line(row), f"{row['volume_ratio']:.3g}", *reached])
+        parts.append(_table([*header, "volume / Drake's", "reached Drake's after", "times as fast"], rows))
     return parts
 
 
@@ -141,8 +145,9 @@ def _scaling(document: Document) -> list[str]:
     for curve in ("obstacles", "joints", "faces"):
         for point in document[curve]:
             cells = [curve, str(point["n"]), str(point["pairs"]), _counts(point["outcomes"])]
-            rows.append([*cells, *(seconds(point[f"{part}_seconds"]) for part in ("setup", "solve", "verify"))])
-    return [_table(["curve", "number", "pairs", "outcomes", "setup", "solve", "verify"], rows)]
+            cells += [seconds(point[f"{part}_seconds"]) for part in ("setup", "solve", "verify")]
+            rows.append([*cells, seconds(point["drake_seconds"]) if "drake_seconds" in point else ""])
+    return [_table(["curve", "number", "pairs", "outcomes", "setup", "solve", "verify", "Drake"], rows)]
 
 
 def _survey(document: Document) -> list[str]:

@@ -21,26 +21,28 @@ from certifier.model import WORLD, Array, Geometry, Pair, Scene
 OBSTACLES = (10, 30, 100, 300, 1000)
 JOINTS = range(2, 8)
 FACES = range(10, 61, 10)
-HALF_WIDTH = 0.03
-"""Of the cubes, and the radius of the ball."""
+HALF_WIDTH, RADIUS = 0.03, 0.2
+"""Of the cubes about the arms; of the ball that all faces touch."""
+REPEAT = 5
+"""Runs of a single pair; the fastest counts."""
 ROOM, CLEARANCE = 3.0, 0.2
 """Obstacles lie within this many metres of the base, and at least that far from the arm."""
 
 
-def curves(progress: Progress, obstacles: tuple[int, ...] = OBSTACLES) -> dict[str, Any]:
+def curves(against: bool, progress: Progress) -> dict[str, Any]:
     """Measure all three curves; the document of ``ciris bench scaling``.
 
     obstacles: boxes scattered around an arm of three joints, all pairs. joints: the last link of an arm against one box, both on
     a cube. faces: link 5 of iiwa_shelf against a board, on a regular simplex with more and more planes cutting its
-    corners off; all planes touch one ball, so none is redundant.
+    corners off; all planes touch one ball, so none is redundant. Drake, if asked, answers the last two.
     """
     _obstacles(1)  # loads the compiled kernels
     return {
         "benchmark": "scaling",
         "machine": measure.machine(),
-        "obstacles": [_told(_obstacles(count), progress) for count in obstacles],
-        "joints": [_told(_joints(n), progress) for n in JOINTS],
-        "faces": [_told(_faces(count), progress) for count in FACES],
+        "obstacles": [_told(_obstacles(count), progress) for count in OBSTACLES],
+        "joints": [_told(_joints(n, against), progress) for n in JOINTS],
+        "faces": [_told(_faces(count, against), progress) for count in FACES],
     }
 
 
@@ -50,35 +52,35 @@ def picture(document: dict[str, Any]) -> str:
     for name, title in (("obstacles", "obstacles around 3 joints"), ("joints", "joints, last link"), ("faces", "faces, link 5 of 7")):
         points = document[name]
         series = {
-            kind: [(point["n"], point[f"{kind}_seconds"]) for point in points if point[f"{kind}_seconds"] > 0]
-            for kind in ("solve", "verify")
+            kind: [(point["n"], point[f"{kind}_seconds"]) for point in points if point.get(f"{kind}_seconds")]
+            for kind in ("solve", "verify", "drake")
         }
-        panels.append(Panel(title, series))
+        panels.append(Panel(title, {kind: curve for kind, curve in series.items() if curve}))
     return draw(panels, "seconds")
 
 
 def _obstacles(count: int) -> dict[str, Any]:
     s = np.full(3, 0.2)
     scene = serial_arm(3, list(_scattered(np.random.default_rng(count), count, s)))
-    return _point(count, scene, Region(*cube(s, HALF_WIDTH), s), range(len(scene.pairs)))
+    return _point(count, scene, Region(*cube(s, HALF_WIDTH), s), list(range(len(scene.pairs))))
 
 
-def _joints(n: int) -> dict[str, Any]:
+def _joints(n: int, against: bool) -> dict[str, Any]:
     s = np.full(n, 0.2)
     tip = _bodies(serial_arm(n, []), s)[-1].max(axis=0)
     scene = serial_arm(n, [box("world/box", WORLD, np.full(3, 0.2), tip + CLEARANCE + 0.1)])
-    return _point(n, scene, Region(*cube(s, HALF_WIDTH), s), [n - 1])
+    return _point(n, scene, Region(*cube(s, HALF_WIDTH), s), [n - 1], REPEAT, against)
 
 
-def _faces(count: int) -> dict[str, Any]:
+def _faces(count: int, against: bool) -> dict[str, Any]:
     scene = replace(catalogue.scene("iiwa_shelf"), pairs=(Pair("iiwa/link_5/box", "shelf/boards/upper"),))
     center, n = catalogue.region("iiwa_shelf", "whole").center, scene.n
     corners = np.concatenate([np.eye(n), np.full((1, n), (1 - np.sqrt(n + 1)) / n)])
     C = corners - corners.mean(axis=0)
     C /= np.linalg.norm(C, axis=1, keepdims=True)
-    cut, _ = tangent(np.random.default_rng(0), center, count - len(C), HALF_WIDTH)
+    cut, _ = tangent(np.random.default_rng(0), center, count - len(C), RADIUS)
     C = np.concatenate([C, cut])
-    return _point(count, scene, Region(C, C @ center + HALF_WIDTH, center), [0])
+    return _point(count, scene, Region(C, C @ center + RADIUS, center), [0], REPEAT, against)
 
 
 def _scattered(rng: np.random.Generator, count: int, s: Array) -> Iterator[Geometry]:
@@ -97,16 +99,24 @@ def _bodies(scene: Scene, s: Array) -> list[Array]:
     return [kinematics.points(WORLD, body.body, body.vertices, s[None])[0] for body in scene.geometries]
 
 
-def _point(n: int, scene: Scene, region: Region, indices: range | list[int]) -> dict[str, Any]:
-    run = measure.ours(scene, region, list(indices))
+def _point(n: int, scene: Scene, region: Region, indices: list[int], repeat: int = 1, against: bool = False) -> dict[str, Any]:
+    runs = [measure.ours(scene, region, indices) for _ in range(repeat)]
+    run = min(runs, key=lambda run: sum(pair.seconds for pair in run.pairs.values()))
     pairs = run.pairs.values()
-    return {
+    point = {
         "n": n,
         "pairs": len(pairs),
         "outcomes": dict(Counter(pair.result.outcome.value for pair in pairs)),
         "setup_seconds": run.setup_seconds,
         "solve_seconds": sum(pair.solve_seconds for pair in pairs),
         "verify_seconds": sum(pair.verify_seconds for pair in pairs),
+    }
+    if not against:
+        return point
+    drake = measure.drake(scene, region, indices, lambda _: None).pairs.values()
+    return point | {
+        "drake_outcomes": dict(Counter(pair.outcome.value for pair in drake)),
+        "drake_seconds": sum(pair.build_seconds + pair.solve_seconds for pair in drake),
     }
 
 

@@ -26,8 +26,8 @@ class Panel:
 
 
 def draw(panels: list[Panel], unit: str) -> str:
-    """The panels side by side, the colours named in the first; ``unit`` is what all ordinates are in."""
-    body = "\n".join(line for i, panel in enumerate(panels) for line in _panel(panel, i * WIDTH, unit, named=i == 0))
+    """The panels side by side, the colours named in the last; ``unit`` is what all ordinates are in."""
+    body = "\n".join(line for i, panel in enumerate(panels) for line in _panel(panel, i * WIDTH, unit, named=panel is panels[-1]))
     white = '<rect width="100%" height="100%" fill="#fff"/>'
     size = f'width="{len(panels) * WIDTH}" height="{HEIGHT}" viewBox="0 0 {len(panels) * WIDTH} {HEIGHT}"'
     style = "text { font: 11px sans-serif; fill: #333 } .grid { stroke: #ddd } .frame { stroke: #888; fill: none }"

@@ -29,6 +29,7 @@ from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee, Outcome, combine
 from certifier.pair import Certification as PairCertification
 from certifier.pair import PairResult
+from certifier.polytope import inscribed_ellipsoid
 from certifier.polytope_step import Step as PolytopeStep
 from certifier.polytope_step import step
 from certifier.region import Region, certified_region
@@ -115,7 +116,9 @@ def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: No
             raise failure
         if transition.accepted:
             run.accepted = transition.accepted
-            curve.append({"iteration": run.accepted.iteration, "seconds": time.perf_counter() - start})
+            seconds = time.perf_counter() - start
+            volume = inscribed_ellipsoid(Polytope(np.array(run.accepted.C), np.array(run.accepted.d))).volume
+            curve.append({"iteration": run.accepted.iteration, "seconds": seconds, "ellipsoid": volume})
     if run.accepted is None:
         raise CirisError("not_grown", transition.action.reason, hint="try another seed, or look at the pair named")
     provenance = {
