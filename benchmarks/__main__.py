@@ -50,7 +50,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "growth": lambda args, screen: growth.growth(args.scenes, args.against is not None, screen.line),
     "agreement": lambda args, screen: agreement.campaign(agreement.questions(), screen.line),
     "scaling": lambda args, screen: scaling.curves(args.against is not None, screen.line),
-    "survey": lambda args, screen: survey.survey(args.scenes, screen.line),
+    "survey": lambda args, screen: survey.survey(args.scenes, args.most, screen.line),
 }
 
 
@@ -71,11 +71,12 @@ def _parser() -> ArgumentParser:
     scene.add_argument("--match", default="", metavar="TEXT", help="only pairs with this in their names")
     scene.add_argument("--pairs", type=int, metavar="N", help="only the N cheapest of them")
     grown = kinds.add_parser("growth", parents=[against], help="regions grown in several ways")
-    grown.add_argument("scenes", nargs="*", metavar="EXAMPLE", default=list(catalogue.EXAMPLES), help="default: all")
+    grown.add_argument("scenes", nargs="*", metavar="EXAMPLE", default=list(growth.EXAMPLES), help=f"default: {', '.join(growth.EXAMPLES)}")
     kinds.add_parser("agreement", parents=[json], help="verdicts on hundreds of pairs")
     kinds.add_parser("scaling", parents=[against], help="how the cost grows with obstacles, joints and faces")
     surveyed = kinds.add_parser("survey", parents=[json], help="every pair of every scene on every region")
     surveyed.add_argument("scenes", nargs="*", metavar="SCENE", default=list(catalogue.SCENES), help="default: all")
+    surveyed.add_argument("--most", type=float, default=5.0, metavar="SECONDS", help="leave pairs with a longer forecast out; default 5")
     kinds.add_parser("docs", help="write the tables of docs/benchmarks.md from docs/benchmarks/*.json")
     return parser
 

@@ -23,6 +23,7 @@ WAYS: dict[str, dict[str, Any]] = {
     "default": {},
 }
 """Options of a grow job, each with the default seeding."""
+EXAMPLES = ("planar_2dof", "arm_3dof", "ur3e_bin", "iiwa_shelf")
 AGAINST = ("planar_2dof", "arm_3dof")
 """Examples on which Drake's alternation ends within minutes."""
 HALF_WIDTH, ROUNDS, TOLERANCE = 0.05, 10, 1e-3

@@ -151,9 +151,11 @@ def _scaling(document: Document) -> list[str]:
 
 
 def _survey(document: Document) -> list[str]:
-    rows = [[row["scene"], row["region"], _counts(row["outcomes"]), seconds(row["seconds"])] for row in document["counts"]]
+    rows = [
+        [row["scene"], row["region"], _counts(row["outcomes"]), str(row["left_out"]), seconds(row["seconds"])] for row in document["counts"]
+    ]
     fit = document["forecast"]
-    parts = [_table(["scene", "region", "outcomes", "seconds"], rows)]
+    parts = [_table(["scene", "region", "outcomes", "left out", "seconds"], rows)]
     if document["undecided"]:
         parts.append(_table(list(document["undecided"][0]), (list(row.values()) for row in document["undecided"])))
     least, low, median, high, most = fit["quantiles"]["present"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from benchmarks import catalogue, measure
 from benchmarks.catalogue import Region
 from benchmarks.measure import Progress
 from certifier.forecast import SECONDS, forecast, terms
-from certifier.model import Scene
+from certifier.model import Pair, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair import Certification, PairResult
 
@@ -24,13 +25,18 @@ SizeClass = tuple[int, tuple[int, int], tuple[int, int]]
 """n, the vertices of A and of B, the dimensions N of their polynomial spaces."""
 
 
-def survey(names: Iterable[str], progress: Progress) -> dict[str, Any]:
-    """Certify every pair of these scenes on every region of the catalogue; the document of ``ciris bench survey``."""
+def survey(names: Iterable[str], most: float, progress: Progress) -> dict[str, Any]:
+    """Certify every pair of these scenes on every region of the catalogue; the document of ``ciris bench survey``.
+
+    Args:
+        most: pairs with a forecast of more seconds are left out, and counted.
+    """
     counts, undecided = [], []
     spent: dict[SizeClass, list[float]] = defaultdict(list)
     for name in names:
-        scene = catalogue.scene(name)
-        sizes = _sizes(scene)
+        whole = catalogue.scene(name)
+        scene = replace(whole, pairs=tuple(Pair(cost.a, cost.b) for cost in forecast(whole) if cost.seconds <= most))
+        sizes, left_out = _sizes(scene), len(whole.pairs) - len(scene.pairs)
         for kind in catalogue.REGIONS:
             outcomes: Counter[str] = Counter()
             total = 0.0
@@ -43,7 +49,7 @@ def survey(names: Iterable[str], progress: Progress) -> dict[str, Any]:
                     progress(" ".join(undecided[-1].values()))
                 elif result.outcome is Outcome.CERTIFIED:
                     spent[size].append(seconds)
-            counts.append({"scene": name, "region": kind, "outcomes": dict(outcomes), "seconds": total})
+            counts.append({"scene": name, "region": kind, "outcomes": dict(outcomes), "left_out": left_out, "seconds": total})
             progress(f"{name} {kind}: {dict(outcomes)}, {total:.1f} s")
     return {
         "benchmark": "survey",

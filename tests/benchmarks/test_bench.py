@@ -106,7 +106,7 @@ def test_figures_cover_the_boxes_they_stand_for() -> None:
 
 
 def test_the_survey_decides_every_pair() -> None:
-    document = survey.survey(["planar_2dof", "rail_arm"], lambda _: None)
+    document = survey.survey(["planar_2dof", "rail_arm"], 5.0, lambda _: None)
     assert document["undecided"] == []
     assert [sum(row["outcomes"].values()) for row in document["counts"]] == [6] * 4 + [18] * 4
 
