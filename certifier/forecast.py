@@ -2,7 +2,7 @@
 
 The time is a sum of what grows with the pair's size: :func:`terms`, each with its seconds in ``SECONDS``. They were fitted, nonnegative and
 by relative error, to the mean processor time, verification included, of every size class (n, k_A, k_B, vertices of A and of B) among
-the certified pairs of the catalogue's scenes: ``python -m benchmarks.calibrate`` measures and fits again. Pairs that are refuted take less.
+the certified pairs of the catalogue's scenes: ``ciris bench survey`` measures and fits again. Pairs that are refuted take less.
 """
 
 from __future__ import annotations
