@@ -51,11 +51,9 @@ def picture(document: dict[str, Any]) -> str:
     panels = []
     for name, title in (("obstacles", "obstacles around 3 joints"), ("joints", "joints, last link"), ("faces", "faces, link 5 of 7")):
         points = document[name]
-        series = {
-            kind: [(point["n"], point[f"{kind}_seconds"]) for point in points if point.get(f"{kind}_seconds")]
-            for kind in ("solve", "verify", "drake")
-        }
-        panels.append(Panel(title, {kind: curve for kind, curve in series.items() if curve}))
+        series = {"ciris: solve": "solve_seconds", "ciris: verify": "verify_seconds", "Drake: build and solve": "drake_seconds"}
+        curves = {label: [(point["n"], point[key]) for point in points if key in point] for label, key in series.items()}
+        panels.append(Panel(title, {label: curve for label, curve in curves.items() if curve}))
     return draw(panels, "seconds")
 
 
