@@ -18,13 +18,11 @@ from benchmarks.arms import random_arm, random_faces
 from benchmarks.catalogue import Region
 from benchmarks.compare import Verdict, same_program, verdict
 from benchmarks.measure import Progress
-from certifier.frames import choose_frame
-from certifier.kinematics import Kinematics
+from certifier.forecast import forecast
 from certifier.model import Pair, Scene
 from certifier.outcome import Outcome
-from certifier.pair import Certification, certify_pair
+from certifier.pair import PairResult, certify_pair
 from certifier.reference import Reference
-from certifier.verify.pair import PairCheck
 
 BOXES, ROUND = 60, 40
 """Random arms with boxes alone, and with balls and capsules among them."""
@@ -73,8 +71,12 @@ def _scaled(region: Region, size: float) -> Region:
     return Region(region.C, region.C @ region.center + size * (region.d - region.C @ region.center), region.center)
 
 
+def _certify(scene: Scene, region: Region) -> PairResult:
+    return certify_pair(scene, 0, scene.polytope(region.C, region.d), region.center)
+
+
 def _certifies(scene: Scene, region: Region) -> bool:
-    return certify_pair(scene, 0, scene.polytope(region.C, region.d), region.center).outcome is Outcome.CERTIFIED
+    return _certify(scene, region).outcome is Outcome.CERTIFIED
 
 
 def _bracket(scene: Scene, region: Region) -> tuple[float, float]:
@@ -113,8 +115,7 @@ def _ask(question: Question) -> dict[str, Any]:
     region = question.region
     theirs = Reference(question.scene).certify(0, region.C, region.d)
     scene, frame = _in_frame(question.scene, theirs.frame)
-    certification = Certification(scene, scene.polytope(region.C, region.d), region.center)
-    ours = certification.certify(0)
+    ours = _certify(scene, region)
     same = same_program(scene, scene.pairs[0], frame, theirs.frame)
     return {
         "name": question.name,
@@ -126,15 +127,13 @@ def _ask(question: Question) -> dict[str, Any]:
         "frames": [frame, theirs.frame],
         "same_program": same,
         "verdict": verdict(ours.outcome, theirs.outcome, same).value,
-        "evidence": measure.verify(scene, ours, PairCheck(scene, certification.ground)) or "none",
+        "evidence": measure.Verifier(scene).verify(ours).what,
     }
 
 
 def _in_frame(scene: Scene, frame: str) -> tuple[Scene, str]:
     """The scene of one pair, its bodies named in the order in which our frame is this one, if there is such an order; and our frame."""
     (pair,) = scene.pairs
-    for order in (pair, Pair(pair.b, pair.a)):
-        ours = choose_frame(Kinematics(scene), order).body
-        if ours == frame:
-            return replace(scene, pairs=(order,)), ours
-    return scene, choose_frame(Kinematics(scene), pair).body
+    named = [replace(scene, pairs=(order,)) for order in (pair, Pair(pair.b, pair.a))]
+    ours = [(some, forecast(some)[0].frame) for some in named]
+    return next((found for found in ours if found[1] == frame), ours[0])

@@ -11,9 +11,7 @@ from benchmarks import catalogue, measure
 from benchmarks.catalogue import Instance, Region
 from benchmarks.measure import Ours, Progress
 from certifier.errors import CirisError
-from certifier.forecast import forecast
-from certifier.frames import choose_frame
-from certifier.kinematics import Kinematics
+from certifier.forecast import PairCost, forecast
 from certifier.model import Pair, Scene
 from certifier.outcome import Outcome
 from certifier.reference import ReferenceResult
@@ -102,7 +100,8 @@ def _task(task: Task, against: bool, repeat: int, progress: Progress) -> dict[st
     runs = [measure.ours(task.scene, task.region, task.indices, progress) for _ in range(repeat)]
     ours = min(runs, key=lambda run: run.setup_seconds + sum(pair.seconds for pair in run.pairs.values()))
     theirs = measure.drake(task.scene, task.region, task.indices, progress) if against else None
-    rows = [_row(task.scene, index, ours.pairs[index], theirs.pairs[index] if theirs else None) for index in task.indices]
+    costs = forecast(task.scene)
+    rows = [_row(task.scene, costs[i], ours.pairs[i], theirs.pairs[i] if theirs else None) for i in task.indices]
     return {
         "scene": task.scene.name,
         "region": task.region_kind,
@@ -112,19 +111,19 @@ def _task(task: Task, against: bool, repeat: int, progress: Progress) -> dict[st
     }
 
 
-def _row(scene: Scene, index: int, ours: Ours, theirs: ReferenceResult | None) -> dict[str, Any]:
-    pair, result = scene.pairs[index], ours.result
-    frame = choose_frame(Kinematics(scene), pair)
+def _row(scene: Scene, cost: PairCost, ours: Ours, theirs: ReferenceResult | None) -> dict[str, Any]:
+    pair, result = Pair(cost.a, cost.b), ours.result
     row: dict[str, Any] = {
         "a": pair.a,
         "b": pair.b,
-        "k": [len(frame.chain_a), len(frame.chain_b)],
-        "vertices": sum(len(scene.geometry(name).vertices) for name in (pair.a, pair.b)),
+        "k": [len(cost.chain_a), len(cost.chain_b)],
+        "vertices": cost.rationals,
         "ciris": {
             "outcome": result.outcome.value,
             "stage": result.stage.value,
             "detail": result.detail,
             "margin": result.margin,
+            "covers": ours.covers,
             "solve_seconds": ours.solve_seconds,
             "verify_seconds": ours.verify_seconds,
         },
@@ -136,8 +135,8 @@ def _row(scene: Scene, index: int, ours: Ours, theirs: ReferenceResult | None) -
         return row
     return row | {
         "drake": {**vars(theirs), "outcome": theirs.outcome.value},
-        "verdict": verdict(result.outcome, theirs.outcome, same_program(scene, pair, frame.body, theirs.frame)).value,
-        "ratio": (theirs.build_seconds + theirs.solve_seconds) / ours.seconds,
+        "verdict": verdict(result.outcome, theirs.outcome, same_program(scene, pair, cost.frame, theirs.frame)).value,
+        "ratio": (theirs.build_seconds + theirs.solve_seconds) / ours.seconds if ours.covers == 1 else None,
     }
 
 

@@ -9,7 +9,7 @@ import platform
 import re
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -47,13 +47,15 @@ class Ours:
     """One pair by our certifier.
 
     Attributes:
-        seconds: everything, verification included; what pairs share is paid by the first that needs it.
+        seconds: everything, verification included; what pairs share is paid by the first that needs it, a shared proof included.
         verify_seconds: what checking the proof takes, measured by checking it once more.
+        covers: how many pairs the proof is about.
     """
 
     result: PairResult
     seconds: float
     verify_seconds: float
+    covers: int
 
     @property
     def solve_seconds(self) -> float:
@@ -79,33 +81,61 @@ def ours(scene: Scene, region: Region, indices: list[int], progress: Progress = 
     """
     start = time.process_time()
     certification = Certification(scene, scene.polytope(region.C, region.d), region.center)
-    setup, check, found = time.process_time() - start, PairCheck(scene, certification.ground), {}
+    setup, verifier, found = time.process_time() - start, Verifier(scene), {}
     for index in indices:
         start = time.process_time()
         result = certification.certify(index)
-        certified = time.process_time()
-        verify(scene, result, check)
-        found[index] = answer = Ours(result, certified - start, time.process_time() - certified if result.proof else 0.0)
+        seconds = time.process_time() - start
+        check = verifier.verify(result)
+        found[index] = answer = Ours(result, seconds, check.seconds, check.covers)
         progress(_line("ciris", scene, index, len(found), len(indices), result.outcome, answer.seconds))
     return Run(setup, found)
 
 
-def verify(scene: Scene, result: PairResult, check: PairCheck) -> str:
-    """Check the proof of an outcome from its bytes; returns what was checked, empty where there is nothing.
+@dataclass(frozen=True)
+class Check:
+    """What was checked, in words, of how many pairs, and how long it took; a proof that has been checked takes no time again."""
 
-    Raises:
-        ProofError: it does not hold.
-    """
-    if result.proof is None:
-        return ""
-    if result.outcome is Outcome.CERTIFIED:
-        check.verify(PairProof.from_bytes(result.proof, scene))
-        return "certificate verified exactly"
-    if result.outcome is Outcome.NOT_CERTIFIABLE:
-        verify_dual(DualProof.from_bytes(result.proof, scene))
-        return "dual proof verified"
-    verify_witness(WitnessProof.from_bytes(result.proof, scene))
-    return "contact verified"
+    what: str
+    covers: int
+    seconds: float
+
+
+class Verifier:
+    """Checks the proofs of one scene from their bytes; those on one polytope share what is the same, as in the certifier."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._on: dict[bytes, PairCheck] = {}
+        self._done: dict[bytes, Check] = {}
+
+    def verify(self, result: PairResult) -> Check:
+        """Check the proof of an outcome.
+
+        Raises:
+            ProofError: it does not hold.
+        """
+        if result.proof is None:
+            return Check("none", 1, 0.0)
+        if result.proof in self._done:
+            return replace(self._done[result.proof], seconds=0.0)
+        start = time.process_time()
+        what, covers = self._check(result.outcome, result.proof)
+        self._done[result.proof] = check = Check(what, covers, time.process_time() - start)
+        return check
+
+    def _check(self, outcome: Outcome, data: bytes) -> tuple[str, int]:
+        if outcome is Outcome.CERTIFIED:
+            proof = PairProof.from_bytes(data, self._scene)
+            ground = b"".join(array.tobytes() for array in vars(proof.ground).values())
+            if ground not in self._on:
+                self._on[ground] = PairCheck(self._scene, proof.ground)
+            return "certificate verified exactly", len(self._on[ground].verify(proof).pairs)
+        if outcome is Outcome.NOT_CERTIFIABLE:
+            verify_dual(DualProof.from_bytes(data, self._scene))
+            return "dual proof verified", 1
+        verify_witness(WitnessProof.from_bytes(data, self._scene))
+        return "contact verified", 1
 
 
 def drake(scene: Scene, region: Region, indices: list[int], progress: Progress) -> Run[ReferenceResult]:

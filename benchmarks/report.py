@@ -82,17 +82,17 @@ def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def _compared(document: Document) -> list[str]:
     """A line a pair, then the sums."""
     against = document["verdicts"] is not None
-    header = ["pair", "region", "joints", "vertices", "ciris", "solve", "verify"]
+    header = ["pair", "region", "joints", "vertices", "ciris", "covers", "solve", "verify"]
     header += ["Drake", "build", "solve", "ratio", "verdicts"] if against else []
     rows = []
     for task in document["tasks"]:
         for row in task["pairs"]:
             ciris, drake = row["ciris"], row["drake"]
             cells = [f"{row['a']} - {row['b']}", task["region"], f"{row['k'][0]} + {row['k'][1]}", str(row["vertices"])]
-            cells += [_plain(ciris["outcome"]), seconds(ciris["solve_seconds"]), seconds(ciris["verify_seconds"])]
+            cells += [_plain(ciris["outcome"]), str(ciris["covers"]), seconds(ciris["solve_seconds"]), seconds(ciris["verify_seconds"])]
             if drake:
                 cells += [_plain(drake["outcome"]), seconds(drake["build_seconds"]), seconds(drake["solve_seconds"])]
-                cells += [_ratio(row["ratio"]), row["verdict"]]
+                cells += [_ratio(row["ratio"]) if row["ratio"] else "", row["verdict"]]
             rows.append(cells)
     total = document["total"]
     ciris, drake = total["ciris"], total["drake"]

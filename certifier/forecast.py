@@ -15,6 +15,7 @@ from certifier.basis import dimension
 from certifier.frames import choose_frame
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Scene
+from certifier.proof import Volume
 
 SECONDS = np.array([1.6e-2, 1.1e-4, 5.2e-5, 2.4e-5, 5.4e-11])
 """Of the terms, on one thread of a 2.5 GHz core (docs/benchmarks.md)."""
@@ -53,8 +54,9 @@ def forecast(scene: Scene) -> list[PairCost]:
     kinematics = Kinematics(scene)
     costs = []
     for pair in scene.pairs:
-        frame = choose_frame(kinematics, pair)
-        vertices = [len(scene.geometry(name).vertices) for name in (pair.a, pair.b)]
+        volumes = (Volume.of(scene.geometry(pair.a)), Volume.of(scene.geometry(pair.b)))
+        frame = choose_frame(kinematics, volumes)
+        vertices = [len(volume.vertices) for volume in volumes]
         lengths = [len(frame.chain_a), len(frame.chain_b)]
         N = [dimension(k, scene.n) for k in lengths]
         memory = sum(8 * v * n * (n + 2 * (4 * scene.n + 5)) for v, n in zip(vertices, N, strict=True))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from certifier.basis import dimension
 from certifier.kinematics import Kinematics
-from certifier.model import Pair
+from certifier.proof import Volume
 
 
 @dataclass(frozen=True)
@@ -22,15 +22,15 @@ class Frame:
     chain_b: tuple[int, ...]
 
 
-def choose_frame(kinematics: Kinematics, pair: Pair) -> Frame:
-    """The cheapest frame on the path between the two bodies; ties go to the one nearer to a."""
+def choose_frame(kinematics: Kinematics, volumes: tuple[Volume, Volume]) -> Frame:
+    """The cheapest frame on the path between the two volumes' bodies; ties go to the one nearer to a."""
     scene = kinematics.scene
-    a, b = scene.geometry(pair.a), scene.geometry(pair.b)
+    a, b = volumes
     best: tuple[float, Frame] | None = None
     for body in kinematics.bodies_between(a.body, b.body):
         frame = Frame(body, _chain(kinematics, body, a.body), _chain(kinematics, body, b.body))
         sides = ((a, frame.chain_a), (b, frame.chain_b))
-        cost = sum(len(g.vertices) * dimension(len(chain), scene.n) ** 2 for g, chain in sides)
+        cost = sum(len(volume.vertices) * dimension(len(chain), scene.n) ** 2 for volume, chain in sides)
         if best is None or cost < best[0]:
             best = cost, frame
     assert best is not None, "a path has at least one body"

@@ -39,6 +39,7 @@ class Kinematics:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
+        self._paths: dict[tuple[str, str], list[Factor]] = {}
 
     @cached_property
     def _joint_above(self) -> dict[str, Joint]:
@@ -57,13 +58,22 @@ class Kinematics:
         common = next(body for body in up_a if body in up_b)
         return up_a[: up_a.index(common) + 1] + up_b[: up_b.index(common)][::-1]
 
+    def rigid_root(self, body: str) -> str:
+        """The first body on the way up that a joint moves, or the world."""
+        while body != WORLD and self._joint_above[body].index is None:
+            body = self._joint_above[body].parent
+        return body
+
     def path(self, frame: str, body: str) -> list[Factor]:
         """The factors of X_FB from frame body F to body B."""
+        if (frame, body) in self._paths:
+            return self._paths[frame, body]
         bodies = self.bodies_between(frame, body)
         factors = []
         for here, there in itertools.pairwise(bodies):
             inverse = self._joint_above.get(here) is not None and self._joint_above[here].parent == there
             factors.append(_factor(self._joint_above[here if inverse else there], self.scene.q_star, inverse))
+        self._paths[frame, body] = factors
         return factors
 
     def chain(self, frame: str, body: str) -> list[int]:

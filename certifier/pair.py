@@ -14,13 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from certifier.basis import subsets
+from certifier.broad_phase import BroadPhase, Volumes
 from certifier.closest import Closest, closest
 from certifier.disproof import WitnessProof
 from certifier.dual import dual_proof
 from certifier.frames import Frame, choose_frame
 from certifier.interior_point import Block, Solution, Status, solve
 from certifier.kinematics import Kinematics
-from certifier.model import Array, Geometry, Pair, Polytope, Scene
+from certifier.model import Array, Pair, Polytope, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.polytope import bound_multipliers, chebyshev_center, check, drop_redundant
 from certifier.program import Box, Sides, build
@@ -32,6 +33,11 @@ from certifier.verify.pair import PairCheck, check_ground
 from certifier.verify.witness import verify_witness
 
 SCREEN_SAMPLES = 64
+GAP_SAMPLES = 16
+APART = 0.15
+"""Least gap at the samples, relative to the way that vertices sweep, for which volumes of several geometries are tried."""
+FEW_ITERATIONS = 4
+"""Those that are settled at all are settled at once."""
 CONE_SAMPLES = 300
 FACES_AT_A_TIME = 8
 """A polytope with many faces is first replaced by its box; then this many faces are added at a time, as the dual asks for them."""
@@ -98,22 +104,38 @@ class Certification:
         self._every = tuple(range(m))
         few = tuple(range(m, m + 2 * scene.n))
         self._first = self._sides(few if self._whole or m > len(few) + FACES_AT_A_TIME else self._every)
+        self._broad_phase = BroadPhase(self._kinematics, self._together)
 
     def certify(self, index: int, max_iterations: int = 60) -> PairResult:
-        """Certify pair ``scene.pairs[index]``."""
-        start = time.perf_counter()
-        result = self._certify(self.scene.pairs[index], max_iterations)
+        """Certify pair ``scene.pairs[index]``, alone or with others that the same proof covers; the first of them takes the time."""
+        start, pair = time.perf_counter(), self.scene.pairs[index]
+        result = self._broad_phase.find(pair) or self._certify(pair, max_iterations)
         return replace(result, seconds=time.perf_counter() - start)
 
+    def _together(self, volumes: Volumes) -> PairResult | None:
+        """One proof for all pairs of two volumes, if they are clearly apart and it takes no more than the first faces."""
+        frame = choose_frame(self._kinematics, volumes)
+        if not self._apart(volumes, frame):
+            return None
+        try:
+            solution = solve(build(self._first, volumes, frame), FEW_ITERATIONS)
+        except np.linalg.LinAlgError:
+            return None
+        if solution.status is not Status.FEASIBLE:
+            return None
+        result = self._prove(volumes, frame, self._first, solution)
+        return result if result.outcome is Outcome.CERTIFIED else None
+
     def _certify(self, pair: Pair, max_iterations: int) -> PairResult:
-        frame = choose_frame(self._kinematics, pair)
-        contact = self._contact(pair, frame, self._screen[:SCREEN_SAMPLES])
+        volumes = (Volume.of(self.scene.geometry(pair.a)), Volume.of(self.scene.geometry(pair.b)))
+        frame = choose_frame(self._kinematics, volumes)
+        contact = self._contact(volumes, frame, self._screen[:SCREEN_SAMPLES])
         if isinstance(contact, _Witness):
             return self._refute(pair, contact, Stage.SCREEN)
         sides = self._first
         while True:
             try:
-                blocks = build(sides, pair, frame)
+                blocks = build(sides, volumes, frame)
                 # Multipliers of P's own faces are what the polytope step holds fixed: they should come from the middle.
                 gap = MIDDLE if self._whole and sides is not self._first else np.inf
                 solution = solve(blocks, max_iterations, gap)
@@ -123,13 +145,13 @@ class Certification:
                 sides = self._sides(self._every)
                 continue
             if solution.status is Status.FEASIBLE:
-                return self._prove(pair, frame, sides, solution)
+                return self._prove(volumes, frame, sides, solution)
             more = self._more_faces(frame, sides, solution)
             if more == sides.faces:
                 break
             sides = self._sides(more)
         weak, spread = self._weak_points(frame, sides, solution)
-        witness = self._contact(pair, frame, np.concatenate([self._screen, weak[self._faces.contains(weak)]]))
+        witness = self._contact(volumes, frame, np.concatenate([self._screen, weak[self._faces.contains(weak)]]))
         if isinstance(witness, _Witness):
             return self._refute(pair, witness, Stage.SOS)
         if solution.status is Status.INFEASIBLE:
@@ -158,11 +180,11 @@ class Certification:
         worst = [unused[i] for i in np.argsort(lowest)[:FACES_AT_A_TIME] if lowest[i] < 0]
         return (*sides.faces, *worst)
 
-    def _prove(self, pair: Pair, frame: Frame, sides: Sides, solution: Solution) -> PairResult:
+    def _prove(self, volumes: Volumes, frame: Frame, sides: Sides, solution: Solution) -> PairResult:
         """The proof in as few bits as hold."""
         failure = ""
         for kind in BITS:
-            proof, check = self._proof(pair, frame, sides, solution, kind), self._check
+            proof, check = self._proof(volumes, frame, sides, solution, kind), self._check
             if self._whole and proof.needs_box_alone:
                 proof, check = proof.on_its_box(), self._whole
             try:
@@ -190,12 +212,19 @@ class Certification:
         detail = f"no plane affine in s, in the frame of {statement.frame}"
         return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, proof=proof.to_bytes())
 
-    def _points(self, geometry: Geometry, frame: Frame, s: Array) -> Array:
-        return self._kinematics.points(frame.body, geometry.body, geometry.vertices, s)
+    def _points(self, volume: Volume, frame: Frame, s: Array) -> Array:
+        return self._kinematics.points(frame.body, volume.body, volume.vertices, s)
 
-    def _contact(self, pair: Pair, frame: Frame, s: Array) -> Closest | _Witness:
+    def _apart(self, volumes: Volumes, frame: Frame) -> bool:
+        """Whether the padded volumes keep a distance at some of the samples that is large against what they sweep in the frame."""
+        A, B = (self._points(volume, frame, self._screen[:GAP_SAMPLES]) for volume in volumes)
+        least = APART * sum(float(np.linalg.norm(np.ptp(points, axis=0), axis=1).max()) for points in (A, B))
+        least += sum(volume.radius for volume in volumes) + 2 * self.scene.padding
+        return all(closest(a, b).gap > least for a, b in zip(A, B, strict=True))
+
+    def _contact(self, volumes: Volumes, frame: Frame, s: Array) -> Closest | _Witness:
         """A configuration among s (S, n), the centre first, at which the padded bodies touch; else the closest points at the centre."""
-        a, b = self.scene.geometry(pair.a), self.scene.geometry(pair.b)
+        a, b = volumes
         reach = a.radius + b.radius + 2 * self.scene.padding
         A, B = self._points(a, frame, s), self._points(b, frame, s)
         first = closest(A[0], B[0])
@@ -206,7 +235,7 @@ class Certification:
                 return _Witness(s[i], found.weights)
         return first
 
-    def _proof(self, pair: Pair, frame: Frame, sides: Sides, solution: Solution, kind: str) -> PairProof:
+    def _proof(self, volumes: Volumes, frame: Frame, sides: Sides, solution: Solution, kind: str) -> PairProof:
         n, u_c = self.scene.n, sides.u_c
         plane = solution.y[: 4 * (n + 1)].reshape(4, n + 1).copy()
         plane[:, 0] -= plane[:, 1:] @ u_c
@@ -215,7 +244,6 @@ class Certification:
         for chain, Q in zip((frame.chain_a, frame.chain_b), solution.Q[:2], strict=True):
             monomial = np.sqrt(3.0) ** subsets(len(chain)).sum(axis=1)
             factors.append(Side.from_gram(chain, Q * (monomial[:, None] * monomial) / sides.scales[:, None, None], kind))
-        volumes = (Volume.of(self.scene.geometry(pair.a)), Volume.of(self.scene.geometry(pair.b)))
         return PairProof(self.scene, volumes, frame.body, self.ground, plane, solution.t, kappa, sides.faces, (factors[0], factors[1]))
 
     def _weak_points(self, frame: Frame, sides: Sides, solution: Solution) -> tuple[Array, Array]:

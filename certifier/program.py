@@ -24,7 +24,8 @@ from certifier.cone import Centre, Cone
 from certifier.frames import Frame
 from certifier.interior_point import Block
 from certifier.kinematics import Kinematics
-from certifier.model import Array, Pair, Polytope
+from certifier.model import Array, Polytope
+from certifier.proof import Volume
 
 
 @dataclass(frozen=True)
@@ -134,23 +135,23 @@ def _denominator(s: Array, revolute: Array) -> Array:
     return product
 
 
-def build(sides: Sides, pair: Pair, frame: Frame) -> list[Block]:
-    """The program of one pair: blocks in the order side A, side B, [LMI, tau], over y = (Z row-major, [kappa, tau], t).
+def build(sides: Sides, volumes: tuple[Volume, Volume], frame: Frame) -> list[Block]:
+    """The program of two volumes: blocks in the order side A, side B, [LMI, tau], over y = (Z row-major, [kappa, tau], t).
 
     Raises:
         np.linalg.LinAlgError: a cone is numerically degenerate.
     """
     scene, n = sides.kinematics.scene, sides.kinematics.scene.n
-    a, b = scene.geometry(pair.a), scene.geometry(pair.b)
-    radii = [g.radius + scene.padding for g in (a, b)]
+    a, b = volumes
+    radii = [volume.radius + scene.padding for volume in volumes]
     rounded = max(radii) > 0
     columns = 4 * (n + 1) + (1 + n if rounded else 0) + 1
     blocks = []
-    for geometry, chain, radius, sign in ((a, frame.chain_a, radii[0], 1.0), (b, frame.chain_b, radii[1], -1.0)):
+    for volume, chain, radius, sign in ((a, frame.chain_a, radii[0], 1.0), (b, frame.chain_b, radii[1], -1.0)):
         cone, centre = sides.cone(chain)
         space, outside, u = basis(len(chain)), sides.outside(chain), sides.points(chain)
-        X = sides.kinematics.numerators(frame.body, geometry.body, sides.box.mid + sides.box.half * u)
-        p = sign * np.einsum("nij,vj->vin", X, np.column_stack([geometry.vertices, np.ones(len(geometry.vertices))]))
+        X = sides.kinematics.numerators(frame.body, volume.body, sides.box.mid + sides.box.half * u)
+        p = sign * np.einsum("nij,vj->vin", X, np.column_stack([volume.vertices, np.ones(len(volume.vertices))]))
         B = np.zeros((len(p), cone.N, columns))
         plane = B[:, :, : 4 * (n + 1)].reshape(len(p), cone.N, 4, n + 1)
         first = np.swapaxes(plane[:, : len(u)], 1, 2)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -77,8 +76,8 @@ def test_what_two_answers_mean_together(ours: Outcome, theirs: Outcome, same: bo
 
 
 def test_the_campaign_finds_agreement_and_evidence() -> None:
-    document = agreement.campaign(islice(agreement.questions(boxes=1, rounded=0), 5), lambda _: None)
-    assert document["instances"] == 5
+    document = agreement.campaign(agreement.questions(boxes=1, rounded=0), lambda _: None)
+    assert document["instances"] == 4
     assert document["verdicts"].keys() <= {"agree", "programs differ"}
     assert "none" not in document["evidence"]
     assert len(document["counts"]) > 1, "feasible and infeasible ones"

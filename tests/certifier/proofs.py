@@ -31,22 +31,14 @@ def scene() -> Scene:
 @cache
 def region() -> bytes:
     """Both blocks share the proofs of the links; the tip has one for each block. The proofs lie on two different grounds."""
-    group = box("world/blocks", WORLD, (0.4, 0.3, 0.3), (0.8, 1.0, 0.0))
-    names = tuple(g.name for g in scene().geometries)
-    grouped = replace(
-        scene(),
-        geometries=(*scene().geometries, group),
-        pairs=tuple(Pair(name, group.name) for name in names[:2]) + scene().pairs[4:],
-    )
     polytope, larger = cube(scene(), 0.0, 0.1), cube(scene(), 0.0, 0.12)
     proofs: dict[int, bytes] = {}
-    for index, pair in enumerate(grouped.pairs):
-        shared = Certification(grouped, larger if index % 2 else polytope, np.zeros(2))
-        found = PairProof.from_bytes(shared.certify(index).proof, grouped)
-        volumes = [replace(v, geometries=("world/block0", "world/block1")) if v.geometries == (group.name,) else v for v in found.volumes]
-        data = replace(found, scene=scene(), volumes=tuple(volumes)).to_bytes()
-        covered = [i for i, p in enumerate(scene().pairs) if p.a == pair.a and pair.b in (p.b, group.name)]
-        proofs |= dict.fromkeys(covered, data)
+    for index, pair in enumerate(scene().pairs):
+        partners = tuple(p for p in scene().pairs if p.a == pair.a) if "bar" in pair.a else (pair,)
+        part = replace(scene(), pairs=partners)
+        shared = Certification(part, larger if index // 2 % 2 else polytope, np.zeros(2))
+        found = PairProof.from_bytes(shared.certify(partners.index(pair)).proof, part)
+        proofs[index] = replace(found, scene=scene()).to_bytes()
     return certified_region(scene(), accepted(polytope, np.zeros(2)), proofs, {}).proof
 
 
