@@ -6,21 +6,34 @@ import sys
 
 import uvicorn
 
-from api.guard import LOOPBACK_NAMES
+from certifier.errors import CirisError
+from db import keys, logs
 from db.settings import settings
 
 SHUTDOWN_SECONDS = 2
 """How long open streams may hold up the end."""
+KEEP_ALIVE_SECONDS = 75
+"""Longer than clients keep idle connections: whoever closes first must not be the one who answers."""
 
 
 def main() -> None:
-    """Serves until a signal ends it; refuses an address that others can reach unless the settings allow it."""
-    host, port = settings().host, settings().port
-    if host not in LOOPBACK_NAMES and not settings().allow_remote:
-        problem = f"others can reach {host}, and this service asks nobody for a key"
-        print(f"error: CIRIS_HOST: {problem} (CIRIS_ALLOW_REMOTE=1 allows it)", file=sys.stderr)
+    """Serves until a signal ends it; refuses an address that others can reach while there are no keys."""
+    logs.configure("api")
+    try:
+        keys.check_bind(settings())
+    except CirisError as error:
+        print(f"error: {error}", file=sys.stderr)
         sys.exit(2)
-    uvicorn.run("api.app:create_app", factory=True, host=host, port=port, timeout_graceful_shutdown=SHUTDOWN_SECONDS, log_level="info")
+    uvicorn.run(
+        "api.app:create_app",
+        factory=True,
+        host=settings().host,
+        port=settings().port,
+        timeout_graceful_shutdown=SHUTDOWN_SECONDS,
+        timeout_keep_alive=KEEP_ALIVE_SECONDS,
+        log_config=None,
+        access_log=False,
+    )
 
 
 if __name__ == "__main__":

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from functools import partial
 
+from anyio import CapacityLimiter
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
-from api import guard, pages, problems
+from api import guard, login, pages, problems
+from api.access import Keyring
+from api.access_log import AccessLog
+from api.metrics import Requests
 from api.routers import events, jobs, planning, regions, scenes, service
 from db.session import Database, database
-from db.settings import settings
+from db.settings import LOOPBACK_NAMES, settings
 
 DESCRIPTION = """Certified collision-free regions of robot configuration space.
 
@@ -30,10 +34,20 @@ def create_app(db: Database | None = None) -> FastAPI:
         separate_input_output_schemas=False,
     )
     app.state.database = db or database()
-    app.add_middleware(guard.Guard, hosts=guard.LOOPBACK_NAMES if settings().host in guard.LOOPBACK_NAMES else None)
+    app.state.requests = Requests()
+    app.state.parsers = CapacityLimiter(scenes.UPLOADS_AT_ONCE)
+    app.add_middleware(
+        guard.Guard,
+        keyring=Keyring(app.state.database, open_without_keys=settings().loopback),
+        hosts=LOOPBACK_NAMES if settings().loopback else None,
+        rate=settings().requests_per_second,
+        respond=partial(problems.respond, pages.render_problem),
+    )
+    app.add_middleware(AccessLog, requests=app.state.requests)
     problems.install(app, pages.render_problem)
     for module in (scenes, jobs, events, regions, planning, service):
         app.include_router(module.router)
+    app.include_router(login.router)
     pages.install(app)
     app.openapi = partial(problems.describe, app)  # type: ignore[method-assign]
     return app

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from urllib.parse import urlsplit
 
 import numpy as np
 
-from api.schemas.jobs import PolytopeBody, Seed
-from certifier.errors import RegionError
+from api.schemas.jobs import PolytopeBody, Seed, WebhookRequest
+from certifier.errors import CirisError, RegionError
 from certifier.model import Array, Scene
 from certifier.seed_options import SeedOptions
+from db.settings import settings
+from workers.addresses import is_public
 
 
 def seed(scene: Scene, body: Seed) -> SeedOptions:
@@ -57,6 +60,27 @@ def polytope(scene: Scene, body: PolytopeBody) -> None:
                 field="polytope.center",
                 hint="leave it out to have one found",
             )
+
+
+def webhook(body: WebhookRequest) -> None:
+    """Refuse a receiver that could never be called.
+
+    Raises:
+        CirisError: webhook_url, webhook_address.
+    """
+    try:
+        url = urlsplit(body.url)
+        usable = url.hostname and url.username is None and url.port != 0
+    except ValueError:
+        usable = False
+    if not usable or not body.url.isascii() or not body.url.isprintable() or " " in body.url:
+        raise CirisError("webhook_url", f"{body.url!r} cannot be called", field="webhook.url", hint="https://host/path, no credentials")
+    try:
+        private = not is_public(url.hostname or "")
+    except ValueError:
+        return  # a name, which is looked up when it is called
+    if private and not settings().webhook_private:
+        raise CirisError("webhook_address", f"{url.hostname} is not a public address", field="webhook.url")
 
 
 def points(scene: Scene, rows: Sequence[Sequence[float]], field: str) -> Array:

@@ -1,46 +1,81 @@
-"""What stands before the routes: limits on the size of bodies (FastAPI's own answers no problem+json), no visits from other web sites.
+"""What stands before the routes: no visits from other web sites, bodies of limited size, a key where one is needed, a limited rate.
 
-The service has no keys on the loopback interface, so a page that the user's browser happens to show must not be able to talk
-to it: neither under a name of its own that resolves to this machine, nor by sending forms across sites.
+The service has no keys on the loopback interface unless somebody makes one, so a page that the user's browser happens to show must
+not be able to talk to it: neither under a name of its own that resolves to this machine, nor by sending forms across sites.
+Whoever has no key is turned away before the body of the request is read.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from http import HTTPStatus
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from api import problems
+from api.access import Keyring, presented_key
+from api.limits import Buckets
+from api.problems import UNAVAILABLE
 from certifier.errors import CirisError
 
-MAX_BODY_BYTES = 64 * 2**20
-LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
+BODY_BYTES = 16 * 2**20
+"""More than the largest request of every route but uploads."""
+UPLOAD_BYTES = 64 * 2**20
+UPLOADS = "/v1/scenes"
+PUBLIC = frozenset({"/healthz", "/readyz", "/login", "/logout"})
+STATIC = "/static/"
+
+
+class TooManyRequests(CirisError):
+    """The caller is to wait."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__("too_many_requests", "more requests than one caller may make", hint="wait as long as Retry-After says")
+        self.headers = {"Retry-After": str(math.ceil(seconds))}
+
+
+class KeyNeeded(CirisError):
+    """The caller has no key, or one that is not valid."""
+
+    def __init__(self, given: str | None) -> None:
+        message = "this service needs an API key" if given is None else "this is not a valid API key"
+        super().__init__("key_needed", message, field="Authorization", hint="send `Authorization: Bearer KEY`; `ciris key add` makes one")
+        self.headers = {"WWW-Authenticate": "Bearer"}
 
 
 class Guard:
-    """ASGI middleware: refuses bodies of more than ``MAX_BODY_BYTES``, cross-site changes, and hosts that are not allowed.
+    """ASGI middleware.
 
     Args:
         hosts: names under which the service may be called; None for any.
+        respond: the response for an error.
     """
 
-    def __init__(self, app: ASGIApp, hosts: frozenset[str] | None) -> None:
-        self._app, self._hosts = app, hosts
+    def __init__(
+        self, app: ASGIApp, keyring: Keyring, hosts: frozenset[str] | None, rate: float, respond: Callable[[Request, Exception], Response]
+    ) -> None:
+        self._app, self._keyring, self._hosts, self._respond = app, keyring, hosts, respond
+        self._buckets = Buckets(rate)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
         headers = Headers(scope=scope)
+        limit = UPLOAD_BYTES if scope["path"] == UPLOADS else BODY_BYTES
         try:
+            _check_url(scope)
             self._check_origin(scope["method"], headers)
-            _check_length(headers)
-        except CirisError as error:
-            await problems.as_json(problems.problem_of(error))(scope, receive, send)
+            _check_length(headers, limit)
+            await self._check_caller(scope, headers)
+        except (CirisError, *UNAVAILABLE) as error:
+            await self._respond(Request(scope), error)(scope, receive, send)
             return
-        await self._app(scope, _counted(receive), send)
+        await self._app(scope, _counted(receive, limit), send)
 
     def _check_origin(self, method: str, headers: Headers) -> None:
         host = headers.get("host", "")
@@ -50,6 +85,18 @@ class Guard:
         if method not in ("GET", "HEAD", "OPTIONS") and origin is not None and origin.partition("://")[2] != host:
             raise CirisError("cross_site", f"requests from {origin} are not accepted", field="Origin")
 
+    async def _check_caller(self, scope: Scope, headers: Headers) -> None:
+        """Finds out who asks (``request.state.caller``), unless anybody may, and counts the request."""
+        public = scope["path"] in PUBLIC or scope["path"].startswith(STATIC)
+        caller = None if public else await self._keyring.caller(headers)
+        address = scope["client"][0] if scope.get("client") else "unknown"
+        wait = self._buckets.take(f"key {caller.key_id}" if caller and caller.key_id else f"address {address}")
+        if wait > 0:
+            raise TooManyRequests(wait)
+        if caller is None and not public:
+            raise KeyNeeded(presented_key(headers))
+        scope.setdefault("state", {})["caller"] = caller
+
 
 def _name(host: str) -> str:
     """The host without its port and brackets."""
@@ -57,17 +104,23 @@ def _name(host: str) -> str:
     return name.strip("[]")
 
 
-def _too_large() -> str:
-    return f"the request has more than {MAX_BODY_BYTES // 2**20} MiB"
+def _check_url(scope: Scope) -> None:
+    """Refuses what no database can look up."""
+    if "\0" in scope["path"] or b"%00" in scope["query_string"]:
+        raise CirisError("invalid_request", "the address holds a zero byte")
 
 
-def _check_length(headers: Headers) -> None:
+def _too_large(limit: int) -> str:
+    return f"the request has more than {limit // 2**20} MiB"
+
+
+def _check_length(headers: Headers, limit: int) -> None:
     length = headers.get("content-length", "")
-    if length.isdigit() and int(length) > MAX_BODY_BYTES:
-        raise CirisError("too_large", _too_large())
+    if length.isdigit() and int(length) > limit:
+        raise CirisError("too_large", _too_large(limit))
 
 
-def _counted(receive: Receive) -> Receive:
+def _counted(receive: Receive, limit: int) -> Receive:
     """``receive`` that refuses to go on once too much came, whatever length was announced.
 
     It does so by an HTTPException: FastAPI takes any other error while it reads a body for a body that cannot be parsed.
@@ -78,8 +131,8 @@ def _counted(receive: Receive) -> Receive:
         nonlocal received
         message = await receive()
         received += len(message.get("body", b""))
-        if received > MAX_BODY_BYTES:
-            raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _too_large())
+        if received > limit:
+            raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _too_large(limit))
         return message
 
     return counted

@@ -6,18 +6,20 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from http import HTTPStatus
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 from fastapi import APIRouter, FastAPI, Request, Response
-from fastapi.responses import HTMLResponse
+from fastapi.responses import HTMLResponse, RedirectResponse
 from fastapi.staticfiles import StaticFiles
 from fastapi.templating import Jinja2Templates
 
 import dashboard
 from api import problems
-from api.access import Db
+from api.access import READ, Db
 from api.routers import jobs, regions, scenes
 from api.schemas.jobs import GrowthPoint, Iteration, Job, PairCell, PairMatrix
 from api.schemas.scenes import PairInfo
@@ -28,10 +30,10 @@ _CHART = (600, 150)
 _SECURITY = {
     "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'; form-action 'self'",
     "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
+    "Referrer-Policy": "same-origin",
 }
 
-router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse, dependencies=[READ])
 templates = Jinja2Templates(_ROOT / "templates")
 
 
@@ -42,30 +44,32 @@ def install(app: FastAPI) -> None:
 
 
 def render_problem(request: Request, problem: problems.Problem) -> Response:
-    """A page for people who look at pages, problem+json for everything else."""
+    """A page for people who look at pages (who sign in first where a key is needed), problem+json for everything else."""
     if request.url.path.startswith(("/v1/", "/static/")) or "text/html" not in request.headers.get("accept", ""):
         return problems.as_json(problem)
-    return _page(request, "problem.html", {"problem": problem}, problem.status)
+    if problem.code == "key_needed" and request.method == "GET":
+        return RedirectResponse(f"/login?next={quote(request.url.path)}", HTTPStatus.SEE_OTHER)
+    return page(request, "problem.html", {"problem": problem}, problem.status)
 
 
 @router.get("/")
 def jobs_page(request: Request, db: Db) -> Response:
-    return _page(request, "jobs.html", _home(db))
+    return page(request, "jobs.html", _home(db))
 
 
 @router.get("/live")
 def jobs_live(request: Request, db: Db) -> Response:
-    return _page(request, "jobs_live.html", _home(db))
+    return page(request, "jobs_live.html", _home(db))
 
 
 @router.get("/jobs/{job_id}")
 def job_page(request: Request, job_id: str, db: Db) -> Response:
-    return _page(request, "job.html", _job(db, job_id))
+    return page(request, "job.html", _job(db, job_id))
 
 
 @router.get("/jobs/{job_id}/live")
 def job_live(request: Request, job_id: str, db: Db) -> Response:
-    return _page(request, "job_live.html", _job(db, job_id))
+    return page(request, "job_live.html", _job(db, job_id))
 
 
 @router.get("/regions/{region_id}")
@@ -73,7 +77,7 @@ def region_page(request: Request, region_id: str, db: Db) -> Response:
     region = regions.get_region(region_id, db)
     shape = np.array(region.manifest["inscribed_ellipsoid"]["shape"])
     reach = np.linalg.norm(shape, axis=1).tolist()
-    return _page(request, "region.html", {"region": region, "manifest": region.manifest, "reach": reach})
+    return page(request, "region.html", {"region": region, "manifest": region.manifest, "reach": reach})
 
 
 @router.get("/scenes/{scene_id}")
@@ -84,10 +88,11 @@ def scene_page(request: Request, scene_id: str, db: Db) -> Response:
         "pairs": scenes.get_scene_pairs(scene_id, db).pairs,
         "regions": regions.list_regions(db, scene=scene_id).regions,
     }
-    return _page(request, "scene.html", context)
+    return page(request, "scene.html", context)
 
 
-def _page(request: Request, name: str, context: dict[str, Any], status: int = 200) -> Response:
+def page(request: Request, name: str, context: dict[str, Any], status: int = 200) -> Response:
+    """A template of the dashboard, filled in, with what keeps it from loading anything foreign."""
     return templates.TemplateResponse(request, name, context, status_code=status, headers=_SECURITY)
 
 

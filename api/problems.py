@@ -11,8 +11,9 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.openapi.utils import get_openapi
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict
 from pydantic.json_schema import models_json_schema
+from sqlalchemy.exc import InterfaceError, OperationalError, TimeoutError
 from starlette.exceptions import HTTPException
 
 from certifier.errors import CirisError
@@ -20,7 +21,7 @@ from certifier.errors import CirisError
 MEDIA_TYPE = "application/problem+json"
 
 _STATUS_OF_CODE = {
-    **dict.fromkeys(("scene_not_found", "job_not_found", "region_not_found", "proof_not_found"), HTTPStatus.NOT_FOUND),
+    **dict.fromkeys(("scene_not_found", "job_not_found", "region_not_found", "proof_not_found", "webhook_not_found"), HTTPStatus.NOT_FOUND),
     "idempotency_conflict": HTTPStatus.CONFLICT,
     "job_not_retryable": HTTPStatus.CONFLICT,
     "too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
@@ -28,7 +29,16 @@ _STATUS_OF_CODE = {
     **dict.fromkeys(("child_timeout", "child_memory", "child_died"), HTTPStatus.SERVICE_UNAVAILABLE),
     "cross_site": HTTPStatus.FORBIDDEN,
     "unknown_host": HTTPStatus.MISDIRECTED_REQUEST,
+    "key_needed": HTTPStatus.UNAUTHORIZED,
+    "scope_missing": HTTPStatus.FORBIDDEN,
+    "too_many_requests": HTTPStatus.TOO_MANY_REQUESTS,
+    "quota_exceeded": HTTPStatus.TOO_MANY_REQUESTS,
+    "busy": HTTPStatus.SERVICE_UNAVAILABLE,
 }
+
+UNAVAILABLE = (OperationalError, InterfaceError, TimeoutError)
+"""The database cannot be reached, or not in time."""
+RETRY_SECONDS = 5
 
 
 class FieldProblem(BaseModel):
@@ -40,6 +50,23 @@ class FieldProblem(BaseModel):
 
 class Problem(BaseModel):
     """An error (RFC 9457): ``code`` is stable, ``detail`` is for people."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "type": "urn:ciris:problem:seed_outside_limits",
+                    "title": "Unprocessable Content",
+                    "status": 422,
+                    "detail": "joint arm/elbow is at 9, not between its limits -2 and 2",
+                    "code": "seed_outside_limits",
+                    "field": "seed.q[1]",
+                    "hint": "",
+                    "errors": [],
+                }
+            ]
+        }
+    )
 
     type: str
     title: str
@@ -76,13 +103,17 @@ def as_json(problem: Problem) -> Response:
 
 def install(app: FastAPI, render: Render) -> None:
     """Makes every error that leaves a route a problem, presented by ``render``."""
-    for kind, explain in _EXPLANATIONS.items():
-        app.add_exception_handler(kind, partial(_handle, explain, render))
+    for kind in _EXPLANATIONS:
+        app.add_exception_handler(kind, partial(respond, render))
 
 
-def _handle(explain: Callable[[Any], Problem], render: Render, request: Request, error: Exception) -> Response:
+def respond(render: Render, request: Request, error: Exception) -> Response:
+    """The response for an error, presented by ``render``, with the headers that the error asks for."""
+    explain = next(_EXPLANATIONS[kind] for kind in type(error).__mro__ if kind in _EXPLANATIONS)
     response = render(request, explain(error))
     response.headers.update(getattr(error, "headers", None) or {})
+    if response.status_code == HTTPStatus.SERVICE_UNAVAILABLE:
+        response.headers["Retry-After"] = str(RETRY_SECONDS)
     return response
 
 
@@ -100,15 +131,21 @@ def _http(error: HTTPException) -> Problem:
     return problem_of(CirisError(code, error.detail), status)
 
 
+def _unavailable(_error: Exception) -> Problem:
+    hint = "try again; what was committed is safe"
+    return problem_of(CirisError("database_unavailable", "the database cannot be reached", hint=hint), HTTPStatus.SERVICE_UNAVAILABLE)
+
+
 def _unexpected(_error: Exception) -> Problem:
     hint = "the service's log has the details"
     return problem_of(CirisError("internal", "something went wrong in the service", hint=hint), HTTPStatus.INTERNAL_SERVER_ERROR)
 
 
-_EXPLANATIONS: dict[type[Exception], Callable[[Any], Problem]] = {
+_EXPLANATIONS: dict[type, Callable[[Any], Problem]] = {
     CirisError: problem_of,
     RequestValidationError: _validation,
     HTTPException: _http,
+    **dict.fromkeys(UNAVAILABLE, _unavailable),
     Exception: _unexpected,
 }
 

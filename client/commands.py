@@ -11,7 +11,7 @@ from typing import Any
 
 from certifier.errors import CirisError
 from client import output, service
-from client.find import service_url
+from client.find import api_key, service_url
 from client.http import Client
 from client.inputs import configuration, polytope_file, seed_of
 from client.output import Screen, print_json
@@ -24,6 +24,13 @@ def up(args: Namespace) -> int:
     options = [f"--{name}={value}" for name, value in (("port", args.port), ("data", args.data)) if value is not None]
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, "-m", "workers.stack", *options])
+
+
+def key(args: Namespace) -> int:
+    """Becomes the command that acts on the keys in the database."""
+    options = [] if args.data is None else [f"--data={args.data}"]
+    sys.stdout.flush()
+    os.execv(sys.executable, [sys.executable, "-m", "db.keys", *options, args.verb, *args.words(args)])
 
 
 def scene_add(args: Namespace) -> int:
@@ -217,4 +224,4 @@ def doctor(args: Namespace) -> int:
 
 
 def _client(args: Namespace) -> Client:
-    return Client(service_url(args.url))
+    return Client(service_url(args.url), api_key())

@@ -17,7 +17,7 @@ import certifier
 from certifier.errors import CirisError
 from client import output, service
 from client.commands import save_proof
-from client.find import data_dir, running_stack
+from client.find import api_key, data_dir, running_stack
 from client.http import Client
 from client.inputs import seed_of
 from client.output import Screen
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _demonstrate(url: str) -> bool:
-    with Client(url) as client:
+    with Client(url, api_key()) as client:
         scene = client.add_scene(SCENE)
         print(f"ciris is up at {url} (data: {data_dir()})")
         size = f"{scene['joints']} joints, {scene['geometries']} convex bodies, {scene['pairs']} pairs to separate"
@@ -116,7 +116,7 @@ def _stack() -> Iterator[str]:
 
 def _answers(url: str) -> bool:
     try:
-        with Client(url) as client:
+        with Client(url, api_key()) as client:
             client.ready()
     except CirisError:
         return False

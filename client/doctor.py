@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
 from certifier.errors import CirisError
-from client.find import data_dir, service_url
+from client.find import api_key, data_dir, service_url
 from client.http import Client
 
 PACKAGES = ("drake", "python-flint", "numpy", "scipy", "numba", "fastapi", "celery", "redis", "sqlalchemy")
@@ -82,7 +82,7 @@ def _flint() -> str:
 
 def _service(url: str | None) -> Finding:
     try:
-        with Client(service_url(url)) as client:
+        with Client(service_url(url), api_key()) as client:
             ready = client.ready()
             wrong = "; ".join(f"{name}: {state}" for name, state in ready["checks"].items() if state != "ok")
             return Finding("service", f"{client.url} is {'ready' if ready['ready'] else f'not ready ({wrong})'}", ready["ready"])

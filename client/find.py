@@ -1,9 +1,10 @@
-"""Where the service is: an address that was given, or the embedded stack of the data directory."""
+"""Where the service is (an address that was given, or the embedded stack of the data directory), and the key to it."""
 
 from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 
 from certifier.errors import CirisError
@@ -36,3 +37,19 @@ def service_url(given: str | None) -> str:
     if url is None:
         raise CirisError("no_service", "no service is running here", hint="start one with `ciris up`, name one with --url, or use --local")
     return url
+
+
+def api_key() -> str | None:
+    """The service's key: CIRIS_API_KEY, or the content of the file that CIRIS_API_KEY_FILE names; None where neither is set.
+
+    Raises:
+        CirisError: api_key, for something that cannot be a key.
+    """
+    name = "CIRIS_API_KEY" if os.environ.get("CIRIS_API_KEY") else "CIRIS_API_KEY_FILE"
+    value = os.environ.get(name)
+    if not value:
+        return None
+    key = (Path(value).expanduser().read_text(errors="replace") if name.endswith("FILE") else value).strip()
+    if not re.fullmatch(r"[\x21-\x7e]+", key):
+        raise CirisError("api_key", "this is not an API key", field=name, hint="it is one word, as `ciris key add` prints it")
+    return key

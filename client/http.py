@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -19,13 +20,36 @@ TIMEOUT_S = 120.0
 QUIET_S = 60.0
 """A stream that says nothing for this long, not even a ping, is taken up anew."""
 
+PATIENCE = 5
+"""How often a request is repeated that the service was asked too often for."""
+
+
+class _Patient(httpx2.HTTPTransport):
+    """Waits as long as the service asks for when it was asked too often, a few times."""
+
+    def handle_request(self, request: httpx2.Request) -> httpx2.Response:
+        for _ in range(PATIENCE):
+            response = super().handle_request(request)
+            wait = response.headers.get("retry-after", "")
+            if response.status_code != httpx2.codes.TOO_MANY_REQUESTS or not wait.isdigit():
+                return response
+            response.close()
+            time.sleep(int(wait))
+        return super().handle_request(request)
+
 
 class Client:
-    """A connection to the service at ``url``. Every method raises CirisError: what the service said, or ``unreachable``."""
+    """A connection to the service at ``url``. Every method raises CirisError: what the service said, or ``unreachable``.
 
-    def __init__(self, url: str) -> None:
+    Args:
+        key: an API key, for a service that asks for one.
+    """
+
+    def __init__(self, url: str, key: str | None = None) -> None:
         self.url = url.rstrip("/")
-        self._http = httpx2.Client(base_url=self.url, timeout=TIMEOUT_S, trust_env=False)
+        headers = {} if key is None else {"Authorization": f"Bearer {key}"}
+        transport = _Patient(trust_env=False)
+        self._http = httpx2.Client(base_url=self.url, headers=headers, timeout=TIMEOUT_S, trust_env=False, transport=transport)
 
     def __enter__(self) -> Self:
         return self
@@ -46,8 +70,8 @@ class Client:
         return self._json("POST", "/v1/scenes", files={"bundle": ("scene.zip", pack_bundle(path), "application/zip")})
 
     def scenes(self) -> list[Document]:
-        """The newest scenes."""
-        return self._json("GET", "/v1/scenes")["scenes"]
+        """Every scene, newest first."""
+        return self._all("scenes")
 
     def scene(self, name: str) -> Document:
         """A scene by id or name."""
@@ -114,9 +138,8 @@ class Client:
             raise self._unreachable(error) from None
 
     def regions(self, *, scene: str | None = None, job: str | None = None) -> list[Document]:
-        """The newest regions, of one scene or job if asked."""
-        params = {name: value for name, value in {"scene": scene, "job": job}.items() if value is not None}
-        return self._json("GET", "/v1/regions", params=params)["regions"]
+        """Every region, newest first, of one scene or job if asked."""
+        return self._all("regions", scene=scene, job=job)
 
     def region(self, region_id: str) -> Document:
         """A region with its manifest."""
@@ -141,6 +164,17 @@ class Client:
     def contains(self, scene: str, q: list[list[float]]) -> Document:
         """Which regions of a scene hold each of these configurations."""
         return self._json("POST", "/v1/planning/contains", json={"scene": scene, "q": q})
+
+    def _all(self, name: str, **filters: str | None) -> list[Document]:
+        """Every page of a list, one after the other."""
+        params = {key: value for key, value in filters.items() if value is not None}
+        found: list[Document] = []
+        while True:
+            page = self._json("GET", f"/v1/{name}", params=params)
+            found += page[name]
+            if page["next"] is None:
+                return found
+            params["after"] = page["next"]
 
     def _json(self, method: str, path: str, **options: Any) -> Any:
         return self._send(method, path, **options).json()

@@ -15,7 +15,8 @@ def emit(session: Session, job: JobRow, kind: str, data: dict[str, Any]) -> None
     """Adds the job's next event; the caller holds the job's lock.
 
     Kinds: ``job`` (state, outcome, reason), ``iteration`` (index, label, state, pairs), ``pairs`` (iteration, pairs: index, state, stage,
-    margin, seconds), ``step`` (kind, state, seconds), ``region`` (region_id, iteration, guarantee, ellipsoid_volume).
+    margin, seconds), ``step`` (kind, state, seconds), ``region`` (region_id, iteration, guarantee, ellipsoid_volume), ``lost`` (worker,
+    reason, and iteration with pairs, or step: they are open again).
     """
     job.event_seq += 1
     session.add(EventRow(job_id=job.id, seq=job.event_seq, kind=kind, data=data))

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import exists, or_, select, tuple_
+from sqlalchemy import ColumnElement, exists, func, or_, select
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db import events, leases
+from db import events, leases, pages, webhooks
 from db.models import JobRow, PairRow, StepRow
+from db.pages import Page
 from db.session import insert_new
+from db.settings import settings
 from db.states import JOB, PAIR, STEP, JobState, StepKind, transition, unfinished
 from db.types import utcnow
 
@@ -28,6 +28,8 @@ def create(
     deadline_at: datetime | None = None,
     idempotency_key: str | None = None,
     request_digest: str | None = None,
+    key_id: str | None = None,
+    priority: int = 0,
     retry_of: str | None = None,
     attempt: int = 1,
 ) -> tuple[JobRow, bool]:
@@ -36,7 +38,8 @@ def create(
     Commit, then send ``coordinate`` for it; if that fails, the sweeper sends it later.
 
     Raises:
-        CirisError: idempotency_conflict, when the key was used for a different request.
+        CirisError: idempotency_conflict, when the key was used for a different request; quota_exceeded, when the API key has as
+            many unfinished jobs as it may.
     """
     job_id = str(uuid4())
     new = {
@@ -47,10 +50,13 @@ def create(
         "deadline_at": deadline_at,
         "idempotency_key": idempotency_key,
         "request_digest": request_digest,
+        "key_id": key_id,
+        "priority": priority,
         "retry_of": retry_of,
         "attempt": attempt,
     }
     if insert_new(session, JobRow, [new]):
+        _check_quota(session, key_id)
         job = lock(session, job_id)
         events.emit(session, job, "job", {"state": job.state})
         return job, True
@@ -65,8 +71,21 @@ def create(
     return job, False
 
 
-def retry(session: Session, job_id: str) -> JobRow:
-    """A new job with the same scene, options and time to its deadline as one that failed or was cancelled.
+def _check_quota(session: Session, key_id: str | None) -> None:
+    """Refuses the job just added when its key has too many. Requests at the same moment may each be the last that fits."""
+    limit = settings().max_jobs_per_key
+    unfinished_jobs = session.scalar(select(func.count()).where(_of_key(key_id), JobRow.state.in_(unfinished(JOB)))) or 0
+    if unfinished_jobs > limit:
+        message = f"{limit} jobs that have not ended are the most at a time"
+        raise CirisError("quota_exceeded", message, hint="wait for some to end, cancel some, or have CIRIS_MAX_JOBS_PER_KEY raised")
+
+
+def _of_key(key_id: str | None) -> ColumnElement[bool]:
+    return JobRow.key_id.is_not_distinct_from(key_id)
+
+
+def retry(session: Session, job_id: str, key_id: str | None = None) -> JobRow:
+    """A new job with the same scene, options, webhook and time to its deadline as one that failed or was cancelled.
 
     A job is retried once: doing it again returns the same new job.
 
@@ -76,16 +95,20 @@ def retry(session: Session, job_id: str) -> JobRow:
     job = lock(session, job_id)
     if job.state not in (JobState.FAILED, JobState.CANCELLED):
         raise CirisError("job_not_retryable", f"the job is {job.state}; only a failed or cancelled one can be retried", field="job")
-    again, _ = create(
+    again, made = create(
         session,
         kind=job.kind,
         scene_id=job.scene_id,
         options=job.options,
         deadline_at=job.deadline_at and utcnow() + (job.deadline_at - job.created_at),
         idempotency_key=f"retry:{job.id}",
+        key_id=key_id,
+        priority=job.priority,
         retry_of=job.id,
         attempt=job.attempt + 1,
     )
+    if made:
+        webhooks.copy(session, job.id, again.id)
     return again
 
 
@@ -113,14 +136,6 @@ def _found(job: JobRow | None, job_id: str) -> JobRow:
     return job
 
 
-@dataclass(frozen=True)
-class Page:
-    """Jobs, newest first, and the id to pass as ``after`` for the next page (None on the last)."""
-
-    jobs: Sequence[JobRow]
-    next: str | None
-
-
 def page(
     session: Session,
     *,
@@ -129,20 +144,15 @@ def page(
     scene_id: str | None = None,
     after: str | None = None,
     limit: int = 50,
-) -> Page:
+) -> Page[JobRow]:
     """One page of the jobs that fit the filters.
 
     Raises:
-        CirisError: job_not_found, when ``after`` is no job's id.
+        CirisError: cursor.
     """
-    query = select(JobRow).order_by(JobRow.created_at.desc(), JobRow.id.desc()).limit(limit + 1)
     filters = {JobRow.state: state, JobRow.kind: kind, JobRow.scene_id: scene_id}
-    query = query.where(*(column == value for column, value in filters.items() if value is not None))
-    if after is not None:
-        last = get(session, after)
-        query = query.where(tuple_(JobRow.created_at, JobRow.id) < tuple_(last.created_at, last.id))
-    rows = session.scalars(query).all()
-    return Page(rows[:limit], rows[limit - 1].id if len(rows) > limit else None)
+    query = select(JobRow).where(*(column == value for column, value in filters.items() if value is not None))
+    return pages.page(session, JobRow, query, after, limit)
 
 
 def cancel(session: Session, job_id: str) -> JobRow:
@@ -158,10 +168,16 @@ def cancel(session: Session, job_id: str) -> JobRow:
     return job
 
 
-def start(session: Session, job: JobRow) -> None:
-    """Moves a queued job to running; the caller holds its lock."""
-    if transition(session, JobRow, JobState.RUNNING, JobRow.id == job.id, started_at=utcnow()):
+def start(session: Session, job: JobRow, served: float = 0.0) -> None:
+    """Moves a queued job to running, as if it had been served like those that run already; the caller holds its lock."""
+    if transition(session, JobRow, JobState.RUNNING, JobRow.id == job.id, started_at=utcnow(), served=served):
         events.emit(session, job, "job", {"state": JobState.RUNNING})
+
+
+def charge(session: Session, job: JobRow, seconds: float) -> None:
+    """Counts work as done for the job: each key has the same share of the workers, divided among its running jobs by 2^priority."""
+    running = session.scalars(select(JobRow.priority).where(_of_key(job.key_id), JobRow.state == JobState.RUNNING))
+    job.served += seconds * sum(2.0 ** (priority - job.priority) for priority in running)
 
 
 def finish(

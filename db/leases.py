@@ -1,18 +1,22 @@
 """Leases: one holder at a time for a row of work, for a limited time, however often its message is delivered.
 
-A holder renews its lease while it lives. A lease of another host is over when it ran out; one of this host as soon as its
-process is gone, and not before (one long call into native code may keep it from renewing).
+A holder renews its lease while it works. A lease is over when its holder is seen to be gone, which can be seen on the same host,
+or else when it ran out.
 """
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import os
+import signal
 import socket
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
-from datetime import datetime, timedelta
+from dataclasses import dataclass
+from datetime import timedelta
+from functools import cache
 from pathlib import Path
 from typing import TypeVar
 from uuid import uuid4
@@ -20,7 +24,7 @@ from uuid import uuid4
 from sqlalchemy import ColumnElement, select, update
 from sqlalchemy.orm import Session
 
-from db.models import PairRow, StepRow
+from db.models import JobRow, PairRow, StepRow
 from db.session import Database
 from db.states import PairState, transition
 from db.types import utcnow
@@ -31,16 +35,33 @@ Row = TypeVar("Row", PairRow, StepRow)
 OPEN, RUNNING = PairState.OPEN.value, PairState.RUNNING.value
 """Pairs and steps share these two states."""
 
+LOOK_SECONDS = 0.5
+"""Pause between a holder's looks whether its work is still wanted. Two that say no end it."""
+
 
 def this_worker() -> str:
     """This process, as ``host:pid:start``; the start tells it from a later process with the same number."""
-    return f"{socket.gethostname()}:{os.getpid()}:{_started(os.getpid())}"
+    return _name(os.getpid())
 
 
 def is_alive(worker: str | None) -> bool | None:
     """Whether that worker lives; None when it is not of this host, so that nobody here can tell."""
     host, pid, started = (worker or "::").rsplit(":", 2)
-    return _started(int(pid)) == started if host == socket.gethostname() else None
+    return _started(int(pid)) == started if host == _host() else None
+
+
+def _name(pid: int) -> str:
+    return f"{_host()}:{pid}:{_started(pid)}"
+
+
+@cache
+def _host() -> str:
+    """This host's name with a mark of where its process numbers hold: containers and clones of a machine may share the name."""
+    try:
+        place = Path("/proc/sys/kernel/random/boot_id").read_text() + os.readlink("/proc/self/ns/pid")
+    except OSError:
+        return socket.gethostname()
+    return f"{socket.gethostname()}.{hashlib.sha256(place.encode()).hexdigest()[:8]}"
 
 
 def _started(pid: int) -> str | None:
@@ -59,19 +80,9 @@ def _started(pid: int) -> str | None:
     return "alive"
 
 
-def is_free(row: Row, now: datetime) -> bool:
-    """Whether the row may be claimed: open, or held by nobody any more."""
-    if row.state != RUNNING:
-        return row.state == OPEN
-    alive = is_alive(row.worker)
-    return alive is False or (alive is None and (row.lease_until is None or row.lease_until < now))
-
-
-def take(session: Session, model: type[Row], rows: Sequence[Row], *, task_id: str | None, seconds: float) -> str:
-    """Claims rows that :func:`is_free` (the caller holds their job's lock) and counts the attempt. Returns the lease's token."""
-    token, now = str(uuid4()), utcnow()
-    if left := [row.id for row in rows if row.state == RUNNING]:
-        transition(session, model, OPEN, model.id.in_(left))
+def take(session: Session, model: type[Row], rows: Sequence[Row], *, seconds: float) -> str:
+    """Claims open rows (the caller holds their job's lock) and counts the attempt. Returns the lease's token."""
+    token = str(uuid4())
     transition(
         session,
         model,
@@ -79,9 +90,9 @@ def take(session: Session, model: type[Row], rows: Sequence[Row], *, task_id: st
         model.id.in_([row.id for row in rows]),
         attempts=model.attempts + 1,
         worker=this_worker(),
-        task_id=task_id,
+        parent=_name(os.getppid()),
         lease_token=token,
-        lease_until=now + timedelta(seconds=seconds),
+        lease_until=utcnow() + timedelta(seconds=seconds),
     )
     return token
 
@@ -92,20 +103,30 @@ def held(model: type[Row], token: str) -> ColumnElement[bool]:
 
 
 @contextmanager
-def renewed(database: Database, model: type[Row], token: str, seconds: float) -> Iterator[None]:
-    """Renews the lease four times in its length while the block runs."""
+def kept(database: Database, model: type[Row], token: str, seconds: float, job_states: Collection[str]) -> Iterator[None]:
+    """Renews the lease while the block runs, and kills this process when the block goes on though its work is not wanted any more.
+
+    It is wanted while some row is held under the token and the job is in one of ``job_states``. The block may be deep in native
+    code, which only a signal that cannot be caught ends; its results could not be saved anyway.
+    """
     done = threading.Event()
 
-    def renew() -> None:
-        while not done.wait(seconds / 4):
+    def keep() -> None:
+        looks, refused = 0, 0
+        while not done.wait(LOOK_SECONDS):
+            looks += 1
             try:
-                with database.write() as session:
-                    until = utcnow() + timedelta(seconds=seconds)
-                    session.execute(update(model).where(held(model, token)).values(lease_until=until))
+                refused = 0 if _is_wanted(database, model, token, job_states) else refused + 1
+                if looks * LOOK_SECONDS >= seconds / 4:
+                    _renew(database, model, token, seconds)
+                    looks = 0
             except Exception:
-                log.exception("a lease could not be renewed; trying again")
+                log.exception("the lease could not be looked after; trying again")
+            if refused > 1 and not done.is_set():
+                log.warning("what this process works on is not wanted any more: it ends itself")
+                os.kill(os.getpid(), signal.SIGKILL)
 
-    thread = threading.Thread(target=renew, name="lease", daemon=True)
+    thread = threading.Thread(target=keep, name="lease", daemon=True)
     thread.start()
     try:
         yield
@@ -114,28 +135,52 @@ def renewed(database: Database, model: type[Row], token: str, seconds: float) ->
         thread.join()
 
 
-def lost(session: Session, model: type[Row]) -> list[tuple[str, str]]:
-    """The (job, token) of the leases whose holder is gone."""
+def _is_wanted(database: Database, model: type[Row], token: str, job_states: Collection[str]) -> bool:
+    wanted = select(model.id).join(JobRow, JobRow.id == model.job_id).where(held(model, token), JobRow.state.in_(job_states))
+    with database.read() as session:
+        return session.scalar(wanted.limit(1)) is not None
+
+
+def _renew(database: Database, model: type[Row], token: str, seconds: float) -> None:
+    with database.write() as session:
+        session.execute(update(model).where(held(model, token)).values(lease_until=utcnow() + timedelta(seconds=seconds)))
+
+
+@dataclass(frozen=True)
+class Lost:
+    """A lease that is over, and why; ``alone`` when the holder died and the process that had forked it lives."""
+
+    job_id: str
+    token: str
+    worker: str
+    reason: str
+    alone: bool
+
+
+def lost(session: Session, model: type[Row], *, by_time: bool) -> list[Lost]:
+    """The leases whose holder is gone or, with ``by_time``, that ran out."""
     now = utcnow()
-    running = session.scalars(select(model).where(model.state == RUNNING))
-    return sorted({(row.job_id, row.lease_token or "") for row in running if is_free(row, now)})
+    found = {}
+    for row in session.scalars(select(model).where(model.state == RUNNING)):
+        alone = False
+        if is_alive(row.worker) is False:
+            alone = is_alive(row.parent) is True
+            reason = "its process died" if alone else "its worker ended"
+        elif by_time and row.lease_until is not None and row.lease_until < now:
+            reason = "its lease ran out"
+        else:
+            continue
+        found[row.lease_token] = Lost(row.job_id, row.lease_token or "", row.worker or "", reason, alone)
+    return list(found.values())
 
 
-def release(session: Session, model: type[Row], token: str) -> list[Row]:
-    """Opens the rows held under this token and returns them; whoever held them can save nothing any more."""
-    ids = list(session.scalars(select(model.id).where(held(model, token))))
-    transition(session, model, OPEN, held(model, token), sent_at=utcnow())
+def release(session: Session, model: type[Row], lost: Lost) -> list[Row]:
+    """Opens the rows of a lost lease and returns them; whoever held them can save nothing any more."""
+    ids = list(session.scalars(select(model.id).where(held(model, lost.token))))
+    transition(session, model, OPEN, held(model, lost.token), deaths=model.deaths + int(lost.alone))
     return list(session.scalars(select(model).where(model.id.in_(ids), model.state == OPEN)))
 
 
-def unclaimed(session: Session, model: type[Row], sent_before: datetime) -> list[str]:
-    """The jobs with open rows that were last sent before then."""
-    return list(session.scalars(select(model.job_id).distinct().where(model.state == OPEN, model.sent_at < sent_before)))
-
-
-def resend(session: Session, model: type[Row], job_id: str, sent_before: datetime) -> list[Row]:
-    """The job's open rows that were last sent before then, now marked as sent again."""
-    where = (model.job_id == job_id, model.state == OPEN, model.sent_at < sent_before)
-    rows = list(session.scalars(select(model).where(*where)))
-    session.execute(update(model).where(model.id.in_([row.id for row in rows])).values(sent_at=utcnow()))
-    return rows
+def is_poison(deaths: int, attempt: int, limit: int) -> bool:
+    """Whether the ``attempt``-th beginning of a row is one too many: it killed its process, or there are no ends in sight."""
+    return deaths >= limit or attempt > 10 * limit

@@ -51,15 +51,31 @@ class Leased:
 
     attempts: Mapped[int] = mapped_column(default=0)
     """How often it was begun."""
+    deaths: Mapped[int] = mapped_column(default=0)
+    """How often the process that held it died alone, so that it may be to blame."""
     worker: Mapped[str | None]
     """Who holds or last held it: ``host:pid:start``."""
-    task_id: Mapped[str | None] = mapped_column(String(36))
-    """The message under which it is held."""
+    parent: Mapped[str | None]
+    """The process that had forked that one, likewise."""
     lease_token: Mapped[str | None] = mapped_column(String(36))
     """Proof of being the holder; new with every claim."""
     lease_until: Mapped[datetime | None]
-    sent_at: Mapped[datetime | None]
-    """When a message for it was last sent."""
+
+
+class ApiKeyRow(Base):
+    """A key that lets its holder in. The key itself is shown once and not kept."""
+
+    __tablename__ = "api_keys"
+
+    id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    """The part of the key that is no secret."""
+    name: Mapped[str]
+    digest: Mapped[str] = mapped_column(String(64))
+    """SHA-256 of the key."""
+    scope: Mapped[str] = mapped_column(String(16))
+    """Scope."""
+    created_at: Mapped[datetime] = mapped_column(default=utcnow)
+    revoked_at: Mapped[datetime | None]
 
 
 class JobRow(Base):
@@ -89,6 +105,12 @@ class JobRow(Base):
     idempotency_key: Mapped[str | None] = mapped_column(String(255), unique=True)
     request_digest: Mapped[str | None] = mapped_column(String(64))
     """SHA-256 of the request, to tell a repetition from a different request under the same key."""
+    key_id: Mapped[str | None] = mapped_column(ForeignKey("api_keys.id"), index=True)
+    """Whose job it is; None where the service asks for no key."""
+    priority: Mapped[int] = mapped_column(default=0)
+    """Each step doubles the job's share of its key's work."""
+    served: Mapped[float] = mapped_column(default=0.0)
+    """Seconds of work that it was given, divided by its share; whoever has the least goes next (db.work)."""
     retry_of: Mapped[str | None] = mapped_column(ForeignKey("jobs.id"))
     attempt: Mapped[int] = mapped_column(default=1)
     """1, or one more than the attempt of ``retry_of``."""
@@ -135,7 +157,11 @@ class PairRow(Leased, Base):
     """One pair of geometries on one iteration's polytope."""
 
     __tablename__ = "pairs"
-    __table_args__ = (UniqueConstraint("job_id", "iteration", "pair_index"), Index(None, "state", "lease_until"))
+    __table_args__ = (
+        UniqueConstraint("job_id", "iteration", "pair_index"),
+        Index(None, "state", "lease_until"),
+        Index(None, "job_id", "state"),
+    )
     transitions: ClassVar[states.Table] = states.PAIR
 
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -161,7 +187,7 @@ class StepRow(Leased, Base):
     """A piece of a job that is not a pair: seeding, the polytope step, accepting a region."""
 
     __tablename__ = "steps"
-    __table_args__ = (UniqueConstraint("job_id", "turn", "kind"), Index(None, "state", "lease_until"))
+    __table_args__ = (UniqueConstraint("job_id", "turn", "kind"), Index(None, "state", "lease_until"), Index(None, "job_id", "state"))
     transitions: ClassVar[states.Table] = states.STEP
 
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -173,6 +199,8 @@ class StepRow(Leased, Base):
     state: Mapped[str] = mapped_column(String(16), default=states.StepState.OPEN)
     input: Mapped[Document]
     """What it works on: the action, or the accepted polytope."""
+    due_at: Mapped[datetime] = mapped_column(default=utcnow)
+    """Not to be begun before."""
     report: Mapped[Document | None]
     """What it found, or the CirisError document of why it failed."""
     seconds: Mapped[float | None]
@@ -222,3 +250,24 @@ class EventRow(Base):
     kind: Mapped[str] = mapped_column(String(32))
     data: Mapped[Document]
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
+
+
+class WebhookRow(Base):
+    """Whom to tell when a job has ended."""
+
+    __tablename__ = "webhooks"
+    __table_args__ = (Index(None, "state", "next_at"),)
+    transitions: ClassVar[states.Table] = states.WEBHOOK
+
+    id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), unique=True)
+    url: Mapped[str]
+    secret: Mapped[str]
+    """``whsec_`` and the base64 of the bytes that sign."""
+    state: Mapped[str] = mapped_column(String(16), default=states.WebhookState.WAITING)
+    attempts: Mapped[int] = mapped_column(default=0)
+    """How often the receiver was called."""
+    next_at: Mapped[datetime] = mapped_column(default=utcnow)
+    """Not to be called before."""
+    error: Mapped[str | None]
+    """Why the last attempt failed."""

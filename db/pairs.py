@@ -1,9 +1,14 @@
-"""Iterations and their pairs: made together, claimed in batches, saved with their proofs, ended early by the first failure."""
+"""Iterations and their pairs: made together, claimed in batches, saved with their proofs, ended early by the first failure.
+
+The order in which an iteration's pairs were added is the order in which they are claimed, and the failure that counts is the first in
+that order, not the first in time: what a job comes to depends neither on how many workers there are nor on what befalls them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -13,7 +18,7 @@ from sqlalchemy.orm import Session
 
 from db import events, jobs, leases, proofs
 from db.models import IterationRow, JobRow, PairRow
-from db.states import PAIR, IterationState, JobState, PairState, transition, unfinished
+from db.states import PAIR, IterationState, PairState, transition, unfinished
 from db.types import utcnow
 
 UNFINISHED = unfinished(PAIR)
@@ -31,10 +36,11 @@ class NewPair:
 
 @dataclass(frozen=True)
 class Claimed:
-    """A pair to certify now; ``attempt`` counts from 1."""
+    """A pair to certify now; ``attempt`` counts from 1, ``deaths`` is how often it may have killed its process."""
 
     index: int
     attempt: int
+    deaths: int
 
 
 @dataclass(frozen=True)
@@ -69,14 +75,12 @@ class Saved:
     """What saving changed.
 
     Attributes:
-        held: False when some of the pairs were not held any more; their results were dropped.
+        held: False when no pair of the claim is held any more; results of pairs that were not held were dropped.
         finished: True for the one saving after which the iteration has no open or running pair.
-        stopped: messages under which other workers hold pairs of this iteration that are not needed any more.
     """
 
     held: bool
     finished: bool
-    stopped: tuple[str, ...] = ()
 
 
 def add_iteration(
@@ -93,8 +97,7 @@ def add_iteration(
     stop_at_first_failure: bool,
 ) -> None:
     """Adds an iteration and its pairs; one without pairs is certified at once. The caller holds the job's lock."""
-    now = utcnow()
-    certified = {} if pairs else {"state": IterationState.CERTIFIED, "finished_at": now}
+    certified = {} if pairs else {"state": IterationState.CERTIFIED, "finished_at": utcnow()}
     session.add(
         IterationRow(
             job_id=job.id,
@@ -117,7 +120,6 @@ def add_iteration(
                     "a": p.a,
                     "b": p.b,
                     "forecast_seconds": p.forecast_seconds,
-                    "sent_at": now,
                 }
                 for p in pairs
             ],
@@ -125,32 +127,43 @@ def add_iteration(
     events.emit(session, job, "iteration", {"index": index, "label": label, "state": "running", "pairs": len(pairs), "reused": len(reuse)})
 
 
-def claim(
-    session: Session, job_id: str, iteration: int, indices: Sequence[int], *, task_id: str | None, lease_seconds: float
-) -> Claim | None:
-    """Claims what is free among these pairs: all that were never begun, or else one that was (its worker died, perhaps because of it).
+def batches(pairs: Sequence[tuple[int, float]], seconds: float) -> list[list[int]]:
+    """Groups (pair index, forecast in seconds), in their order, into pieces of work of at most ``seconds`` or one pair each.
 
-    None when there is nothing to do: done, skipped, held by someone else, or the job is not running.
+    Taking the first group away leaves the other groups as they are.
     """
-    job = jobs.lock(session, job_id)
-    if job.state != JobState.RUNNING:
-        return None
-    now, wanted = utcnow(), {index: place for place, index in enumerate(indices)}
-    rows = session.scalars(_pairs(job_id, iteration).where(PairRow.pair_index.in_(indices), PairRow.state.in_(UNFINISHED))).all()
-    free = sorted((row for row in rows if leases.is_free(row, now)), key=lambda row: wanted[row.pair_index])
-    chosen = [row for row in free if row.attempts == 0] or free[:1]
-    if not chosen:
-        return None
-    pairs = tuple(Claimed(row.pair_index, row.attempts + 1) for row in chosen)
-    token = leases.take(session, PairRow, chosen, task_id=task_id, seconds=lease_seconds)
-    return Claim(token, job_id, job.scene_id, iteration, pairs)
+    groups: list[list[int]] = []
+    filled = inf
+    for index, forecast in pairs:
+        if filled + forecast > seconds:
+            groups.append([])
+            filled = 0.0
+        groups[-1].append(index)
+        filled += forecast
+    return groups
 
 
-def save(session: Session, claim: Claim, results: Sequence[Result], *, worth_stopping: float) -> Saved:
+def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds: float) -> Claim | None:
+    """Claims the next batch of the job's open pairs, or alone one that may have killed its process.
+
+    None when no pair is open. The caller holds the job's lock.
+    """
+    rows = session.scalars(select(PairRow).where(PairRow.job_id == job.id, PairRow.state == PairState.OPEN).order_by(PairRow.id)).all()
+    if not rows:
+        return None
+    fresh = {row.pair_index: row for row in rows if row.deaths == 0}
+    groups = batches([(index, row.forecast_seconds) for index, row in fresh.items()], batch_seconds)
+    chosen = [fresh[index] for index in groups[0]] if groups else rows[:1]
+    pairs = tuple(Claimed(row.pair_index, row.attempts + 1, row.deaths) for row in chosen)
+    jobs.charge(session, job, sum(row.forecast_seconds for row in chosen))
+    token = leases.take(session, PairRow, chosen, seconds=lease_seconds)
+    return Claim(token, job.id, job.scene_id, chosen[0].iteration, pairs)
+
+
+def save(session: Session, claim: Claim, results: Sequence[Result]) -> Saved:
     """Saves results with their proofs, in one transaction, if they are still held.
 
-    A first failure skips the iteration's other pairs, where it was asked for. Other workers' messages are named in ``stopped`` when
-    the pair that they hold is expected to take more than ``worth_stopping`` seconds.
+    A failure skips the pairs after it, where the iteration ends early; whoever holds one of them stops (leases.kept).
     """
     job = jobs.lock(session, claim.job_id)
     where = (PairRow.job_id == claim.job_id, PairRow.iteration == claim.iteration, leases.held(PairRow, claim.token))
@@ -172,22 +185,17 @@ def save(session: Session, claim: Claim, results: Sequence[Result], *, worth_sto
     label, stop_at_first_failure = session.execute(
         select(IterationRow.label, IterationRow.stop_at_first_failure).where(*_iteration(job.id, claim.iteration))
     ).one()
-    stopped: tuple[str, ...] = ()
-    if stop_at_first_failure and any(result.state != PairState.CERTIFIED for result in saved):
-        stopped = skip(session, claim.job_id, worth_stopping=worth_stopping, but=claim.token)
+    failed = [held[result.index].id for result in saved if result.state != PairState.CERTIFIED]
+    if stop_at_first_failure and failed:
+        skip(session, claim.job_id, PairRow.id > min(failed))
     finished = _finish_iteration(session, job, claim.iteration, label)
-    return Saved(held=len(saved) == len(results), finished=finished, stopped=stopped)
+    still_held = session.scalar(select(PairRow.id).where(leases.held(PairRow, claim.token)).limit(1)) is not None
+    return Saved(still_held, finished)
 
 
-def skip(session: Session, job_id: str, *, worth_stopping: float, but: str | None = None) -> tuple[str, ...]:
-    """Skips the job's unfinished pairs; returns the messages, except those held under the token ``but``, that are worth stopping."""
-    where = (PairRow.job_id == job_id, PairRow.state.in_(UNFINISHED))
-    running = session.scalars(
-        select(PairRow).where(*where, PairRow.state == PairState.RUNNING, PairRow.forecast_seconds > worth_stopping)
-    ).all()
-    stopped = tuple(sorted({row.task_id for row in running if row.task_id and row.lease_token != but}))
-    transition(session, PairRow, PairState.SKIPPED, *where)
-    return stopped
+def skip(session: Session, job_id: str, *which: ColumnElement[bool]) -> None:
+    """Skips the job's unfinished pairs, all or those that fit the conditions."""
+    transition(session, PairRow, PairState.SKIPPED, PairRow.job_id == job_id, PairRow.state.in_(UNFINISHED), *which)
 
 
 def _finish_iteration(session: Session, job: JobRow, index: int, label: str) -> bool:
@@ -205,6 +213,15 @@ def _finish_iteration(session: Session, job: JobRow, index: int, label: str) -> 
 def skip_iterations(session: Session, job_id: str) -> None:
     """Ends the job's running iterations as skipped; their pairs are seen to by :func:`skip`."""
     transition(session, IterationRow, IterationState.SKIPPED, IterationRow.job_id == job_id, finished_at=utcnow())
+
+
+def reached(session: Session, iteration: IterationRow) -> Sequence[PairRow]:
+    """The settled pairs of an iteration in their order; up to the first failure where that ended it, though others were settled too."""
+    rows = session.scalars(_pairs(iteration.job_id, iteration.index).where(PairRow.state != PairState.SKIPPED).order_by(PairRow.id)).all()
+    if iteration.stop_at_first_failure:
+        first = next((place for place, row in enumerate(rows, start=1) if row.state != PairState.CERTIFIED), None)
+        rows = rows[:first]
+    return rows
 
 
 def of_iteration(session: Session, job_id: str, iteration: int) -> Sequence[PairRow]:

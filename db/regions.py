@@ -13,8 +13,9 @@ from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
 from certifier.model import Array
-from db import events, jobs, proofs
+from db import events, jobs, pages, proofs
 from db.models import IterationRow, JobRow, ProofRow, RegionRow
+from db.pages import Page
 
 
 def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any], proof: bytes) -> RegionRow:
@@ -52,11 +53,22 @@ def get(session: Session, region_id: str) -> RegionRow:
     return row
 
 
-def newest(session: Session, *, scene_id: str | None = None, job_id: str | None = None, limit: int = 100) -> Sequence[RegionRow]:
-    """Regions, newest first: of one scene, of one job, or all."""
+def page(
+    session: Session, *, scene_id: str | None = None, job_id: str | None = None, after: str | None = None, limit: int = 100
+) -> Page[RegionRow]:
+    """One page of the regions: of one scene, of one job, or all.
+
+    Raises:
+        CirisError: cursor.
+    """
     wanted = {RegionRow.scene_id: scene_id, RegionRow.job_id: job_id}
     query = select(RegionRow).where(*(column == value for column, value in wanted.items() if value is not None))
-    return session.scalars(query.order_by(RegionRow.created_at.desc(), RegionRow.id).limit(limit)).all()
+    return pages.page(session, RegionRow, query, after, limit)
+
+
+def of_job(session: Session, job_id: str) -> Sequence[RegionRow]:
+    """The job's regions, in the order of their iterations."""
+    return session.scalars(select(RegionRow).where(RegionRow.job_id == job_id).order_by(RegionRow.iteration)).all()
 
 
 @dataclass(frozen=True)

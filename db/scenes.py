@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from certifier.errors import SceneError
 from certifier.model import Scene
+from db import pages
 from db.models import SceneRow
+from db.pages import Page
 from db.session import insert_new
 
 ID_LENGTH = 16
@@ -38,6 +38,10 @@ def get(session: Session, name: str) -> SceneRow:
     return row
 
 
-def newest(session: Session, limit: int = 100) -> Sequence[SceneRow]:
-    """Scenes, newest first."""
-    return session.scalars(select(SceneRow).order_by(SceneRow.created_at.desc(), SceneRow.id).limit(limit)).all()
+def page(session: Session, after: str | None = None, limit: int = 100) -> Page[SceneRow]:
+    """One page of the scenes.
+
+    Raises:
+        CirisError: cursor.
+    """
+    return pages.page(session, SceneRow, select(SceneRow), after, limit)

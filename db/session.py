@@ -22,6 +22,16 @@ from sqlalchemy.orm import DeclarativeBase, Session
 from db.settings import settings
 
 BUSY_SECONDS = 30.0
+"""How long a writer waits for another one (SQLite)."""
+SILENCE_SECONDS = 20
+"""A PostgreSQL server or client that says nothing for so long is believed gone, and with the client its locks."""
+_LINK = {
+    "connect_timeout": 5,
+    "keepalives_idle": SILENCE_SECONDS // 4,
+    "keepalives_interval": SILENCE_SECONDS // 4,
+    "keepalives_count": 3,
+    "tcp_user_timeout": 1000 * SILENCE_SECONDS,
+}
 
 
 class Database:
@@ -30,15 +40,19 @@ class Database:
     def __init__(self, url: str) -> None:
         parsed = make_url(url)
         self.sqlite = parsed.get_backend_name() == "sqlite"
-        options: dict[str, Any] = {"json_serializer": _strict_json, "pool_pre_ping": not self.sqlite}
+        options: dict[str, Any] = {"json_serializer": _strict_json, "pool_pre_ping": not self.sqlite, "hide_parameters": True}
         if self.sqlite:
             if parsed.database:
                 Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
             options["connect_args"] = {"timeout": BUSY_SECONDS}
+        else:
+            options["connect_args"] = _LINK
         self.engine: Engine = create_engine(parsed, **options)
         if self.sqlite:
             event.listen(self.engine, "connect", _configure_sqlite)
             event.listen(self.engine, "begin", _begin_sqlite)
+        else:
+            event.listen(self.engine, "connect", _configure_postgresql)
         self.writer = self.engine.execution_options(sqlite_begin="BEGIN IMMEDIATE")
 
     @contextmanager
@@ -80,6 +94,13 @@ def _configure_sqlite(connection: Any, _record: Any) -> None:
     connection.isolation_level = None
     for pragma in ("journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON"):
         connection.execute(f"PRAGMA {pragma}")
+
+
+def _configure_postgresql(connection: Any, _record: Any) -> None:
+    """Has the server end a transaction whose client is gone or hangs, so that it locks nobody out."""
+    with connection.cursor() as cursor:
+        cursor.execute(f"SET idle_in_transaction_session_timeout = '{SILENCE_SECONDS}s'")
+    connection.commit()
 
 
 def _begin_sqlite(connection: Connection) -> None:

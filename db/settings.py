@@ -19,6 +19,13 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def _memory_of_a_process() -> int:
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // _cores()
+
+
+LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
+
+
 class Settings(BaseSettings):
     """Every setting of the service; ``CIRIS_DATA_DIR=/srv/ciris`` sets ``data_dir``, and so on."""
 
@@ -32,30 +39,39 @@ class Settings(BaseSettings):
     """Celery's broker; empty: the embedded stack starts its own."""
 
     host: str = "127.0.0.1"
-    """Address the API binds to."""
-    allow_remote: bool = False
-    """Let the API bind to an address that others can reach, though it asks nobody for a key (inside a container, behind a proxy)."""
+    """Address the API binds to; one that others can reach needs an API key to have been made."""
     port: int = 8643
     """Port the API binds to; the embedded stack takes a free one when it is taken and was not asked for."""
+    requests_per_second: float = Field(default=100.0, gt=0)
+    """How many requests one key (or one address without a key) may make for long; for a short while, twice as many."""
     solve_processes: int = Field(default_factory=_cores, ge=1)
     """Processes that solve pairs, one thread each."""
 
     batch_seconds: float = 0.5
-    """Pairs are sent together until their forecasts sum to this many seconds."""
+    """Pairs are certified together until their forecasts sum to this many seconds."""
     lease_seconds: float = 60.0
     """How long a claim lasts without being renewed; its holder renews it four times as often."""
     max_attempts: int = 3
-    """How often a pair or step is begun before it counts as poison and ends as an error."""
+    """How often the process of a pair or step dies, alone, before that counts as poison and ends as an error."""
     sweep_seconds: float = 2.0
     """Pause between two rounds of the sweeper."""
-    resend_seconds: float = 10.0
-    """Work that nobody has claimed this long after it was sent, with the queue empty, is sent again."""
-    step_timeout_seconds: float = 3600.0
-    """Limit of one seeding or polytope step."""
     verify_timeout_seconds: float = 600.0
     """Limit of one check of a stored proof on request."""
+    webhook_private: bool = False
+    """Let webhooks go to addresses that are not public, as in a network of one's own."""
+    time_limit_seconds: float = Field(default=3600.0, gt=0)
+    """Hard limit of one batch of pairs or one step; its process is then killed. A job with a pair that would need longer is refused."""
     child_memory_bytes: int = 16 << 30
-    """Limit of the address space of the process that runs a seeding, a polytope step or a check on request."""
+    """Limit of the address space of the process that runs a seeding or a check on request."""
+    pair_memory_bytes: int = Field(default_factory=_memory_of_a_process)
+    """A job with a pair that would need more memory is refused. Default: this machine's memory, divided by its cores."""
+    max_jobs_per_key: int = Field(default=1000, ge=1)
+    """How many jobs of one API key may be unfinished (of all callers together where the service asks for no key)."""
+
+    @property
+    def loopback(self) -> bool:
+        """Whether only this machine can reach the API."""
+        return self.host in LOOPBACK_NAMES
 
     @property
     def database(self) -> str:

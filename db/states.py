@@ -1,4 +1,4 @@
-"""The states of jobs, pairs, steps and iterations, their legal transitions as data, and the one function that makes them.
+"""The states of jobs, pairs, steps, iterations and webhooks, their legal transitions as data, and the one function that makes them.
 
 A transition is a conditional update: it changes the rows that are in a state from which the new one may be reached, and
 tells how many those were. Two processes that race for the same transition therefore never both win.
@@ -14,7 +14,7 @@ from sqlalchemy import ColumnElement, CursorResult, update
 from sqlalchemy.orm import Session
 
 if TYPE_CHECKING:
-    from db.models import IterationRow, JobRow, PairRow, StepRow
+    from db.models import IterationRow, JobRow, PairRow, StepRow, WebhookRow
 
 
 class JobState(StrEnum):
@@ -68,7 +68,7 @@ class StepState(StrEnum):
     FAILED = "failed"
     """``report`` says why; for an ``accept`` the region's proof was refused and the region is not served."""
     SKIPPED = "skipped"
-    """Not needed any more: the job ended."""
+    """Not needed any more: the job ended, or (``accept``) a later region was accepted."""
 
 
 class StepKind(StrEnum):
@@ -89,6 +89,15 @@ class IterationState(StrEnum):
     """At least one pair was not certified."""
     SKIPPED = "skipped"
     """The job ended first."""
+
+
+class WebhookState(StrEnum):
+    WAITING = "waiting"
+    """The job has not ended, or its end has not been received yet."""
+    DELIVERED = "delivered"
+    """The receiver has answered with a status of success."""
+    FAILED = "failed"
+    """Given up; ``error`` says why."""
 
 
 Table = Mapping[str, frozenset[str]]
@@ -131,6 +140,10 @@ ITERATION: Table = _table(
     IterationState,
     {IterationState.RUNNING: {IterationState.CERTIFIED, IterationState.FAILED, IterationState.SKIPPED}},
 )
+WEBHOOK: Table = _table(
+    WebhookState,
+    {WebhookState.WAITING: {WebhookState.DELIVERED, WebhookState.FAILED}},
+)
 
 
 def sources(table: Table, target: str) -> frozenset[str]:
@@ -145,7 +158,7 @@ def unfinished(table: Table) -> frozenset[str]:
 
 def transition(
     session: Session,
-    model: type[JobRow | PairRow | StepRow | IterationRow],
+    model: type[JobRow | PairRow | StepRow | IterationRow | WebhookRow],
     target: str,
     *where: ColumnElement[bool],
     **values: Any,

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any
+from datetime import datetime
+from typing import Any, cast
 
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, CursorResult, select, update
 from sqlalchemy.orm import Session
 
 from db import events, jobs, leases
 from db.models import JobRow, StepRow
-from db.states import JOB, STEP, StepKind, StepState, transition, unfinished
+from db.states import STEP, StepKind, StepState, transition, unfinished
 from db.types import utcnow
 
 UNFINISHED = unfinished(STEP)
@@ -19,7 +20,7 @@ UNFINISHED = unfinished(STEP)
 
 @dataclass(frozen=True)
 class Claim:
-    """A step held under a token, with what is needed to do it; ``attempt`` counts from 1."""
+    """A step held under a token, with what is needed to do it; ``attempt`` and ``deaths`` as for db.pairs.Claimed."""
 
     token: str
     step_id: int
@@ -29,53 +30,63 @@ class Claim:
     kind: StepKind
     input: dict[str, Any]
     attempt: int
+    deaths: int
 
 
-def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any]) -> StepRow:
-    """Adds a step of the job's present turn; the caller holds the job's lock."""
-    step = StepRow(job_id=job.id, turn=job.turn, kind=kind, input=input, sent_at=utcnow())
+def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any], due_at: datetime | None = None) -> StepRow:
+    """Adds a step of the job's present turn, due now unless told otherwise; the caller holds the job's lock."""
+    step = StepRow(job_id=job.id, turn=job.turn, kind=kind, input=input, due_at=due_at or utcnow())
     session.add(step)
     session.flush()
     events.emit(session, job, "step", {"kind": kind, "state": StepState.OPEN})
     return step
 
 
-def claim(session: Session, step_id: int, *, task_id: str | None, lease_seconds: float) -> Claim | None:
-    """Claims the step; None when it is done, skipped or held by someone else, or when the job has ended."""
-    step = session.get(StepRow, step_id)
+def claim(session: Session, job: JobRow, kinds: Collection[StepKind], *, lease_seconds: float) -> Claim | None:
+    """Claims the job's latest step of these kinds that is open and due; None when there is none. The caller holds the job's lock."""
+    query = select(StepRow).where(StepRow.job_id == job.id, is_due(StepRow), StepRow.kind.in_(kinds))
+    step = session.scalar(query.order_by(StepRow.turn.desc()).limit(1))
     if step is None:
         return None
-    job = jobs.lock(session, step.job_id)
-    session.refresh(step)
-    if job.state not in unfinished(JOB) or not leases.is_free(step, utcnow()):
-        return None
-    attempt = step.attempts + 1
-    token = leases.take(session, StepRow, [step], task_id=task_id, seconds=lease_seconds)
-    return Claim(token, step_id, job.id, job.scene_id, job.options, StepKind(step.kind), step.input, attempt)
+    attempt, deaths = step.attempts + 1, step.deaths
+    token = leases.take(session, StepRow, [step], seconds=lease_seconds)
+    return Claim(token, step.id, job.id, job.scene_id, job.options, StepKind(step.kind), step.input, attempt, deaths)
 
 
 def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any], seconds: float) -> bool:
-    """Ends the step with its report, if it is still held; the caller holds the job's lock."""
+    """Ends the step with its report, if it is still held; the caller holds the job's lock.
+
+    A region that was accepted takes the place of those certified before it that nobody has begun to accept.
+    """
     held = (StepRow.id == claim.step_id, leases.held(StepRow, claim.token))
     if not transition(session, StepRow, state, *held, report=report, seconds=seconds, lease_until=None):
         return False
-    events.emit(session, jobs.get(session, claim.job_id), "step", {"kind": claim.kind, "state": state, "seconds": seconds})
+    job = jobs.get(session, claim.job_id)
+    jobs.charge(session, job, seconds)
+    events.emit(session, job, "step", {"kind": claim.kind, "state": state, "seconds": seconds})
+    if claim.kind == StepKind.ACCEPT and state == StepState.DONE:
+        turn = select(StepRow.turn).where(StepRow.id == claim.step_id).scalar_subquery()
+        earlier = (StepRow.job_id == job.id, StepRow.kind == StepKind.ACCEPT, StepRow.turn < turn)
+        transition(session, StepRow, StepState.SKIPPED, *earlier, StepRow.state == StepState.OPEN)
     return True
 
 
-def skip(session: Session, job_id: str) -> tuple[str, ...]:
-    """Skips the job's unfinished steps, except that certified polytopes are still accepted; returns the messages that hold some."""
+def is_due(step: type[StepRow]) -> ColumnElement[bool]:
+    """Condition: the step is open and may be begun."""
+    return (step.state == StepState.OPEN) & (step.due_at <= utcnow())
+
+
+def hasten(session: Session, job_id: str) -> bool:
+    """Makes the job's open steps due now; False when they are already."""
+    now = utcnow()
+    late = update(StepRow).where(StepRow.job_id == job_id, StepRow.state == StepState.OPEN, StepRow.due_at > now).values(due_at=now)
+    return bool(cast("CursorResult[Any]", session.execute(late)).rowcount)
+
+
+def skip(session: Session, job_id: str) -> None:
+    """Skips the job's unfinished steps, except that certified polytopes are still accepted."""
     where = (StepRow.job_id == job_id, StepRow.kind != StepKind.ACCEPT, StepRow.state.in_(UNFINISHED))
-    holding = session.scalars(select(StepRow.task_id).where(*where, StepRow.state == StepState.RUNNING)).all()
     transition(session, StepRow, StepState.SKIPPED, *where)
-    return tuple(task_id for task_id in holding if task_id)
-
-
-def supersede(session: Session, job: JobRow) -> None:
-    """Skips the regions that nobody has begun to accept: a later one has been reached."""
-    transition(
-        session, StepRow, StepState.SKIPPED, StepRow.job_id == job.id, StepRow.kind == StepKind.ACCEPT, StepRow.state == StepState.OPEN
-    )
 
 
 def of_turn(session: Session, job: JobRow, kind: StepKind) -> StepRow | None:

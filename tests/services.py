@@ -9,7 +9,7 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -46,6 +46,14 @@ class Queue:
             self._process.wait()
             self._process = None
 
+    def kill(self, *, losing_everything: bool) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+        if losing_everything:
+            shutil.rmtree(self._directory / "data")
+
     def flush(self) -> None:
         """Loses every message."""
         redis.Redis(unix_socket_path=str(self.socket)).flushall()
@@ -80,17 +88,24 @@ class Postgres:
 
 
 @contextmanager
-def postgres_server() -> Iterator[Postgres]:
-    """A private PostgreSQL; as root it runs as ``nobody``, because it refuses to run as root."""
+def postgres_server(port: int | None = None, reachable: Sequence[str] = ()) -> Iterator[Postgres]:
+    """A private PostgreSQL; as root it runs as ``nobody``, because it refuses to run as root.
+
+    Args:
+        reachable: addresses of this machine at which others, whom it trusts, can reach it too.
+    """
     binaries = _postgres_binaries()
     user = "nobody" if os.geteuid() == 0 else None
     with tempfile.TemporaryDirectory(prefix="cp-", dir="/tmp") as directory:
         if user is not None:
             shutil.chown(directory, user)
-        data, port = Path(directory) / "data", _free_port()
+        data, port = Path(directory) / "data", port or free_port()
         initialise = [binaries / "initdb", "-D", data, "-U", "postgres", "-A", "trust", "--no-sync", "--locale=C.UTF-8", "-E", "UTF8"]
         subprocess.run(initialise, check=True, stdout=subprocess.DEVNULL, user=user, cwd=directory)
-        serve = [binaries / "postgres", "-D", data, "-p", str(port), "-k", directory, "-c", "listen_addresses=127.0.0.1", "-c", "fsync=off"]
+        with (data / "pg_hba.conf").open("a") as trusted:
+            trusted.writelines(f"host all all {address}/30 trust\n" for address in reachable)
+        listen = f"listen_addresses={','.join(['127.0.0.1', *reachable])}"
+        serve = [binaries / "postgres", "-D", data, "-p", str(port), "-k", directory, "-c", listen, "-c", "fsync=off"]
         preexec = partial(die_with_parent, signal.SIGINT)
         with (Path(directory) / "log").open("wb") as log:
             process = subprocess.Popen(serve, stdout=log, stderr=log, user=user, cwd=directory, preexec_fn=preexec)
@@ -99,7 +114,7 @@ def postgres_server() -> Iterator[Postgres]:
             _wait(lambda: server.connect().close(), psycopg.OperationalError, process)
             yield server
         finally:
-            process.send_signal(signal.SIGINT)
+            process.send_signal(signal.SIGQUIT)  # at once: nobody needs the data any more
             process.wait()
 
 
@@ -114,7 +129,7 @@ def _postgres_binaries() -> Path:
     return found
 
 
-def _free_port() -> int:
+def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

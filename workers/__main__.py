@@ -1,13 +1,12 @@
 """``python -m workers control`` or ``python -m workers solve``: one Celery worker, with the settings of the environment.
 
-The control worker coordinates jobs in threads and runs the sweeper. The solve worker runs ``CIRIS_SOLVE_PROCESSES`` processes, each of
-which computes in one thread: the pairs are what is parallel.
+The control worker coordinates jobs in threads, runs the sweeper and delivers webhooks. The solve worker runs
+``CIRIS_SOLVE_PROCESSES`` processes, each of which computes in one thread: the pairs are what is parallel.
 """
 
 from __future__ import annotations
 
 import argparse
-import logging
 import os
 import threading
 from typing import Any
@@ -20,10 +19,10 @@ def main() -> None:
     parser.add_argument("queue", choices=["control", "solve"])
     queue = parser.parse_args().queue
     os.environ.update(ONE_THREAD)  # before numpy is imported
-    logging.basicConfig(level=logging.INFO, format=f"%(asctime)s {queue} %(processName)s %(levelname)s %(name)s: %(message)s")
 
-    from celery.signals import worker_process_init, worker_ready
+    from celery.signals import setup_logging, worker_process_init, worker_ready
 
+    from db import logs
     from db.session import database
     from db.settings import settings
     from workers.app import CONTROL, celery_app
@@ -35,6 +34,10 @@ def main() -> None:
     pool = ["--pool=threads", "--concurrency=2"] if queue == CONTROL else ["--pool=prefork", f"--concurrency={settings().solve_processes}"]
     stop = threading.Event()
 
+    @setup_logging.connect(weak=False)
+    def configure_logs(**_: Any) -> None:
+        logs.configure(queue)
+
     @worker_process_init.connect(weak=False)
     def after_fork(**_: Any) -> None:
         die_with_parent()
@@ -43,12 +46,14 @@ def main() -> None:
     @worker_ready.connect(weak=False)
     def sweep(**_: Any) -> None:
         if queue == CONTROL:
-            from workers import sweeper
+            from workers import sweeper, webhooks
 
-            threading.Thread(target=sweeper.run, args=(stop,), name="sweeper", daemon=True).start()
+            for loop in (sweeper.run, webhooks.run):
+                threading.Thread(target=loop, args=(stop,), name=loop.__module__, daemon=True).start()
 
     app.worker_main(
         [
+            "--quiet",
             "worker",
             f"--queues={queue}",
             f"--hostname={queue}-{os.getpid()}@%h",

@@ -1,7 +1,8 @@
-"""The Celery application: built once from the settings, set up to lose no work, and the senders of its messages.
+"""The Celery application: built once from the settings, and the senders of its messages.
 
-Messages carry only ids and are sent after the transaction that they announce. A message may come twice, late or never: what is
-to be done stands in the database, claims are conditional, and the sweeper sends again what was lost.
+A message to the control worker names a job; one to the solvers only says that there is work, and whoever takes it asks the database
+which (db.work). Messages are sent after the transaction that they announce. They may come twice, late or never: what is to be done
+stands in the database, claims are conditional, and the sweeper sends again what was lost.
 """
 
 from __future__ import annotations
@@ -13,13 +14,19 @@ from functools import cache
 from celery import Celery
 from kombu import Queue
 from kombu.exceptions import OperationalError
+from redis.exceptions import RedisError
 
 from db.settings import settings
 
 log = logging.getLogger(__name__)
 
 CONTROL, SOLVE = "control", "solve"
-COORDINATE, SOLVE_PAIRS, RUN_STEP = "ciris.coordinate", "ciris.solve_pairs", "ciris.run_step"
+COORDINATE, WORK = "ciris.coordinate", "ciris.work"
+
+SILENCE_SECONDS = 10
+"""A Redis that says nothing for so long is believed gone, and the connection is made anew."""
+GRACE_SECONDS = 30
+"""How much later than the step's own limit, which ends it with an error, the worker kills its process."""
 
 SENDING = {"max_retries": 1, "interval_start": 0, "interval_step": 0}
 """Whoever sends does not wait for Redis to come back: the sweeper sends again."""
@@ -32,7 +39,7 @@ def celery_app() -> Celery:
     app.conf.update(
         task_queues=[Queue(CONTROL), Queue(SOLVE)],
         task_default_queue=CONTROL,
-        task_routes={COORDINATE: CONTROL, SOLVE_PAIRS: SOLVE, RUN_STEP: SOLVE},
+        task_routes={COORDINATE: CONTROL, WORK: SOLVE},
         task_serializer="json",
         accept_content=["json"],
         task_ignore_result=True,
@@ -40,17 +47,16 @@ def celery_app() -> Celery:
         task_acks_late=True,
         task_reject_on_worker_lost=True,
         worker_prefetch_multiplier=1,
+        task_time_limit=settings().time_limit_seconds + GRACE_SECONDS,
+        worker_enable_remote_control=False,
         worker_hijack_root_logger=False,
         broker_connection_retry_on_startup=True,
         broker_connection_max_retries=None,
         broker_transport_options={
-            # A whole worker that dies gives its messages back within seconds, not minutes.
-            "unacked_restore_interval": 5,
-            "unacked_restore_throttle": 1,
-            "visibility_timeout": 3600,
-            # Waiting for a message is not a broken connection.
-            "socket_timeout": None,
+            "socket_timeout": SILENCE_SECONDS,
             "socket_connect_timeout": 2,
+            "socket_keepalive": True,
+            "health_check_interval": SILENCE_SECONDS // 2,
             **SENDING,
         },
         task_publish_retry_policy=SENDING,
@@ -63,23 +69,9 @@ def send_coordinate(job_id: str) -> bool:
     return _send(COORDINATE, [[job_id]])
 
 
-def send_pairs(job_id: str, iteration: int, batches: Sequence[Sequence[int]]) -> bool:
-    """Sends batches of pair indices to the solvers; False as for :func:`send_coordinate`."""
-    return _send(SOLVE_PAIRS, [[job_id, iteration, list(batch)] for batch in batches])
-
-
-def send_step(step_id: int) -> bool:
-    """Sends a step to the solvers; False as for :func:`send_coordinate`."""
-    return _send(RUN_STEP, [[step_id]])
-
-
-def stop_messages(task_ids: Sequence[str]) -> None:
-    """Kills the processes that work on these messages. What is not reached ends by itself and can save nothing."""
-    if task_ids:
-        try:
-            celery_app().control.revoke(list(task_ids), terminate=True, signal="SIGKILL")
-        except OperationalError as error:
-            log.warning("Redis cannot be reached; %d tasks that are not needed run to their end: %s", len(task_ids), error)
+def send_work(count: int = 1) -> bool:
+    """Tells the solvers of so many pieces of work; False as for :func:`send_coordinate`."""
+    return _send(WORK, [[]] * count)
 
 
 def _send(name: str, calls: Sequence[Sequence[object]]) -> bool:
@@ -101,5 +93,8 @@ def waiting(queue: str) -> int:
         kombu.exceptions.OperationalError: Redis cannot be reached.
     """
     app = celery_app()
-    with app.connection_for_read() as connection, connection.channel() as channel:
-        return int(app.amqp.queues[queue](channel).queue_declare(passive=False).message_count)
+    try:
+        with app.connection_for_read() as connection, connection.channel() as channel:
+            return int(app.amqp.queues[queue](channel).queue_declare(passive=False).message_count)
+    except RedisError as error:
+        raise OperationalError(str(error)) from error

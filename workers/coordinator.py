@@ -6,17 +6,13 @@ and the rows' outcomes into its reports, and says how a job ends. Nothing here r
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
 from typing import Any
 
-from certifier.growth import Certification, Failed, GrowthOptions, Proposed, Report, Stepped, Transition, advance, begin
+from certifier.growth import Failed, GrowthOptions, Proposed, Report, Stepped, Transition, advance, begin
 from certifier.model import Scene
 from certifier.outcome import Outcome
-from db.states import JobKind, JobState, PairState, StepKind, StepState
-
-SETTLED = {state.value: Outcome(state.value) for state in PairState if state.value in set(Outcome)}
+from db.states import JobKind, JobState, StepKind, StepState
 
 
 def next_transition(scene: Scene, options: dict[str, Any], state: dict[str, Any] | None, report: Report | None) -> Transition:
@@ -27,11 +23,6 @@ def next_transition(scene: Scene, options: dict[str, Any], state: dict[str, Any]
     if report is None:
         raise ValueError("a job that has begun advances with a report")
     return advance(scene, state, report)
-
-
-def certification_report(iteration: int, states: dict[int, str], weak: dict[int, dict[str, Any]]) -> Certification:
-    """The report of a certification from its pairs' final states and where they fail; skipped pairs are left out."""
-    return Certification(iteration, {index: SETTLED[state] for index, state in states.items() if state in SETTLED}, weak)
 
 
 def step_report(kind: StepKind, state: StepState, report: dict[str, Any]) -> Report:
@@ -60,21 +51,3 @@ def ending(kind: str, outcome: Outcome, reason: str, error: dict[str, Any] | Non
     if outcome == Outcome.CERTIFIED or (kind == JobKind.CERTIFY and outcome != Outcome.ERROR):
         return Ending(JobState.SUCCEEDED, outcome, reason)
     return Ending(JobState.FAILED, outcome, reason, error or {"code": "not_grown", "message": reason, "field": None, "hint": ""})
-
-
-def batches(pairs: Sequence[tuple[int, float]], seconds: float) -> list[list[int]]:
-    """Groups (pair index, forecast in seconds) into messages.
-
-    Pairs expected to take ``seconds`` or more travel alone, longest first; the others keep their order and travel together until
-    they fill that time.
-    """
-    big = sorted((pair for pair in pairs if pair[1] >= seconds), key=lambda pair: -pair[1])
-    groups = [[index] for index, _ in big]
-    filled = inf
-    for index, forecast in (pair for pair in pairs if pair[1] < seconds):
-        if filled + forecast > seconds:
-            groups.append([])
-            filled = 0.0
-        groups[-1].append(index)
-        filled += forecast
-    return groups

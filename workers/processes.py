@@ -1,20 +1,30 @@
-"""Child processes that do not outlive their parent, and the private queue server that is one of them."""
+"""Child processes that do not outlive their parent or get in the way of others, and the private queue server that is one of them."""
 
 from __future__ import annotations
 
 import ctypes
+import os
 import shutil
 import signal
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1
+NICENESS = 10
 
 
 def die_with_parent(sig: int = signal.SIGKILL) -> None:
     """Has the kernel send this process a signal when its parent dies (Linux only; elsewhere nothing happens)."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, sig)
+
+
+def give_way() -> None:
+    """Lets every other process go first: by niceness, and by that of the session, which is what Linux' autogroups compare."""
+    os.nice(NICENESS)
+    with suppress(OSError):
+        Path("/proc/self/autogroup").write_text(str(NICENESS))
 
 
 def queue_server_command(directory: Path, socket: Path) -> list[str]:

@@ -23,14 +23,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from types import FrameType
 
 from certifier.errors import CirisError
-from db import migrate
+from db import keys, logs, migrate
 from db.settings import Settings
-from workers.processes import die_with_parent, queue_server_command, queue_url
+from workers.processes import die_with_parent, give_way, queue_server_command, queue_url
 
 log = logging.getLogger(__name__)
 
@@ -48,11 +47,16 @@ STOP_SECONDS = 8.0
 
 @dataclass
 class Child:
-    """One supervised process, in a process group of its own, so that Ctrl-C reaches only the supervisor."""
+    """One supervised process, in a session of its own, so that Ctrl-C reaches only the supervisor.
+
+    Attributes:
+        background: it computes; on a busy machine the others answer first.
+    """
 
     name: str
     command: list[str]
     stop_signal: int
+    background: bool = False
     process: subprocess.Popen[bytes] | None = None
     started: float = 0.0
     backoff: float = 0.0
@@ -66,9 +70,15 @@ class Child:
                 stderr=output,
                 env=environment,
                 start_new_session=True,
-                preexec_fn=partial(die_with_parent, self.stop_signal),
+                preexec_fn=self._prepare,
             )
         self.started = time.monotonic()
+
+    def _prepare(self) -> None:
+        """In the child, before it becomes its program."""
+        die_with_parent(self.stop_signal)
+        if self.background:
+            give_way()
 
     @property
     def dead(self) -> bool:
@@ -107,7 +117,7 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
         ready: called once with the API's URL, when it answers.
 
     Raises:
-        CirisError: stack_running, port_taken, or stack_failed when the API does not come up.
+        CirisError: stack_running, port_taken, no_keys, or stack_failed when the API does not come up.
     """
     data = settings.data_dir.expanduser().absolute()
     (data / "logs").mkdir(parents=True, exist_ok=True)
@@ -117,6 +127,7 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
         children = _children(settings, data, sockets / SOCKET)
         environment = _environment(settings, data, sockets / SOCKET, bound)
         migrate.upgrade(settings.database)
+        keys.check_bind(settings)
         try:
             for child in children:
                 child.start(environment, data / "logs")
@@ -134,7 +145,7 @@ def _children(settings: Settings, data: Path, queue_socket: Path) -> list[Child]
     """The processes, in the order of starting."""
     children = [
         Child("control", [sys.executable, "-m", "workers", "control"], signal.SIGQUIT),
-        Child("solve", [sys.executable, "-m", "workers", "solve"], signal.SIGQUIT),
+        Child("solve", [sys.executable, "-m", "workers", "solve"], signal.SIGQUIT, background=True),
         Child("api", [sys.executable, "-m", "api"], signal.SIGTERM),
     ]
     if not settings.redis_url:
@@ -247,7 +258,7 @@ def main() -> None:
     parser.add_argument("--port", type=int, help="the API's port; default: CIRIS_PORT, or any free one when that is taken")
     parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
     arguments = parser.parse_args()
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s")
+    logs.configure("stack")
     chosen = Settings() if arguments.data is None else Settings(data_dir=arguments.data)
     try:
         run_stack(chosen, port=arguments.port, ready=lambda url: print(f"ciris is up at {url}", flush=True))

@@ -1,4 +1,4 @@
-"""Doing a step: seeding, the polytope step, accepting a region. A message may come twice, or its worker die halfway, without harm."""
+"""Doing a claimed step: seeding, the polytope step, accepting a region. The worker may die halfway without harm."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 from sqlalchemy.orm import Session
+from structlog.contextvars import bound_contextvars
 
 from certifier.child import run_in_child
 from certifier.errors import CirisError
@@ -24,11 +24,12 @@ from db import jobs, leases, pairs, proofs, regions, steps
 from db.models import JobRow, StepRow
 from db.session import database
 from db.settings import settings
-from db.states import IterationState, StepKind, StepState
+from db.states import IterationState, JobState, StepKind, StepState
 from db.types import utcnow
-from workers.app import send_coordinate
+from workers.app import send_coordinate, send_work
+from workers.pairs import LOST
 from workers.scenes import load_scene
-from workers.transaction import writing
+from workers.transaction import persistently
 
 log = logging.getLogger(__name__)
 
@@ -41,34 +42,40 @@ class Done:
     save: Callable[[Session, JobRow], None] = lambda session, job: None
 
 
-def run_step(step_id: int, task_id: str | None = None) -> None:
-    """Does a step, unless it is done, not wanted any more, or being done by someone else."""
-    lease = settings().lease_seconds
-    with database().write() as session:
-        claim = steps.claim(session, step_id, task_id=task_id, lease_seconds=lease)
-    if claim is None:
-        return
+def carry_out(claim: steps.Claim) -> None:
+    """Does a claimed step and saves what came of it."""
+    wanted = [JobState.RUNNING, JobState.CANCELLING] if claim.kind == StepKind.ACCEPT else [JobState.RUNNING]
     start = time.perf_counter()
-    with leases.renewed(database(), StepRow, claim.token, lease):
+    bound = bound_contextvars(job=claim.job_id, step=claim.kind.value)
+    with bound, leases.kept(database(), StepRow, claim.token, settings().lease_seconds, wanted):
         try:
             state, done = StepState.DONE, _do(claim)
         except CirisError as error:
             state, done = StepState.FAILED, Done(error.to_document())
         except Exception as error:
-            log.exception("job %s: step %s failed", claim.job_id, claim.kind)
+            log.exception("the step failed")
             problem = CirisError("internal_error", f"{claim.kind}: {type(error).__name__}: {error}")
             state, done = StepState.FAILED, Done(problem.to_document())
-        with writing() as (session, afterwards):
-            job = jobs.lock(session, claim.job_id)
-            if steps.save(session, claim, state, done.report, time.perf_counter() - start):
-                done.save(session, job)
-                afterwards.append(partial(send_coordinate, claim.job_id))
+        saved = persistently(lambda: _save(claim, state, done, time.perf_counter() - start))
+    if saved:
+        if claim.kind == StepKind.ACCEPT and state == StepState.FAILED:
+            send_work()  # a region certified earlier may be had instead
+        send_coordinate(claim.job_id)
+
+
+def _save(claim: steps.Claim, state: StepState, done: Done, seconds: float) -> bool:
+    with database().write() as session:
+        job = jobs.lock(session, claim.job_id)
+        if not steps.save(session, claim, state, done.report, seconds):
+            return False
+        done.save(session, job)
+        return True
 
 
 def _do(claim: steps.Claim) -> Done:
-    limit = settings().max_attempts
-    if claim.attempt > limit:
-        raise CirisError("worker_lost", f"the worker died {limit} times during the step {claim.kind} (killed, crashed or out of memory)")
+    if leases.is_poison(claim.deaths, claim.attempt, settings().max_attempts):
+        problem = f"{LOST.format(deaths=claim.deaths, attempts=claim.attempt - 1)} the step {claim.kind}"
+        raise CirisError("worker_lost", problem)
     scene = load_scene(claim.scene_id)
     match claim.kind:
         case StepKind.PROPOSE:
@@ -80,7 +87,10 @@ def _do(claim: steps.Claim) -> Done:
 
 
 def _propose(scene: Scene, claim: steps.Claim) -> Done:
-    return Done(_in_child("propose_in_child", {"scene": scene.to_document(), "seed": claim.input["seed"]}))
+    """Seeds in a process of its own: Drake may abort the process, hang, or want too much memory, and that fails the step, nothing else."""
+    limits, payload = settings(), {"scene": scene.to_document(), "seed": claim.input["seed"]}
+    timeout, memory = limits.time_limit_seconds, limits.child_memory_bytes
+    return Done(run_in_child("workers.steps:propose_in_child", payload, timeout_s=timeout, memory_bytes=memory))
 
 
 def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:
@@ -90,33 +100,28 @@ def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:
 
 
 def _step(scene: Scene, claim: steps.Claim) -> Done:
-    return Done(_in_child("step_in_child", {"job_id": claim.job_id, "scene_id": claim.scene_id, **claim.input}))
+    """The polytope step on an accepted polytope with its proofs."""
+    action = claim.input
 
+    def read() -> dict[int, bytes]:
+        with database().read() as session:
+            rows = steps.accepted(session, claim.job_id)
+            accepted = next(row.input for row in rows if row.input["iteration"] == action["iteration"])
+            return _proofs(session, claim.job_id, accepted["proofs"])
 
-def step_in_child(payload: dict[str, Any]) -> dict[str, Any]:
-    """The polytope step on an accepted polytope, as its child process runs it: the action and ids in, the report out."""
-    job_id, iteration = payload["job_id"], payload["iteration"]
-    with database().read() as session:
-        accepted = next(row.input for row in steps.accepted(session, job_id) if row.input["iteration"] == iteration)
-        held = _proofs(session, job_id, accepted["proofs"])
-    return asdict(stepped(polytope_step(load_scene(payload["scene_id"]), Polytope(np.array(payload["C"]), np.array(payload["d"])), held)))
-
-
-def _in_child(function: str, payload: dict[str, Any]) -> dict[str, Any]:
-    """A report computed by a process of its own: native code that dies, hangs or wants too much memory fails the step, nothing else."""
-    limits = settings()
-    report: dict[str, Any] = run_in_child(
-        f"workers.steps:{function}", payload, timeout_s=limits.step_timeout_seconds, memory_bytes=limits.child_memory_bytes
-    )
-    return report
+    polytope = Polytope(np.array(action["C"]), np.array(action["d"]))
+    return Done(asdict(stepped(polytope_step(scene, polytope, persistently(read)))))
 
 
 def _accept(scene: Scene, claim: steps.Claim) -> Done:
     """Assembles and verifies the proof of a region; what the verifier refuses is raised as its ProofError and never stored."""
     accepted = claim.input
-    with database().read() as session:
-        held = _proofs(session, claim.job_id, accepted["proofs"])
-        provenance = _provenance(session, scene, jobs.get(session, claim.job_id))
+
+    def read() -> tuple[dict[int, bytes], dict[str, Any]]:
+        with database().read() as session:
+            return _proofs(session, claim.job_id, accepted["proofs"]), _provenance(session, scene, jobs.get(session, claim.job_id))
+
+    held, provenance = persistently(read)
     region = certified_region(scene, Accepted(**accepted), held, provenance)
 
     def save(session: Session, job: JobRow) -> None:

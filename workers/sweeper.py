@@ -10,72 +10,86 @@ import threading
 from collections.abc import Sequence
 from datetime import datetime, timedelta
 from functools import partial
+from typing import Any
 
 from kombu.exceptions import OperationalError
 
-from db import jobs, leases
+from db import events, jobs, leases, work
 from db.models import PairRow, StepRow
 from db.session import database
 from db.settings import settings
 from db.types import utcnow
-from workers.app import SOLVE, send_coordinate, send_pairs, send_step, waiting
-from workers.coordinator import batches
-from workers.transaction import Afterwards, writing
+from workers.app import SOLVE, send_coordinate, send_work, waiting
+from workers.transaction import writing
 
 log = logging.getLogger(__name__)
+
+MOST_MESSAGES = 1000
+"""How many messages to the solvers one round sends at most; the next round sees what is left."""
 
 
 def run(stop: threading.Event) -> None:
     """Sweeps until ``stop`` is set. A round that fails (the database or Redis is away) is logged, and the next one tries again."""
+    holders = Holders()
     while not stop.wait(settings().sweep_seconds):
         try:
-            sweep()
+            sweep(by_time=holders.could_renew(utcnow()))
         except OperationalError as error:
             log.warning("Redis cannot be reached; nothing was sent again: %s", error)
         except Exception:
             log.exception("a round of the sweeper failed")
+            holders.database_was_away()
 
 
-def sweep() -> None:
-    """One round: frees what dead workers held, sends again what no message stands for any more, asks for due coordinations."""
-    now = utcnow()
-    _release_lost(PairRow)
-    _release_lost(StepRow)
-    if waiting(SOLVE) == 0:
-        # With no message waiting, an open row that was sent a while ago has lost its message.
-        before = now - timedelta(seconds=settings().resend_seconds)
-        _send_again(PairRow, before)
-        _send_again(StepRow, before)
+class Holders:
+    """Whether the holders of leases have had the time to renew them: not while the database is away or this machine sleeps."""
+
+    def __init__(self) -> None:
+        self._since = self._last = utcnow()
+
+    def could_renew(self, now: datetime) -> bool:
+        """Whether what ran out by ``now`` ran out because nobody renewed it. To be asked in every round."""
+        lease = timedelta(seconds=settings().lease_seconds)
+        if now - self._last > lease / 2:
+            self._since = now
+        self._last = now
+        return now - self._since >= lease
+
+    def database_was_away(self) -> None:
+        self._since = self._last
+
+
+def sweep(*, by_time: bool = True) -> None:
+    """One round: frees what lost workers held, sends again what no message stands for any more, asks for due coordinations."""
+    release_lost(by_time=by_time)
     with database().read() as session:
-        due = jobs.awaiting_coordination(session, now)
+        due = jobs.awaiting_coordination(session, utcnow())
+        pieces = work.open_pieces(session)
     for job_id in due:
         send_coordinate(job_id)
+    if pieces and waiting(SOLVE) == 0:
+        send_work(min(pieces, MOST_MESSAGES))
 
 
-def _release_lost(model: type[leases.Row]) -> None:
+def release_lost(*, by_time: bool) -> None:
+    """Opens what is held by workers that died or, with ``by_time``, did not renew their leases; the jobs' events say why."""
+    _release_lost(PairRow, by_time)
+    _release_lost(StepRow, by_time)
+
+
+def _release_lost(model: type[leases.Row], by_time: bool) -> None:
     with database().read() as session:
-        lost = leases.lost(session, model)
-    for job_id, token in lost:
+        lost = leases.lost(session, model, by_time=by_time)
+    for lease in lost:
         with writing() as (session, afterwards):
-            jobs.lock(session, job_id)
-            _send(leases.release(session, model, token), afterwards)
+            job = jobs.lock(session, lease.job_id)
+            if rows := leases.release(session, model, lease):
+                events.emit(session, job, "lost", {"worker": lease.worker, "reason": lease.reason, **_what(rows)})
+                afterwards.append(partial(send_work, len(rows)))
 
 
-def _send_again(model: type[leases.Row], sent_before: datetime) -> None:
-    with database().read() as session:
-        affected = leases.unclaimed(session, model, sent_before)
-    for job_id in affected:
-        with writing() as (session, afterwards):
-            jobs.lock(session, job_id)
-            _send(leases.resend(session, model, job_id, sent_before), afterwards)
-
-
-def _send(rows: Sequence[PairRow] | Sequence[StepRow], afterwards: Afterwards) -> None:
-    groups: dict[tuple[str, int], list[tuple[int, float]]] = {}
-    for row in rows:
-        if isinstance(row, StepRow):
-            afterwards.append(partial(send_step, row.id))
-        else:
-            groups.setdefault((row.job_id, row.iteration), []).append((row.pair_index, row.forecast_seconds))
-    for (job_id, iteration), pairs in groups.items():
-        afterwards.append(partial(send_pairs, job_id, iteration, batches(pairs, settings().batch_seconds)))
+def _what(rows: Sequence[PairRow] | Sequence[StepRow]) -> dict[str, Any]:
+    first = rows[0]
+    if isinstance(first, StepRow):
+        return {"step": first.kind}
+    return {"iteration": first.iteration, "pairs": [row.pair_index for row in rows if isinstance(row, PairRow)]}

@@ -1,10 +1,12 @@
-"""The tasks by name: thin, ids in, nothing out. A worker registers those of the queue that it serves and imports only what they need."""
+"""The tasks by name: thin, nothing out. A worker registers those of the queue that it serves and imports only what they need."""
 
 from __future__ import annotations
 
 from celery import Celery, Task
+from structlog.contextvars import bound_contextvars
 
-from workers.app import CONTROL, COORDINATE, RUN_STEP, SOLVE_PAIRS
+from workers.app import CONTROL, COORDINATE, WORK
+from workers.messages import Acknowledged
 
 
 def register(app: Celery, queue: str) -> None:
@@ -12,16 +14,18 @@ def register(app: Celery, queue: str) -> None:
     if queue == CONTROL:
         from workers.turns import coordinate
 
-        app.task(name=COORDINATE)(coordinate)
+        @app.task(name=COORDINATE, Request=Acknowledged)
+        def _coordinate(job_id: str) -> None:
+            with bound_contextvars(job=job_id):
+                coordinate(job_id)
+
         return
 
-    from workers.pairs import solve_pairs
-    from workers.steps import run_step
+    from workers.solver import work
+    from workers.sweeper import release_lost
 
-    @app.task(name=SOLVE_PAIRS, bind=True)
-    def _solve_pairs(self: Task, job_id: str, iteration: int, indices: list[int]) -> None:
-        solve_pairs(job_id, iteration, indices, self.request.id)
-
-    @app.task(name=RUN_STEP, bind=True)
-    def _run_step(self: Task, step_id: int) -> None:
-        run_step(step_id, self.request.id)
+    @app.task(name=WORK, bind=True, Request=Acknowledged)
+    def _work(self: Task) -> None:
+        if self.request.delivery_info.get("redelivered"):
+            release_lost(by_time=False)  # whoever had this message has died
+        work()

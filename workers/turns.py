@@ -8,28 +8,32 @@ from __future__ import annotations
 
 import logging
 from dataclasses import asdict, dataclass
-from datetime import timedelta
+from datetime import datetime, timedelta
 from functools import lru_cache, partial
 from typing import Any
 
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from certifier.forecast import forecast
-from certifier.growth import Certify, Finish, Propose, Report, Step, Transition, action_from_document, action_to_document
+from certifier.forecast import PairCost, forecast
+from certifier.growth import Certification, Certify, Finish, Propose, Report, Step, Transition, action_from_document, action_to_document
 from certifier.outcome import Outcome
-from db import jobs, leases, pairs, steps
+from db import jobs, leases, pairs, steps, work
 from db.models import IterationRow, JobRow
+from db.session import database
 from db.settings import settings
 from db.states import JOB, STEP, IterationState, JobState, StepKind, StepState, unfinished
 from db.types import utcnow
-from workers.app import send_pairs, send_step, stop_messages
-from workers.coordinator import batches, certification_report, ending, next_transition, step_report
+from workers import admission
+from workers.app import send_work
+from workers.coordinator import ending, next_transition, step_report
 from workers.scenes import load_scene
-from workers.transaction import Afterwards, writing
+from workers.transaction import Afterwards, persistently, writing
 
 log = logging.getLogger(__name__)
 
+ACCEPT_SECONDS = 20.0
+"""How long a certified polytope waits for a larger one before it is made a region, which takes as long as verifying all its proofs."""
 COORDINATION_SECONDS = 60.0
 """A coordinator that has not answered after this time is believed dead."""
 
@@ -42,6 +46,7 @@ class Turn:
     number: int
     scene_id: str
     options: dict[str, Any]
+    deadline_at: datetime | None
     growth: dict[str, Any] | None
     report: Report | None
 
@@ -50,19 +55,28 @@ def coordinate(job_id: str) -> None:
     """Takes the job as far as it goes without waiting for a worker. Harmless however often and whenever it is called."""
     while (turn := _begin(job_id)) is not None:
         try:
-            transition = next_transition(load_scene(turn.scene_id), turn.options, turn.growth, turn.report)
+            transition = _decide(turn)
         except CirisError as error:
-            _give_up(turn, error)
+            decision = partial(_give_up, turn, error)
         except Exception as error:
-            log.exception("job %s: the next step could not be decided", job_id)
-            _give_up(turn, CirisError("internal_error", f"the next step could not be decided: {type(error).__name__}: {error}"))
+            log.exception("the next step could not be decided")
+            problem = CirisError("internal_error", f"the next step could not be decided: {type(error).__name__}: {error}")
+            decision = partial(_give_up, turn, problem)
         else:
-            _save(turn, transition)
+            decision = partial(_save, turn, transition)
+        persistently(decision)
+
+
+def _decide(turn: Turn) -> Transition:
+    if turn.growth is None:
+        left = None if turn.deadline_at is None else (turn.deadline_at - utcnow()).total_seconds()
+        admission.check(_forecast(turn.scene_id), settings(), left)
+    return next_transition(load_scene(turn.scene_id), turn.options, turn.growth, turn.report)
 
 
 @lru_cache(maxsize=8)
-def _forecast(scene_id: str) -> list[float]:
-    return [cost.seconds for cost in forecast(load_scene(scene_id))]
+def _forecast(scene_id: str) -> list[PairCost]:
+    return forecast(load_scene(scene_id))
 
 
 def _begin(job_id: str) -> Turn | None:
@@ -73,22 +87,22 @@ def _begin(job_id: str) -> Turn | None:
             return None
         now = utcnow()
         if job.state == JobState.CANCELLING:
-            _finish_growth(session, job, Finish(Outcome.INCONCLUSIVE, "cancelled"), afterwards)
+            _finish_growth(session, job, Finish(Outcome.INCONCLUSIVE, "cancelled"))
         elif job.deadline_at is not None and job.deadline_at <= now:
             outcome = Outcome.CERTIFIED if steps.accepted(session, job_id) else Outcome.INCONCLUSIVE
-            _finish_growth(session, job, Finish(outcome, "the deadline was reached"), afterwards)
+            _finish_growth(session, job, Finish(outcome, "the deadline was reached"))
         if job.coordinator_attempts >= settings().max_attempts:
             job.error = CirisError("coordination_failed", "the coordinator died or hung each time it decided about this job").to_document()
-            _finish_growth(session, job, Finish(Outcome.ERROR, "the coordinator failed"), afterwards)
+            _finish_growth(session, job, Finish(Outcome.ERROR, "the coordinator failed"))
         if job.action is not None and job.action["kind"] == "finish":
-            _finish(session, job)
+            _finish(session, job, afterwards)
             return None
         report = None if job.action is None else _report(session, job)
         if jobs.is_coordinated(job, now) or (job.action is not None and report is None):
             return None
         job.coordinator, job.coordinator_until = leases.this_worker(), now + timedelta(seconds=COORDINATION_SECONDS)
         job.coordinator_attempts += 1
-        return Turn(job_id, job.turn, job.scene_id, job.options, job.growth, report)
+        return Turn(job_id, job.turn, job.scene_id, job.options, job.deadline_at, job.growth, report)
 
 
 def _report(session: Session, job: JobRow) -> Report | None:
@@ -98,9 +112,9 @@ def _report(session: Session, job: JobRow) -> Report | None:
         iteration = session.get_one(IterationRow, (job.id, action.iteration))
         if iteration.state == IterationState.RUNNING:
             return None
-        rows = pairs.of_iteration(session, job.id, action.iteration)
+        rows = pairs.reached(session, iteration)
         weak = {row.pair_index: row.weak_points for row in rows if row.weak_points is not None}
-        return certification_report(action.iteration, {row.pair_index: row.state for row in rows}, weak)
+        return Certification(action.iteration, {row.pair_index: Outcome(row.state) for row in rows}, weak)
     step = steps.of_turn(session, job, StepKind(action.kind))
     if step is None or step.state in unfinished(STEP):
         return None
@@ -113,18 +127,18 @@ def _save(turn: Turn, transition: Transition) -> None:
         job = jobs.lock(session, turn.job_id)
         if job.turn != turn.number or job.state not in (JobState.QUEUED, JobState.RUNNING):
             return
-        jobs.start(session, job)
+        if job.state == JobState.QUEUED:
+            jobs.start(session, job, work.served_by_now(session))
         _advance(job, transition.action)
         job.growth = transition.state
         match transition.action:
             case Propose() | Step() as action:
-                _add_step(session, job, StepKind(action.kind), action_to_document(action), afterwards)
+                steps.add(session, job, StepKind(action.kind), action_to_document(action))
+                afterwards.append(send_work)
             case Certify() as action:
                 _add_iteration(session, job, action, afterwards)
         if transition.accepted is not None:
-            # After the work that the growth waits for: a region that is overtaken before anybody began to accept it is left out.
-            steps.supersede(session, job)
-            _add_step(session, job, StepKind.ACCEPT, asdict(transition.accepted), afterwards)
+            steps.add(session, job, StepKind.ACCEPT, asdict(transition.accepted), utcnow() + timedelta(seconds=ACCEPT_SECONDS))
 
 
 def _advance(job: JobRow, action: Propose | Certify | Step | Finish) -> None:
@@ -134,14 +148,9 @@ def _advance(job: JobRow, action: Propose | Certify | Step | Finish) -> None:
     job.coordinator_attempts = 0
 
 
-def _add_step(session: Session, job: JobRow, kind: StepKind, document: dict[str, Any], afterwards: Afterwards) -> None:
-    step = steps.add(session, job, kind, document)
-    afterwards.append(partial(send_step, step.id))
-
-
 def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: Afterwards) -> None:
-    scene, seconds = load_scene(job.scene_id), _forecast(job.scene_id)
-    new = [pairs.NewPair(i, scene.pairs[i].a, scene.pairs[i].b, seconds[i]) for i in action.pairs]
+    costs = _forecast(job.scene_id)
+    new = [pairs.NewPair(i, costs[i].a, costs[i].b, costs[i].seconds) for i in action.pairs]
     pairs.add_iteration(
         session,
         job,
@@ -154,34 +163,36 @@ def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: A
         reuse=action.reuse,
         stop_at_first_failure=action.stop_at_first_failure,
     )
-    groups = batches([(pair.index, pair.forecast_seconds) for pair in new], settings().batch_seconds)
-    afterwards.append(partial(send_pairs, job.id, action.iteration, groups))
+    pieces = pairs.batches([(pair.index, pair.forecast_seconds) for pair in new], settings().batch_seconds)
+    afterwards.append(partial(send_work, len(pieces)))
 
 
 def _give_up(turn: Turn, error: CirisError) -> None:
     """Lets the job end with this error."""
-    with writing() as (session, afterwards):
+    with database().write() as session:
         job = jobs.lock(session, turn.job_id)
         if job.turn == turn.number and job.state in (JobState.QUEUED, JobState.RUNNING):
             job.error = error.to_document()
-            _finish_growth(session, job, Finish(Outcome.ERROR, error.message), afterwards)
+            _finish_growth(session, job, Finish(Outcome.ERROR, error.message))
 
 
-def _finish_growth(session: Session, job: JobRow, finish: Finish, afterwards: Afterwards) -> None:
+def _finish_growth(session: Session, job: JobRow, finish: Finish) -> None:
     """Stops the job's work, except that regions reached are still accepted; does nothing when the growth has finished already."""
     if job.action is not None and job.action["kind"] == "finish":
         return
     jobs.start(session, job)
-    running = pairs.skip(session, job.id, worth_stopping=settings().batch_seconds) + steps.skip(session, job.id)
+    pairs.skip(session, job.id)
+    steps.skip(session, job.id)
     pairs.skip_iterations(session, job.id)
-    afterwards.append(partial(stop_messages, running))
     _advance(job, finish)
 
 
-def _finish(session: Session, job: JobRow) -> None:
+def _finish(session: Session, job: JobRow, afterwards: Afterwards) -> None:
     """Ends the job once its last region has been accepted or refused."""
     rows = steps.of_job(session, job.id)
     if any(step.state in unfinished(STEP) for step in rows):
+        if steps.hasten(session, job.id):
+            afterwards.append(send_work)
         return
     refused = next((step.report for step in rows if step.kind == StepKind.ACCEPT and step.state == StepState.FAILED), None)
     failed = next((step.report for step in reversed(rows) if step.state == StepState.FAILED), None)

@@ -10,22 +10,24 @@ from fastapi import APIRouter, Depends, Header, Query
 from fastapi.concurrency import run_in_threadpool
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
-from api.access import Db
+from api.access import READ, Db
+from api.schemas.common import MAX_INT
 from api.schemas.jobs import Event, EventList
 from db import events, jobs
 from db.session import Database
 
+After = Annotated[int, Query(ge=0, le=MAX_INT, description="Only events with a larger number.")]
 POLL_SECONDS = 0.3
 PAGE = 500
 
-router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ])
 
 
 @router.get("/{job_id}/events")
 def list_job_events(
     job_id: str,
     db: Db,
-    after: Annotated[int, Query(ge=0, description="Only events with a larger number.")] = 0,
+    after: After = 0,
     limit: Annotated[int, Query(ge=1, le=1000)] = PAGE,
 ) -> EventList:
     """What happened to the job, in order."""
@@ -44,8 +46,10 @@ def _existing(job_id: str, db: Db) -> str:
 async def stream_job_events(
     job_id: Annotated[str, Depends(_existing)],
     db: Db,
-    after: Annotated[int, Query(ge=0, description="Only events with a larger number.")] = 0,
-    last_event_id: Annotated[int | None, Header(ge=0, description="Where an interrupted stream goes on; wins over `after`.")] = None,
+    after: After = 0,
+    last_event_id: Annotated[
+        int | None, Header(ge=0, le=MAX_INT, description="Where an interrupted stream goes on; beats `after`.")
+    ] = None,
 ) -> AsyncIterator[ServerSentEvent]:
     """The job's events as they happen; the last one is called `end`, then the stream closes."""
     seq = after if last_event_id is None else last_event_id

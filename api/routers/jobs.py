@@ -13,25 +13,40 @@ from typing import Annotated, Any
 from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 
 from api import checks
-from api.access import Db
-from api.schemas.jobs import CertifyRequest, GrowRequest, GrowthCurve, GrowthPoint, Iteration, Job, JobPage, NewJob, PairCell, PairMatrix
+from api.access import READ, SUBMIT, Db, Submitter
+from api.schemas.common import MAX_INT, Cursor
+from api.schemas.jobs import (
+    CertifyRequest,
+    GrowRequest,
+    GrowthCurve,
+    GrowthPoint,
+    Iteration,
+    Job,
+    JobPage,
+    JobRequest,
+    NewJob,
+    PairCell,
+    PairMatrix,
+    Webhook,
+)
 from api.schemas.scenes import PairInfo
 from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Stage
 from certifier.proof_file import with_scene
-from db import jobs, pairs, proofs, regions, scenes
+from db import jobs, pairs, proofs, regions, scenes, webhooks
 from db.models import IterationRow, PairRow
 from db.states import IterationState, JobKind, JobState, PairState
 from db.types import utcnow
 from workers.app import send_coordinate
 
-router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ])
 
 
 @router.post("", status_code=status.HTTP_201_CREATED, responses={200: {"model": Job, "description": "Made earlier under the same key."}})
 def create_job(
     body: NewJob,
+    caller: Submitter,
     db: Db,
     response: Response,
     background: BackgroundTasks,
@@ -41,6 +56,8 @@ def create_job(
     with db.read() as session:
         scene = scenes.get(session, body.scene)
     options = _options(body, Scene.from_document(scene.document))
+    if body.webhook is not None:
+        checks.webhook(body.webhook)
     with db.write() as session:
         job, made = jobs.create(
             session,
@@ -48,9 +65,13 @@ def create_job(
             scene_id=scene.id,
             options=options,
             deadline_at=utcnow() + timedelta(seconds=body.deadline_seconds) if body.deadline_seconds else None,
-            idempotency_key=idempotency_key,
-            request_digest=_digest(scene.id, options, body.deadline_seconds),
+            idempotency_key=idempotency_key and f"{caller.key_id or 'open'}:{idempotency_key}",
+            request_digest=_digest(scene.id, options, body),
+            key_id=caller.key_id,
+            priority=body.priority,
         )
+        if made and body.webhook is not None:
+            webhooks.add(session, job.id, body.webhook.url, body.webhook.secret)
     if made:
         background.add_task(send_coordinate, job.id)
     else:
@@ -67,8 +88,9 @@ def _options(body: GrowRequest | CertifyRequest, scene: Scene) -> dict[str, Any]
     return {"kind": "certify", "seed": body.polytope.model_dump(exclude_none=True), "random_seed": body.random_seed}
 
 
-def _digest(scene_id: str, options: dict[str, Any], deadline_seconds: float | None) -> str:
-    return hashlib.sha256(json.dumps([scene_id, options, deadline_seconds], sort_keys=True).encode()).hexdigest()
+def _digest(scene_id: str, options: dict[str, Any], body: JobRequest) -> str:
+    document = [scene_id, options, body.priority, body.deadline_seconds, body.webhook and body.webhook.model_dump()]
+    return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 
 @router.get("")
@@ -77,14 +99,14 @@ def list_jobs(
     state: JobState | None = None,
     kind: JobKind | None = None,
     scene: str | None = None,
-    after: Annotated[str | None, Query(description="`next` of the page before.")] = None,
+    after: Cursor = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
 ) -> JobPage:
     """Jobs, newest first."""
     with db.read() as session:
         scene_id = scenes.get(session, scene).id if scene else None
         page = jobs.page(session, state=state, kind=kind, scene_id=scene_id, after=after, limit=limit)
-    return JobPage(jobs=[Job.of(row) for row in page.jobs], next=page.next)
+    return JobPage(jobs=[Job.of(row) for row in page.rows], next=page.next)
 
 
 @router.get("/{job_id}")
@@ -94,7 +116,7 @@ def get_job(job_id: str, db: Db) -> Job:
         return Job.of(jobs.get(session, job_id))
 
 
-@router.post("/{job_id}/cancel", status_code=status.HTTP_202_ACCEPTED)
+@router.post("/{job_id}/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
 def cancel_job(job_id: str, db: Db, background: BackgroundTasks) -> Job:
     """Ask a job to end; regions certified before remain. Nothing happens to a job that has ended."""
     with db.write() as session:
@@ -104,17 +126,24 @@ def cancel_job(job_id: str, db: Db, background: BackgroundTasks) -> Job:
 
 
 @router.post("/{job_id}/retry", status_code=status.HTTP_201_CREATED)
-def retry_job(job_id: str, db: Db, response: Response, background: BackgroundTasks) -> Job:
+def retry_job(job_id: str, caller: Submitter, db: Db, response: Response, background: BackgroundTasks) -> Job:
     """A new job like one that failed or was cancelled; asking again gives the same new job."""
     with db.write() as session:
-        job = jobs.retry(session, job_id)
+        job = jobs.retry(session, job_id, caller.key_id)
     background.add_task(send_coordinate, job.id)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return Job.of(job)
 
 
+@router.get("/{job_id}/webhook")
+def get_job_webhook(job_id: str, db: Db) -> Webhook:
+    """Whether the end of the job has been told to the receiver that the request named."""
+    with db.read() as session:
+        return Webhook.of(webhooks.of_job(session, jobs.get(session, job_id).id))
+
+
 @router.get("/{job_id}/pairs")
-def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge=0)] = None) -> PairMatrix:
+def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge=0, le=MAX_INT)] = None) -> PairMatrix:
     """The pair matrix: what became of every pair on every iteration's polytope, or on one of them."""
     with db.read() as session:
         job = jobs.get(session, job_id)
@@ -175,7 +204,7 @@ def get_job_growth(job_id: str, db: Db) -> GrowthCurve:
     """The regions certified on the way, with their volumes."""
     with db.read() as session:
         job = jobs.get(session, job_id)
-        rows = sorted(regions.newest(session, job_id=job_id), key=lambda row: row.iteration)
+        rows = regions.of_job(session, job_id)
     start = job.started_at or job.created_at
     points = [
         GrowthPoint(iteration=r.iteration, region=r.id, ellipsoid_volume=r.ellipsoid_volume, seconds=(r.created_at - start).total_seconds())

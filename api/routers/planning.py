@@ -6,14 +6,14 @@ import numpy as np
 from fastapi import APIRouter
 
 from api import checks
-from api.access import Db
+from api.access import READ, Db
 from api.schemas.regions import Containment, ContainsRequest, ContainsResponse, Hit
 from certifier.model import Polytope, Scene
 from certifier.outcome import Guarantee
 from db import regions, scenes
 from planner.membership import MembershipIndex, to_s
 
-router = APIRouter(prefix="/v1/planning", tags=["planning"])
+router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ])
 
 
 @router.post("/contains")

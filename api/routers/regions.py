@@ -10,13 +10,14 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response, status
 
 from api import exports
-from api.access import Db
+from api.access import ADMIN, READ, Db
+from api.schemas.common import Cursor
 from api.schemas.regions import RegionDetail, RegionPage, RegionSummary, Verification
 from certifier.child import run_in_child
 from db import jobs, proofs, regions, scenes
 from db.settings import settings
 
-router = APIRouter(prefix="/v1/regions", tags=["regions"])
+router = APIRouter(prefix="/v1/regions", tags=["regions"], dependencies=[READ])
 
 
 class ExportFormat(StrEnum):
@@ -31,12 +32,19 @@ class ExportFormat(StrEnum):
 
 
 @router.get("")
-def list_regions(db: Db, scene: str | None = None, job: str | None = None, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> RegionPage:
+def list_regions(
+    db: Db,
+    scene: str | None = None,
+    job: str | None = None,
+    after: Cursor = None,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+) -> RegionPage:
     """Certified regions, newest first."""
     with db.read() as session:
         scene_id = scenes.get(session, scene).id if scene else None
         job_id = jobs.get(session, job).id if job else None
-        return RegionPage(regions=[RegionSummary.of(row) for row in regions.newest(session, scene_id=scene_id, job_id=job_id, limit=limit)])
+        page = regions.page(session, scene_id=scene_id, job_id=job_id, after=after, limit=limit)
+    return RegionPage(regions=[RegionSummary.of(row) for row in page.rows], next=page.next)
 
 
 @router.get("/{region_id}")
@@ -87,7 +95,7 @@ def export_region(region_id: str, db: Db, format: ExportFormat = ExportFormat.JS
     return _download(data, f"{region_id}.{suffix}", exports.MEDIA_TYPES[format])
 
 
-@router.delete("/{region_id}", status_code=status.HTTP_204_NO_CONTENT)
+@router.delete("/{region_id}", dependencies=[ADMIN], status_code=status.HTTP_204_NO_CONTENT)
 def delete_region(region_id: str, db: Db) -> None:
     """Forget a region and its proof file."""
     with db.write() as session:

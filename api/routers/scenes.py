@@ -3,37 +3,57 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Annotated
+from typing import Annotated, BinaryIO
 
-from fastapi import APIRouter, File, Query, Response, UploadFile, status
+from anyio import CapacityLimiter, to_thread
+from fastapi import APIRouter, File, Query, Request, Response, UploadFile, status
 
-from api.access import Db
+from api.access import READ, SUBMIT, Db
+from api.schemas.common import Cursor
 from api.schemas.scenes import IgnoredPair, LintReport, PairForecast, SceneDetail, ScenePage, ScenePairs, SceneSummary, Substitution
+from certifier.errors import CirisError
 from certifier.forecast import forecast
 from certifier.model import Scene
 from certifier.scene.bundle import load_bundle
 from db import scenes
+from db.models import SceneRow
+from db.session import Database
 
-router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
+UPLOADS_AT_ONCE = 2
+"""Each may take a minute and gigabytes, and none may take the threads of other requests."""
+UPLOADS_WAITING = 16
+
+router = APIRouter(prefix="/v1/scenes", tags=["scenes"], dependencies=[READ])
 
 
-@router.post("", status_code=status.HTTP_201_CREATED)
-def create_scene(
-    bundle: Annotated[UploadFile, File(description="A zip with the scene file and every file it refers to.")], db: Db, response: Response
+@router.post("", dependencies=[SUBMIT], status_code=status.HTTP_201_CREATED)
+async def create_scene(
+    bundle: Annotated[UploadFile, File(description="A zip with the scene file and every file it refers to.")],
+    db: Db,
+    request: Request,
+    response: Response,
 ) -> SceneDetail:
     """Upload a scene. It is parsed in a process that may die without harm; the same content is the same scene."""
-    scene = load_bundle(bundle.file.read())
-    with db.write() as session:
-        row = scenes.add(session, scene)
+    parsers: CapacityLimiter = request.app.state.parsers
+    if parsers.statistics().tasks_waiting >= UPLOADS_WAITING:
+        raise CirisError("busy", "too many uploads wait to be read", hint="try again in a while")
+    row = await to_thread.run_sync(_add_scene, db, bundle.file, limiter=parsers)
     response.headers["Location"] = f"/v1/scenes/{row.id}"
     return SceneDetail.of(row)
 
 
+def _add_scene(db: Database, file: BinaryIO) -> SceneRow:
+    scene = load_bundle(file.read())
+    with db.write() as session:
+        return scenes.add(session, scene)
+
+
 @router.get("")
-def list_scenes(db: Db, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> ScenePage:
+def list_scenes(db: Db, after: Cursor = None, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> ScenePage:
     """Scenes, newest first."""
     with db.read() as session:
-        return ScenePage(scenes=[SceneSummary.of(row) for row in scenes.newest(session, limit)])
+        page = scenes.page(session, after, limit)
+    return ScenePage(scenes=[SceneSummary.of(row) for row in page.rows], next=page.next)
 
 
 @router.get("/{scene_id}")

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response, status
+from fastapi import APIRouter, Request, Response, status
 from kombu.exceptions import OperationalError
 from redis.exceptions import RedisError
 from sqlalchemy import text
 from sqlalchemy.exc import SQLAlchemyError
 
-from api.access import Db
+from api import metrics
+from api.access import READ, Db
 from api.schemas.service import Health, Readiness
 from db.session import Database
-from workers.app import CONTROL, waiting
+from db.statistics import collect
+from workers.app import CONTROL, SOLVE, waiting
 
 router = APIRouter(tags=["service"])
 
 
 @router.get("/healthz")
-def get_health() -> Health:
+async def get_health() -> Health:
     """The process answers."""
     return Health()
 
@@ -30,6 +32,20 @@ def get_readiness(db: Db, response: Response) -> Readiness:
     if not ready:
         response.status_code = status.HTTP_503_SERVICE_UNAVAILABLE
     return Readiness(ready=ready, checks=checks)
+
+
+@router.get(
+    "/metrics", dependencies=[READ], response_class=Response, responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}}
+)
+def get_metrics(request: Request, db: Db) -> Response:
+    """Jobs, pairs, queue lengths and requests in Prometheus' text format."""
+    try:
+        messages = {queue: waiting(queue) for queue in (CONTROL, SOLVE)}
+    except (OperationalError, RedisError):
+        messages = {}
+    with db.read() as session:
+        statistics = collect(session)
+    return Response(metrics.render(statistics, messages, request.app.state.requests), media_type=metrics.MEDIA_TYPE)
 
 
 def _database(db: Database) -> str:

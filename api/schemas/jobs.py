@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from base64 import b64decode
 from datetime import datetime
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from api.schemas.common import Document, Offsets, RandomSeed, Real, Request, Rows, Vector
+from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector
 from api.schemas.scenes import PairInfo
 from certifier.outcome import Outcome, Stage
 from certifier.seed_options import Method
-from db.models import EventRow, JobRow
-from db.states import IterationState, JobKind, JobState, PairState
+from db.models import EventRow, JobRow, WebhookRow
+from db.states import IterationState, JobKind, JobState, PairState, WebhookState
 
 
 class GrowOptions(Request):
@@ -47,11 +48,36 @@ class Seed(Request):
     random_seed: int | None = Field(None, description="Seeds IRIS.")
 
 
+class WebhookRequest(Request):
+    """Whom to tell when the job has ended: a POST, signed as Standard Webhooks has it, repeated until it is answered with success."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"url": "https://planner.example.org/ciris", "secret": "whsec_AAECAwQFBgcICQoLDA0ODxAREhMUFRYXGBkaGxwdHh8="}]
+        }
+    )
+
+    url: str = Field(max_length=2000, pattern=r"^https?://", description="http:// or https://, of a public address.")
+    secret: str = Field(
+        pattern=r"^whsec_[A-Za-z0-9+/]{32,88}={0,2}$",
+        description="`whsec_` and the base64 of 24 to 64 random bytes, with which the message is signed. It is not shown again.",
+    )
+
+    @field_validator("secret")
+    @classmethod
+    def _is_base64(cls, secret: str) -> str:
+        if not 24 <= len(b64decode(secret.removeprefix("whsec_"), validate=True)) <= 64:
+            raise ValueError("it must stand for 24 to 64 bytes")
+        return secret
+
+
 class JobRequest(Request):
     """What every job has."""
 
-    scene: str = Field(min_length=1, max_length=255, description="A scene's id, or its name.")
+    scene: SceneName
+    priority: int = Field(0, ge=-3, le=3, description="Each step doubles the job's share of the work done for its key.")
     deadline_seconds: Real | None = Field(None, gt=0, le=30 * 86400, description="The job ends after this long, with what it has by then.")
+    webhook: WebhookRequest | None = None
 
 
 class GrowRequest(JobRequest):
@@ -100,6 +126,7 @@ class Job(BaseModel):
     reason: str | None = Field(description="Why it ended, a sentence.")
     error: Document | None = Field(description="What was wrong (code, message, field, hint) when it failed.")
     options: Document
+    priority: int
     region: str | None = Field(description="The id of the last region certified.")
     retry_of: str | None
     attempt: int
@@ -120,6 +147,7 @@ class Job(BaseModel):
             reason=row.reason,
             error=row.error,
             options=row.options,
+            priority=row.priority,
             region=row.region_id,
             retry_of=row.retry_of,
             attempt=row.attempt,
@@ -131,18 +159,31 @@ class Job(BaseModel):
         )
 
 
-class JobPage(BaseModel):
+class JobPage(Page):
     """Jobs, newest first."""
 
     jobs: list[Job]
-    next: str | None = Field(description="Pass as `after` for the next page; null on the last.")
+
+
+class Webhook(BaseModel):
+    """Whether the end of the job has been told."""
+
+    url: str
+    state: WebhookState
+    attempts: int
+    next_at: datetime = Field(description="Not tried before.")
+    error: str | None = Field(description="Why the last attempt failed.")
+
+    @classmethod
+    def of(cls, row: WebhookRow) -> Self:
+        return cls(url=row.url, state=WebhookState(row.state), attempts=row.attempts, next_at=row.next_at, error=row.error)
 
 
 class Event(BaseModel):
     """Something that happened to a job."""
 
     seq: int = Field(description="1, 2, 3 ... within the job; the event's id in the stream.")
-    kind: str = Field(description="job, iteration, pairs, step or region.")
+    kind: str = Field(description="job, iteration, pairs, step, region or lost.")
     data: Document
     created_at: datetime
 

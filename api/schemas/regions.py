@@ -7,7 +7,7 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from api.schemas.common import Document, Request, Vector
+from api.schemas.common import Document, Page, Request, SceneName, Vector
 from certifier.outcome import Guarantee
 from db.models import RegionRow
 
@@ -42,8 +42,8 @@ class RegionSummary(BaseModel):
         )
 
 
-class RegionPage(BaseModel):
-    """The newest regions."""
+class RegionPage(Page):
+    """Regions, newest first."""
 
     regions: list[RegionSummary]
 
@@ -74,7 +74,7 @@ class ContainsRequest(Request):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "iiwa-shelf", "q": [[0, 0.3, 0, -1.8, 0, 0.9, 0]]}]})
 
-    scene: str = Field(min_length=1, max_length=255, description="A scene's id, or its name.")
+    scene: SceneName
     q: list[Vector] | None = Field(None, min_length=1, max_length=MAX_POINTS, description="Joint positions, radians or metres.")
     s: list[Vector] | None = Field(None, min_length=1, max_length=MAX_POINTS, description="Tangent-space coordinates.")
 

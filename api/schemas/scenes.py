@@ -7,7 +7,7 @@ from typing import Self
 
 from pydantic import BaseModel, Field
 
-from api.schemas.common import Document
+from api.schemas.common import Document, Page
 from certifier.model import JointKind
 from db.models import SceneRow
 
@@ -39,8 +39,8 @@ class SceneSummary(BaseModel):
         )
 
 
-class ScenePage(BaseModel):
-    """The newest scenes."""
+class ScenePage(Page):
+    """Scenes, newest first."""
 
     scenes: list[SceneSummary]
 

@@ -10,16 +10,17 @@ import json
 import os
 import tempfile
 import zipfile
-from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from certifier.errors import CirisError, SceneError
 from certifier.model import Scene
 from certifier.scene.file import read_scene_file
-from certifier.scene.load import load_scene
+from certifier.scene.load import read_in_child
 from certifier.scene.references import references, resolve
 
-_INDEX = "bundle.json"
+INDEX = "bundle.json"
+"""Where the bundle says which file is the scene file."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -49,12 +50,12 @@ def pack_bundle(path: str | Path) -> bytes:
         file = waiting.pop()
         if file not in files and file.is_file():
             files.add(file)
-            starts = _starts(file, scene_file.path)
-            waiting += [resolve(r, start, scene_file.packages) for r in references(file) for start in starts]
+            places = starts(file, scene_file.path)
+            waiting += [resolve(r, place, scene_file.packages) for r in references(file) for place in places]
     root = Path(os.path.commonpath([f.parent for f in files] + list(scene_file.packages.values())))
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
-        _write(archive, _INDEX, json.dumps({"scene": scene_file.path.relative_to(root).as_posix()}).encode())
+        _write(archive, INDEX, json.dumps({"scene": scene_file.path.relative_to(root).as_posix()}).encode())
         for directory in sorted(set(scene_file.packages.values()) - {root}):
             _write(archive, f"{directory.relative_to(root).as_posix()}/", b"")
         for file in sorted(files):
@@ -63,96 +64,33 @@ def pack_bundle(path: str | Path) -> bytes:
 
 
 def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
-    """The scene in a bundle from a stranger: unpacked within limits, checked and parsed in a child process.
+    """The scene in a bundle from a stranger: unpacked within limits, checked and parsed, all of it in a child process.
 
     Raises:
         SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_path``, ``bundle_file``, ``bundle_uri``, ``bundle_xml``,
             ``bundle_text``, or what :func:`load_scene` raises.
     """
     limits = limits or BundleLimits()
+    if len(data) > limits.bytes:
+        raise SceneError("bundle_too_large", f"the bundle has {len(data)} bytes; at most {limits.bytes} are accepted")
     with tempfile.TemporaryDirectory(prefix="ciris-") as directory:
-        root = Path(directory).resolve()
-        scene = _unpack(data, root, limits)
+        archive, root = Path(directory).resolve() / "bundle.zip", Path(directory).resolve() / "files"
+        archive.write_bytes(data)
+        root.mkdir()
+        payload = {"archive": str(archive), "root": str(root), "limits": asdict(limits)}
         try:
-            return load_scene(root / scene, bundle_root=root, timeout_s=limits.timeout_s, memory_bytes=limits.memory_bytes)
+            return read_in_child("certifier.scene.unpack:parse_bundle", payload, "the bundle", None, limits.timeout_s, limits.memory_bytes)
         except CirisError as error:
             error.message = error.message.replace(f"{root}/", "")
             raise
 
 
-def check_bundle(root: Path, scene: Path) -> None:
-    """Check every file of an unpacked bundle before Drake sees it: known kinds, no entities, no reference out of ``root``.
-
-    Raises:
-        SceneError: as :func:`load_bundle`.
-    """
-    packages = read_scene_file(scene).packages
-    for name, directory in packages.items():
-        _inside(directory, root, f"packages.{name}")
-    for file in sorted(f for f in root.rglob("*") if f.is_file() and f.name != _INDEX):
-        where = file.relative_to(root).as_posix()
-        for reference in references(file):
-            if file.suffix.lower() in (".mjcf", ".xml") and ".." in PurePosixPath(reference).parts:
-                raise SceneError("bundle_uri", f"{where}: {reference!r}: .. is not accepted here")
-            for start in _starts(file, scene):
-                _inside(resolve(reference, start, packages), root, f"{where}: {reference!r}")
-
-
-def _starts(file: Path, scene: Path) -> set[Path]:
+def starts(file: Path, scene: Path) -> set[Path]:
     """The directories that a relative reference in ``file`` may start at: its own, and for SDFormat's include the working directory."""
     return {file.parent, scene.parent} if file.suffix.lower() == ".sdf" else {file.parent}
-
-
-def _inside(path: Path, root: Path, what: str) -> None:
-    if not path.is_relative_to(root):
-        raise SceneError("bundle_uri", f"{what} leads out of the bundle")
 
 
 def _write(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
     entry = zipfile.ZipInfo(name, _EPOCH)
     entry.compress_type = zipfile.ZIP_DEFLATED
     archive.writestr(entry, content)
-
-
-def _unpack(data: bytes, root: Path, limits: BundleLimits) -> str:
-    """Write the zip's files below root; the path of the scene file."""
-    if len(data) > limits.bytes:
-        raise SceneError("bundle_too_large", f"the bundle has {len(data)} bytes; at most {limits.bytes} are accepted")
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            entries = archive.infolist()
-            if len(entries) > limits.files:
-                raise SceneError("bundle_too_large", f"the bundle has {len(entries)} files; at most {limits.files} are accepted")
-            left = limits.unpacked_bytes
-            for entry in entries:
-                left -= _extract(archive, entry, root, left)
-                if left < 0:
-                    raise SceneError("bundle_too_large", f"the bundle unpacks to more than {limits.unpacked_bytes} bytes")
-        scene = str(json.loads((root / _INDEX).read_text(encoding="utf-8"))["scene"])
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, ValueError, KeyError, TypeError) as error:
-        hint = "make bundles with pack_bundle or `ciris scene add`"
-        raise SceneError("bundle_zip", f"this is not a scene bundle: {type(error).__name__}: {error}", hint=hint) from None
-    _checked_name(scene)
-    return scene
-
-
-def _extract(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, root: Path, limit: int) -> int:
-    """Write one entry, at most ``limit`` bytes of it and one more; the number of bytes written."""
-    target = root / _checked_name(entry.filename)
-    if entry.is_dir():
-        target.mkdir(parents=True, exist_ok=True)
-        return 0
-    if (entry.external_attr >> 16) & 0o170000 not in (0, 0o100000):
-        raise SceneError("bundle_path", f"{entry.filename!r} is not a plain file")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with archive.open(entry) as source, target.open("xb") as sink:
-        content = source.read(limit + 1)
-        sink.write(content)
-    return len(content)
-
-
-def _checked_name(name: str) -> str:
-    path = PurePosixPath(name)
-    if path.is_absolute() or ".." in path.parts or "\\" in name or "\0" in name or not path.parts:
-        raise SceneError("bundle_path", f"{name!r} is not a path inside the bundle")
-    return name

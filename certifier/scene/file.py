@@ -187,8 +187,8 @@ def _section(value: Any, where: str, known: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _string(value: Any, where: str) -> str:
-    if not isinstance(value, str) or not value:
-        raise _wrong(where, f"must be text, not {value!r}")
+    if not isinstance(value, str) or not value or not value.isprintable():
+        raise _wrong(where, f"must be printable text, not {value!r}")
     return value
 
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from certifier.child import run_in_child
 from certifier.errors import CirisError, SceneError
 from certifier.model import Scene
 
 
-def load_scene(path: str | Path, *, bundle_root: Path | None = None, timeout_s: float = 60, memory_bytes: int = 4 * 2**30) -> Scene:
+def load_scene(path: str | Path, *, timeout_s: float = 60, memory_bytes: int = 4 * 2**30) -> Scene:
     """The scene that a scene file describes, read by a child process that may die without harm.
 
     Args:
         path: the scene file (docs/architecture.md); relative paths in it start at its directory.
-        bundle_root: the directory that no file may refer out of, when the files come from a stranger.
         timeout_s: wall-clock limit of the child, seconds.
         memory_bytes: memory limit of the child.
 
@@ -24,19 +24,26 @@ def load_scene(path: str | Path, *, bundle_root: Path | None = None, timeout_s: 
     path = Path(path).absolute()
     if not path.is_file():
         raise SceneError("scene_not_found", f"there is no scene file {path}")
-    payload = {"path": str(path), "bundle_root": None if bundle_root is None else str(bundle_root)}
+    # SDFormat looks for included files in the working directory.
+    return read_in_child("certifier.scene.parse:parse", {"path": str(path)}, path.name, path.parent, timeout_s, memory_bytes)
+
+
+def read_in_child(function: str, payload: dict[str, Any], name: str, directory: Path | None, timeout_s: float, memory_bytes: int) -> Scene:
+    """The scene whose document ``function(payload)`` returns, computed by a child process.
+
+    Args:
+        name: what is read, for people.
+        directory: the child's working directory; None for this process's own.
+
+    Raises:
+        SceneError: the function's own, or ``scene_model_crash``.
+    """
     try:
-        document = run_in_child(
-            "certifier.scene.parse:parse",
-            payload,
-            timeout_s=timeout_s,
-            memory_bytes=memory_bytes,
-            directory=path.parent,  # where SDFormat looks for included files
-        )
+        document = run_in_child(function, payload, timeout_s=timeout_s, memory_bytes=memory_bytes, directory=directory)
     except SceneError:
         raise
     except CirisError as death:
-        message = f"reading the models of {path.name} failed: {death.message}"
+        message = f"reading the models of {name} failed: {death.message}"
         hint = "look for files that include themselves, broken shapes or meshes"
         raise SceneError("scene_model_crash", message, field="directives", hint=hint) from None
     return Scene.from_document(document)

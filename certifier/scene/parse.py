@@ -40,7 +40,6 @@ from pydrake.systems.framework import DiagramBuilder
 from certifier.errors import SceneError
 from certifier.model import WORLD, Array, Geometry, Joint, JointKind, Scene
 from certifier.scene import shapes
-from certifier.scene.bundle import check_bundle
 from certifier.scene.file import SceneFile, read_scene_file
 from certifier.scene.lint import findings
 from certifier.scene.pairs import pairs
@@ -51,14 +50,12 @@ _IGNORED_SHAPE = "Ignoring unsupported SDFormat element in geometry"
 
 
 def parse(payload: dict[str, Any]) -> dict[str, Any]:
-    """The document of the Scene described by the file ``payload["path"]``; with a ``bundle_root``, its files are checked first.
+    """The document of the Scene described by the file ``payload["path"]``.
 
     Raises:
         SceneError: whatever is wrong with the file, the models it names or the scene they make.
     """
     path = Path(payload["path"])
-    if payload["bundle_root"]:
-        check_bundle(Path(payload["bundle_root"]), path)
     scene_file = read_scene_file(path)
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)

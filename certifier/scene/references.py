@@ -10,12 +10,13 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
+from urllib.parse import unquote
 from xml.parsers import expat
 
 import yaml
 
 from certifier.errors import SceneError
-from certifier.scene.file import compose
+from certifier.scene.file import MAX_DEPTH, compose
 
 _ATTRIBUTES = {"file", "filename", "uri", "url"}
 _PLUGIN = "plugin"
@@ -70,6 +71,8 @@ def _xml(path: Path) -> list[str]:
 
     def start(name: str, attributes: dict[str, str]) -> None:
         stack.append(name)
+        if len(stack) > MAX_DEPTH:
+            raise SceneError("bundle_xml", f"{path.name} is nested more than {MAX_DEPTH} levels deep")
         text.clear()
         directories.extend(value for key, value in attributes.items() if key in _DIRECTORIES)
         if name != _PLUGIN:
@@ -120,7 +123,8 @@ def _gltf(path: Path) -> list[str]:
     document = json.loads(path.read_text(encoding="utf-8"))
     try:
         uris = [part["uri"] for key in ("buffers", "images") for part in document.get(key, []) if "uri" in part]
-        return [uri for uri in uris if not uri.startswith("data:")]
+        written = [uri for uri in uris if not uri.startswith("data:")]
+        return list(dict.fromkeys([*written, *map(unquote, written)]))
     except (AttributeError, TypeError):
         raise SceneError("bundle_text", f"{path.name} is not glTF") from None
 

@@ -28,6 +28,7 @@ function replace(html) {
 async function refresh(url) {
   try {
     const response = await fetch(url, { headers: { Accept: "text/html" } });
+    if (response.status === 401) location.reload();
     connection.hidden = response.ok;
     if (response.ok) replace(await response.text());
   } catch {

@@ -115,10 +115,10 @@ def store_region(database: Database, certified: Region) -> str:
             reuse={},
             stop_at_first_failure=True,
         )
-        claim = pairs.claim(session, job.id, 0, [index for index, _, _ in names], task_id=None, lease_seconds=60)
+        claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
         assert claim is not None
         found = pairs.Result(0, pairs.PairState.CERTIFIED, seconds=0.1, stage="sos", margin=0.3, detail="", proof=b"proof of a pair")
-        pairs.save(session, claim, [replace(found, index=index) for index, _, _ in names], worth_stopping=1)
+        pairs.save(session, claim, [replace(found, index=index) for index, _, _ in names])
         region = regions.add(session, job, 0, manifest, certified.proof)
         jobs.finish(session, job, jobs.JobState.SUCCEEDED, reason="as large as asked for", outcome="certified")
         return region.id

@@ -106,7 +106,7 @@ def test_pages_follow_each_other_and_filters_apply(client: TestClient, scene: Sc
     assert client.get("/v1/jobs?kind=certify").json()["jobs"] == []
     assert len(client.get("/v1/jobs?scene=slider").json()["jobs"]) == 5
     assert client.get("/v1/jobs?state=lost").json()["field"] == "state"
-    assert client.get("/v1/jobs?after=nope").status_code == 404
+    assert client.get("/v1/jobs?after=nope").json()["code"] == "cursor"
 
 
 def test_a_cancelled_job_can_be_tried_again_once(client: TestClient, scene: Scene) -> None:
@@ -161,10 +161,10 @@ def test_a_witness_is_given_in_joint_positions(client: TestClient, database: Dat
         pairs.add_iteration(
             session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={1: 0}, stop_at_first_failure=False
         )
-        claim = pairs.claim(session, job_id, 0, [0], task_id=None, lease_seconds=60)
+        claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
         assert claim is not None
         refuted = pairs.Result(0, pairs.PairState.REFUTED, seconds=0.1, stage="screen", margin=None, detail="", witness_s=[0.25])
-        pairs.save(session, claim, [refuted], worth_stopping=1)
+        pairs.save(session, claim, [refuted])
     matrix = client.get(f"/v1/jobs/{job_id}/pairs").json()
     assert matrix["cells"][0]["witness_q"] == scene.to_q([0.25]).tolist()
     assert matrix["iterations"][0]["reused"] == {"1": 0}

@@ -5,8 +5,11 @@ from typing import Any
 from fastapi.testclient import TestClient
 from pydantic import TypeAdapter
 
-from api.schemas.jobs import NewJob
+from api import checks
+from api.problems import Problem
+from api.schemas.jobs import NewJob, WebhookRequest
 from api.schemas.regions import ContainsRequest
+from db.keys import Scope
 
 OPERATIONS = {
     "create_scene": "POST /v1/scenes",
@@ -22,6 +25,7 @@ OPERATIONS = {
     "get_job_pairs": "GET /v1/jobs/{job_id}/pairs",
     "download_pair_proof": "GET /v1/jobs/{job_id}/pairs/{pair}/proof",
     "get_job_growth": "GET /v1/jobs/{job_id}/growth",
+    "get_job_webhook": "GET /v1/jobs/{job_id}/webhook",
     "list_job_events": "GET /v1/jobs/{job_id}/events",
     "stream_job_events": "GET /v1/jobs/{job_id}/events/stream",
     "list_regions": "GET /v1/regions",
@@ -33,6 +37,7 @@ OPERATIONS = {
     "contains": "POST /v1/planning/contains",
     "get_health": "GET /healthz",
     "get_readiness": "GET /readyz",
+    "get_metrics": "GET /metrics",
 }
 
 
@@ -67,3 +72,16 @@ def test_the_examples_are_accepted_by_the_schemas(client: TestClient) -> None:
             TypeAdapter(NewJob).validate_python(example)
     for example in schemas["ContainsRequest"]["examples"]:
         ContainsRequest.model_validate(example)
+    for example in schemas["WebhookRequest"]["examples"]:
+        checks.webhook(WebhookRequest.model_validate(example))
+    for example in schemas["Problem"]["examples"]:
+        Problem.model_validate(example)
+
+
+def test_every_operation_says_which_scope_it_needs(client: TestClient) -> None:
+    document = client.get("/openapi.json").json()
+    assert document["components"]["securitySchemes"]["key"]["scheme"] == "bearer"
+    for name, (_, operation) in operations(document).items():
+        scopes = {scope for entry in operation.get("security", []) for scope in entry["key"]}
+        assert scopes or name in ("get_health", "get_readiness"), name
+        assert scopes <= set(Scope)

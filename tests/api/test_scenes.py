@@ -71,7 +71,8 @@ def test_a_missing_bundle_names_the_field(client: TestClient) -> None:
 
 
 def test_too_much_is_refused_by_its_announced_and_by_its_real_length(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(guard, "MAX_BODY_BYTES", 1000)
+    monkeypatch.setattr(guard, "UPLOAD_BYTES", 1000)
+    monkeypatch.setattr(guard, "BODY_BYTES", 1000)
     announced = upload(client, b"x" * 2000)
     streamed = client.post("/v1/jobs", content=(b"x" * 100 for _ in range(50)), headers={"Content-Type": "application/json"})
     for answer in (announced, streamed):

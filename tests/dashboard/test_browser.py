@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from certifier.model import Scene
-from db import jobs, pairs
+from db import jobs, keys, pairs
+from db.keys import Scope
 from db.session import Database
 from db.states import JobState
 
@@ -63,10 +64,11 @@ def begin(database: Database, scene: Scene, job_id: str) -> None:
 
 def settle(database: Database, job_id: str, index: int) -> None:
     with database.write() as session:
-        claim = pairs.claim(session, job_id, 0, [index], task_id=None, lease_seconds=60)
+        claim = pairs.claim(session, jobs.lock(session, job_id), lease_seconds=60, batch_seconds=0)
         assert claim is not None
+        assert [pair.index for pair in claim.pairs] == [index]
         result = pairs.Result(index, pairs.PairState.CERTIFIED, seconds=0.1, stage="sos", margin=0.01, proof=b"proof")
-        pairs.save(session, claim, [result], worth_stopping=1)
+        pairs.save(session, claim, [result])
 
 
 def test_a_job_is_followed_live_to_its_end(page: Any, url: str, database: Database, scene: Scene, job_id: str) -> None:
@@ -132,3 +134,20 @@ def test_no_page_is_wider_than_a_phone(browser: Any, url: str, region: str, sche
         light = page.evaluate("getComputedStyle(document.body).backgroundColor").split("(")[1].split(",")[0]
         assert (int(light) > 128) == (scheme == "light")
     context.close()
+
+
+def test_signing_in_leads_to_the_page_that_was_asked_for_and_follows_the_job(
+    page: Any, url: str, database: Database, scene: Scene, job_id: str
+) -> None:
+    with database.write() as session:
+        key = keys.add(session, "reader", Scope.READ)
+    page.goto(f"{url}/jobs/{job_id}")
+    page.get_by_label("API key").fill(key)
+    page.keyboard.press("Enter")
+    page.wait_for_url(f"{url}/jobs/{job_id}")
+    begin(database, scene, job_id)
+    page.get_by_text("pairs settled").first.wait_for()
+    assert key not in page.content()
+    assert page.evaluate("document.cookie") == ""
+    page.get_by_role("button", name="Sign out reader").click()
+    page.wait_for_url(f"{url}/login")

@@ -35,7 +35,7 @@ def test_every_page_works_offline_and_under_a_strict_policy(client: TestClient, 
 
 
 def test_the_pages_are_no_part_of_the_api(client: TestClient, paths: list[str]) -> None:
-    assert all(path.startswith(("/v1/", "/healthz", "/readyz")) for path in client.get("/openapi.json").json()["paths"])
+    assert all(path.startswith(("/v1/", "/healthz", "/readyz", "/metrics")) for path in client.get("/openapi.json").json()["paths"])
 
 
 def test_names_are_escaped(client: TestClient, database: Database) -> None:

@@ -22,6 +22,12 @@ def a_running_job(session: Session, pair_count: int = 4, *, stop_at_first_failur
     """A running job whose iteration 0 has ``pair_count`` open pairs of 1 s each."""
     job = a_job(session)
     jobs.start(session, job)
+    add_pairs(session, job, pair_count, stop_at_first_failure=stop_at_first_failure)
+    return job
+
+
+def add_pairs(session: Session, job: JobRow, pair_count: int, *, stop_at_first_failure: bool = True) -> None:
+    """Iteration 0 with so many open pairs of 1 s each."""
     pairs.add_iteration(
         session,
         job,
@@ -34,7 +40,6 @@ def a_running_job(session: Session, pair_count: int = 4, *, stop_at_first_failur
         reuse={},
         stop_at_first_failure=stop_at_first_failure,
     )
-    return job
 
 
 def certified(index: int, proof: bytes = b"proof") -> pairs.Result:

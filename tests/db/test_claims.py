@@ -4,39 +4,48 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
+import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 
-from sqlalchemy import select
+import pytest
+from sqlalchemy import select, update
 
-from db import events, jobs, leases, pairs, steps
+from db import events, jobs, leases, pairs, steps, work
 from db.models import IterationRow, PairRow, ProofRow, StepRow
 from db.session import Database
-from db.states import IterationState, JobState, PairState, StepKind, StepState, transition
+from db.states import IterationState, JobState, PairState, StepKind, StepState
 from db.types import utcnow
 from tests.db.builders import a_running_job, certified
 
 ELSEWHERE = "elsewhere:1:1"
 
 
-def claim(db: Database, job_id: str, indices: list[int], task_id: str = "t") -> pairs.Claim | None:
+def claim(db: Database, job_id: str, batch_seconds: float = 0.5) -> pairs.Claim | None:
+    """Claims the next pairs of the job; the builders' pairs take 1 s each."""
     with db.write() as session:
-        return pairs.claim(session, job_id, 0, indices, task_id=task_id, lease_seconds=60)
+        held = work.claim(session, job_id, lease_seconds=60, batch_seconds=batch_seconds)
+        assert held is None or isinstance(held, pairs.Claim)
+        return held
 
 
 def save(db: Database, held: pairs.Claim, results: list[pairs.Result]) -> pairs.Saved:
     with db.write() as session:
-        return pairs.save(session, held, results, worth_stopping=0.5)
+        return pairs.save(session, held, results)
+
+
+def refuted(index: int) -> pairs.Result:
+    return pairs.Result(index, PairState.REFUTED, seconds=0.1, stage="screen", witness_s=[0.5])
 
 
 def claim_and_certify(url: str, job_id: str, out: multiprocessing.Queue) -> None:  # type: ignore[type-arg]
-    """Takes single pairs until none is left; runs in several processes and threads at once."""
+    """Takes single pairs until none is left; runs in several processes at once."""
     db = Database(url)
-    for index in range(40):
-        if (held := claim(db, job_id, [index])) is not None:
-            saved = save(db, held, [certified(index)])
-            out.put((index, saved.finished))
+    while (held := claim(db, job_id)) is not None:
+        index = held.pairs[0].index
+        out.put((index, save(db, held, [certified(index)]).finished))
     db.close()
 
 
@@ -59,11 +68,11 @@ def test_processes_that_race_for_pairs_never_share_one(db: Database, database_ur
         assert len(session.scalars(select(ProofRow)).all()) == 1
 
 
-def test_threads_that_race_for_overlapping_batches_never_share_a_pair(db: Database) -> None:
+def test_threads_that_race_for_batches_never_share_a_pair(db: Database) -> None:
     with db.write() as session:
         job_id = a_running_job(session, 12).id
     with ThreadPoolExecutor(6) as pool:
-        held = list(pool.map(lambda i: claim(db, job_id, list(range(i, i + 7))), range(6)))
+        held = list(pool.map(lambda _: claim(db, job_id, batch_seconds=2.5), range(8)))
     taken = Counter(pair.index for one in held if one is not None for pair in one.pairs)
     assert taken == Counter(range(12))
 
@@ -72,142 +81,217 @@ def test_a_claim_is_refused_when_the_job_is_not_running(db: Database) -> None:
     with db.write() as session:
         job_id = a_running_job(session).id
         jobs.cancel(session, job_id)
-    assert claim(db, job_id, [0]) is None
+    assert claim(db, job_id) is None
 
 
-def test_the_first_failure_skips_the_rest_and_names_the_messages_to_stop(db: Database) -> None:
+def test_the_first_failure_in_the_order_of_the_pairs_counts_whenever_it_comes(db: Database) -> None:
     with db.write() as session:
-        job_id = a_running_job(session, 4).id
-    first, second = claim(db, job_id, [0, 1], "mine"), claim(db, job_id, [2], "other")
+        job_id = a_running_job(session, 5).id
+    first, second, third = claim(db, job_id, batch_seconds=2.5), claim(db, job_id), claim(db, job_id)
     assert first is not None
     assert second is not None
-    witness = pairs.Result(0, PairState.REFUTED, seconds=0.1, stage="screen", witness_s=[0.5])
-    assert save(db, first, [witness]) == pairs.Saved(held=True, finished=True, stopped=("other",))
+    assert third is not None
+    assert save(db, second, [refuted(2)]) == pairs.Saved(held=False, finished=False)
     with db.read() as session:
-        rows = pairs.of_job(session, job_id)
-        assert [row.state for row in rows] == ["refuted", "skipped", "skipped", "skipped"]
-        assert rows[0].witness_s == [0.5]
-        assert session.get_one(IterationRow, (job_id, 0)).state == IterationState.FAILED
+        assert [row.state for row in pairs.of_job(session, job_id)] == ["running", "running", "refuted", "skipped", "skipped"]
+    assert save(db, third, [certified(3)]) == pairs.Saved(held=False, finished=False)
+    assert save(db, first, [certified(0)]) == pairs.Saved(held=True, finished=False)
+    assert save(db, first, [refuted(1)]) == pairs.Saved(held=False, finished=True)
+    with db.read() as session:
+        rows, iteration = pairs.of_job(session, job_id), session.get_one(IterationRow, (job_id, 0))
+        assert [row.state for row in rows] == ["certified", "refuted", "refuted", "skipped", "skipped"]
+        assert [row.pair_index for row in pairs.reached(session, iteration)] == [0, 1]
+        assert rows[1].witness_s == [0.5]
+        assert iteration.state == IterationState.FAILED
         assert [e.kind for e in events.since(session, job_id)][-2:] == ["pairs", "iteration"]
-    assert save(db, second, [certified(2)]) == pairs.Saved(held=False, finished=False)
-    with db.read() as session:
-        assert session.scalars(select(ProofRow)).all() == []
+        assert len(session.scalars(select(ProofRow)).all()) == 1
+
+
+def test_a_failure_ends_the_batch_that_it_is_in(db: Database) -> None:
+    with db.write() as session:
+        job_id = a_running_job(session, 3).id
+    held = claim(db, job_id, batch_seconds=5)
+    assert held is not None
+    assert save(db, held, [refuted(0)]) == pairs.Saved(held=False, finished=True)
 
 
 def test_without_early_end_every_pair_gets_its_verdict(db: Database) -> None:
     with db.write() as session:
         job_id = a_running_job(session, 2, stop_at_first_failure=False).id
-    held = claim(db, job_id, [0, 1])
+    held = claim(db, job_id, batch_seconds=3)
     assert held is not None
     assert not save(db, held, [pairs.Result(0, PairState.NOT_CERTIFIABLE, seconds=0.1, weak_points=[[0.1]])]).finished
     assert save(db, held, [certified(1)]).finished
     with db.read() as session:
         assert [row.state for row in pairs.of_job(session, job_id)] == ["not_certifiable", "certified"]
         assert set(pairs.proving(session, job_id, {0: 0, 1: 0})) == {1}
+        assert [row.pair_index for row in pairs.reached(session, session.get_one(IterationRow, (job_id, 0)))] == [0, 1]
 
 
-def test_a_lease_of_another_host_ends_by_time_and_its_result_is_then_refused(db: Database) -> None:
+def test_a_lease_that_ran_out_is_released_and_its_result_is_then_refused(db: Database) -> None:
     with db.write() as session:
         job_id = a_running_job(session, 1).id
-    first = claim(db, job_id, [0])
+    first = claim(db, job_id)
     assert first is not None
-    assert claim(db, job_id, [0]) is None
+    assert claim(db, job_id) is None
     with db.write() as session:
         row = session.scalars(select(PairRow)).one()
         row.worker, row.lease_until = ELSEWHERE, utcnow() - timedelta(seconds=1)
-    second = claim(db, job_id, [0])
+    with db.write() as session:
+        assert leases.lost(session, PairRow, by_time=False) == []
+        (lease,) = leases.lost(session, PairRow, by_time=True)
+        assert lease == leases.Lost(job_id, first.token, ELSEWHERE, "its lease ran out", alone=False)
+        assert [row.pair_index for row in leases.release(session, PairRow, lease)] == [0]
+    second = claim(db, job_id)
     assert second is not None
-    assert second.pairs == (pairs.Claimed(0, attempt=2),)
+    assert second.pairs == (pairs.Claimed(0, attempt=2, deaths=0),)
     assert not save(db, first, [certified(0)]).held
     assert save(db, second, [certified(0)]).finished
 
 
-def test_a_lease_of_this_host_ends_with_its_process_and_not_before(db: Database) -> None:
+def test_a_lease_of_this_host_ends_with_its_process(db: Database) -> None:
     process = multiprocessing.get_context("spawn").Process(target=os.getpid)
     process.start()
     worker = f"{leases.this_worker().split(':')[0]}:{process.pid}:{leases._started(process.pid or 0)}"
     with db.write() as session:
         job_id = a_running_job(session, 1).id
-    assert claim(db, job_id, [0]) is not None
+    assert claim(db, job_id) is not None
     with db.write() as session:
-        row = session.scalars(select(PairRow)).one()
-        row.lease_until = utcnow() - timedelta(seconds=1)
-        assert not leases.is_free(row, utcnow())
-        row.worker = worker
+        assert leases.lost(session, PairRow, by_time=True) == []
+        session.scalars(select(PairRow)).one().worker = worker
     process.join()
+    with db.read() as session:
+        (lease,) = leases.lost(session, PairRow, by_time=False)
+    assert (lease.job_id, lease.worker, lease.reason, lease.alone) == (job_id, worker, "its process died", True)
     with db.write() as session:
-        ((lost_job, token),) = leases.lost(session, PairRow)
-        assert lost_job == job_id
-        assert [row.pair_index for row in leases.release(session, PairRow, token)] == [0]
+        session.scalars(select(PairRow)).one().parent = worker
+    with db.write() as session:
+        (lease,) = leases.lost(session, PairRow, by_time=False)
+        assert (lease.reason, lease.alone) == ("its worker ended", False)
+        leases.release(session, PairRow, lease)
+        assert session.scalars(select(PairRow)).one().deaths == 0
     assert leases.is_alive(leases.this_worker()) is True
     assert leases.is_alive(ELSEWHERE) is None
 
 
-def test_what_was_begun_before_is_claimed_alone(db: Database) -> None:
+def test_another_process_space_of_the_same_name_is_another_host(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = leases.this_worker()
+    leases._host.cache_clear()
+    monkeypatch.setattr(os, "readlink", lambda path: "pid:[1]")
+    try:
+        assert leases.is_alive(here) is None
+        assert leases.this_worker().split(".")[0] == here.split(".")[0]
+    finally:
+        leases._host.cache_clear()
+
+
+def test_what_may_have_killed_its_process_is_claimed_alone(db: Database) -> None:
     with db.write() as session:
-        job_id = a_running_job(session, 3).id
-        transition(session, PairRow, PairState.RUNNING, PairRow.pair_index < 2, attempts=1, worker=ELSEWHERE, lease_until=utcnow())
+        job_id = a_running_job(session, 4).id
+        session.execute(update(PairRow).where(PairRow.pair_index < 2).values(attempts=1, deaths=1))
     claimed = []
-    while (held := claim(db, job_id, [0, 1, 2])) is not None:
+    while (held := claim(db, job_id, batch_seconds=5)) is not None:
         claimed.append([(pair.index, pair.attempt) for pair in held.pairs])
-    assert claimed == [[(2, 1)], [(0, 2)], [(1, 2)]]
+    assert claimed == [[(2, 1), (3, 1)], [(0, 2)], [(1, 2)]]
 
 
 def test_a_renewed_lease_does_not_run_out(db: Database) -> None:
     with db.write() as session:
         job_id = a_running_job(session, 1).id
-    with db.write() as session:
-        held = pairs.claim(session, job_id, 0, [0], task_id=None, lease_seconds=0.2)
+    held = claim(db, job_id)
     assert held is not None
     with db.read() as session:
         before = session.scalars(select(PairRow)).one().lease_until
-    with leases.renewed(db, PairRow, held.token, seconds=0.2):
-        until = utcnow() + timedelta(seconds=5)
+    with leases.kept(db, PairRow, held.token, seconds=0.2, job_states=[JobState.RUNNING]):
+        until = utcnow() + timedelta(seconds=10)
         while utcnow() < until:
             with db.read() as session:
                 after = session.scalars(select(PairRow)).one().lease_until
             assert before is not None
             assert after is not None
-            if after > before:
+            if after != before:
                 return
+            time.sleep(0.05)
     raise AssertionError("the lease was never renewed")
+
+
+def hold(url: str, token: str, states: list[str]) -> None:
+    """Works for ever."""
+    db = Database(url)
+    with leases.kept(db, PairRow, token, 60, states):
+        while True:
+            time.sleep(1)
+
+
+@pytest.mark.parametrize("what", ["skipped", "cancelled"])
+def test_a_holder_whose_work_is_not_wanted_any_more_dies(db: Database, database_url: str, what: str) -> None:
+    with db.write() as session:
+        job_id = a_running_job(session, 1).id
+    held = claim(db, job_id)
+    assert held is not None
+    process = multiprocessing.get_context("spawn").Process(target=hold, args=(database_url, held.token, [JobState.RUNNING]))
+    process.start()
+    process.join(3)
+    assert process.exitcode is None
+    with db.write() as session:
+        if what == "skipped":
+            pairs.skip(session, job_id)
+        else:
+            jobs.cancel(session, job_id)
+    process.join(30)
+    assert process.exitcode == -signal.SIGKILL
 
 
 def test_a_step_is_done_once_and_accepting_survives_a_cancel(db: Database) -> None:
     with db.write() as session:
-        job = a_running_job(session)
-        seeding, accepting = steps.add(session, job, StepKind.PROPOSE, {}).id, steps.add(session, job, StepKind.ACCEPT, {}).id
+        job = a_running_job(session, 0)
+        steps.add(session, job, StepKind.PROPOSE, {})
+        steps.add(session, job, StepKind.ACCEPT, {})
         job_id = job.id
+    held = claim_step(db, job_id)
+    assert held is not None
+    assert held.kind == StepKind.PROPOSE
     with db.write() as session:
-        held = steps.claim(session, seeding, task_id="t", lease_seconds=60)
-    with db.write() as session:
-        assert held is not None
-        assert steps.claim(session, seeding, task_id="u", lease_seconds=60) is None
-        assert steps.claim(session, 999, task_id="u", lease_seconds=60) is None
         assert steps.save(session, held, StepState.DONE, {"x": 1}, 0.5)
         assert not steps.save(session, held, StepState.DONE, {"x": 2}, 0.5)
         jobs.cancel(session, job_id)
-        assert steps.skip(session, job_id) == ()
+        steps.skip(session, job_id)
     with db.read() as session:
         assert {row.kind: (row.state, row.report) for row in steps.of_job(session, job_id)} == {
             "propose": ("done", {"x": 1}),
             "accept": ("open", None),
         }
+    assert claim_step(db, job_id) is not None
     with db.write() as session:
-        assert steps.claim(session, accepting, task_id="t", lease_seconds=60) is not None
-        job = jobs.lock(session, job_id)
-        jobs.finish(session, job, JobState.CANCELLED, reason="asked")
-    with db.write() as session:
-        assert steps.claim(session, accepting, task_id="t", lease_seconds=60) is None
+        session.execute(update(StepRow).values(state=StepState.OPEN))
+        jobs.finish(session, jobs.lock(session, job_id), JobState.CANCELLED, reason="asked")
+    assert claim_step(db, job_id) is None
 
 
-def test_open_rows_are_resent_only_once_in_a_while(db: Database) -> None:
+def claim_step(db: Database, job_id: str) -> steps.Claim | None:
     with db.write() as session:
-        job_id = a_running_job(session, 2).id
-    later = utcnow() + timedelta(seconds=1)
+        held = work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5)
+        assert held is None or isinstance(held, steps.Claim)
+        return held
+
+
+@pytest.mark.parametrize("outcome", [StepState.DONE, StepState.FAILED])
+def test_the_latest_region_is_accepted_and_an_earlier_one_only_if_it_is_refused(db: Database, outcome: StepState) -> None:
     with db.write() as session:
-        assert leases.unclaimed(session, PairRow, later) == [job_id]
-        assert [row.pair_index for row in leases.resend(session, PairRow, job_id, later)] == [0, 1]
+        job = a_running_job(session, 0)
+        for turn in (1, 2):
+            job.turn = turn
+            steps.add(session, job, StepKind.ACCEPT, {"turn": turn})
+        job_id = job.id
+    held = claim_step(db, job_id)
+    assert held is not None
+    assert held.input == {"turn": 2}
+    assert claim_step(db, job_id) is None
     with db.write() as session:
-        assert leases.unclaimed(session, StepRow, later) == []
-        assert leases.resend(session, PairRow, job_id, utcnow() - timedelta(seconds=1)) == []
+        steps.save(session, held, outcome, {}, 0.1)
+    earlier = claim_step(db, job_id)
+    if outcome == StepState.DONE:
+        assert earlier is None
+    else:
+        assert earlier is not None
+        assert earlier.input == {"turn": 1}

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from sqlalchemy import inspect
 
-from db import migrate, scenes
+from db import jobs, migrate, pairs, scenes
 from db.session import Database
+from tests.db.builders import a_running_job
 from tests.scenes import slider
 
 
@@ -44,4 +45,17 @@ def test_rows_survive_a_second_upgrade(empty_database_url: str) -> None:
     migrate.upgrade(empty_database_url)
     with database.read() as session:
         assert scenes.get(session, scene_id).hash == slider().hash
+    database.close()
+
+
+def test_jobs_and_their_pairs_survive_the_way_down_and_up(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.write() as session:
+        job_id = a_running_job(session, pair_count=3).id
+    migrate.downgrade(empty_database_url, "0001")
+    migrate.upgrade(empty_database_url)
+    assert migrate.drift(empty_database_url) == []
+    with database.read() as session:
+        assert (jobs.get(session, job_id).state, len(pairs.of_job(session, job_id))) == ("running", 3)
     database.close()

@@ -28,7 +28,7 @@ def test_a_scene_is_stored_once_and_comes_back_equal(db: Database) -> None:
     assert (again.id, again.name) == (first.id, "one") == (slider().hash[:16], "one")
     with db.read() as session:
         assert type(slider()).from_document(scenes.get(session, "one").document).hash == slider().hash
-        assert [row.id for row in scenes.newest(session)] == [first.id]
+        assert [row.id for row in scenes.page(session).rows] == [first.id]
 
 
 def test_scenes_whose_short_ids_collide_are_both_stored(db: Database) -> None:
@@ -79,14 +79,14 @@ def test_pages_hold_every_job_once_newest_first(db: Database) -> None:
     with db.read() as session:
         while True:
             page = jobs.page(session, state="queued", kind="grow", after=after, limit=2)
-            found += [job.id for job in page.jobs]
+            found += [job.id for job in page.rows]
             after = page.next
             if after is None:
                 break
         assert len(found) == len(set(found)) == 7
         times = [jobs.get(session, job_id).created_at for job_id in found]
         assert times == sorted(times, reverse=True)
-        assert not jobs.page(session, state="failed").jobs
+        assert not jobs.page(session, state="failed").rows
 
 
 def test_cancel_ends_a_queued_job_and_asks_a_running_one_to_end(db: Database) -> None:
@@ -145,8 +145,8 @@ def test_a_region_is_its_jobs_latest_until_it_is_deleted(db: Database) -> None:
         (stored,) = regions.polytopes(session, scene_id)
         np.testing.assert_array_equal(stored.C, [[1.0], [-1.0]])
         assert proofs.get(session, digest) == b"first"
-        assert [row.id for row in regions.newest(session, job_id=job_id)] == [region_id]
-        assert not regions.newest(session, scene_id="other")
+        assert [row.id for row in regions.page(session, job_id=job_id).rows] == [region_id]
+        assert not regions.page(session, scene_id="other").rows
     with db.write() as session:
         regions.delete(session, region_id)
     with db.read() as session:

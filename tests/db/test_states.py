@@ -10,7 +10,7 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 from sqlalchemy.orm import Session
 
-from db.models import Base, IterationRow, JobRow, PairRow, StepRow
+from db.models import Base, IterationRow, JobRow, PairRow, StepRow, WebhookRow
 from db.session import Database
 from db.states import JobState, PairState, StepState, sources, transition, unfinished
 from tests.db.builders import a_running_job
@@ -60,7 +60,7 @@ def test_a_job_that_has_ended_never_changes(session: Session, wanted: list[JobSt
     assert ended in (None, row.state)
 
 
-@pytest.mark.parametrize("model", [JobRow, PairRow, StepRow, IterationRow])
+@pytest.mark.parametrize("model", [JobRow, PairRow, StepRow, IterationRow, WebhookRow])
 def test_every_state_can_be_reached_and_every_unfinished_one_can_end(model: type[JobRow]) -> None:
     table = model.transitions
     first = next(iter(table))

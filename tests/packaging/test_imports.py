@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 THIRD_PARTIES = {
     "certifier": {"flint", "numba", "numpy", "pydrake", "scipy", "yaml"},
     "certifier.verify": {"flint", "numpy"},
-    "db": {"alembic", "numpy", "pydantic", "pydantic_settings", "sqlalchemy"},
+    "db": {"alembic", "numpy", "pydantic", "pydantic_settings", "sqlalchemy", "structlog"},
     "planner": {"numpy", "pydrake", "scipy"},
     "client": {"flint", "httpx2", "numpy", "pydrake", "yaml"},
     "dashboard": set(),

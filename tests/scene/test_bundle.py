@@ -8,8 +8,8 @@ import pytest
 
 from certifier.errors import SceneError
 from certifier.scene import BundleLimits, load_bundle, pack_bundle
-from certifier.scene.bundle import check_bundle
 from certifier.scene.references import references, resolve
+from certifier.scene.unpack import check_bundle
 from tests.scene.workshop import EXAMPLES, ROOM, SCENE, parsed, write
 
 TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"

@@ -45,4 +45,4 @@ def write(directory: Path, scene=SCENE, *, extra="", kind="revolute", limit=LIMI
 
 def parsed(path: Path) -> Scene:
     """The child's half of loading, in this process: quick, for models that Drake survives."""
-    return Scene.from_document(parse({"path": str(path), "bundle_root": None}))
+    return Scene.from_document(parse({"path": str(path)}))

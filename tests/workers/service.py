@@ -26,7 +26,8 @@ from workers.processes import die_with_parent
 from workers.scenes import load_scene
 
 ROOT = Path(__file__).parents[2]
-PATIENCE_SECONDS = 60.0
+PATIENCE_SECONDS = 180.0
+"""For machines that are busy with other things; nothing is to take that long."""
 Found = TypeVar("Found")
 
 
@@ -58,27 +59,35 @@ def eventually(look: Callable[[], Found | None], what: str, seconds: float = PAT
     return found
 
 
+COMMANDS = {"control": ["workers", "control"], "solve": ["workers", "solve"], "api": ["api"]}
+
+
 class Service:
-    """Worker processes with the settings of this process's environment."""
+    """Worker processes, and the API, with the settings of this process's environment."""
 
     def __init__(self, logs: Path) -> None:
         self._logs = logs
         self._workers: dict[str, subprocess.Popen[bytes]] = {}
 
-    def start(self, queue: str) -> None:
-        with (self._logs / f"{queue}.log").open("ab") as log:
-            self._workers[queue] = subprocess.Popen(
-                [sys.executable, "-m", "workers", queue],
+    def start(self, name: str) -> None:
+        with (self._logs / f"{name}.log").open("ab") as log:
+            self._workers[name] = subprocess.Popen(
+                [sys.executable, "-m", *COMMANDS[name]],
                 cwd=ROOT,
                 stdout=log,
                 stderr=log,
                 preexec_fn=partial(die_with_parent, signal.SIGKILL),
             )
 
-    def kill(self, queue: str) -> None:
+    def kill(self, name: str) -> None:
         """Kills a whole worker, as the kernel does when memory runs out."""
-        self._workers[queue].kill()
-        self._workers[queue].wait()
+        self._workers[name].kill()
+        self._workers[name].wait()
+
+    def children(self, name: str) -> list[int]:
+        """The processes that a worker has forked."""
+        pid = self._workers[name].pid
+        return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
     def stop(self) -> None:
         for worker in self._workers.values():
@@ -98,7 +107,7 @@ class Service:
 def running_service(database_url: str, queue_url: str, logs: Path, **variables: str) -> Iterator[Service]:
     """A control worker and two solving processes."""
     given = {"CIRIS_DATABASE_URL": database_url, "CIRIS_REDIS_URL": queue_url, "CIRIS_SOLVE_PROCESSES": "2", "CIRIS_SWEEP_SECONDS": "0.5"}
-    with environment(**given, CIRIS_RESEND_SECONDS="2", **variables):
+    with environment(**{**given, **variables}):
         service = Service(logs)
         try:
             service.start("control")

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from certifier.model import Scene
-from db import pairs, steps
-from db.session import database
 from tests.services import Queue
 from tests.workers.options import box_around, grow_box
 from tests.workers.service import Service, ended, events_of, eventually, job_of, kill_holder, pairs_of, submit
-from workers.app import send_coordinate, send_pairs, send_step
+from workers.app import send_coordinate, send_work
 
 pytestmark = [pytest.mark.usefixtures("service"), pytest.mark.parametrize("service", ["sqlite"], indirect=True)]
 
@@ -32,7 +30,7 @@ def test_a_pair_that_kills_its_process_every_time_ends_as_an_error(arm: tuple[Sc
         kill_holder(job_id, index=2, attempt=attempt)
     job = ended(job_id)
     assert (job.state, job.outcome) == ("failed", "error")
-    assert "the worker died 3 times" in (job.error or {})["message"]
+    assert "its process died 3 times" in (job.error or {})["message"]
     assert [row.state for row in pairs_of(job_id)] == ["certified", "certified", "error", "certified"]
 
 
@@ -51,13 +49,9 @@ def test_messages_that_come_again_change_nothing(planar: Scene) -> None:
 
 
 def send_all_again(job_id: str) -> None:
-    send_coordinate(job_id)
-    with database().read() as session:
-        rows, did = pairs.of_job(session, job_id), steps.of_job(session, job_id)
-    for iteration in {row.iteration for row in rows}:
-        send_pairs(job_id, iteration, [[row.pair_index for row in rows if row.iteration == iteration]])
-    for step in did:
-        send_step(step.id)
+    for _ in range(5):
+        send_coordinate(job_id)
+    send_work(10)
 
 
 def test_a_job_survives_the_death_of_both_workers(arm: tuple[Scene, np.ndarray], service: Service) -> None:
@@ -78,11 +72,16 @@ def test_a_job_survives_the_loss_of_every_message(arm: tuple[Scene, np.ndarray],
     assert ended(job_id).outcome == "certified"
 
 
-def test_a_job_survives_an_outage_of_redis(arm: tuple[Scene, np.ndarray], queue: Queue) -> None:
+def test_jobs_survive_an_outage_of_redis_in_which_every_process_ends_its_work(arm: tuple[Scene, np.ndarray], queue: Queue) -> None:
     scene, s = arm
-    job_id = submit(scene, box_around(s, 0.014))
-    eventually(lambda: any(row.state == "running" for row in pairs_of(job_id)), "a pair is running")
+    job_ids = [submit(scene, box_around(s, radius)) for radius in (0.014, 0.0145)]
+
+    def working() -> set[str | None]:
+        return {row.worker for job_id in job_ids for row in pairs_of(job_id) if row.state == "running"}
+
+    eventually(lambda: len(working()) == 2, "both processes work")
     queue.stop()
-    time.sleep(1)
+    eventually(lambda: not working(), "they have done what they had begun")
+    time.sleep(1)  # and nobody takes their acknowledgements
     queue.start()
-    assert ended(job_id).outcome == "certified"
+    assert [ended(job_id).outcome for job_id in job_ids] == ["certified", "certified"]

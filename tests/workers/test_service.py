@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from certifier.growth import GrowthOptions
+from certifier.local import grow
 from certifier.model import Scene
 from certifier.verify.region import verify_region
 from db import jobs, pairs, proofs, regions
@@ -17,14 +19,17 @@ pytestmark = pytest.mark.usefixtures("service")
 SEED = [0.0, 0.0]
 
 
-def test_a_region_grows_is_stored_and_its_proof_holds(planar: Scene) -> None:
-    job = ended(submit(planar, grow_box(SEED, 0.05, max_rounds=1)))
+def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(planar: Scene) -> None:
+    options = grow_box(SEED, 0.4, pushes=1, max_rounds=1)
+    job = ended(submit(planar, options))
     assert (job.state, job.outcome, job.error) == ("succeeded", "certified", None)
     with database().read() as session:
         region = regions.get(session, job.region_id or "")
         proof = proofs.get(session, region.proof_digest)
         volumes = [row.ellipsoid_volume for row in pairs.iterations(session, job.id) if row.ellipsoid_volume]
     statement = verify_region(proof)
+    alone = grow(planar, GrowthOptions.from_document(options)).manifest
+    assert (region.arrays["C"].tolist(), region.arrays["d"].tolist()) == (alone["halfspace_normals"], alone["halfspace_offsets"])
     assert len(statement.gaps) == len(planar.pairs)
     assert np.all(region.arrays["C"] @ planar.to_s(SEED) <= region.arrays["d"])
     assert region.manifest["guarantee"] == region.guarantee == "exact"

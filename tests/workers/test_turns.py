@@ -4,24 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import timedelta
+from typing import Any
 
 import pytest
 from sqlalchemy import update
+from sqlalchemy.exc import OperationalError
 
+from certifier.errors import CirisError
+from certifier.forecast import forecast
 from certifier.outcome import Outcome
 from db import jobs, pairs, regions, steps
-from db.models import JobRow, PairRow, ProofRow
+from db.models import JobRow, PairRow, ProofRow, StepRow
 from db.session import database
-from db.states import PairState, transition
+from db.settings import settings
 from db.types import utcnow
 from tests.scenes import slider
 from tests.services import Queue, queue_server
 from tests.workers.options import box_around, grow_box
 from tests.workers.service import environment, events_of, job_of, pairs_of, submit
-from workers import sweeper
+from workers import admission, sweeper, transaction
 from workers.app import CONTROL, SOLVE, send_coordinate, waiting
-from workers.pairs import solve_pairs
-from workers.steps import run_step
+from workers.scenes import load_scene
+from workers.solver import work
 from workers.turns import coordinate
 
 ELSEWHERE = "elsewhere:1:1"
@@ -38,7 +42,7 @@ def queue() -> Iterator[Queue]:
 def _here(database_url: str, queue: Queue) -> Iterator[None]:
     """This process is the service."""
     queue.flush()
-    with environment(CIRIS_DATABASE_URL=database_url, CIRIS_REDIS_URL=queue.url, CIRIS_RESEND_SECONDS="0"):
+    with environment(CIRIS_DATABASE_URL=database_url, CIRIS_REDIS_URL=queue.url):
         yield
 
 
@@ -59,17 +63,23 @@ def test_a_job_begins_once_however_often_it_is_coordinated(job_id: str) -> None:
     assert (waiting(SOLVE), job_of(job_id).turn) == (1, 1)
 
 
-def test_solving_twice_certifies_once(job_id: str) -> None:
-    for _ in range(2):
-        solve_pairs(job_id, 0, [0, 1, 2], "t")
+def work_all() -> None:
+    """Does what is to be done until nothing is."""
+    while work():
+        pass
+
+
+def test_work_is_done_once(job_id: str) -> None:
+    work_all()
+    assert not work()
     assert [(row.state, row.attempts) for row in pairs_of(job_id)] == [("certified", 1)] * 3
-    assert waiting(CONTROL) == 2
+    assert waiting(CONTROL) == 2  # one asks for the beginning, one for what follows
 
 
 def test_a_cancelled_job_ends_with_its_open_pairs_skipped(job_id: str) -> None:
     with database().write() as session:
         jobs.cancel(session, job_id)
-    solve_pairs(job_id, 0, [0, 1, 2])
+    assert not work()
     coordinate(job_id)
     assert [row.state for row in pairs_of(job_id)] == ["skipped"] * 3
     job = job_of(job_id)
@@ -87,8 +97,8 @@ def test_a_deadline_ends_the_job_with_what_it_has(job_id: str) -> None:
 
 def test_a_poison_pair_ends_as_an_error_with_its_cause(job_id: str) -> None:
     with database().write() as session:
-        transition(session, PairRow, PairState.RUNNING, PairRow.pair_index == 1, attempts=3, worker=ELSEWHERE, lease_until=utcnow())
-    solve_pairs(job_id, 0, [0, 1, 2])
+        session.execute(update(PairRow).where(PairRow.pair_index == 1).values(deaths=3))
+    work_all()
     coordinate(job_id)
     assert [row.state for row in pairs_of(job_id)] == ["certified", "error", "certified"]
     job = job_of(job_id)
@@ -98,7 +108,7 @@ def test_a_poison_pair_ends_as_an_error_with_its_cause(job_id: str) -> None:
 
 
 def test_a_coordination_that_always_dies_ends_the_job(job_id: str) -> None:
-    solve_pairs(job_id, 0, [0, 1, 2])
+    work_all()
     with database().write() as session:
         jobs.lock(session, job_id).coordinator_attempts = 3
     coordinate(job_id)
@@ -108,7 +118,7 @@ def test_a_coordination_that_always_dies_ends_the_job(job_id: str) -> None:
 
 
 def test_two_coordinators_do_not_work_at_once_and_a_dead_one_is_replaced(job_id: str) -> None:
-    solve_pairs(job_id, 0, [0, 1, 2])
+    work_all()
 
     def held_by(worker: str, seconds: float) -> None:
         with database().write() as session:
@@ -128,7 +138,7 @@ def test_a_polytope_that_is_none_ends_the_job_with_its_error() -> None:
     del empty["seed"]["center"]
     job_id = submit(slider(), empty)
     coordinate(job_id)
-    solve_pairs(job_id, 0, [0])
+    work_all()
     coordinate(job_id)
     error = job_of(job_id).error
     assert error is not None
@@ -147,37 +157,35 @@ def test_a_step_whose_worker_dies_each_time_ends_the_job_with_its_cause() -> Non
     coordinate(job_id)
     with database().write() as session:
         (step,) = steps.of_job(session, job_id)
-        step.attempts = 3
-    run_step(step.id)
+        step.deaths = 3
+    work_all()
     coordinate(job_id)
     job = job_of(job_id)
     assert (job.state, (job.error or {})["code"]) == ("failed", "worker_lost")
 
 
 def test_a_region_whose_proof_is_refused_is_never_stored(job_id: str) -> None:
-    solve_pairs(job_id, 0, [0, 1, 2])
+    work_all()
     coordinate(job_id)
     with database().write() as session:
         session.execute(update(ProofRow).values(data=b"not the proof that was verified"))
-        (step,) = steps.of_job(session, job_id)
-    run_step(step.id)
+    work_all()
     coordinate(job_id)
     job = job_of(job_id)
     assert (job.state, job.region_id, job.reason) == ("failed", None, "the proof of a region was refused")
     assert (job.error or {})["code"] == "proof_malformed"
     with database().read() as session:
-        assert not regions.newest(session)
+        assert not regions.page(session).rows
 
 
 def test_a_certified_polytope_becomes_a_region_even_after_a_cancel(job_id: str) -> None:
-    solve_pairs(job_id, 0, [0, 1, 2])
+    work_all()
     coordinate(job_id)
     with database().write() as session:
         jobs.cancel(session, job_id)
-        (step,) = steps.of_job(session, job_id)
     coordinate(job_id)
     assert job_of(job_id).state == "cancelling"
-    run_step(step.id)
+    work_all()
     coordinate(job_id)
     job = job_of(job_id)
     assert job.state == "cancelled"
@@ -188,24 +196,103 @@ def test_a_certified_polytope_becomes_a_region_even_after_a_cancel(job_id: str) 
 def test_the_sweeper_sends_lost_messages_again(job_id: str, queue: Queue) -> None:
     queue.flush()
     sweeper.sweep()
-    assert waiting(SOLVE) == 1
+    assert waiting(SOLVE) == 3
     sweeper.sweep()
-    assert waiting(SOLVE) == 1
-    solve_pairs(job_id, 0, [0, 1, 2])
+    assert waiting(SOLVE) == 3
+    work_all()
     queue.flush()
     sweeper.sweep()
-    assert waiting(CONTROL) == 1
+    assert (waiting(SOLVE), waiting(CONTROL)) == (0, 1)
 
 
-def test_the_sweeper_frees_what_a_lost_worker_held(job_id: str) -> None:
+def test_the_sweeper_frees_what_a_lost_worker_held_and_says_why(job_id: str) -> None:
     with database().write() as session:
-        for index in (0, 1):
-            pairs.claim(session, job_id, 0, [index], task_id=None, lease_seconds=60)
-        gone = {"worker": ELSEWHERE, "lease_until": utcnow() - timedelta(seconds=1)}
+        pairs.claim(session, jobs.lock(session, job_id), lease_seconds=60, batch_seconds=60)
+        gone = {"worker": ELSEWHERE, "lease_until": utcnow() - timedelta(seconds=1), "lease_token": "gone"}
         session.execute(update(PairRow).where(PairRow.pair_index == 0).values(gone))
+    sweeper.sweep(by_time=False)
+    assert [row.state for row in pairs_of(job_id)] == ["running"] * 3
     sweeper.sweep()
-    assert [row.state for row in pairs_of(job_id)] == ["open", "running", "open"]
+    assert [row.state for row in pairs_of(job_id)] == ["open", "running", "running"]
     assert waiting(SOLVE) == 2
+    lost = events_of(job_id)[-1]
+    assert (lost.kind, lost.data) == ("lost", {"worker": ELSEWHERE, "reason": "its lease ran out", "iteration": 0, "pairs": [0]})
+
+
+def test_leases_are_not_ended_by_time_right_after_nobody_could_renew_them() -> None:
+    holders, now = sweeper.Holders(), utcnow()
+
+    def could_renew(*after: float) -> list[bool]:
+        return [holders.could_renew(now + timedelta(seconds=seconds)) for seconds in after]
+
+    assert could_renew(20, 40, 61) == [False, False, True]
+    assert could_renew(200, 220, 240, 261) == [False, False, False, True]
+    holders.database_was_away()
+    assert could_renew(262) == [False]
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "deadline", "message"),
+    [
+        ("CIRIS_PAIR_MEMORY_BYTES", "1000", None, "GiB of memory; a process may use"),
+        ("CIRIS_TIME_LIMIT_SECONDS", "0.001", None, "the limit is 0 s"),
+        ("CIRIS_TIME_LIMIT_SECONDS", "3600", 0.0, "the deadline is in"),
+    ],
+)
+def test_a_job_that_cannot_fit_is_refused_before_anything_is_computed(
+    database_url: str, queue: Queue, limit: str, value: str, deadline: float | None, message: str
+) -> None:
+    with environment(CIRIS_DATABASE_URL=database_url, CIRIS_REDIS_URL=queue.url, **{limit: value}):
+        job_id = submit(slider(), box_around([0.0], 0.1))
+        left = None if deadline is None else utcnow() + timedelta(seconds=deadline)
+        with database().read() as session:
+            scene_id = jobs.get(session, job_id).scene_id
+        with pytest.raises(CirisError, match=message) as refused:
+            admission.check(forecast(load_scene(scene_id)), settings(), left and (left - utcnow()).total_seconds())
+        assert refused.value.code == "does_not_fit"
+        if deadline is None:
+            coordinate(job_id)
+            job = job_of(job_id)
+            assert (job.state, (job.error or {})["code"], pairs_of(job_id)) == ("failed", "does_not_fit", [])
+
+
+class Away(Exception):
+    """What SQLAlchemy's error wraps."""
+
+
+def test_a_database_that_is_away_for_a_while_costs_no_result(job_id: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    failures = iter([True, True, False])
+    save = pairs.save
+
+    def fails_twice(*arguments: Any) -> pairs.Saved:
+        if next(failures, False):
+            raise OperationalError("SELECT 1", {}, Away())
+        return save(*arguments)
+
+    monkeypatch.setattr(pairs, "save", fails_twice)
+    monkeypatch.setattr(transaction, "RETRY_SECONDS", 0.01)
+    work_all()
+    assert [(row.state, row.attempts) for row in pairs_of(job_id)] == [("certified", 1)] * 3
+
+
+def test_a_region_is_had_from_an_earlier_polytope_when_the_proof_of_the_last_is_refused(job_id: str) -> None:
+    work_all_pairs_and_forge_a_later_region(job_id)
+    work_all()
+    coordinate(job_id)
+    job = job_of(job_id)
+    assert (job.state, job.reason) == ("failed", "the proof of a region was refused")
+    with database().read() as session:
+        assert regions.get(session, job.region_id or "").iteration == 0
+
+
+def work_all_pairs_and_forge_a_later_region(job_id: str) -> None:
+    """Leaves two regions to be accepted: a good one, and a later one whose proofs do not exist."""
+    while any(row.state == "open" for row in pairs_of(job_id)):
+        work()
+    coordinate(job_id)
+    with database().write() as session:
+        (good,) = steps.of_job(session, job_id)
+        session.add(StepRow(job_id=job_id, turn=good.turn + 1, kind="accept", input={**good.input, "iteration": 1, "proofs": {}}))
 
 
 def test_without_redis_a_job_is_kept_and_sent_by_the_sweeper(queue: Queue) -> None:

@@ -1,0 +1,46 @@
+"""How often one caller may ask: token buckets.
+
+They live in the API's process. Redis may be away or start empty at any time without anybody noticing, so nothing that guards the
+service stands in it; several API processes allow their callers as many times the rate, which is what they can serve.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+
+MAX_BUCKETS = 10_000
+BURST_SECONDS = 2.0
+
+
+@dataclass
+class _Bucket:
+    tokens: float
+    filled: float
+
+
+class Buckets:
+    """One token bucket for each name: ``rate`` tokens a second, at most ``BURST_SECONDS`` of them kept.
+
+    Of more than ``MAX_BUCKETS`` names the one that was quiet for longest is forgotten.
+    """
+
+    def __init__(self, rate: float, clock: Callable[[], float] = time.monotonic) -> None:
+        self._rate, self._size, self._clock = rate, max(1.0, BURST_SECONDS * rate), clock
+        self._buckets: OrderedDict[str, _Bucket] = OrderedDict()
+
+    def take(self, name: str) -> float:
+        """Takes a token; returns 0, or the seconds until there is one again."""
+        now = self._clock()
+        bucket = self._buckets.setdefault(name, _Bucket(self._size, now))
+        self._buckets.move_to_end(name)
+        if len(self._buckets) > MAX_BUCKETS:
+            self._buckets.popitem(last=False)
+        bucket.tokens = min(self._size, bucket.tokens + self._rate * (now - bucket.filled))
+        bucket.filled = now
+        if bucket.tokens < 1:
+            return (1 - bucket.tokens) / self._rate
+        bucket.tokens -= 1
+        return 0.0

@@ -1,0 +1,44 @@
+"""Signing in: a browser keeps an API key in a cookie that scripts cannot read and other sites cannot send."""
+
+from __future__ import annotations
+
+import re
+from http import HTTPStatus
+from typing import Annotated
+
+from fastapi import APIRouter, Form, Request, Response
+from fastapi.responses import HTMLResponse, RedirectResponse
+
+from api.access import COOKIE, Db
+from api.pages import page
+from db import keys
+
+router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+
+
+@router.get("/login")
+def login_page(request: Request, next: str = "/") -> Response:
+    return page(request, "login.html", {"next": next, "wrong": False})
+
+
+@router.post("/login")
+def sign_in(request: Request, db: Db, key: Annotated[str, Form()], next: Annotated[str, Form()] = "/") -> Response:
+    with db.read() as session:
+        valid = keys.ring(session).check(key.strip()) is not None
+    if not valid:
+        return page(request, "login.html", {"next": next, "wrong": True}, HTTPStatus.UNAUTHORIZED)
+    response = RedirectResponse(_local(next), HTTPStatus.SEE_OTHER)
+    response.set_cookie(COOKIE, key.strip(), httponly=True, samesite="strict", secure=request.url.scheme == "https")
+    return response
+
+
+@router.post("/logout")
+def sign_out() -> Response:
+    response = RedirectResponse("/login", HTTPStatus.SEE_OTHER)
+    response.delete_cookie(COOKIE, httponly=True, samesite="strict")
+    return response
+
+
+def _local(path: str) -> str:
+    """The path, unless it could lead to another site."""
+    return path if re.fullmatch(r"/([\w.-]+(/[\w.-]+)*)?", path, re.ASCII) else "/"

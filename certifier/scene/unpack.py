@@ -1,0 +1,107 @@
+"""A bundle from a stranger, in the child process that reads it: unpacked within limits, every file checked before Drake sees it."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from certifier.errors import SceneError
+from certifier.scene.bundle import INDEX, BundleLimits, starts
+from certifier.scene.file import read_scene_file
+from certifier.scene.references import references, resolve
+
+_DEPTH = 32
+_CHUNK = 2**20
+
+
+def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
+    """The document of the Scene. Drake is loaded once the files have passed.
+
+    Raises:
+        SceneError: as :func:`certifier.scene.bundle.load_bundle`.
+    """
+    root = Path(payload["root"])
+    scene = root / unpack(Path(payload["archive"]), root, BundleLimits(**payload["limits"]))
+    check_bundle(root, scene)
+    os.chdir(scene.parent)  # where SDFormat looks for included files
+    from certifier.scene.parse import parse
+
+    return parse({"path": str(scene)})
+
+
+def check_bundle(root: Path, scene: Path) -> None:
+    """Check every file of an unpacked bundle before Drake sees it: known kinds, no entities, no reference out of ``root``.
+
+    Raises:
+        SceneError: as :func:`certifier.scene.bundle.load_bundle`.
+    """
+    packages = read_scene_file(scene).packages
+    for name, directory in packages.items():
+        _inside(directory, root, f"packages.{name}")
+    for file in sorted(f for f in root.rglob("*") if f.is_file() and f.name != INDEX):
+        where = file.relative_to(root).as_posix()
+        for reference in references(file):
+            if file.suffix.lower() in (".mjcf", ".xml") and ".." in PurePosixPath(reference).parts:
+                raise SceneError("bundle_uri", f"{where}: {reference!r}: .. is not accepted here")
+            for start in starts(file, scene):
+                _inside(resolve(reference, start, packages), root, f"{where}: {reference!r}")
+
+
+def _inside(path: Path, root: Path, what: str) -> None:
+    if not path.is_relative_to(root):
+        raise SceneError("bundle_uri", f"{what} leads out of the bundle")
+
+
+def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
+    """Write the zip's files below root; the path of the scene file.
+
+    Raises:
+        SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_path``.
+    """
+    try:
+        with zipfile.ZipFile(bundle) as archive:
+            entries = archive.infolist()
+            if len(entries) > limits.files:
+                raise SceneError("bundle_too_large", f"the bundle has {len(entries)} files; at most {limits.files} are accepted")
+            left = limits.unpacked_bytes
+            for entry in entries:
+                left -= _extract(archive, entry, root, left)
+        scene = str(json.loads((root / INDEX).read_text(encoding="utf-8"))["scene"])
+    except SceneError:
+        raise
+    except Exception as error:  # zipfile and the decompressors raise a dozen kinds
+        hint = "make bundles with pack_bundle or `ciris scene add`"
+        raise SceneError("bundle_zip", f"this is not a scene bundle: {type(error).__name__}: {error}", hint=hint) from None
+    _checked_name(scene)
+    return scene
+
+
+def _extract(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, root: Path, left: int) -> int:
+    """Write one entry, unless it has more than ``left`` bytes, whatever it says; the number of its bytes."""
+    target = root / _checked_name(entry.filename)
+    if entry.is_dir():
+        target.mkdir(parents=True, exist_ok=True)
+        return 0
+    if (entry.external_attr >> 16) & 0o170000 not in (0, 0o100000):
+        raise SceneError("bundle_path", f"{entry.filename!r} is not a plain file")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    written = 0
+    with archive.open(entry) as source, target.open("xb") as sink:
+        while chunk := source.read(_CHUNK):
+            written += len(chunk)
+            if written > left:
+                raise SceneError("bundle_too_large", f"the bundle unpacks to more than is accepted; {entry.filename!r} goes beyond it")
+            sink.write(chunk)
+    return written
+
+
+def _checked_name(name: str) -> str:
+    path = PurePosixPath(name)
+    if path.is_absolute() or ".." in path.parts or "\\" in name or "\0" in name or not path.parts:
+        raise SceneError("bundle_path", f"{name!r} is not a path inside the bundle")
+    if len(path.parts) > _DEPTH:
+        raise SceneError("bundle_path", f"{name[:80]!r}... is nested more than {_DEPTH} directories deep")
+    return name

@@ -1,0 +1,192 @@
+"""API keys: made and revoked here, or with ``python -m db.keys`` (which is what ``ciris key`` runs).
+
+A key is ``ciris_<id>_<secret>`` with 256 random bits of secret, so that a fast hash is enough to keep: there is nothing to guess.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import hmac
+import json
+import re
+import secrets
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from sqlalchemy import select
+from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.orm import Session
+
+from certifier.errors import CirisError
+from db import migrate
+from db.models import ApiKeyRow
+from db.session import Database
+from db.settings import Settings
+from db.types import utcnow
+
+_KEY = re.compile(r"ciris_([0-9a-f]{12})_[\w-]{43}", re.ASCII)
+_NAME = re.compile(r"\w[\w.@-]{0,63}")
+
+
+class Scope(StrEnum):
+    """What a key allows; each scope includes those before it."""
+
+    READ = "read"
+    """Look at scenes, jobs and regions, ask about configurations."""
+    SUBMIT = "submit"
+    """Upload scenes; create, cancel and retry jobs."""
+    ADMIN = "admin"
+    """Delete regions."""
+
+    def includes(self, other: Scope) -> bool:
+        """Whether a key of this scope may do what needs the other."""
+        order = list(Scope)
+        return order.index(self) >= order.index(other)
+
+
+def add(session: Session, name: str, scope: Scope) -> str:
+    """Makes a key and returns it. It cannot be had a second time.
+
+    Raises:
+        CirisError: key_name, for a name that cannot be used or is in use.
+    """
+    if not _NAME.fullmatch(name):
+        raise CirisError("key_name", f"{name!r} is no name for a key", field="name", hint="up to 64 letters, digits and . _ - @")
+    if _active(session, name):
+        raise CirisError("key_name", f"there is a key {name!r} already", field="name", hint="revoke it, or choose another name")
+    key_id = secrets.token_hex(6)
+    key = f"ciris_{key_id}_{secrets.token_urlsafe(32)}"
+    session.add(ApiKeyRow(id=key_id, name=name, digest=_digest(key), scope=scope))
+    return key
+
+
+def revoke(session: Session, name: str) -> None:
+    """Ends a key at once.
+
+    Raises:
+        CirisError: key_not_found.
+    """
+    rows = _active(session, name)
+    if not rows:
+        raise CirisError("key_not_found", f"there is no key {name!r}", field="name", hint="`ciris key ls` lists them")
+    for row in rows:
+        row.revoked_at = utcnow()
+
+
+def newest(session: Session) -> Sequence[ApiKeyRow]:
+    """Every key, newest first; the revoked ones too."""
+    return session.scalars(select(ApiKeyRow).order_by(ApiKeyRow.created_at.desc(), ApiKeyRow.id)).all()
+
+
+def exist(session: Session) -> bool:
+    """Whether a key was ever made. Revoking the last one therefore locks the service instead of opening it."""
+    return session.scalar(select(ApiKeyRow.id).limit(1)) is not None
+
+
+@dataclass(frozen=True)
+class Ring:
+    """Every key that was made, by its id, as of one moment."""
+
+    rows: dict[str, ApiKeyRow]
+
+    def knows(self, key: str) -> bool:
+        """Whether the ring has a key of this id, valid or not."""
+        parts = _KEY.fullmatch(key)
+        return parts is not None and parts[1] in self.rows
+
+    def check(self, key: str) -> ApiKeyRow | None:
+        """The row of a valid key; None for anything else."""
+        parts = _KEY.fullmatch(key)
+        row = self.rows.get(parts[1]) if parts else None
+        if row is None or row.revoked_at is not None or not hmac.compare_digest(row.digest, _digest(key)):
+            return None
+        return row
+
+
+def ring(session: Session) -> Ring:
+    """The keys as they are now."""
+    return Ring({row.id: row for row in session.scalars(select(ApiKeyRow))})
+
+
+def check_bind(settings: Settings) -> None:
+    """Refuses to serve an address that others can reach while no key was made.
+
+    Raises:
+        CirisError: no_keys, or no_database when the database cannot tell.
+    """
+    if settings.loopback:
+        return
+    database = Database(settings.database)
+    try:
+        with database.read() as session:
+            guarded = exist(session)
+    except SQLAlchemyError as error:
+        hint = "is it there, and migrated (`python -m db.migrate`)?"
+        raise CirisError("no_database", f"the database cannot be used: {type(error).__name__}", hint=hint) from None
+    finally:
+        database.close()
+    if not guarded:
+        problem = f"others can reach {settings.host}, and no API key has been made that could keep them out"
+        raise CirisError("no_keys", problem, field="CIRIS_HOST", hint="`ciris key add NAME --scope admin` makes one")
+
+
+def _active(session: Session, name: str) -> Sequence[ApiKeyRow]:
+    return session.scalars(select(ApiKeyRow).where(ApiKeyRow.name == name, ApiKeyRow.revoked_at.is_(None))).all()
+
+
+def _digest(key: str) -> str:
+    return hashlib.sha256(key.encode()).hexdigest()
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """``ciris key``: acts on the database of the settings, migrated if need be."""
+    parser = argparse.ArgumentParser(prog="ciris key", description="The API keys of the service whose database the settings name.")
+    parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    adding = verbs.add_parser("add", help="make a key and print it, once")
+    adding.add_argument("name")
+    adding.add_argument("--scope", type=Scope, choices=list(Scope), required=True)
+    verbs.add_parser("ls", help="list the keys, without what is secret").add_argument("--json", action="store_true")
+    verbs.add_parser("revoke", help="end a key within a second").add_argument("name")
+    given = parser.parse_args(arguments)
+    settings = Settings() if given.data is None else Settings(data_dir=given.data)
+    migrate.upgrade(settings.database)
+    database = Database(settings.database)
+    try:
+        with database.write() as session:
+            lines = _run(session, given)
+    except CirisError as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
+    finally:
+        database.close()
+    for line in lines:
+        print(line)
+
+
+def _run(session: Session, given: argparse.Namespace) -> list[str]:
+    """Does what was asked; the lines to print once it is committed."""
+    match given.verb:
+        case "add":
+            return [add(session, given.name, given.scope)]
+        case "revoke":
+            revoke(session, given.name)
+            return []
+        case _:
+            rows = [_described(row) for row in newest(session)]
+            return [json.dumps(rows, indent=1)] if given.json else ["  ".join(f"{k} {v}" for k, v in row.items() if v) for row in rows]
+
+
+def _described(row: ApiKeyRow) -> dict[str, str | None]:
+    """What may be shown of a key."""
+    created_at = row.created_at.isoformat(timespec="seconds")
+    revoked_at = None if row.revoked_at is None else row.revoked_at.isoformat(timespec="seconds")
+    return {"name": row.name, "scope": row.scope, "id": row.id, "created_at": created_at, "revoked_at": revoked_at}
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,64 @@
+"""The log of every process of the service: one JSON object a line on standard error, with the job and pair that it is about.
+
+What is bound with ``structlog.contextvars.bound_contextvars(job=...)`` stands in every line until the block ends, whichever library
+writes it; libraries and our own code use the standard library's loggers. Secrets do not get into log calls; should one get into the
+text of an error all the same, it is blotted out here.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+import sys
+
+import structlog
+from structlog.types import EventDict
+
+_SECRETS = (
+    (re.compile(r"(ciris_[0-9a-f]{12}_)[\w-]+"), r"\1***"),
+    (re.compile(r"(whsec_)[\w+/=-]+"), r"\1***"),
+    (re.compile(r"(\w://[^\s/:@]*:)[^\s/@]+@"), r"\1***@"),
+)
+REQUEST_FIELDS = ("method", "path", "status", "seconds", "client", "key")
+"""What the line of a request has in its ``extra``."""
+
+
+def configure(process: str) -> None:
+    """Sets this process up to log.
+
+    Args:
+        process: its name in every line.
+    """
+
+    def named(_logger: object, _method: str, event: EventDict) -> EventDict:
+        event["process"] = process
+        return event
+
+    formatter = structlog.stdlib.ProcessorFormatter(
+        foreign_pre_chain=[
+            structlog.contextvars.merge_contextvars,
+            structlog.stdlib.add_log_level,
+            structlog.stdlib.add_logger_name,
+            structlog.stdlib.ExtraAdder(allow=REQUEST_FIELDS),
+            structlog.processors.TimeStamper(fmt="iso"),
+        ],
+        processors=[
+            structlog.stdlib.ProcessorFormatter.remove_processors_meta,
+            named,
+            structlog.processors.format_exc_info,
+            structlog.processors.EventRenamer("message"),
+            _render,
+        ],
+    )
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(formatter)
+    logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
+    logging.captureWarnings(True)
+
+
+def _render(_logger: object, _method: str, event: EventDict) -> str:
+    line = json.dumps(event, default=str)
+    for pattern, replacement in _SECRETS:
+        line = pattern.sub(replacement, line)
+    return line

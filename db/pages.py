@@ -1,0 +1,56 @@
+"""Lists, newest first, one page at a time.
+
+A cursor holds the place of the last row of its page, not the row: it stays good when that row is deleted, and no row that is there
+all the while is left out or shown twice.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Generic, TypeVar
+
+from sqlalchemy import Select, tuple_
+from sqlalchemy.orm import Session
+
+from certifier.errors import CirisError
+from db.models import JobRow, RegionRow, SceneRow
+
+Row = TypeVar("Row", JobRow, RegionRow, SceneRow)
+
+
+@dataclass(frozen=True)
+class Page(Generic[Row]):
+    """Rows, newest first, and what to pass as ``after`` for the next page (None on the last)."""
+
+    rows: Sequence[Row]
+    next: str | None
+
+
+def page(session: Session, model: type[Row], query: Select[Row], after: str | None, limit: int) -> Page[Row]:
+    """One page of the rows that the query finds.
+
+    Raises:
+        CirisError: cursor, when ``after`` did not come from a page.
+    """
+    if after is not None:
+        query = query.where(tuple_(model.created_at, model.id) < tuple_(*_place(after)))
+    rows = session.scalars(query.order_by(model.created_at.desc(), model.id.desc()).limit(limit + 1)).all()
+    return Page(rows[:limit], _cursor(rows[limit - 1]) if len(rows) > limit else None)
+
+
+def _cursor(row: JobRow | RegionRow | SceneRow) -> str:
+    return base64.urlsafe_b64encode(f"{row.created_at.isoformat()} {row.id}".encode()).decode()
+
+
+def _place(cursor: str) -> tuple[datetime, str]:
+    try:
+        created_at, _, row_id = base64.b64decode(cursor, altchars="-_", validate=True).decode().partition(" ")
+        place = datetime.fromisoformat(created_at)
+        if place.tzinfo is None or not row_id.isprintable():
+            raise ValueError
+    except ValueError:
+        raise CirisError("cursor", "this is not the `next` of a page", field="after") from None
+    return place, row_id

@@ -1,0 +1,46 @@
+"""How much there is of everything, for monitoring."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from db.models import JobRow, PairRow, RegionRow, StepRow, WebhookRow
+from db.states import JobState, PairState, StepKind, WebhookState
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Rows of the database, by state; states that nothing is in count zero.
+
+    Attributes:
+        pair_seconds: time spent on pairs by the state that it led to, summed.
+        step_seconds: time spent on steps by kind, summed.
+    """
+
+    jobs: dict[str, int]
+    pairs: dict[str, int]
+    pair_seconds: dict[str, float]
+    step_seconds: dict[str, float]
+    webhooks: dict[str, int]
+    regions: int
+
+
+def collect(session: Session) -> Statistics:
+    """The statistics as of now."""
+    jobs = dict(session.execute(select(JobRow.state, func.count()).group_by(JobRow.state)).all())
+    pairs = session.execute(select(PairRow.state, func.count(), func.sum(PairRow.seconds)).group_by(PairRow.state)).all()
+    steps = dict(session.execute(select(StepRow.kind, func.sum(StepRow.seconds)).group_by(StepRow.kind)).all())
+    webhooks = dict(session.execute(select(WebhookRow.state, func.count()).group_by(WebhookRow.state)).all())
+    counted = {state: count for state, count, _ in pairs}
+    seconds = {state: total for state, _, total in pairs}
+    return Statistics(
+        jobs={state: jobs.get(state, 0) for state in JobState},
+        pairs={state: counted.get(state, 0) for state in PairState},
+        pair_seconds={state: seconds.get(state) or 0.0 for state in PairState},
+        step_seconds={kind: steps.get(kind) or 0.0 for kind in StepKind},
+        webhooks={state: webhooks.get(state, 0) for state in WebhookState},
+        regions=session.scalar(select(func.count()).select_from(RegionRow)) or 0,
+    )

@@ -1,0 +1,67 @@
+"""What the workers do next: a fair order over API keys and jobs, in which none starves.
+
+Messages to the solvers only say that there is work; which, is decided here when one of them is free. Every key has the same share of
+the workers, however many jobs it has, and within a key a job's share doubles with each step of its priority. ``jobs.served`` counts the
+seconds that a job was given, divided by its share; the job with the least goes next (stride scheduling: Waldspurger, Weihl 1995).
+"""
+
+from __future__ import annotations
+
+from sqlalchemy import ColumnElement, and_, exists, func, or_, select
+from sqlalchemy.orm import Session, aliased
+
+from db import jobs, pairs, steps
+from db.models import JobRow, PairRow, StepRow
+from db.states import JobState, PairState, StepKind, StepState
+
+URGENT = (StepKind.PROPOSE, StepKind.STEP)
+"""The job waits for these; for accepting a region it does not."""
+
+
+def next_job(session: Session) -> str | None:
+    """The job for which something is to be done next; None when nothing is to be done."""
+    return session.scalar(select(JobRow.id).where(_has_work()).order_by(JobRow.served, JobRow.created_at, JobRow.id).limit(1))
+
+
+def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds: float) -> pairs.Claim | steps.Claim | None:
+    """Claims a piece of the job's work: a step that it waits for, else pairs, else the latest region to accept, one at a time.
+
+    None when others were faster.
+    """
+    job = jobs.lock(session, job_id)
+    claimed: pairs.Claim | steps.Claim | None = None
+    if job.state == JobState.RUNNING:
+        claimed = steps.claim(session, job, URGENT, lease_seconds=lease_seconds)
+        claimed = claimed or pairs.claim(session, job, lease_seconds=lease_seconds, batch_seconds=batch_seconds)
+    if claimed is None and session.scalar(select(JobRow.id).where(JobRow.id == job_id, _has_region())):
+        claimed = steps.claim(session, job, [StepKind.ACCEPT], lease_seconds=lease_seconds)
+    return claimed
+
+
+def served_by_now(session: Session) -> float:
+    """What a job that starts now counts as having been served: no advantage over those that wait for work, nor a debt."""
+    waiting = session.scalar(select(func.min(JobRow.served)).where(_has_work()))
+    if waiting is None:
+        waiting = session.scalar(select(func.max(JobRow.served)).where(JobRow.state == JobState.RUNNING))
+    return waiting or 0.0
+
+
+def open_pieces(session: Session) -> int:
+    """How many messages are enough for all that is open and due."""
+    conditions = (PairRow.state == PairState.OPEN, steps.is_due(StepRow))
+    return sum(session.scalar(select(func.count()).where(condition)) or 0 for condition in conditions)
+
+
+def _has_work() -> ColumnElement[bool]:
+    """Condition: :func:`claim` would find something."""
+    pair = exists().where(PairRow.job_id == JobRow.id, PairRow.state == PairState.OPEN)
+    step = exists().where(StepRow.job_id == JobRow.id, steps.is_due(StepRow), StepRow.kind.in_(URGENT))
+    return or_(and_(JobRow.state == JobState.RUNNING, or_(pair, step)), _has_region())
+
+
+def _has_region() -> ColumnElement[bool]:
+    """Condition: the job has a region to accept and nobody is accepting one of its regions."""
+    step, other = aliased(StepRow), aliased(StepRow)
+    waits = exists().where(step.job_id == JobRow.id, step.kind == StepKind.ACCEPT, steps.is_due(step))
+    accepting = exists().where(other.job_id == JobRow.id, other.kind == StepKind.ACCEPT, other.state == StepState.RUNNING)
+    return and_(JobRow.state.in_((JobState.RUNNING, JobState.CANCELLING)), waits, ~accepting)

@@ -1,0 +1,252 @@
+"""Keys over HTTP: who gets in, what a scope allows, signing in to the dashboard, and how often one may ask."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import httpx2
+import pytest
+from fastapi.routing import APIRoute
+from fastapi.testclient import TestClient
+from starlette.routing import Mount
+
+from api.access import KEYS_SECONDS, _authorize
+from api.app import create_app
+from api.guard import PUBLIC
+from api.limits import MAX_BUCKETS, Buckets
+from certifier.errors import CirisError
+from certifier.model import Scene
+from client import Client
+from db import events, jobs, keys
+from db.keys import Scope
+from db.session import Database
+from tests.api.conftest import BASE_URL, PROBLEM
+from tests.api.test_jobs import GROW
+
+
+def a_key(database: Database, scope: Scope, name: str | None = None) -> str:
+    with database.write() as session:
+        return keys.add(session, name or scope, scope)
+
+
+def bearer(key: str) -> dict[str, str]:
+    return {"Authorization": f"Bearer {key}"}
+
+
+def the_keys_are_read_again() -> None:
+    time.sleep(KEYS_SECONDS)
+
+
+def test_nobody_needs_a_key_until_there_is_one(client: TestClient, database: Database) -> None:
+    assert client.get("/v1/jobs").status_code == 200
+    key = a_key(database, Scope.READ)
+    the_keys_are_read_again()
+    refused = client.get("/v1/jobs")
+    assert (refused.status_code, refused.json()["code"], refused.headers["content-type"]) == (401, "key_needed", PROBLEM)
+    assert refused.headers["www-authenticate"] == "Bearer"
+    assert client.get("/v1/jobs", headers=bearer(key)).status_code == 200
+    with database.write() as session:
+        keys.revoke(session, "read")
+    the_keys_are_read_again()
+    for headers in ({}, bearer(key)):
+        assert client.get("/v1/jobs", headers=headers).status_code == 401
+
+
+@pytest.mark.parametrize("header", ["Bearer", "Bearer ", "Bearer x", "Basic eDp5", "Bearer ciris_000000000000_" + 43 * "a", "Bearer \xe9"])
+def test_what_is_no_key_is_refused(client: TestClient, database: Database, header: str) -> None:
+    a_key(database, Scope.READ)
+    answer = client.get("/v1/jobs", headers={"Authorization": header.encode("latin-1")})
+    assert (answer.status_code, answer.json()["code"]) == (401, "key_needed")
+
+
+def test_a_service_that_others_can_reach_needs_keys_from_the_start(database: Database, environment: pytest.MonkeyPatch) -> None:
+    environment.setenv("CIRIS_HOST", "0.0.0.0")
+    with TestClient(create_app(database), base_url="http://robots.example") as client:
+        assert client.get("/v1/jobs").status_code == 401
+        assert client.get("/healthz").status_code == 200
+
+
+SCOPES = [
+    ("GET", "/v1/jobs", Scope.READ),
+    ("GET", "/metrics", Scope.READ),
+    ("GET", "/", Scope.READ),
+    ("POST", "/v1/planning/contains", Scope.READ),
+    ("POST", "/v1/scenes", Scope.SUBMIT),
+    ("POST", "/v1/jobs", Scope.SUBMIT),
+    ("POST", "/v1/jobs/x/cancel", Scope.SUBMIT),
+    ("POST", "/v1/jobs/x/retry", Scope.SUBMIT),
+    ("DELETE", "/v1/regions/x", Scope.ADMIN),
+]
+
+
+@pytest.mark.parametrize(("method", "path", "needed"), SCOPES)
+def test_a_scope_allows_what_it_says(client: TestClient, database: Database, method: str, path: str, needed: Scope) -> None:
+    for scope in Scope:
+        answer = client.request(method, path, headers=bearer(a_key(database, scope)))
+        assert (answer.status_code == 403) == (not scope.includes(needed)), scope
+        if answer.status_code == 403:
+            assert answer.json()["code"] == "scope_missing"
+            assert needed.value in answer.json()["detail"]
+
+
+def test_every_route_asks_for_a_scope_or_is_public(database: Database) -> None:
+    routes = create_app(database).routes
+    assert {route.path for route in routes if isinstance(route, Mount)} == {"/static"}
+    for route in routes:
+        if isinstance(route, APIRoute) and route.path not in PUBLIC:
+            calls = [dependency.call for dependency in route.dependant.dependencies]
+            assert _authorize in calls, route.path
+
+
+def test_a_body_is_not_read_before_the_key(client: TestClient, database: Database) -> None:
+    a_key(database, Scope.READ)
+
+    def body() -> Iterator[bytes]:
+        raise AssertionError("the body was asked for")
+        yield b""
+
+    answer = client.post("/v1/jobs", content=body(), headers={"Content-Length": "10", "Content-Type": "application/json"})
+    assert answer.status_code == 401
+
+
+def test_a_job_is_its_keys(client: TestClient, database: Database, scene: Scene) -> None:
+    ours, theirs = a_key(database, Scope.SUBMIT, "ours"), a_key(database, Scope.SUBMIT, "theirs")
+    first = client.post("/v1/jobs", json=GROW, headers=bearer(ours) | {"Idempotency-Key": "1"})
+    same = client.post("/v1/jobs", json=GROW, headers=bearer(ours) | {"Idempotency-Key": "1"})
+    other = client.post("/v1/jobs", json=GROW, headers=bearer(theirs) | {"Idempotency-Key": "1"})
+    assert (first.status_code, same.status_code, other.status_code) == (201, 200, 201)
+    assert other.json()["id"] != first.json()["id"] == same.json()["id"]
+    with database.read() as session:
+        assert jobs.get(session, first.json()["id"]).key_id == ours.split("_")[1]
+
+
+def test_an_idempotency_key_cannot_take_the_place_of_a_retry(client: TestClient, scene: Scene) -> None:
+    job = client.post("/v1/jobs", json=GROW).json()
+    client.post(f"/v1/jobs/{job['id']}/cancel")
+    planted = client.post("/v1/jobs", json=GROW, headers={"Idempotency-Key": f"retry:{job['id']}"}).json()
+    assert client.post(f"/v1/jobs/{job['id']}/retry").json()["id"] != planted["id"]
+
+
+def test_a_stream_is_taken_up_with_a_key(url: str, database: Database, scene: Scene) -> None:
+    key = a_key(database, Scope.READ)
+    with database.write() as session:
+        job, _ = jobs.create(session, kind="grow", scene_id=scene.hash[:16], options={"random_seed": 0})
+        events.emit(session, job, "pairs", {})
+        jobs.finish(session, job, jobs.JobState.CANCELLED, reason="")
+    stream = f"{url}/v1/jobs/{job.id}/events/stream"
+    assert httpx2.get(stream, headers={"Last-Event-ID": "1"}).status_code == 401
+    text = httpx2.get(stream, headers={"Last-Event-ID": "1", **bearer(key)}).text
+    assert [line for line in text.splitlines() if line.startswith("id: ")] == ["id: 2", "id: 3"]
+    with Client(url, key) as client:
+        assert [event["seq"] for event in client.events(job.id)] == [1, 2, 3]
+
+
+def test_signing_in_and_out(client: TestClient, database: Database) -> None:
+    key = a_key(database, Scope.READ)
+    html = {"Accept": "text/html"}
+    away = client.get("/jobs/x", headers=html, follow_redirects=False)
+    assert (away.status_code, away.headers["location"]) == (303, "/login?next=/jobs/x")
+    page = client.get(away.headers["location"], headers=html)
+    assert 'name="next" value="/jobs/x"' in page.text
+
+    wrong = client.post("/login", data={"key": "guess"}, headers=html)
+    assert wrong.status_code == 401
+    assert "guess" not in wrong.text
+
+    right = client.post("/login", data={"key": key, "next": "/jobs"}, follow_redirects=False)
+    assert (right.status_code, right.headers["location"]) == (303, "/jobs")
+    cookie = right.headers["set-cookie"].lower()
+    assert "httponly" in cookie
+    assert "samesite=strict" in cookie
+    assert client.get("/", headers=html).status_code == 200
+    assert client.get("/v1/jobs").status_code == 200
+    assert "Sign out read" in client.get("/").text
+
+    client.post("/logout")
+    assert client.get("/v1/jobs").status_code == 401
+
+
+@pytest.mark.parametrize("path", ["//evil.example", "https://evil.example", "/\\evil.example", "/a//b", "/a?b", "javascript:alert(1)", ""])
+def test_signing_in_leads_nowhere_else(client: TestClient, database: Database, path: str) -> None:
+    answer = client.post("/login", data={"key": a_key(database, Scope.READ), "next": path}, follow_redirects=False)
+    assert answer.headers["location"] == "/"
+
+
+def test_the_cookie_stays_on_encrypted_connections_where_there_are_any(database: Database, environment: pytest.MonkeyPatch) -> None:
+    environment.setenv("CIRIS_HOST", "0.0.0.0")
+    with TestClient(create_app(database), base_url="https://robots.example") as client:
+        answer = client.post("/login", data={"key": a_key(database, Scope.READ)}, follow_redirects=False)
+    assert "secure" in answer.headers["set-cookie"].lower()
+
+
+@pytest.fixture
+def hasty(database: Database, environment: pytest.MonkeyPatch) -> Iterator[TestClient]:
+    """A service that answers two requests a second, four at once."""
+    environment.setenv("CIRIS_REQUESTS_PER_SECOND", "2")
+    with TestClient(create_app(database), base_url=BASE_URL) as client:
+        yield client
+
+
+def test_who_asks_too_often_is_to_wait(hasty: TestClient, database: Database) -> None:
+    answers = [hasty.get("/v1/jobs") for _ in range(8)]
+    refused = [answer for answer in answers if answer.status_code == 429]
+    assert [answer.status_code for answer in answers[:4]] == [200] * 4
+    assert refused
+    assert (refused[0].json()["code"], refused[0].headers["retry-after"]) == ("too_many_requests", "1")
+
+
+def test_every_key_has_its_own_rate(hasty: TestClient, database: Database) -> None:
+    one, other = a_key(database, Scope.READ, "one"), a_key(database, Scope.READ, "other")
+    while hasty.get("/v1/jobs", headers=bearer(one)).status_code == 200:
+        pass
+    assert hasty.get("/v1/jobs", headers=bearer(other)).status_code == 200
+
+
+def test_guessing_keys_is_slow(hasty: TestClient, database: Database) -> None:
+    a_key(database, Scope.READ)
+    assert [hasty.get("/v1/jobs", headers=bearer(f"guess{i}")).status_code for i in range(8)].count(401) < 8
+
+
+@pytest.fixture
+def hasty_url(environment: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> str:
+    environment.setenv("CIRIS_REQUESTS_PER_SECOND", "4")
+    return str(request.getfixturevalue("url"))
+
+
+def test_the_python_client_waits_and_asks_again(hasty_url: str) -> None:
+    with Client(hasty_url) as client:
+        for _ in range(10):
+            client.scenes()
+    assert 'ciris_http_requests_total{method="GET",status="429"}' in httpx2.get(f"{hasty_url}/metrics").text
+
+
+def test_a_bucket_fills_with_time_and_no_further() -> None:
+    now = [0.0]
+    buckets = Buckets(2.0, clock=lambda: now[0])
+    assert [buckets.take("a") for _ in range(5)] == [0, 0, 0, 0, 0.5]
+    now[0] += 0.5
+    assert buckets.take("a") == 0
+    assert buckets.take("a") > 0
+    now[0] += 1000
+    assert [buckets.take("a") > 0 for _ in range(5)] == [False] * 4 + [True]
+
+
+def test_strangers_cannot_fill_the_memory() -> None:
+    buckets = Buckets(1.0)
+    for i in range(2 * MAX_BUCKETS):
+        buckets.take(str(i))
+    assert len(buckets._buckets) == MAX_BUCKETS
+
+
+@pytest.mark.parametrize("value", ["", "two words", "na\u00efve"])
+def test_a_key_that_cannot_be_sent_is_refused_without_being_shown(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
+    from client.find import api_key
+
+    monkeypatch.setenv("CIRIS_API_KEY", value)
+    if not value:
+        assert api_key() is None
+        return
+    with pytest.raises(CirisError) as caught:
+        api_key()
+    assert value not in str(caught.value)

@@ -1,0 +1,67 @@
+"""The metrics: Prometheus' format, and figures that are those of the database and the queue."""
+
+from __future__ import annotations
+
+import re
+
+from fastapi.testclient import TestClient
+
+from api.metrics import Requests, render
+from certifier.model import Scene
+from db.session import Database
+from db.statistics import collect
+from tests.api.test_jobs import GROW
+
+SAMPLE = re.compile(r'([a-z_]+)(?:\{((?:[a-z]+="[^"\\]*",?)*)\})? (-?[0-9.e+-]+)')
+
+
+def samples(text: str) -> dict[str, float]:
+    """Every sample by its name and labels; each family is announced before its samples."""
+    found: dict[str, float] = {}
+    announced: set[str] = set()
+    for line in text.splitlines():
+        if line.startswith("# "):
+            announced.add(line.split()[2])
+            continue
+        match = SAMPLE.fullmatch(line)
+        assert match, line
+        assert match[1] in announced
+        assert line.rpartition(" ")[0] not in found, "twice"
+        found[line.rpartition(" ")[0]] = float(match[3])
+    return found
+
+
+def test_the_figures_are_those_of_the_database(client: TestClient, region: str) -> None:
+    client.post("/v1/jobs", json=GROW)
+    answer = client.get("/metrics")
+    assert answer.headers["content-type"].startswith("text/plain; version=0.0.4")
+    found = samples(answer.text)
+    assert found['ciris_jobs{state="queued"}'] == 1
+    assert found['ciris_jobs{state="succeeded"}'] == 1
+    assert found['ciris_jobs{state="failed"}'] == 0
+    assert found['ciris_pairs{state="certified"}'] == 2
+    assert found['ciris_pair_seconds{state="certified"}'] == 0.2
+    assert found["ciris_regions"] == 1
+    assert found['ciris_queue_messages{queue="control"}'] == 1
+    assert found['ciris_http_requests_total{method="POST",status="201"}'] == 1
+
+
+def test_an_empty_service_has_figures_too(client: TestClient) -> None:
+    found = samples(client.get("/metrics").text)
+    assert found['ciris_pairs{state="refuted"}'] == 0
+    assert found["ciris_regions"] == 0
+
+
+def test_both_databases_count_alike(db: Database) -> None:
+    with db.read() as session:
+        statistics = collect(session)
+    assert set(statistics.jobs.values()) == {0}
+    assert samples(render(statistics, {}, Requests()))['ciris_step_seconds{kind="accept"}'] == 0
+
+
+def test_invented_methods_make_no_new_series(client: TestClient, scene: Scene) -> None:
+    for number in range(5):
+        client.request(f"METHOD{number}", "/v1/jobs")
+    found = samples(client.get("/metrics").text)
+    assert found['ciris_http_requests_total{method="other",status="405"}'] == 5
+    assert not any("METHOD" in name for name in found)

@@ -1,0 +1,102 @@
+"""API keys: what is kept of them, who is let in, and the command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sqlalchemy import text
+
+from certifier.errors import CirisError
+from db import keys
+from db.keys import Scope
+from db.session import Database
+
+
+def test_a_key_is_valid_until_it_is_revoked(db: Database) -> None:
+    with db.write() as session:
+        assert not keys.exist(session)
+        key = keys.add(session, "planner", Scope.READ)
+    with db.write() as session:
+        row = keys.ring(session).check(key)
+        assert row is not None
+        assert (row.name, row.scope) == ("planner", "read")
+        keys.revoke(session, "planner")
+    with db.read() as session:
+        assert keys.ring(session).check(key) is None
+        assert keys.exist(session), "revoking the last key does not open the service"
+
+
+def test_a_name_serves_again_once_its_key_is_revoked(db: Database) -> None:
+    with db.write() as session:
+        first = keys.add(session, "planner", Scope.READ)
+        with pytest.raises(CirisError, match="already"):
+            keys.add(session, "planner", Scope.ADMIN)
+        keys.revoke(session, "planner")
+        with pytest.raises(CirisError, match="there is no key"):
+            keys.revoke(session, "planner")
+        second = keys.add(session, "planner", Scope.SUBMIT)
+    with db.read() as session:
+        assert keys.ring(session).check(first) is None
+        assert keys.ring(session).check(second) is not None
+
+
+def test_the_database_does_not_hold_the_key(db: Database) -> None:
+    with db.write() as session:
+        key = keys.add(session, "planner", Scope.READ)
+    with db.read() as session:
+        (row,) = session.execute(text("SELECT * FROM api_keys")).all()
+    secret = key.removeprefix(f"ciris_{row.id}_")
+    assert len(secret) == 43
+    assert secret not in str(row)
+
+
+@given(place=st.integers(0, 60), letter=st.sampled_from("aZ0_-\n é"))
+def test_no_other_key_is_valid(key_database: tuple[Database, str], place: int, letter: str) -> None:
+    database, key = key_database
+    other = key[: place % len(key)] + letter + key[place % len(key) + 1 :]
+    with database.read() as session:
+        assert (keys.ring(session).check(other) is not None) == (other == key)
+        assert keys.ring(session).check(key + letter) is None
+
+
+@pytest.fixture(scope="module")
+def key_database(tmp_path_factory: pytest.TempPathFactory, migrated_sqlite: Path) -> tuple[Database, str]:
+    path = tmp_path_factory.mktemp("keys") / "keys.sqlite3"
+    path.write_bytes(migrated_sqlite.read_bytes())
+    database = Database(f"sqlite:///{path}")
+    with database.write() as session:
+        return database, keys.add(session, "planner", Scope.READ)
+
+
+@pytest.mark.parametrize("name", ["", "-x", "a b", "a" * 65, "a\n"])
+def test_names_that_cannot_be_typed_are_refused(db: Database, name: str) -> None:
+    with db.write() as session, pytest.raises(CirisError, match="no name for a key"):
+        keys.add(session, name, Scope.READ)
+
+
+def test_scopes_are_ordered() -> None:
+    held = [[scope.includes(other) for other in Scope] for scope in (Scope.READ, Scope.SUBMIT, Scope.ADMIN)]
+    assert held == [[True, False, False], [True, True, False], [True, True, True]]
+
+
+def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("CIRIS_DATA_DIR", str(tmp_path))
+    keys.main(["add", "planner", "--scope", "submit"])
+    key = capsys.readouterr().out.strip()
+    keys.main(["ls", "--json"])
+    (listed,) = json.loads(capsys.readouterr().out)
+    assert (listed["name"], listed["scope"], listed["revoked_at"]) == ("planner", "submit", None)
+    assert listed["id"] == key.split("_")[1]
+    keys.main(["revoke", "planner"])
+    keys.main(["ls"])
+    line = capsys.readouterr().out
+    assert "revoked_at" in line
+    assert key.split("_", 2)[2] not in line
+    with pytest.raises(SystemExit) as ended:
+        keys.main(["revoke", "planner"])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err == "error: name: there is no key 'planner' (`ciris key ls` lists them)\n"

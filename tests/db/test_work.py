@@ -1,0 +1,122 @@
+"""The order of work: batches, and shares of jobs and keys, on both databases."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import chain
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from certifier.errors import CirisError
+from db import jobs, pairs, work
+from db.models import ApiKeyRow, JobRow
+from db.pairs import batches
+from db.session import Database
+from db.settings import settings
+from db.states import JobState
+from tests.db.builders import a_job, add_pairs
+
+forecasts = st.lists(st.floats(0, 2), max_size=60)
+
+
+@given(forecasts)
+def test_batches_keep_the_order_and_none_is_overfull(seconds: list[float]) -> None:
+    groups = batches(list(enumerate(seconds)), 0.5)
+    assert list(chain.from_iterable(groups)) == list(range(len(seconds)))
+    assert all(len(group) == 1 or sum(seconds[i] for i in group) <= 0.5 + 1e-9 for group in groups)
+
+
+@given(forecasts)
+def test_taking_a_batch_leaves_the_others_as_they_were(seconds: list[float]) -> None:
+    """So there are as many messages as batches, though batches are formed when they are claimed."""
+    left = list(enumerate(seconds))
+    groups = batches(left, 0.5)
+    for group in groups:
+        assert batches(left, 0.5)[0] == group
+        left = [pair for pair in left if pair[0] not in group]
+    assert not left
+
+
+def test_small_pairs_fill_a_batch() -> None:
+    assert batches([(i, 0.1) for i in range(7)], 0.5) == [[0, 1, 2, 3, 4], [5, 6]]
+
+
+def run(db: Database, pieces: int) -> list[str]:
+    """The jobs for which so many pieces of 1 s are claimed, in order."""
+    order = []
+    for _ in range(pieces):
+        with db.read() as session:
+            job_id = work.next_job(session)
+        assert job_id is not None
+        with db.write() as session:
+            assert work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5) is not None
+        order.append(job_id)
+    return order
+
+
+def a_job_of(db: Database, key: str | None = None, priority: int = 0, pair_count: int = 60) -> str:
+    with db.write() as session:
+        if key is not None and session.get(ApiKeyRow, key) is None:
+            session.add(ApiKeyRow(id=key, name=key, digest="", scope="submit"))
+            session.flush()
+        job = a_job(session, key_id=key, priority=priority)
+        jobs.start(session, job, work.served_by_now(session))
+        add_pairs(session, job, pair_count)
+        return job.id
+
+
+def test_jobs_take_turns_whatever_their_length(db: Database) -> None:
+    long, short = a_job_of(db, pair_count=60), a_job_of(db, pair_count=5)
+    order = run(db, 12)
+    assert Counter(order[:10]) == {long: 5, short: 5}
+    assert order[10:] == [long, long]
+
+
+def test_a_step_of_priority_doubles_the_share_and_nobody_starves(db: Database) -> None:
+    jobs_by_priority = {priority: a_job_of(db, priority=priority) for priority in (1, 0, -1)}
+    shares = Counter(run(db, 28))
+    assert [shares[jobs_by_priority[priority]] for priority in (1, 0, -1)] == pytest.approx([16, 8, 4], abs=1)
+
+
+def test_keys_have_equal_shares_however_many_jobs_they_have(db: Database) -> None:
+    many = {a_job_of(db, "many", priority=3) for _ in range(5)}
+    one = a_job_of(db, "one")
+    shares = Counter(run(db, 30))
+    assert shares[one] == pytest.approx(15, abs=1)
+    assert all(shares[job_id] == pytest.approx(3, abs=1) for job_id in many)
+
+
+def test_a_job_that_comes_late_neither_waits_nor_overtakes(db: Database) -> None:
+    early = a_job_of(db)
+    run(db, 20)
+    late = a_job_of(db)
+    assert Counter(run(db, 10)) == {early: 5, late: 5}
+
+
+def test_there_is_nothing_to_do_for_jobs_that_do_not_run(db: Database) -> None:
+    job_id = a_job_of(db)
+    with db.read() as session:
+        assert work.open_pieces(session) == 60
+    with db.write() as session:
+        jobs.cancel(session, job_id)
+    with db.read() as session:
+        assert work.next_job(session) is None
+    with db.write() as session:
+        assert work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5) is None
+        pairs.skip(session, job_id)
+        assert work.open_pieces(session) == 0
+
+
+def test_a_key_has_a_quota_of_unfinished_jobs(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(settings(), "max_jobs_per_key", 2)
+    job_id, _ = a_job_of(db, "a"), a_job_of(db, "a")
+    with pytest.raises(CirisError, match="2 jobs"):
+        a_job_of(db, "a")
+    a_job_of(db, "b")
+    with db.write() as session:
+        jobs.finish(session, jobs.lock(session, job_id), JobState.FAILED, reason="")
+    a_job_of(db, "a")
+    with db.read() as session:
+        assert session.query(JobRow).count() == 4

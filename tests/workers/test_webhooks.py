@@ -1,0 +1,252 @@
+"""Webhooks against a real receiver: signatures, repetition, what is refused, and that a worker's death loses nothing."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import hmac
+import json
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from datetime import timedelta
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+
+from certifier.errors import CirisError
+from db import jobs, webhooks
+from db.models import WebhookRow
+from db.session import database
+from db.states import JobState
+from db.types import utcnow
+from tests.db.builders import a_job
+from tests.workers.service import environment
+from workers import addresses
+from workers import webhooks as delivering
+from workers.addresses import is_public, resolve
+
+SECRET = "whsec_" + base64.b64encode(bytes(range(32))).decode()
+
+
+@dataclass
+class Receiver:
+    """An HTTP server that answers with ``answers`` in turn, the last of them for ever."""
+
+    url: str = ""
+    answers: list[int] = field(default_factory=lambda: [204])
+    headers: list[dict[str, str]] = field(default_factory=list)
+    bodies: list[bytes] = field(default_factory=list)
+
+
+@pytest.fixture
+def receiver() -> Iterator[Receiver]:
+    received = Receiver()
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            received.bodies.append(self.rfile.read(int(self.headers["Content-Length"])))
+            received.headers.append({name.lower(): value for name, value in self.headers.items()})
+            status = received.answers.pop(0) if len(received.answers) > 1 else received.answers[0]
+            self.send_response(status)
+            if status == 302:
+                self.send_header("Location", "/elsewhere")
+            self.end_headers()
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    received.url = f"http://127.0.0.1:{server.server_port}/hook?a=b"
+    yield received
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+@pytest.fixture
+def service(database_url: str) -> Iterator[None]:
+    """The settings of a service that may call receivers on this machine."""
+    with environment(CIRIS_DATABASE_URL=database_url, CIRIS_WEBHOOK_PRIVATE="1"):
+        yield
+
+
+def a_webhook(url: str, *, ended: bool = True) -> str:
+    """The id of a job with a webhook."""
+    with database().write() as session:
+        job = a_job(session)
+        webhooks.add(session, job.id, url, SECRET)
+        if ended:
+            jobs.finish(session, job, JobState.CANCELLED, reason="no longer wanted")
+        return job.id
+
+
+def row_of(job_id: str) -> WebhookRow:
+    with database().read() as session:
+        return webhooks.of_job(session, job_id)
+
+
+def pass_time(seconds: float) -> None:
+    """What was to wait for so long waits no more."""
+    with database().write() as session:
+        for row in session.query(WebhookRow):
+            row.next_at -= timedelta(seconds=seconds)
+
+
+def test_the_end_of_a_job_is_told_once_and_signed(service: None, receiver: Receiver) -> None:
+    job_id = a_webhook(receiver.url)
+    for _ in range(2):
+        delivering.deliver_due()
+    (body,), (headers,) = receiver.bodies, receiver.headers
+    message = json.loads(body)
+    assert (message["type"], message["data"]["id"], message["data"]["state"]) == ("job.ended", job_id, "cancelled")
+    row = row_of(job_id)
+    assert (row.state, row.attempts, headers["webhook-id"]) == ("delivered", 1, row.id)
+    assert abs(int(headers["webhook-timestamp"]) - time.time()) < 60
+    signed = f"{row.id}.{headers['webhook-timestamp']}.".encode() + body
+    expected = base64.b64encode(hmac.new(bytes(range(32)), signed, hashlib.sha256).digest()).decode()
+    assert headers["webhook-signature"] == f"v1,{expected}"
+
+
+def test_a_job_that_goes_on_is_not_told(service: None, receiver: Receiver) -> None:
+    job_id = a_webhook(receiver.url, ended=False)
+    delivering.deliver_due()
+    assert receiver.bodies == []
+    with database().write() as session:
+        jobs.cancel(session, job_id)
+    delivering.deliver_due()
+    assert len(receiver.bodies) == 1
+
+
+def test_a_receiver_that_fails_is_called_again_later_and_later(service: None, receiver: Receiver) -> None:
+    receiver.answers = [500, 302, 204]
+    job_id = a_webhook(receiver.url)
+    delivering.deliver_due()
+    for calls, pause in enumerate(webhooks.BACKOFF_SECONDS[:2], start=1):
+        pass_time(pause - 5)
+        delivering.deliver_due()
+        assert len(receiver.bodies) == calls
+        pass_time(5)
+        delivering.deliver_due()
+    assert len(receiver.bodies) == 3
+    row = row_of(job_id)
+    assert (row.state, row.attempts, row.error) == ("delivered", 3, None)
+    assert len({headers["webhook-id"] for headers in receiver.headers}) == 1
+
+
+def test_a_receiver_that_never_answers_well_is_given_up(service: None, receiver: Receiver) -> None:
+    receiver.answers = [503]
+    job_id = a_webhook(receiver.url)
+    for pause in (0, *webhooks.BACKOFF_SECONDS, 86400):
+        pass_time(pause)
+        delivering.deliver_due()
+    row = row_of(job_id)
+    assert (row.state, row.attempts, row.error) == ("failed", 1 + len(webhooks.BACKOFF_SECONDS), "the receiver answered 503")
+    assert len(receiver.bodies) == row.attempts
+
+
+def test_a_worker_that_dies_with_a_delivery_loses_nothing(service: None, receiver: Receiver) -> None:
+    job_id = a_webhook(receiver.url)
+    with database().write() as session:
+        assert len(webhooks.claim(session, utcnow())) == 1
+        assert webhooks.claim(session, utcnow()) == [], "nobody else takes it meanwhile"
+    delivering.deliver_due()
+    assert receiver.bodies == []
+    pass_time(webhooks.BACKOFF_SECONDS[0])
+    delivering.deliver_due()
+    assert row_of(job_id).state == "delivered"
+
+
+def test_a_worker_that_dies_each_time_is_given_up(service: None) -> None:
+    job_id = a_webhook("http://127.0.0.1:9/")
+    for _ in range(2 + len(webhooks.BACKOFF_SECONDS)):
+        with database().write() as session:
+            webhooks.claim(session, utcnow())
+        pass_time(86400)
+    assert row_of(job_id).state == "failed"
+
+
+def test_a_receiver_that_trickles_is_cut_off(service: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(delivering, "SECONDS", 1.0)
+    done = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def trickle() -> None:
+            connection, _ = server.accept()
+            with connection:
+                try:
+                    while not done.wait(0.1):
+                        connection.send(b"H")
+                except OSError:
+                    pass
+
+        thread = threading.Thread(target=trickle)
+        thread.start()
+        job_id = a_webhook(f"http://127.0.0.1:{server.getsockname()[1]}/")
+        start = time.monotonic()
+        delivering.deliver_due()
+        assert time.monotonic() - start < 30
+        done.set()
+        thread.join()
+    assert row_of(job_id).error
+
+
+def test_a_retry_tells_the_same_receiver(service: None, receiver: Receiver) -> None:
+    job_id = a_webhook(receiver.url)
+    with database().write() as session:
+        again = jobs.retry(session, job_id).id
+        assert jobs.retry(session, job_id).id == again
+    assert (row_of(again).url, row_of(again).secret, row_of(again).state) == (receiver.url, SECRET, "waiting")
+
+
+def test_private_addresses_are_not_called(database_url: str, receiver: Receiver) -> None:
+    with environment(CIRIS_DATABASE_URL=database_url):
+        job_id = a_webhook(receiver.url.replace("127.0.0.1", "localhost"))
+        delivering.deliver_due()
+        assert receiver.bodies == []
+        assert "localhost is not a public address" in (row_of(job_id).error or "")
+
+
+PRIVATE = (
+    "127.0.0.1 0.0.0.0 10.1.2.3 172.16.0.1 192.168.1.1 169.254.169.254 100.64.0.1 224.0.0.1 255.255.255.255 ::1 :: fe80::1 fe80::1%eth0 "
+    "fc00::1 ff02::1 ::ffff:127.0.0.1 ::ffff:8.8.8.8 64:ff9b::7f00:1 2002:7f00:1:: 2001:0:53aa:64c:0:0:80ff:fffe"
+)
+
+
+def test_what_is_public() -> None:
+    assert [address for address in PRIVATE.split() if is_public(address)] == []
+    assert is_public("8.8.8.8")
+    assert is_public("2606:4700:4700::1111")
+
+
+def test_one_private_address_among_public_ones_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    def found(*addresses_found: str) -> None:
+        entries = [(0, 0, 0, "", (address, 80)) for address in addresses_found]
+        monkeypatch.setattr(addresses.socket, "getaddrinfo", lambda *_args, **_options: entries)
+
+    found("8.8.8.8")
+    assert resolve("example.org", 80, private=False) == "8.8.8.8"
+    found("8.8.8.8", "10.0.0.1")
+    with pytest.raises(CirisError, match="not a public address"):
+        resolve("example.org", 80, private=False)
+    assert resolve("example.org", 80, private=True) == "8.8.8.8"
+
+
+def test_names_that_do_not_resolve_are_an_error_of_the_receiver() -> None:
+    for host in ("nowhere.invalid", "a" * 300, "\udcff"):
+        with pytest.raises(CirisError, match="cannot be resolved"):
+            resolve(host, 80, private=False)
+
+
+def test_the_running_service_delivers(receiver: Receiver, sqlite_url: str, queue: object, tmp_path: Path) -> None:
+    from tests.workers.service import eventually, running_service
+
+    with running_service(sqlite_url, queue.url, tmp_path, CIRIS_WEBHOOK_PRIVATE="1"):  # type: ignore[attr-defined]
+        job_id = a_webhook(receiver.url)
+        eventually(lambda: row_of(job_id).state == "delivered", "the webhook is delivered")
+    assert len(receiver.bodies) == 1

@@ -1,0 +1,134 @@
+"""Telling receivers that a job has ended: signed as Standard Webhooks (standardwebhooks.com) has it, until they say that they know.
+
+It runs beside the sweeper. A delivery may come twice, with the same ``webhook-id``; it never leaves for an address that is not public
+unless the settings allow that, and redirects are not followed.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import hmac
+import json
+import logging
+import socket
+import ssl
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from http.client import HTTPConnection, HTTPException
+from urllib.parse import SplitResult, urlsplit
+
+from structlog.contextvars import bound_contextvars
+
+from certifier.errors import CirisError
+from db import webhooks
+from db.models import JobRow
+from db.session import database
+from db.settings import settings
+from db.types import utcnow
+from workers.addresses import resolve
+
+log = logging.getLogger(__name__)
+
+AT_ONCE = 8
+SECONDS = 15.0
+"""A receiver that has not answered within this time has failed, however slowly it is still talking."""
+
+
+def run(stop: threading.Event) -> None:
+    """Delivers until ``stop`` is set. A round that fails (the database is away) is logged, and the next one tries again."""
+    while not stop.wait(settings().sweep_seconds):
+        try:
+            deliver_due()
+        except Exception:
+            log.exception("a round of webhooks failed")
+
+
+def deliver_due() -> None:
+    """One round: every delivery that is due, a few at once."""
+    with database().write() as session:
+        due = webhooks.claim(session, utcnow())
+    if due:
+        with ThreadPoolExecutor(AT_ONCE, thread_name_prefix="webhook") as pool:
+            list(pool.map(_deliver, due))
+
+
+def _deliver(delivery: webhooks.Delivery) -> None:
+    webhook = delivery.webhook
+    error = ""
+    try:
+        status = _post(urlsplit(webhook.url), webhook.id, webhook.secret, _body(delivery.job))
+        if not 200 <= status < 300:
+            error = f"the receiver answered {status}"
+    except (CirisError, OSError, HTTPException) as problem:
+        error = f"{type(problem).__name__}: {problem}"
+    with bound_contextvars(job=delivery.job.id, webhook=webhook.id), database().write() as session:
+        if error:
+            log.warning("attempt %d to deliver a webhook failed: %s", webhook.attempts, error)
+            webhooks.failed(session, webhook.id, error)
+        else:
+            webhooks.delivered(session, webhook.id)
+
+
+def _body(job: JobRow) -> bytes:
+    data = {
+        "id": job.id,
+        "kind": job.kind,
+        "scene": job.scene_id,
+        "state": job.state,
+        "outcome": job.outcome,
+        "reason": job.reason,
+        "error": job.error,
+        "region": job.region_id,
+    }
+    ended = job.finished_at and job.finished_at.isoformat()
+    return json.dumps({"type": "job.ended", "timestamp": ended, "data": data}).encode()
+
+
+def signature(secret: str, webhook_id: str, timestamp: int, body: bytes) -> str:
+    """The value of ``webhook-signature``: HMAC-SHA256 over ``id.timestamp.body`` under the bytes that the secret stands for."""
+    key = base64.b64decode(secret.removeprefix("whsec_"))
+    signed = hmac.new(key, f"{webhook_id}.{timestamp}.".encode() + body, hashlib.sha256)
+    return f"v1,{base64.b64encode(signed.digest()).decode()}"
+
+
+def _post(url: SplitResult, webhook_id: str, secret: str, body: bytes) -> int:
+    """Posts the body; the status of the answer."""
+    timestamp = int(time.time())
+    headers = {
+        "Content-Type": "application/json",
+        "User-Agent": "ciris",
+        "webhook-id": webhook_id,
+        "webhook-timestamp": str(timestamp),
+        "webhook-signature": signature(secret, webhook_id, timestamp, body),
+    }
+    connection = _Pinned(url)
+    limit = threading.Timer(SECONDS, connection.abandon)
+    limit.start()
+    try:
+        connection.request("POST", (url.path or "/") + (f"?{url.query}" if url.query else ""), body, headers)
+        return connection.getresponse().status
+    finally:
+        limit.cancel()
+        connection.close()
+
+
+class _Pinned(HTTPConnection):
+    """A connection to the address that was checked, under the name that was given."""
+
+    def __init__(self, url: SplitResult) -> None:
+        self._tls = url.scheme == "https"
+        super().__init__(url.hostname or "", url.port or (443 if self._tls else 80), timeout=SECONDS)
+
+    def connect(self) -> None:
+        address = resolve(self.host, self.port, private=settings().webhook_private)
+        self.sock = socket.create_connection((address, self.port), self.timeout)
+        if self._tls:
+            self.sock = ssl.create_default_context().wrap_socket(self.sock, server_hostname=self.host)
+
+    def abandon(self) -> None:
+        if self.sock is not None:
+            with suppress(OSError):
+                self.sock.shutdown(socket.SHUT_RDWR)
