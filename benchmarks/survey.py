@@ -18,6 +18,7 @@ from certifier.forecast import SECONDS, forecast, terms
 from certifier.model import Pair, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair import Certification, PairResult
+from certifier.proof import PairProof
 
 DECIDED = (Outcome.CERTIFIED, Outcome.REFUTED, Outcome.NOT_CERTIFIABLE)
 
@@ -47,7 +48,7 @@ def survey(names: Iterable[str], most: float, progress: Progress) -> dict[str, A
                     found = {"scene": name, "region": kind, "a": pair.a, "b": pair.b, "outcome": result.outcome.value}
                     undecided.append(found | {"detail": result.detail})
                     progress(" ".join(undecided[-1].values()))
-                elif result.outcome is Outcome.CERTIFIED:
+                elif result.outcome is Outcome.CERTIFIED and len(PairProof.from_bytes(result.proof or b"", scene).pairs) == 1:
                     spent[size].append(seconds)
             counts.append({"scene": name, "region": kind, "outcomes": dict(outcomes), "left_out": left_out, "seconds": total})
             progress(f"{name} {kind}: {dict(outcomes)}, {total:.1f} s")
