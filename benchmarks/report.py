@@ -21,23 +21,19 @@ def text(document: Document) -> str:
 
 
 def write() -> None:
-    """Put the tables of all documents in docs/benchmarks into docs/benchmarks.md, and draw the curves.
-
-    Raises:
-        FileNotFoundError: the page has marks of a document that is not there.
-    """
+    """Put the tables of all documents in docs/benchmarks into docs/benchmarks.md, and draw the curves."""
     PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
     (FIGURES / "scaling.svg").write_text(scaling.picture(_document("scaling")), encoding="utf-8")
 
 
 def page(old: str) -> str:
-    """The page with what stands between ``<!-- NAME -->`` and ``<!-- end -->`` written anew from docs/benchmarks/NAME.json."""
-    return re.sub(
-        r"(<!-- (\w+) -->\n).*?(<!-- end -->)",
-        lambda found: f"{found[1]}\n{text(_document(found[2]))}\n\n{found[3]}",
-        old,
-        flags=re.DOTALL,
-    )
+    """The page, what stands between ``<!-- NAME -->`` and ``<!-- end -->`` written anew from docs/benchmarks/NAME.json if it is there."""
+
+    def tables(found: re.Match[str]) -> str:
+        measured = (FIGURES / f"{found[2]}.json").exists()
+        return f"{found[1]}\n{text(_document(found[2])) if measured else 'Not measured yet.'}\n\n{found[3]}"
+
+    return re.sub(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", tables, old, flags=re.DOTALL)
 
 
 def _document(name: str) -> Document:
