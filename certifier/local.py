@@ -29,6 +29,7 @@ from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee, Outcome, combine
 from certifier.pair import Certification as PairCertification
 from certifier.pair import PairResult
+from certifier.polytope import inscribed_ellipsoid
 from certifier.polytope_step import Step as PolytopeStep
 from certifier.polytope_step import step
 from certifier.region import Region, certified_region
@@ -72,10 +73,11 @@ class _Run:
         if isinstance(action, Propose):
             self.progress("seeding")
             proposal = propose(self.scene, SeedOptions.from_document(action.seed))
-            return Proposed(proposal.C.tolist(), proposal.d.tolist(), proposal.center.tolist(), proposal.info)
+            return Proposed(proposal.C.tolist(), proposal.d.tolist(), proposal.center.tolist(), proposal.contain.tolist(), proposal.info)
         assert self.accepted is not None, "a step follows an accepted region"
         self.progress("polytope step")
-        found = step(self.scene, Polytope(np.array(action.C), np.array(action.d)), self.proofs(self.accepted))
+        polytope, witnesses = Polytope(np.array(action.C), np.array(action.d)), np.array(action.contain)
+        found = step(self.scene, polytope, self.proofs(self.accepted), witnesses=witnesses)
         return stepped(found)
 
 
@@ -115,7 +117,9 @@ def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: No
             raise failure
         if transition.accepted:
             run.accepted = transition.accepted
-            curve.append({"iteration": run.accepted.iteration, "seconds": time.perf_counter() - start})
+            seconds = time.perf_counter() - start
+            volume = inscribed_ellipsoid(Polytope(np.array(run.accepted.C), np.array(run.accepted.d))).volume
+            curve.append({"iteration": run.accepted.iteration, "seconds": seconds, "ellipsoid": volume})
     if run.accepted is None:
         raise CirisError("not_grown", transition.action.reason, hint="try another seed, or look at the pair named")
     provenance = {
@@ -141,13 +145,17 @@ def certify(scene: Scene, C: Array, d: Array, center: Array | None = None, progr
     assert isinstance(action, Certify)
     run = _Run(scene, options.random_seed, progress)
     run.certify(action)
-    results = run.results[action.iteration]
+    return document(scene, run.results[action.iteration], Guarantee.EXACT, time.perf_counter() - start)
+
+
+def document(scene: Scene, results: dict[int, PairResult], guarantee: Guarantee, seconds: float) -> dict[str, Any]:
+    """The results of all pairs with stable keys; ``guarantee`` is what it is worth that every pair is certified."""
     outcome = combine([result.outcome for result in results.values()])
     return {
         "scene": {"name": scene.name, "hash": scene.hash},
         "outcome": outcome.value,
-        "guarantee": (Guarantee.EXACT if outcome is Outcome.CERTIFIED else Guarantee.NONE).value,
-        "seconds": time.perf_counter() - start,
+        "guarantee": (guarantee if outcome is Outcome.CERTIFIED else Guarantee.NONE).value,
+        "seconds": seconds,
         "pairs": [pair_document(scene, index, results[index]) for index in sorted(results)],
     }
 

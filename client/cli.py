@@ -138,6 +138,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     certify.add_argument("--watch", action="store_true", help="a line for every pair as it is settled")
     certify.add_argument("--local", action="store_true", help="in this process, without a service")
+    certify.add_argument("--backend", choices=["ciris", "drake"], default="ciris", help="drake: Drake's own program, a cross-check")
+    certify.add_argument("--solver", metavar="NAME", help="Drake's solver: clarabel (default), scs, csdp or mosek")
     certify.set_defaults(run="client.commands:certify")
 
     verify = verbs.add_parser("verify", parents=[json], help="check a proof file offline; says what was proved")
@@ -161,6 +163,12 @@ def _parser() -> argparse.ArgumentParser:
     contains.add_argument("scene", metavar="SCENE")
     contains.add_argument("--q", metavar='"0,0.3,..."', required=True, action="append", help="joint positions; may be given several times")
     contains.set_defaults(run="client.commands:contains")
+
+    bench = verbs.add_parser("bench", help="measure, side by side with Drake: ciris bench BENCHMARK --help")
+    kinds = ["pairs", "scene", "growth", "agreement", "scaling", "survey", "docs"]
+    bench.add_argument("benchmark", choices=kinds)
+    bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...")
+    bench.set_defaults(run="client.bench:bench")
 
     doctor = verbs.add_parser("doctor", parents=[remote, json], help="what is installed, what works, what the machine can do")
     doctor.set_defaults(run="client.commands:doctor")

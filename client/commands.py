@@ -116,10 +116,11 @@ def save_proof(manifest: dict[str, Any], proof: bytes, out: str | None) -> Path:
 def certify(args: Namespace) -> int:
     screen = Screen()
     polytope = polytope_file(args.polytope)
+    drake = _drake(args)
     if args.local:
         from client import local
 
-        document = local.certify(args.scene, polytope, screen, args.watch)
+        document = local.certify(args.scene, polytope, screen, args.watch, drake)
     else:
         with _client(args) as client:
             document = service.certify(client, service.known_scene(client, args.scene), polytope, screen, args.watch)
@@ -133,6 +134,17 @@ def certify(args: Namespace) -> int:
         scene = document["scene"]["name"]
         print(f"{scene}: {output.plain(document['outcome'])}, guarantee {document['guarantee']}, {output.seconds(document['seconds'])}")
     return OK if document["outcome"] == "certified" else NO
+
+
+def _drake(args: Namespace) -> str | None:
+    """The solver that Drake is to use; None when the certifier is ours."""
+    if args.backend != "drake":
+        if args.solver is not None:
+            raise CirisError("option", "only Drake takes a solver", field="--solver", hint="add --backend drake")
+        return None
+    if not args.local:
+        raise CirisError("option", "the service asks its own certifier only", field="--backend", hint="add --local")
+    return args.solver or "clarabel"
 
 
 def region_ls(args: Namespace) -> int:

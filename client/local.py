@@ -36,11 +36,17 @@ def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], screen: Scre
     return Grown(region.manifest, region.proof, provenance["seconds"], remark=provenance["reason"])
 
 
-def certify(scene: str, polytope: PolytopeFile, screen: Screen, watch: bool) -> dict[str, Any]:
-    """Certifies a polytope here; the document of ``ciris certify --json``."""
+def certify(scene: str, polytope: PolytopeFile, screen: Screen, watch: bool, drake: str | None) -> dict[str, Any]:
+    """Certifies a polytope here, or asks Drake with the solver of that name; the document of ``ciris certify --json``."""
     loaded = load(scene)
-    from certifier import local
+    progress = screen.line if watch else screen.status
+    if drake is None:
+        from certifier import local
 
-    document = local.certify(loaded, polytope.C, polytope.d, polytope.center, screen.line if watch else screen.status)
+        document = local.certify(loaded, polytope.C, polytope.d, polytope.center, progress)
+    else:
+        from certifier import reference
+
+        document = reference.certify(loaded, polytope.C, polytope.d, drake, progress)
     screen.clear()
     return document

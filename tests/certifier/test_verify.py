@@ -49,6 +49,17 @@ def test_a_valid_proof_says_what_it_proves():
     assert "exact" in text
 
 
+def test_a_region_may_be_looser_along_a_normal_than_the_polytopes_of_its_proofs():
+    """A cube's faces, which the region has no more, are parallel to the joint limits, which it has."""
+    scene, data = instance()
+    tilted = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
+    region = scene.polytope(tilted, np.full(4, 0.05))
+    parts = RegionProof.from_bytes(data).proofs
+    proofs = {i: proof.to_bytes() for i, pair in enumerate(scene.pairs) for proof in parts if pair in proof.pairs}
+    statement = verify_region(certified_region(scene, accepted(region, np.zeros(2)), proofs, {}).proof)
+    assert statement.gap > 0
+
+
 def rejected(proof, code=None):
     with pytest.raises(ProofError) as refusal:
         verify_pair(proof)

@@ -106,6 +106,32 @@ def test_certifying_here_prints_the_stable_document(spawn: Ciris, files: Path) -
 
 
 @pytest.mark.usefixtures("parsed_once")
+def test_drakes_answer_is_numeric_at_most(ciris: Ciris, files: Path) -> None:
+    arguments = ("certify", PLANAR, "--local", "--backend", "drake", "--json", "--polytope")
+    done = ciris(*arguments, "small.npz")
+    assert (done.status, done.json["outcome"], done.json["guarantee"]) == (0, "certified", "numeric")
+    assert {pair["detail"] for pair in done.json["pairs"]} == {"clarabel: SolutionFound (Solved)"}
+    write(files / "large.npz", C=np.concatenate([np.eye(2), -np.eye(2)]), d=np.full(4, 0.6))
+    done = ciris(*arguments, "large.npz", "--solver", "scs")
+    assert (done.status, done.json["outcome"], done.json["guarantee"]) == (1, "not_certifiable", "none")
+
+
+@pytest.mark.usefixtures("parsed_once")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--local", "--backend", "drake", "--solver", "best"), "solver: best is unknown (available: clarabel"),
+        (("--local", "--solver", "scs"), "add --backend drake"),
+        (("--backend", "drake"), "add --local"),
+    ],
+)
+def test_drake_and_its_solvers_are_asked_for_properly(ciris: Ciris, files: Path, arguments: tuple[str, ...], words: str) -> None:
+    done = ciris("certify", PLANAR, "--polytope", "small.npz", *arguments)
+    assert (done.status, done.raw) == (2, b"")
+    assert words in done.error
+
+
+@pytest.mark.usefixtures("parsed_once")
 def test_a_collision_is_a_negative_answer_with_its_witness(ciris: Ciris, tmp_path: Path) -> None:
     write(tmp_path / "all.npz", C=np.zeros((0, 2)), d=np.zeros(0))
     done = ciris("certify", PLANAR, "--polytope", "all.npz", "--local")

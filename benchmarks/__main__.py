@@ -1,0 +1,85 @@
+"""``ciris bench``."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from typing import Any
+
+from benchmarks import agreement, catalogue, compare, growth, report, scaling, survey
+from certifier.errors import CirisError
+from client.output import Screen, print_json
+
+OK, CONTRADICTED, BAD_INPUT = 0, 1, 2
+
+
+def main() -> int:
+    """Runs one benchmark; exit status 1 when verdicts contradict each other."""
+    logging.getLogger("drake").setLevel(logging.WARNING)
+    args = _parser().parse_args()
+    if args.benchmark == "docs":
+        report.write()
+        return OK
+    screen = Screen()
+    try:
+        document = _BENCHMARKS[args.benchmark](args, screen)
+    except CirisError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return BAD_INPUT
+    if args.json:
+        print_json(document)
+    else:
+        print(report.text(document))
+    return CONTRADICTED if compare.Verdict.CONTRADICTION in (document.get("verdicts") or {}) else OK
+
+
+def _pairs(args: Namespace, screen: Screen) -> dict[str, Any]:
+    return compare.compare("pairs", compare.ladder(), args.against is not None, args.repeat, screen.line)
+
+
+def _scene(args: Namespace, screen: Screen) -> dict[str, Any]:
+    task = compare.whole_scene(args.scene, args.region, args.match, args.pairs)
+    return compare.compare("scene", [task], args.against is not None, args.repeat, screen.line)
+
+
+_BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
+    "pairs": _pairs,
+    "scene": _scene,
+    "growth": lambda args, screen: growth.growth(args.scenes, args.against is not None, screen.line),
+    "agreement": lambda args, screen: agreement.campaign(agreement.questions(), screen.line),
+    "scaling": lambda args, screen: scaling.curves(args.against is not None, screen.line),
+    "survey": lambda args, screen: survey.survey(args.scenes, args.most, screen.line),
+}
+
+
+def _parser() -> ArgumentParser:
+    parser = ArgumentParser(prog="ciris bench", description=__doc__)
+    kinds = parser.add_subparsers(dest="benchmark", required=True)
+    json = ArgumentParser(add_help=False)
+    json.add_argument("--json", action="store_true", help="print one JSON document")
+    against = ArgumentParser(add_help=False, parents=[json])
+    against.add_argument("--against", choices=["drake"], help="Drake with Clarabel, in the same run")
+    repeat = ArgumentParser(add_help=False)
+    repeat.add_argument("--repeat", type=int, default=1, metavar="N", help="run ours this often; the fastest run counts")
+    kinds.add_parser("pairs", parents=[against, repeat], help="pairs with longer and longer chains, each feasible and infeasible")
+    scene = kinds.add_parser("scene", parents=[against, repeat], help="the pairs of a scene")
+    scene.add_argument("scene", nargs="?", default="iiwa_shelf", help=f"default iiwa_shelf; {', '.join(catalogue.SCENES)}")
+    regions = "; ".join(f"{name}: {what}" for name, what in catalogue.REGIONS.items())
+    scene.add_argument("--region", choices=list(catalogue.REGIONS), default="middle", help=f"default middle; {regions}")
+    scene.add_argument("--match", default="", metavar="TEXT", help="only pairs with this in their names")
+    scene.add_argument("--pairs", type=int, metavar="N", help="only the N cheapest of them")
+    grown = kinds.add_parser("growth", parents=[against], help="regions grown in several ways")
+    grown.add_argument("scenes", nargs="*", metavar="EXAMPLE", default=list(growth.EXAMPLES), help=f"default: {', '.join(growth.EXAMPLES)}")
+    kinds.add_parser("agreement", parents=[json], help="verdicts on hundreds of pairs")
+    kinds.add_parser("scaling", parents=[against], help="how the cost grows with obstacles, joints and faces")
+    surveyed = kinds.add_parser("survey", parents=[json], help="every pair of every scene on every region")
+    surveyed.add_argument("scenes", nargs="*", metavar="SCENE", default=list(catalogue.SCENES), help="default: all")
+    surveyed.add_argument("--most", type=float, default=5.0, metavar="SECONDS", help="leave pairs with a longer forecast out; default 5")
+    kinds.add_parser("docs", help="write the tables of docs/benchmarks.md from docs/benchmarks/*.json")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

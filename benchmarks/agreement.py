@@ -1,0 +1,139 @@
+"""The agreement campaign: our verdicts against Drake's, on pairs that are feasible and on their infeasible twins.
+
+Drake chooses the frame of a pair its own way. Where ours is another one of equal cost, naming the two bodies the other way round makes ours
+Drake's, and the programs the same; what remains is said in the verdict. Every answer of ours is checked from the bytes of its proof.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks import measure
+from benchmarks.arms import random_arm, random_faces
+from benchmarks.catalogue import Region
+from benchmarks.compare import Verdict, same_program, verdict
+from benchmarks.measure import Progress
+from certifier.forecast import forecast
+from certifier.model import Pair, Scene
+from certifier.outcome import Outcome
+from certifier.pair import PairResult, certify_pair
+from certifier.reference import Reference
+
+BOXES, ROUND = 60, 40
+"""Random arms with boxes alone, and with balls and capsules among them."""
+SMALLEST, LARGEST = 0.05, 1.0
+"""Sizes of the nested polytopes around a random arm; the largest reaches to the joint limits."""
+BRACKET, APART = 1.02, 1.01
+"""How closely the size at which a pair ceases to be certifiable is bracketed, and how far on either side Drake is asked."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """A scene of one pair, and a polytope."""
+
+    name: str
+    group: str
+    scene: Scene
+    region: Region
+
+
+def questions(boxes: int = BOXES, rounded: int = ROUND) -> Iterator[Question]:
+    """The whole campaign: arms of either kind, each at four sizes."""
+    yield from _questions("boxes", boxes, rounded=False)
+    yield from _questions("round", rounded, rounded=True)
+
+
+def _questions(group: str, count: int, rounded: bool) -> Iterator[Question]:
+    """Arms of 2 to 4 joints with the first pair that is certified at the smallest size and not at the largest: each has its twin."""
+    made = seed = 0
+    while made < count:
+        rng = np.random.default_rng([seed, rounded])
+        arm = random_arm(rng, 2 + seed % 3, rounded)
+        center = rng.uniform(-0.3, 0.3, arm.n)
+        C, d = random_faces(rng, center, 1.0)
+        whole = Region(C, d, center)
+        for pair in (arm.pairs[i] for i in rng.permutation(len(arm.pairs))):
+            scene = replace(arm, pairs=(pair,))
+            if _certifies(scene, _scaled(whole, SMALLEST)) and not _certifies(scene, _scaled(whole, LARGEST)):
+                for size in (SMALLEST, *_bracket(scene, whole), LARGEST):
+                    yield Question(f"{group} {seed} x {size:.3g}", group, scene, _scaled(whole, size))
+                made += 1
+                break
+        seed += 1
+
+
+def _scaled(region: Region, size: float) -> Region:
+    return Region(region.C, region.C @ region.center + size * (region.d - region.C @ region.center), region.center)
+
+
+def _certify(scene: Scene, region: Region) -> PairResult:
+    return certify_pair(scene, 0, scene.polytope(region.C, region.d), region.center)
+
+
+def _certifies(scene: Scene, region: Region) -> bool:
+    return _certify(scene, region).outcome is Outcome.CERTIFIED
+
+
+def _bracket(scene: Scene, region: Region) -> tuple[float, float]:
+    """Sizes just below and just above the one at which the pair ceases to be certifiable."""
+    certified, failed = SMALLEST, LARGEST
+    while failed > BRACKET * certified:
+        middle = float(np.sqrt(certified * failed))
+        certified, failed = (middle, failed) if _certifies(scene, _scaled(region, middle)) else (certified, middle)
+    return certified / APART, failed * APART
+
+
+def campaign(questions: Iterable[Question], progress: Progress) -> dict[str, Any]:
+    """Ask both sides everything; the document of ``ciris bench agreement``.
+
+    Raises:
+        ProofError: a proof of ours does not hold.
+    """
+    findings = []
+    for question in questions:
+        findings.append(finding := _ask(question))
+        progress(f"{len(findings)} {question.name}: {finding['ciris']}, Drake {finding['drake']}: {finding['verdict']}")
+    counts = Counter((f["group"], f["ciris"], f["drake"], f["verdict"]) for f in findings)
+    return {
+        "benchmark": "agreement",
+        "machine": measure.machine(),
+        "instances": len(findings),
+        "same_program": sum(f["same_program"] for f in findings),
+        "counts": [{"group": g, "ciris": c, "drake": d, "verdict": v, "instances": n} for (g, c, d, v), n in sorted(counts.items())],
+        "verdicts": dict(Counter(f["verdict"] for f in findings)),
+        "evidence": dict(Counter(f["evidence"] for f in findings)),
+        "disagreements": [f for f in findings if f["verdict"] != Verdict.AGREE],
+    }
+
+
+def _ask(question: Question) -> dict[str, Any]:
+    region = question.region
+    theirs = Reference(question.scene).certify(0, region.C, region.d)
+    scene, frame = _in_frame(question.scene, theirs.frame)
+    ours = _certify(scene, region)
+    same = same_program(scene, scene.pairs[0], frame, theirs.frame)
+    return {
+        "name": question.name,
+        "group": question.group,
+        "ciris": ours.outcome.value,
+        "detail": ours.detail,
+        "drake": theirs.outcome.value,
+        "status": theirs.status,
+        "frames": [frame, theirs.frame],
+        "same_program": same,
+        "verdict": verdict(ours.outcome, theirs.outcome, same).value,
+        "evidence": measure.Verifier(scene).verify(ours).what,
+    }
+
+
+def _in_frame(scene: Scene, frame: str) -> tuple[Scene, str]:
+    """The scene of one pair, its bodies named in the order in which our frame is this one, if there is such an order; and our frame."""
+    (pair,) = scene.pairs
+    named = [replace(scene, pairs=(order,)) for order in (pair, Pair(pair.b, pair.a))]
+    ours = [(some, forecast(some)[0].frame) for some in named]
+    return next((found for found in ours if found[1] == frame), ours[0])

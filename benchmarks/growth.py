@@ -1,0 +1,107 @@
+"""How large regions grow and how soon: our ways to grow one beside each other, and beside Drake's alternation from the same start."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from benchmarks import catalogue, measure
+from benchmarks.measure import Progress
+from certifier.errors import CirisError
+from certifier.growth import GrowthOptions
+from certifier.local import grow
+from certifier.model import Array, Scene
+from certifier.polytope import inscribed_ellipsoid
+from certifier.reference import Reference
+
+WAYS: dict[str, dict[str, Any]] = {
+    "uniform contraction": {"contraction": "uniform", "pushes": 0, "max_rounds": 0},
+    "targeted contraction": {"pushes": 0, "max_rounds": 0},
+    "targeted, then (12)": {"pushes": 0},
+    "targeted, then pushes": {"max_rounds": 0},
+    "default": {},
+}
+"""Options of a grow job, each with the default seeding."""
+EXAMPLES = ("planar_2dof", "arm_3dof", "ur3e_bin", "iiwa_shelf")
+AGAINST = ("planar_2dof", "arm_3dof")
+"""Examples on which Drake's alternation ends within minutes."""
+HALF_WIDTH, ROUNDS, TOLERANCE = 0.05, 10, 1e-3
+"""Of the cube that both sides start from, and Drake's own limits for the alternation."""
+
+
+def growth(names: list[str], against: bool, progress: Progress) -> dict[str, Any]:
+    """Grow a region on every example in every way; the document of ``ciris bench growth``."""
+    # the first run loads the compiled kernels
+    _grown(names[0], {**_seed(names[0]), "method": "box"}, {"pushes": 0, "max_rounds": 0})
+    ways = []
+    for name in names:
+        for way, options in WAYS.items():
+            ways.append({"scene": name, "way": way, **_grown(name, _seed(name), options)})
+            progress(_line(ways[-1]))
+    sides = [row for name in AGAINST if name in names for row in _against(name, progress)] if against else []
+    return {"benchmark": "growth", "machine": measure.machine(), "ways": ways, "against": sides}
+
+
+def _against(name: str, progress: Progress) -> list[dict[str, Any]]:
+    """Drake's alternation from a cube about the seed; our alternation from the same cube; our default from the seed itself.
+
+    ``reached_seconds``: when our certified region first had at least the volume of Drake's last; None if never.
+    """
+    scene = catalogue.scene(name)
+    center = scene.to_s(catalogue.seed(name))
+    C, d = catalogue.cube(center, HALF_WIDTH)
+    cube = {"method": "polytope", "C": C.tolist(), "d": d.tolist(), "center": center.tolist()}
+    alternation = {"pushes": 0, "max_rounds": ROUNDS, "tolerance": TOLERANCE}
+    sides: dict[str, Callable[[], dict[str, Any]]] = {
+        "Drake's alternation": lambda: _drakes(scene, C, d),
+        "our alternation": lambda: _grown(name, cube, alternation),
+        "our default, from the seed": lambda: _grown(name, _seed(name), {}),
+    }
+    rows: list[dict[str, Any]] = []
+    for way, run in sides.items():
+        row = {"scene": name, "way": way, **run()}
+        drakes = rows[0] if rows else row
+        reached = next((point["seconds"] for point in row["curve"] if point["ellipsoid"] >= drakes["ellipsoid"]), None)
+        row |= {"volume_ratio": row["ellipsoid"] / drakes["ellipsoid"], "reached_seconds": reached}
+        row |= {"time_ratio": drakes["seconds"] / reached if reached else None}
+        progress(_line(row))
+        rows.append(row)
+    return rows
+
+
+def _seed(name: str) -> dict[str, Any]:
+    return {"q": catalogue.seed(name).tolist()}
+
+
+def _grown(name: str, seed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
+    """One region of ours, its proof verified. Where none could be certified, the row says why."""
+    start = time.perf_counter()
+    try:
+        manifest = grow(catalogue.scene(name), GrowthOptions(seed=seed, **options)).manifest
+    except CirisError as error:
+        return {"seconds": time.perf_counter() - start, "ellipsoid": 0.0, "faces": 0, "curve": [], "ended": str(error)}
+    seconds = time.perf_counter() - start
+    return {
+        "seconds": seconds,
+        "ellipsoid": manifest["volume"]["ellipsoid"],
+        "faces": len(manifest["halfspace_offsets"]),
+        "curve": manifest["provenance"]["growth_curve"],
+        "ended": manifest["provenance"]["reason"],
+    }
+
+
+def _drakes(scene: Scene, C: Array, d: Array) -> dict[str, Any]:
+    start = time.perf_counter()
+    rounds = Reference(scene).alternate(C, d, ROUNDS, TOLERANCE)
+    seconds = time.perf_counter() - start
+    if not rounds:
+        raise CirisError("start_not_certified", "Drake does not certify the cube that both sides start from", field="HALF_WIDTH")
+    last = scene.polytope(*rounds[-1])
+    volume = inscribed_ellipsoid(last).volume
+    curve = [{"iteration": len(rounds), "seconds": seconds, "ellipsoid": volume}]
+    return {"seconds": seconds, "ellipsoid": volume, "faces": len(last.d), "curve": curve, "ended": f"after {len(rounds)} rounds"}
+
+
+def _line(row: dict[str, Any]) -> str:
+    return f"{row['scene']}, {row['way']}: ellipsoid {row['ellipsoid']:.3g}, {row['seconds']:.1f} s, {row['faces']} faces; {row['ended']}"

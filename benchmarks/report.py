@@ -1,0 +1,177 @@
+"""The documents of the benchmarks as tables: on a terminal, and between the marks of docs/benchmarks.md."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from benchmarks import scaling
+from benchmarks.catalogue import ROOT
+
+PAGE, FIGURES = ROOT / "docs/benchmarks.md", ROOT / "docs/benchmarks"
+
+Document = dict[str, Any]
+
+
+def text(document: Document) -> str:
+    """A document for people: the machine, then its tables."""
+    return "\n\n".join([machine(document), *_TABLES[document["benchmark"]](document)])
+
+
+def write() -> None:
+    """Put the tables of all documents in docs/benchmarks into docs/benchmarks.md, and draw the curves."""
+    PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    (FIGURES / "scaling.svg").write_text(scaling.picture(_document("scaling")), encoding="utf-8")
+
+
+def page(old: str) -> str:
+    """The page, what stands between ``<!-- NAME -->`` and ``<!-- end -->`` written anew from docs/benchmarks/NAME.json if it is there."""
+
+    def tables(found: re.Match[str]) -> str:
+        measured = (FIGURES / f"{found[2]}.json").exists()
+        return f"{found[1]}\n{text(_document(found[2])) if measured else 'Not measured yet.'}\n\n{found[3]}"
+
+    return re.sub(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", tables, old, flags=re.DOTALL)
+
+
+def _document(name: str) -> Document:
+    document: Document = json.loads((FIGURES / f"{name}.json").read_text(encoding="utf-8"))
+    return document
+
+
+def machine(document: Document) -> str:
+    """Where it was measured, in a sentence."""
+    here = document["machine"]
+    versions = ", ".join(f"{package} {number}" for package, number in here["versions"].items())
+    where = f"{here['processor']}, {here['cores']} cores, {here['memory_gib']} GiB; Python {here['python']}, {versions}"
+    return f"Measured on: {where}; one thread."
+
+
+def seconds(value: float) -> str:
+    """Three significant digits, milliseconds at the least."""
+    digits = 0 if value >= 99.95 else 1 if value >= 9.995 else 2 if value >= 0.995 else 3
+    return f"{value:.{digits}f}"
+
+
+def _ratio(value: float) -> str:
+    return f"{value:.{1 if value < 9.95 else 0}f}"
+
+
+def _plain(outcome: str) -> str:
+    return outcome.replace("_", " ")
+
+
+def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Markdown with aligned columns; numbers to the right."""
+    lines = [list(header), *map(list, rows)]
+    widths = [max(3, *(len(line[i]) for line in lines)) for i in range(len(header))]
+    right = [all(re.fullmatch(r"[\d.,e+-]*", line[i].replace(" ", "")) for line in lines[1:]) for i in range(len(header))]
+    lines.insert(1, ["-" * (w - 1) + (":" if r else "-") for w, r in zip(widths, right, strict=True)])
+    return "\n".join(
+        "| " + " | ".join(cell.rjust(w) if r else cell.ljust(w) for cell, w, r in zip(line, widths, right, strict=True)) + " |"
+        for line in lines
+    )
+
+
+def _compared(document: Document) -> list[str]:
+    """A line a pair, then the sums."""
+    against = document["verdicts"] is not None
+    header = ["pair", "region", "joints", "vertices", "ciris", "covers", "solve", "verify"]
+    header += ["Drake", "build", "solve", "ratio", "verdicts"] if against else []
+    rows = []
+    for task in document["tasks"]:
+        for row in task["pairs"]:
+            ciris, drake = row["ciris"], row["drake"]
+            cells = [f"{row['a']} - {row['b']}", task["region"], f"{row['k'][0]} + {row['k'][1]}", str(row["vertices"])]
+            cells += [_plain(ciris["outcome"]), str(ciris["covers"]), seconds(ciris["solve_seconds"]), seconds(ciris["verify_seconds"])]
+            if drake:
+                cells += [_plain(drake["outcome"]), seconds(drake["build_seconds"]), seconds(drake["solve_seconds"])]
+                cells += [_ratio(row["ratio"]) if row["ratio"] else "", row["verdict"]]
+            rows.append(cells)
+    total = document["total"]
+    ciris, drake = total["ciris"], total["drake"]
+    sums = [["ciris", seconds(ciris["setup_seconds"]), "", *(seconds(ciris[f"{name}_seconds"]) for name in ("solve", "verify"))]]
+    sums[0].append(seconds(sum(ciris.values())))
+    if drake:
+        sums.append(["Drake", *(seconds(drake[f"{name}_seconds"]) for name in ("setup", "build", "solve")), ""])
+        sums[1].append(seconds(sum(drake.values())))
+        sums.append(["ratio", "", "", _ratio(total["solve_ratio"]), "", _ratio(total["ratio"])])
+    parts = [_table(header, rows), _table([f"{total['pairs']} pairs", "setup", "build", "solve", "verify", "total"], sums)]
+    if against:
+        parts.append(f"Verdicts: {_counts(document['verdicts'])}.")
+    return parts
+
+
+def _growth(document: Document) -> list[str]:
+    def line(row: Document) -> list[str]:
+        return [row["scene"], row["way"], f"{row['ellipsoid']:.3g}", seconds(row["seconds"]), str(row["faces"])]
+
+    header = ["example", "way", "ellipsoid", "seconds", "faces"]
+    rows = [[*line(row), str(len(row["curve"])), row["ended"]] for row in document["ways"]]
+    parts = [_table([*header, "certified regions", "ended"], rows)]
+    if document["against"]:
+        rows = []
+        for row in document["against"]:
+            reached = [seconds(row["reached_seconds"]), _ratio(row["time_ratio"])] if row["reached_seconds"] else ["never", ""]
+            rows.append([*line(row), f"{row['volume_ratio']:.3g}", *reached])
+        parts.append(_table([*header, "volume / Drake's", "reached Drake's after", "times as fast"], rows))
+    return parts
+
+
+def _agreement(document: Document) -> list[str]:
+    rows = [[c["group"], _plain(c["ciris"]), _plain(c["drake"]), str(c["instances"]), c["verdict"]] for c in document["counts"]]
+    parts = [_table(["group", "ciris", "Drake", "instances", "verdicts"], rows)]
+    parts.append(
+        f"{document['instances']} instances, {document['same_program']} of them the very same program: {_counts(document['verdicts'])}. "
+        f"What speaks for our answers: {_counts(document['evidence'])}."
+    )
+    if document["disagreements"]:
+        header = ["instance", "ciris", "Drake", "Drake's solver", "verdicts", "evidence for ours"]
+        found = document["disagreements"]
+        parts.append(
+            _table(header, ([f["name"], _plain(f["ciris"]), _plain(f["drake"]), f["status"], f["verdict"], f["evidence"]] for f in found))
+        )
+    return parts
+
+
+def _scaling(document: Document) -> list[str]:
+    rows = []
+    for curve in ("obstacles", "joints", "faces"):
+        for point in document[curve]:
+            cells = [curve, str(point["n"]), str(point["pairs"]), _counts(point["outcomes"])]
+            cells += [seconds(point[f"{part}_seconds"]) for part in ("setup", "solve", "verify")]
+            rows.append([*cells, seconds(point["drake_seconds"]) if "drake_seconds" in point else ""])
+    return [_table(["curve", "number", "pairs", "outcomes", "setup", "solve", "verify", "Drake"], rows)]
+
+
+def _survey(document: Document) -> list[str]:
+    rows = [
+        [row["scene"], row["region"], _counts(row["outcomes"]), str(row["left_out"]), seconds(row["seconds"])] for row in document["counts"]
+    ]
+    fit = document["forecast"]
+    parts = [_table(["scene", "region", "outcomes", "left out", "seconds"], rows)]
+    if document["undecided"]:
+        parts.append(_table(list(document["undecided"][0]), (list(row.values()) for row in document["undecided"])))
+    least, low, median, high, most = fit["quantiles"]["present"]
+    parts.append(
+        f"Forecast divided by measured time of {fit['size_classes']} size classes: median {median:.2f}, "
+        f"80 % within {low:.2f} .. {high:.2f}, all within {least:.2f} .. {most:.2f}. "
+        f"Constants that would fit best: {', '.join(f'{value:.2g}' for value in fit['constants'])}."
+    )
+    return parts
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{number} {_plain(name)}" for name, number in sorted(counts.items(), key=lambda item: -item[1]))
+
+
+_TABLES: dict[str, Callable[[Document], list[str]]] = {
+    "pairs": _compared,
+    "scene": _compared,
+    "growth": _growth,
+    "agreement": _agreement,
+    "scaling": _scaling,
+    "survey": _survey,
+}

@@ -1,0 +1,90 @@
+"""Every pair of every scene on every region, ours alone: the outcomes, what is left undecided, what a pair costs by its size."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import nnls
+
+from benchmarks import catalogue, measure
+from benchmarks.catalogue import Region
+from benchmarks.measure import Progress
+from certifier.forecast import SECONDS, forecast, terms
+from certifier.model import Pair, Scene
+from certifier.outcome import Outcome, Stage
+from certifier.pair import Certification, PairResult
+from certifier.proof import PairProof
+
+DECIDED = (Outcome.CERTIFIED, Outcome.REFUTED, Outcome.NOT_CERTIFIABLE)
+
+SizeClass = tuple[int, tuple[int, int], tuple[int, int]]
+"""n, the vertices of A and of B, the dimensions N of their polynomial spaces."""
+
+
+def survey(names: Iterable[str], most: float, progress: Progress) -> dict[str, Any]:
+    """Certify every pair of these scenes on every region of the catalogue; the document of ``ciris bench survey``.
+
+    Args:
+        most: pairs with a forecast of more seconds are left out, and counted.
+    """
+    counts, undecided = [], []
+    spent: dict[SizeClass, list[float]] = defaultdict(list)
+    for name in names:
+        whole = catalogue.scene(name)
+        scene = replace(whole, pairs=tuple(Pair(cost.a, cost.b) for cost in forecast(whole) if cost.seconds <= most))
+        sizes, left_out = _sizes(scene), len(whole.pairs) - len(scene.pairs)
+        for kind in catalogue.REGIONS:
+            outcomes: Counter[str] = Counter()
+            total = 0.0
+            for pair, size, (result, seconds) in zip(scene.pairs, sizes, _certified(scene, catalogue.region(name, kind)), strict=True):
+                outcomes[result.outcome.value] += 1
+                total += seconds
+                if result.outcome not in DECIDED:
+                    found = {"scene": name, "region": kind, "a": pair.a, "b": pair.b, "outcome": result.outcome.value}
+                    undecided.append(found | {"detail": result.detail})
+                    progress(" ".join(undecided[-1].values()))
+                elif result.outcome is Outcome.CERTIFIED and len(PairProof.from_bytes(result.proof or b"", scene).pairs) == 1:
+                    spent[size].append(seconds)
+            counts.append({"scene": name, "region": kind, "outcomes": dict(outcomes), "left_out": left_out, "seconds": total})
+            progress(f"{name} {kind}: {dict(outcomes)}, {total:.1f} s")
+    return {
+        "benchmark": "survey",
+        "machine": measure.machine(),
+        "counts": counts,
+        "undecided": undecided,
+        "forecast": _fit({size: float(np.mean(seconds)) for size, seconds in spent.items()}),
+    }
+
+
+def _certified(scene: Scene, region: Region) -> Iterator[tuple[PairResult, float]]:
+    """Every pair and its processor time; whatever is raised is an outcome, as it is in the service."""
+    certification = Certification(scene, scene.polytope(region.C, region.d), region.center)
+    for index in range(len(scene.pairs)):
+        start = time.process_time()
+        try:
+            result = certification.certify(index)
+        except Exception as error:
+            result = PairResult(Outcome.ERROR, Stage.SOS, detail=repr(error))
+        yield result, time.process_time() - start
+
+
+def _sizes(scene: Scene) -> list[SizeClass]:
+    vertices = {geometry.name: len(geometry.vertices) for geometry in scene.geometries}
+    return [(scene.n, (vertices[cost.a], vertices[cost.b]), (cost.N_a, cost.N_b)) for cost in forecast(scene)]
+
+
+def _fit(seconds: dict[SizeClass, float]) -> dict[str, Any]:
+    """The constants of the forecast that fit these mean times best, by relative error, and how well they and the present ones do."""
+    rows = np.array([terms(n, list(vertices), list(N)) for n, vertices, N in seconds])
+    measured = np.array(list(seconds.values()))
+    constants, _ = nnls(rows / measured[:, None], np.ones(len(measured)))
+    quantiles = {
+        name: np.quantile(rows @ some / measured, [0, 0.1, 0.5, 0.9, 1]).tolist()
+        for name, some in (("fitted", constants), ("present", SECONDS))
+    }
+    return {"size_classes": len(measured), "constants": constants.tolist(), "quantiles": quantiles}

@@ -1,0 +1,28 @@
+"""``ciris bench``: the measurements of the folder benchmarks, which is in a checkout of the repository only."""
+
+from __future__ import annotations
+
+import os
+import sys
+from argparse import Namespace
+from pathlib import Path
+from typing import NoReturn
+
+from certifier.errors import CirisError
+
+CHECKOUT = Path(__file__).parents[1]
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+"""What has to stand in the environment before numpy is loaded for everything to run on one thread."""
+
+
+def bench(args: Namespace) -> NoReturn:
+    """Become ``python -m benchmarks`` on one thread.
+
+    Raises:
+        CirisError: ``no_benchmarks`` outside a checkout.
+    """
+    if not (CHECKOUT / "benchmarks").is_dir():
+        raise CirisError("no_benchmarks", "the benchmarks are not installed", hint="run ciris from a checkout of the repository")
+    path = os.pathsep.join([str(CHECKOUT), *filter(None, [os.environ.get("PYTHONPATH")])])
+    command = [sys.executable, "-P", "-m", "benchmarks", args.benchmark, *args.arguments]
+    os.execve(sys.executable, command, os.environ | ONE_THREAD | {"PYTHONPATH": path})

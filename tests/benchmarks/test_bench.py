@@ -1,0 +1,115 @@
+"""The benchmarks at their smallest: what ``ciris bench`` prints, and that it would say so if verdicts or proofs did not fit."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks import agreement, catalogue, compare, growth, report, survey
+from benchmarks.compare import Verdict, verdict
+from certifier.closest import closest
+from certifier.kinematics import Kinematics
+from certifier.model import WORLD
+from certifier.outcome import Outcome
+
+
+def bench(*arguments: str) -> dict[str, Any]:
+    command = [sys.executable, "-m", "client.cli", "bench", *arguments, "--json"]
+    document: dict[str, Any] = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    return document
+
+
+def test_a_scene_is_compared_with_drake_pair_by_pair() -> None:
+    document = bench("scene", "planar_2dof", "--region", "wide", "--against", "drake")
+    (task,) = document["tasks"]
+    assert (task["scene"], task["region"], task["faces"]) == ("planar-2dof", "wide", 4)
+    assert {row["ciris"]["outcome"] for row in task["pairs"]} == {"certified", "refuted"}
+    assert {row["drake"]["outcome"] for row in task["pairs"]} == {"certified", "not_certifiable"}
+    assert document["verdicts"] == {"agree": 6}
+    drake, ciris = (sum(document["total"][side].values()) for side in ("drake", "ciris"))
+    assert document["total"]["ratio"] == pytest.approx(drake / ciris)
+    assert all(row["a"] in report.text(document) for row in task["pairs"])
+
+
+def test_pairs_are_chosen_by_name_and_cost() -> None:
+    task = compare.whole_scene("iiwa_shelf", "middle", match="link_5", count=3)
+    assert len(task.indices) == 3
+    assert all("link_5" in f"{task.scene.pairs[i].a} {task.scene.pairs[i].b}" for i in task.indices)
+
+
+def test_a_way_to_grow_is_a_row_with_its_region(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growth, "WAYS", {"pushes": {"max_rounds": 0}})
+    document = growth.growth(["planar_2dof"], against=False, progress=lambda _: None)
+    (row,) = document["ways"]
+    assert (row["scene"], row["way"]) == ("planar_2dof", "pushes")
+    assert row["ellipsoid"] > 0.1
+    assert row["curve"][-1]["ellipsoid"] == pytest.approx(row["ellipsoid"])
+    assert "planar_2dof" in report.text(document)
+
+
+def test_a_region_that_cannot_be_grown_is_a_row_that_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growth, "WAYS", {"nothing": {}})
+    monkeypatch.setattr(catalogue, "seed", lambda _: np.array([9.0, 0.0]))
+    (row,) = growth.growth(["planar_2dof"], against=False, progress=lambda _: None)["ways"]
+    assert row["ellipsoid"] == 0
+    assert "is at 9," in row["ended"]
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs", "same", "expected"),
+    [
+        (Outcome.CERTIFIED, Outcome.CERTIFIED, False, Verdict.AGREE),
+        (Outcome.REFUTED, Outcome.NOT_CERTIFIABLE, False, Verdict.AGREE),
+        (Outcome.CERTIFIED, Outcome.NOT_CERTIFIABLE, False, Verdict.PROGRAMS_DIFFER),
+        (Outcome.CERTIFIED, Outcome.NOT_CERTIFIABLE, True, Verdict.CONTRADICTION),
+        (Outcome.REFUTED, Outcome.CERTIFIED, False, Verdict.CONTRADICTION),
+        (Outcome.INCONCLUSIVE, Outcome.CERTIFIED, True, Verdict.UNDECIDED),
+    ],
+)
+def test_what_two_answers_mean_together(ours: Outcome, theirs: Outcome, same: bool, expected: Verdict) -> None:
+    assert verdict(ours, theirs, same) is expected
+
+
+def test_the_campaign_finds_agreement_and_evidence() -> None:
+    document = agreement.campaign(agreement.questions(boxes=1, rounded=0), lambda _: None)
+    assert document["instances"] == 4
+    assert document["verdicts"].keys() <= {"agree", "programs differ"}
+    assert "none" not in document["evidence"]
+    assert len(document["counts"]) > 1, "feasible and infeasible ones"
+
+
+@pytest.mark.parametrize("name", catalogue.SCENES)
+def test_seeds_are_free(name: str) -> None:
+    scene = catalogue.scene(name)
+    kinematics, s = Kinematics(scene), scene.to_s(catalogue.seed(name))[None]
+    at_seed = {g.name: kinematics.points(WORLD, g.body, g.vertices, s)[0] for g in scene.geometries}
+    gaps = [closest(at_seed[p.a], at_seed[p.b]).gap - scene.geometry(p.a).radius - scene.geometry(p.b).radius for p in scene.pairs]
+    assert min(gaps) > 0
+
+
+def test_figures_cover_the_boxes_they_stand_for() -> None:
+    """Balls and capsules do; every point of a box lies in one of them."""
+    boxes = catalogue.scene("iiwa_shelf")
+    rng = np.random.default_rng(0)
+    for name in ("iiwa_sphere_shelf", "iiwa_dense_cupboard"):
+        balls = catalogue.scene(name).geometries
+        for link in (g for g in boxes.geometries if g.body.startswith("iiwa/")):
+            points = rng.dirichlet(np.ones(8), 200) @ link.vertices
+            reach = [np.linalg.norm(points - ball.vertices[0], axis=1) - ball.radius for ball in balls if ball.body == link.body]
+            assert np.min(reach, axis=0).max() <= 0
+
+
+def test_the_survey_decides_every_pair() -> None:
+    document = survey.survey(["planar_2dof", "rail_arm"], 5.0, lambda _: None)
+    assert document["undecided"] == []
+    assert [sum(row["outcomes"].values()) for row in document["counts"]] == [6] * 4 + [18] * 4
+
+
+def test_the_page_shows_the_figures_that_lie_beside_it() -> None:
+    page = report.PAGE.read_text(encoding="utf-8")
+    assert page == report.page(page)
