@@ -13,6 +13,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from http import HTTPStatus
 from pathlib import Path
 
 import httpx2
@@ -91,34 +92,53 @@ def busy_workers(url: str, key: str) -> tuple[str, str]:
     return small["id"], job["id"]
 
 
-async def visit(http: httpx2.AsyncClient, scene: str, job: str, key: str, until: float, tally: Tally) -> None:
+class Connection:
+    """A client's connection, with as little work as possible on this side: what is measured is the service."""
+
+    def __init__(self, url: str, key: str) -> None:
+        self._host, _, port = url.removeprefix("http://").partition(":")
+        self._port, self._headers = (
+            int(port),
+            f"Host: {self._host}:{port}\r\nAuthorization: Bearer {key}\r\nContent-Type: application/json\r\n",
+        )
+
+    async def open(self) -> None:
+        self._reader, self._writer = await asyncio.open_connection(self._host, self._port)
+
+    async def ask(self, method: str, path: str, body: bytes = b"") -> tuple[int, bytes]:
+        """Status and body of the answer."""
+        self._writer.write(f"{method} {path} HTTP/1.1\r\n{self._headers}Content-Length: {len(body)}\r\n\r\n".encode() + body)
+        head = (await self._reader.readuntil(b"\r\n\r\n")).lower()
+        length = int(head.partition(b"content-length:")[2].split(maxsplit=1)[0])
+        return int(head.split(maxsplit=2)[1]), await self._reader.readexactly(length)
+
+
+async def visit(url: str, scene: str, job: str, key: str, until: float, tally: Tally) -> None:
     """One client: looks at its last job and at what else there is, and posts another job now and then."""
-    headers = {"Authorization": f"Bearer {key}"}
-    certify = {"kind": "certify", "scene": scene, "polytope": {"C": [[1, 0], [-1, 0], [0, 1], [0, -1]], "d": [0.01] * 4}}
-    choice = random.Random(key)
+    box = {"C": [[1, 0], [-1, 0], [0, 1], [0, -1]], "d": [0.01] * 4}
+    certify = json.dumps({"kind": "certify", "scene": scene, "polytope": box}).encode()
+    choice, connection = random.Random(key), Connection(url, key)
+    await connection.open()
     await asyncio.sleep(choice.uniform(0, PAUSE_SECONDS))
     while time.monotonic() < until:
-        if choice.random() < POSTS:
-            kind, call = "post", http.post("/v1/jobs", json=certify, headers=headers)
-        else:
-            paths = {"job": f"/v1/jobs/{job}", "events": f"/v1/jobs/{job}/events", "pairs": f"/v1/jobs/{job}/pairs"}
-            paths |= {"jobs": "/v1/jobs?limit=20", "regions": f"/v1/regions?scene={scene}&limit=20"}
-            kind = choice.choices(list(paths), [6, 1, 1, 1, 1])[0]
-            call = http.get(paths[kind], headers=headers)
+        paths = {"job": f"/v1/jobs/{job}", "events": f"/v1/jobs/{job}/events", "pairs": f"/v1/jobs/{job}/pairs"}
+        paths |= {"jobs": "/v1/jobs?limit=20", "regions": f"/v1/regions?scene={scene}&limit=20"}
+        kind = "post" if choice.random() < POSTS else choice.choices(list(paths), [6, 1, 1, 1, 1])[0]
         start = time.perf_counter()
-        answer = await call
+        if kind == "post":
+            status, answer = await connection.ask("POST", "/v1/jobs", certify)
+        else:
+            status, answer = await connection.ask("GET", paths[kind])
         tally.seconds.setdefault(kind, []).append(time.perf_counter() - start)
-        tally.statuses[answer.status_code] += 1
-        if kind == "post" and answer.is_success:
-            job = answer.json()["id"]
+        tally.statuses[status] += 1
+        if status == HTTPStatus.CREATED:
+            job = json.loads(answer)["id"]
         await asyncio.sleep(choice.expovariate(1 / PAUSE_SECONDS))
 
 
 async def everybody(url: str, scene: str, job: str, made: list[str]) -> Tally:
     tally, until = Tally(), time.monotonic() + SECONDS
-    limits = httpx2.Limits(max_connections=CLIENTS, max_keepalive_connections=CLIENTS)
-    async with httpx2.AsyncClient(base_url=url, limits=limits, timeout=60, trust_env=False) as http:
-        await asyncio.gather(*(visit(http, scene, job, key, until, tally) for key in made))
+    await asyncio.gather(*(visit(url, scene, job, key, until, tally) for key in made))
     return tally
 
 
