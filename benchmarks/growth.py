@@ -14,12 +14,14 @@ from certifier.local import grow
 from certifier.model import Array, Scene
 from certifier.polytope import inscribed_ellipsoid
 from certifier.reference import Reference
+from certifier.verify.region import verify_region
 
 WAYS: dict[str, dict[str, Any]] = {
     "uniform contraction": {"contraction": "uniform", "pushes": 0, "max_rounds": 0},
-    "targeted contraction": {"pushes": 0, "max_rounds": 0},
-    "targeted, then (12)": {"pushes": 0},
-    "targeted, then pushes": {"max_rounds": 0},
+    "targeted contraction": {"contractions": 1, "pushes": 0, "max_rounds": 0},
+    "two of them": {"pushes": 0, "max_rounds": 0},
+    "one, then (12)": {"contractions": 1, "pushes": 0, "max_rounds": 3},
+    "one, then pushes": {"contractions": 1, "max_rounds": 0},
     "default": {},
 }
 """Options of a grow job, each with the default seeding."""
@@ -78,12 +80,15 @@ def _grown(name: str, seed: dict[str, Any], options: dict[str, Any]) -> dict[str
     """One region of ours, its proof verified. Where none could be certified, the row says why."""
     start = time.perf_counter()
     try:
-        manifest = grow(catalogue.scene(name), GrowthOptions(seed=seed, **options)).manifest
+        region = grow(catalogue.scene(name), GrowthOptions(seed=seed, **options))
     except CirisError as error:
         return {"seconds": time.perf_counter() - start, "ellipsoid": 0.0, "faces": 0, "curve": [], "ended": str(error)}
-    seconds = time.perf_counter() - start
+    seconds, start, manifest = time.perf_counter() - start, time.perf_counter(), region.manifest
+    verify_region(region.proof)
     return {
         "seconds": seconds,
+        "verify_seconds": time.perf_counter() - start,
+        "proof_bytes": len(region.proof),
         "ellipsoid": manifest["volume"]["ellipsoid"],
         "faces": len(manifest["halfspace_offsets"]),
         "curve": manifest["provenance"]["growth_curve"],

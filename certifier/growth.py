@@ -26,6 +26,8 @@ from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytope import chebyshev_center, drop_redundant, inscribed_ellipsoid
 
+FEW_ROUNDS, LIGHT_JOINTS = 3, 4
+"""Rounds of the polytope step by default, where no pair has more joints between its bodies; with seven, a round takes a minute."""
 SMALLEST_SCALE = 1e-3
 """The last trial of the uniform contraction, relative to the proposal."""
 NEAR = (1.0, 0.6, 0.3)
@@ -47,7 +49,7 @@ class GrowthOptions:
         contractions: how many targeted contractions of the proposal are tried; each is given up when it is smaller than the best so far.
         bisection_steps: certifications spent on uniform contraction after the two ends are known.
         pushes: how often the faces are pushed out after the contractions; each push that fails is followed by a shorter one.
-        max_rounds: rounds of the polytope step (12) after the pushes.
+        max_rounds: rounds of the polytope step (12) after the pushes; None for FEW_ROUNDS where they take seconds, else none.
         tolerance: relative growth of the ellipsoid's volume that is still worth a push or a round.
         backoff: how many times a stepped polytope that fails to certify is halved towards the last certified one.
         random_seed: seeds every random choice of the certification.
@@ -59,7 +61,7 @@ class GrowthOptions:
     contractions: int = 2
     bisection_steps: int = 6
     pushes: int = 3
-    max_rounds: int = 3
+    max_rounds: int | None = None
     tolerance: float = 0.02
     backoff: int = 2
     random_seed: int = 0
@@ -91,6 +93,8 @@ class GrowthOptions:
         integers = (("bisection_steps", 60), ("pushes", 1000), ("max_rounds", 1000), ("backoff", 20), ("random_seed", 2**63 - 1))
         for name, upper in integers:
             value = getattr(options, name)
+            if name == "max_rounds" and value is None:
+                continue
             if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= upper:
                 raise RegionError("option_value", f"{name} must be an integer from 0 to {upper}", field=f"options.{name}")
         if options.contraction == "uniform" and options.seed.get("contain"):
@@ -443,7 +447,7 @@ def _push(scene: Scene, state: dict[str, Any], reach: float = PUSH) -> Transitio
     """The next push from the best region, or the alternation when there were enough."""
     pushes = state.get("pushes", 0)
     if pushes >= state["options"]["pushes"] or reach - 1 < SMALLEST_PUSH:
-        return _step(state)
+        return _step(scene, state)
     best, rows = state["best"], state["rows"]
     limits = 2 * scene.n
     C, d, center = np.array(best["C"])[:-limits], np.array(best["d"])[:-limits], np.array(best["center"])
@@ -480,10 +484,12 @@ def _bisect(scene: Scene, state: dict[str, Any], action: Certify, report: Certif
     return _shrink(scene, state, math.sqrt(uniform["certified"] * uniform["failed"]))
 
 
-def _step(state: dict[str, Any]) -> Transition:
+def _step(scene: Scene, state: dict[str, Any]) -> Transition:
     """The next round of (12) on the best region, or the end."""
-    rounds = state.get("rounds", 0)
-    if rounds >= state["options"]["max_rounds"]:
+    rounds, most = state.get("rounds", 0), state["options"]["max_rounds"]
+    if most is None:
+        most = FEW_ROUNDS if max((len(_joints(scene, i)) for i in range(len(scene.pairs))), default=0) <= LIGHT_JOINTS else 0
+    if rounds >= most:
         return Transition(state, Finish(Outcome.CERTIFIED, "certified; the limit of rounds was reached" if rounds else "certified"))
     best = state["best"]
     action = Step(best["iteration"], best["C"], best["d"], best["center"], state["keep"])
@@ -495,7 +501,7 @@ def _alternate(scene: Scene, state: dict[str, Any], accepted: bool) -> Transitio
     if accepted:
         if state["growth"] < state["options"]["tolerance"]:
             return Transition(state, Finish(Outcome.CERTIFIED, "certified; growth is under the tolerance"))
-        return _step(state)
+        return _step(scene, state)
     if state["halvings"] == state["options"]["backoff"]:
         return Transition(state, Finish(Outcome.CERTIFIED, "certified; the last step could not be certified"))
     base, target = state["base"], state["target"]
