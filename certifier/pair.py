@@ -39,7 +39,7 @@ APART = 0.15
 FEW_ITERATIONS = 4
 """Those that are settled at all are settled at once."""
 CONE_SAMPLES = 300
-FACES_AT_A_TIME = 8
+FACES_AT_A_TIME = 16
 """A polytope with many faces is first replaced by its box; then this many faces are added at a time, as the dual asks for them."""
 
 MIDDLE = 1.0
