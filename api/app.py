@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from functools import partial
 
-from anyio import CapacityLimiter
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
 from api import guard, login, pages, problems
 from api.access import Keyring
 from api.access_log import AccessLog
+from api.children import ChildLimiter
 from api.metrics import Requests
 from api.routers import events, jobs, planning, regions, scenes, service
 from db.session import Database, database
@@ -35,7 +35,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     )
     app.state.database = db or database()
     app.state.requests = Requests()
-    app.state.parsers = CapacityLimiter(scenes.UPLOADS_AT_ONCE)
+    app.state.children = ChildLimiter()
     app.add_middleware(
         guard.Guard,
         keyring=Keyring(app.state.database, open_without_keys=settings().loopback),

@@ -4,8 +4,8 @@ A pair that is not certifiable comes with the pseudo-moments of its dual point: 
 far around (spread). The polytope is measured by an ellipsoid about its analytic centre, a distance in it being seen from
 the hull of the centre and the points to keep.
 
-    a mean at distance 1 or more     -> a face between it and the hull; the ellipsoid does not notice
-    means within                     -> the pair fails because it turns too far: the joint that turns farthest gets a shorter range,
+    a mean farther than ``near``     -> a face between it and the hull
+    all means nearer                 -> the pair fails because it turns too far: the joint that turns farthest gets a shorter range,
                                         all its joints do when that has not helped for long
     a collision                      -> a face, wherever it is
 
@@ -83,12 +83,13 @@ def measure(polytope: Polytope, start: Array) -> Measure:
     return Measure(s, 2 * np.linalg.inv(scaled.T @ scaled))
 
 
-def contract(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, failures: list[Failure]) -> Polytope | None:
+def contract(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, failures: list[Failure], near: float) -> Polytope | None:
     """The polytope with faces added for every failure, redundant faces dropped.
 
     Args:
         polytope: its last 2n rows are the joint limits; so are the result's.
         keep: (k, n) points that stay inside.
+        near: distance in the ellipsoid; at 1 it does not notice a face.
 
     Returns:
         None when a joint's range would become too short to go on.
@@ -96,7 +97,7 @@ def contract(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, 
     limits = 2 * scene.n
     C, d = [polytope.C[:-limits]], [polytope.d[:-limits]]
     for failure in failures:
-        found = _face(ellipsoid, keep, failure)
+        found = _face(ellipsoid, keep, failure, near)
         if found is None:
             found = _shorter_range(scene, polytope, ellipsoid, keep, failure)
         if found is None:
@@ -108,8 +109,8 @@ def contract(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, 
     return Polytope(limited.C[kept], limited.d[kept])
 
 
-def _face(ellipsoid: Measure, keep: Array, failure: Failure) -> tuple[Array, Array] | None:
-    """A face before the farthest mean; None when all are within the ellipsoid and none is a collision."""
+def _face(ellipsoid: Measure, keep: Array, failure: Failure, near: float) -> tuple[Array, Array] | None:
+    """A face before the farthest mean; None when all are near and none is a collision."""
     if not len(failure.points):
         return None
     joints = list(failure.joints)
@@ -125,7 +126,7 @@ def _face(ellipsoid: Measure, keep: Array, failure: Failure) -> tuple[Array, Arr
             best = distance, point, nearest
     assert best is not None
     distance, point, nearest = best
-    if distance == 0 or (distance < 1 and failure.spread.any()):
+    if distance == 0 or (distance < near and failure.spread.any()):
         return None
     backoff = min(LARGEST_BACKOFF, BACKOFF * BACKOFF_GROWTH**failure.attempts)
     normal = root.T @ root @ (point - nearest)

@@ -5,7 +5,7 @@ whoever drives them (the service's coordinator, or :mod:`certifier.local`) carri
 State, actions and reports are JSON-able, so a job can be resumed from its rows alone.
 
 Contraction, targeted: faces are added where pairs fail (:mod:`certifier.contraction`) until every pair is certified. What was certified
-stays so, since the polytope only shrinks.
+stays so, since the polytope only shrinks. Tried a few times with another balance between faces and shorter ranges; the largest counts.
 Contraction, uniform (B.4): the largest {C s <= d - delta} that certifies, by bisection; it keeps its Chebyshev centre and shrinks to it.
 Pushing: all faces of the certified polytope move out from its centre, within the proposal, and the result is contracted by targeted faces;
 it counts when the ellipsoid has grown.
@@ -28,6 +28,8 @@ from certifier.polytope import chebyshev_center, drop_redundant, inscribed_ellip
 
 SMALLEST_SCALE = 1e-3
 """The last trial of the uniform contraction, relative to the proposal."""
+NEAR = (1.0, 0.6, 0.3)
+"""Of the contractions, one after the other: from how near on a pair's failure calls for a shorter range and not for a face."""
 MAX_ATTEMPTS = 60
 """Faces added for one pair before the targeted contraction gives up."""
 PUSH, SMALLEST_PUSH = 1.5, 0.1
@@ -42,8 +44,9 @@ class GrowthOptions:
         kind: ``grow`` a region from a seed, or ``certify`` a given polytope as it is.
         seed: the document of :class:`certifier.seeding.SeedOptions`; for ``certify`` its ``C``, ``d`` and optional ``center``.
         contraction: ``targeted`` or ``uniform``.
+        contractions: how many targeted contractions of the proposal are tried; each is given up when it is smaller than the best so far.
         bisection_steps: certifications spent on uniform contraction after the two ends are known.
-        pushes: how often the faces are pushed out after the contraction; each push that fails is followed by a shorter one.
+        pushes: how often the faces are pushed out after the contractions; each push that fails is followed by a shorter one.
         max_rounds: rounds of the polytope step (12) after the pushes.
         tolerance: relative growth of the ellipsoid's volume that is still worth a push or a round.
         backoff: how many times a stepped polytope that fails to certify is halved towards the last certified one.
@@ -53,6 +56,7 @@ class GrowthOptions:
     kind: Literal["grow", "certify"] = "grow"
     seed: dict[str, Any] = field(default_factory=dict)
     contraction: Literal["targeted", "uniform"] = "targeted"
+    contractions: int = 2
     bisection_steps: int = 6
     pushes: int = 3
     max_rounds: int = 3
@@ -82,11 +86,15 @@ class GrowthOptions:
             raise RegionError("option_value", "kind is 'grow' or 'certify'", field="options.kind")
         if options.contraction not in ("targeted", "uniform"):
             raise RegionError("option_value", "contraction is 'targeted' or 'uniform'", field="options.contraction")
+        if not isinstance(options.contractions, int) or not 1 <= options.contractions <= len(NEAR):
+            raise RegionError("option_value", f"contractions must be an integer from 1 to {len(NEAR)}", field="options.contractions")
         integers = (("bisection_steps", 60), ("pushes", 1000), ("max_rounds", 1000), ("backoff", 20), ("random_seed", 2**63 - 1))
         for name, upper in integers:
             value = getattr(options, name)
             if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= upper:
                 raise RegionError("option_value", f"{name} must be an integer from 0 to {upper}", field=f"options.{name}")
+        if options.contraction == "uniform" and options.seed.get("contain"):
+            raise RegionError("option_value", "only targeted contraction keeps points inside", field="options.contraction")
         if not (isinstance(options.tolerance, (int, float)) and 0 < options.tolerance < 10):
             raise RegionError("option_value", "tolerance must be a number between 0 and 10", field="options.tolerance")
         return options
@@ -126,12 +134,17 @@ class Certify:
 
 @dataclass(frozen=True)
 class Step:
-    """Run the polytope step (12) on the last accepted polytope with its proofs; report Stepped or Failed."""
+    """Run the polytope step (12) on the last accepted polytope with its proofs; report Stepped or Failed.
+
+    Attributes:
+        contain: (k, n) points that stay inside.
+    """
 
     iteration: int
     C: list[list[float]]
     d: list[float]
     center: list[float]
+    contain: list[list[float]]
     kind: Literal["step"] = "step"
 
 
@@ -165,11 +178,12 @@ def action_from_document(document: dict[str, Any]) -> Action:
 
 @dataclass(frozen=True)
 class Proposed:
-    """A proposal: its faces without the joint limits, a point inside, and what the seeding has to say of itself."""
+    """A proposal: faces without the joint limits, the seed and what else the region has to contain, and what the seeding says of itself."""
 
     C: list[list[float]]
     d: list[float]
     center: list[float]
+    contain: list[list[float]]
     info: dict[str, Any]
 
 
@@ -330,18 +344,33 @@ def _proposed(scene: Scene, state: dict[str, Any], report: Proposed) -> Transiti
     rows = Polytope(limited.C / norms[:, None], limited.d / norms)
     state |= {"rows": {"C": rows.C.tolist(), "d": rows.d.tolist()}, "seed": report.center, "proposal": report.info}
     if state["options"]["contraction"] == "targeted":
-        return _trim(scene, state, "contract", rows)
+        return _contract(scene, {**state, "keep": [report.center, *report.contain], "contractions": 0})
     center, radius = chebyshev_center(rows)
+    state |= {"keep": [center.tolist()], "near": NEAR[0]}
     uniform = {"center": center.tolist(), "radius": radius, "holds": {}, "steps": state["options"]["bisection_steps"]}
     return _shrink(scene, {**state, "uniform": uniform}, 1.0)
 
 
+def _contract(scene: Scene, state: dict[str, Any]) -> Transition:
+    """The next targeted contraction of the proposal, or pushes from the largest when there were enough."""
+    tried = state["contractions"]
+    if tried == state["options"]["contractions"]:
+        return _push(scene, state)
+    rows = Polytope(np.array(state["rows"]["C"]), np.array(state["rows"]["d"]))
+    return _trim(scene, {**state, "contractions": tried + 1, "near": NEAR[tried]}, "contract", rows)
+
+
+def _is_worth_it(state: dict[str, Any], polytope: Polytope) -> bool:
+    """Whether certifying the polytope would be progress."""
+    return state["best"] is None or inscribed_ellipsoid(polytope).volume > state["best"]["volume"] * (1 + state["options"]["tolerance"])
+
+
 def _trim(scene: Scene, state: dict[str, Any], label: str, polytope: Polytope, trim: dict[str, Any] | None = None) -> Transition:
     """Certify what the targeted contraction has come to; a pair certified on a larger polytope is certified on this one."""
-    if label == "push" and inscribed_ellipsoid(polytope).volume < state["best"]["volume"] * (1 + state["options"]["tolerance"]):
-        return _push_less(scene, state)
+    if not _is_worth_it(state, polytope):
+        return _push_less(scene, state) if label == "push" else _contract(scene, state)
     trim = trim or {"holds": {}, "attempts": {}}
-    center = measure(polytope, np.array(state["seed"])).center
+    center = measure(polytope, np.array(state["keep"][0])).center
     holds = {int(index): iteration for index, iteration in trim["holds"].items()}
     return _certify(scene, {**state, "trim": trim}, label, polytope.C, polytope.d, center.tolist(), holds)
 
@@ -375,8 +404,10 @@ def _certified(scene: Scene, state: dict[str, Any], report: Certification) -> Tr
     elif state["options"]["contraction"] == "uniform" and action.label == "contract":
         state["suspects"] = [*failures, *(i for i in state.get("suspects", []) if i not in failures)]
         transition = _bisect(scene, state, action, report, complete)
+    elif not complete:
+        transition = _cut(scene, state, action, report, failures)
     else:
-        transition = _push(scene, state) if complete else _cut(scene, state, action, report, failures)
+        transition = _push(scene, state) if action.label == "push" else _contract(scene, state)
     return Transition(transition.state, transition.action, accepted)
 
 
@@ -385,22 +416,24 @@ def _cut(scene: Scene, state: dict[str, Any], action: Certify, report: Certifica
     trim = state["trim"]
     attempts = dict(trim["attempts"])
     holds = trim["holds"] | {str(i): action.iteration for i, outcome in report.outcomes.items() if outcome is Outcome.CERTIFIED}
-    polytope, seed = Polytope(np.array(action.C), np.array(action.d)), np.array(state["seed"])
+    polytope, keep = Polytope(np.array(action.C), np.array(action.d)), np.array(state["keep"])
     found = []
     for index in failures:
         weak = report.weak.get(index, {"points": [], "spread": []})
         points, spread = np.array(weak["points"]).reshape(-1, scene.n), np.array(weak["spread"])
         found.append(Failure(_joints(scene, index), points, spread, attempts.get(str(index), 0)))
         attempts[str(index)] = attempts.get(str(index), 0) + 1
-    smaller = contract(scene, polytope, measure(polytope, seed), seed[None], found)
+    smaller = contract(scene, polytope, measure(polytope, keep[0]), keep, found, state["near"])
     if smaller is None or max(attempts.values()) > MAX_ATTEMPTS:
-        return _no_smaller(scene, state, failures, list(report.outcomes.values()))
+        return _no_smaller(scene, state, action.label, failures, list(report.outcomes.values()))
     return _trim(scene, state, action.label, smaller, {"holds": holds, "attempts": attempts})
 
 
-def _no_smaller(scene: Scene, state: dict[str, Any], failures: list[int], outcomes: list[Outcome]) -> Transition:
-    if state["best"] is not None:
+def _no_smaller(scene: Scene, state: dict[str, Any], label: str, failures: list[int], outcomes: list[Outcome]) -> Transition:
+    if label == "push":
         return _push_less(scene, state)
+    if state["best"] is not None or state["contractions"] < state["options"]["contractions"]:
+        return _contract(scene, state)
     pair = scene.pairs[failures[0]]
     reason = f"not even a small region around the seed can be certified: {pair.a} and {pair.b} are too close there"
     return Transition(state, Finish(combine(outcomes), reason))
@@ -453,7 +486,8 @@ def _step(state: dict[str, Any]) -> Transition:
     if rounds >= state["options"]["max_rounds"]:
         return Transition(state, Finish(Outcome.CERTIFIED, "certified; the limit of rounds was reached" if rounds else "certified"))
     best = state["best"]
-    return Transition({**state, "phase": "step", "rounds": rounds + 1}, Step(best["iteration"], best["C"], best["d"], best["center"]))
+    action = Step(best["iteration"], best["C"], best["d"], best["center"], state["keep"])
+    return Transition({**state, "phase": "step", "rounds": rounds + 1}, action)
 
 
 def _alternate(scene: Scene, state: dict[str, Any], accepted: bool) -> Transition:

@@ -47,14 +47,16 @@ class Termination(StrEnum):
     """Drake did not say."""
 
 
-def iris(scene: Scene, center: Array, options: SeedOptions) -> tuple[Array, Array, dict[str, Any]]:
-    """Faces (m, n), (m,) of an IRIS region around the centre (n,), |c_j| = 1, joint limits left out, and what Drake said about them.
+def iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Array, dict[str, Any]]:
+    """Faces (m, n), (m,) of an IRIS region around points (k, n) of s, the seed first, and what Drake said about them.
+
+    |c_j| = 1, and the joint limits are left out. Whether the points are inside remains to be checked.
 
     Returns:
         (C, d, account) with the account's keys guarantee, termination, iterations, epsilon, delta, warnings.
 
     Raises:
-        RegionError: ``seed_cut_off`` when the region does not contain the centre; ``seeding_failed`` with Drake's words.
+        RegionError: ``seeding_failed`` with Drake's words.
     """
     function, iris_options = (IrisNp2, IrisNp2Options()) if options.method is Method.IRIS_NP2 else (IrisZo, IrisZoOptions())
     iris_options.parameterization = IrisParameterizationFunction(_positions(scene), scene.n)
@@ -65,9 +67,11 @@ def iris(scene: Scene, center: Array, options: SeedOptions) -> tuple[Array, Arra
     sampled.relative_termination_threshold, sampled.termination_threshold = options.tolerance, -math.inf
     sampled.configuration_space_margin, sampled.relax_margin = options.margin, True
     sampled.random_seed = options.random_seed
+    if len(points) > 1:
+        sampled.containment_points = points.T
     sampled.parallelism = Parallelism(num_threads=1)
     sampled.verbose = True
-    start = Hyperellipsoid.MakeHypersphere(_START_RADIUS, center)
+    start = Hyperellipsoid.MakeHypersphere(_START_RADIUS, points[0])
     limits = HPolyhedron.MakeBox(scene.s_lower, scene.s_upper)
     try:
         with _listening() as records:
@@ -79,10 +83,6 @@ def iris(scene: Scene, center: Array, options: SeedOptions) -> tuple[Array, Arra
     C, d = region.A()[2 * scene.n :], region.b()[2 * scene.n :]
     norms = np.linalg.norm(C, axis=1)
     C, d = C / norms[:, None], d / norms
-    if not np.all(C @ center < d):
-        raise RegionError(
-            "seed_cut_off", f"the region of {options.method} does not contain the seed", field="seed", hint="allow fewer iterations"
-        )
     kept = drop_redundant(scene.polytope(C, d), fixed=2 * scene.n)[: -2 * scene.n]
     return C[kept], d[kept], {"epsilon": options.epsilon, "delta": options.delta, **_account(records)}
 

@@ -73,10 +73,11 @@ class _Run:
         if isinstance(action, Propose):
             self.progress("seeding")
             proposal = propose(self.scene, SeedOptions.from_document(action.seed))
-            return Proposed(proposal.C.tolist(), proposal.d.tolist(), proposal.center.tolist(), proposal.info)
+            return Proposed(proposal.C.tolist(), proposal.d.tolist(), proposal.center.tolist(), proposal.contain.tolist(), proposal.info)
         assert self.accepted is not None, "a step follows an accepted region"
         self.progress("polytope step")
-        found = step(self.scene, Polytope(np.array(action.C), np.array(action.d)), self.proofs(self.accepted))
+        polytope, witnesses = Polytope(np.array(action.C), np.array(action.d)), np.array(action.contain)
+        found = step(self.scene, polytope, self.proofs(self.accepted), witnesses=witnesses)
         return stepped(found)
 
 

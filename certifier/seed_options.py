@@ -30,6 +30,7 @@ class SeedOptions:
     Attributes:
         method: one of :class:`Method`.
         q: (n,) the seed, joint positions; for every method but ``polytope``.
+        contain: (n,) each, joint positions that the region has to contain besides q.
         C, d: (m, n), (m,) the polytope in s, for ``polytope``; the joint limits are added to it.
         center: (n,) a point inside that polytope, in s; default: the centre of its largest ball.
         half_width: half the side of the ``box``, in s.
@@ -44,6 +45,7 @@ class SeedOptions:
 
     method: Method = Method.IRIS_NP2
     q: tuple[float, ...] | None = None
+    contain: tuple[tuple[float, ...], ...] = ()
     C: tuple[tuple[float, ...], ...] | None = None
     d: tuple[float, ...] | None = None
     center: tuple[float, ...] | None = None
@@ -86,9 +88,12 @@ class SeedOptions:
         for name in ("q", "d", "center"):
             if name in given:
                 given[name] = _numbers(name, given[name])
-        if "C" in given:
-            rows = given["C"]
-            given["C"] = tuple(_numbers(f"C[{i}]", row) for i, row in enumerate(rows if isinstance(rows, list | tuple) else [rows]))
+        for name in ("C", "contain"):
+            if name in given:
+                rows = given[name]
+                given[name] = tuple(
+                    _numbers(f"{name}[{i}]", row) for i, row in enumerate(rows if isinstance(rows, list | tuple) else [rows])
+                )
         for name, most in (("half_width", math.inf), ("epsilon", 1), ("delta", 1), ("tolerance", math.inf), ("margin", math.inf)):
             if name in given and not (_is_number(given[name]) and 0 < given[name] < most):
                 raise _refuse(name, f"{name} must be a positive number" + (f" below {most}" if most < math.inf else ""))

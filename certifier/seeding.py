@@ -28,6 +28,7 @@ class Proposal:
     Attributes:
         C, d: (m, n), (m,) the faces, |c_j| = 1 where IRIS made them; the joint limits are not among them.
         center: (n,) the seed (for ``polytope``: the centre) in s, inside all faces and limits.
+        contain: (k, n) what else the region has to contain, in s, likewise.
         guarantee: ``sampled`` when IRIS passed its statistical test, else ``none``.
         info: JSON-able: method, guarantee, faces, seconds, and for IRIS termination, iterations, epsilon, delta and Drake's warnings.
     """
@@ -35,11 +36,12 @@ class Proposal:
     C: Array
     d: Array
     center: Array
+    contain: Array
     guarantee: Guarantee
     info: dict[str, Any]
 
 
-def check_seed(scene: Scene, q: ArrayLike) -> None:
+def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> None:
     """Refuse joint positions around which no region can be certified.
 
     Raises:
@@ -50,22 +52,22 @@ def check_seed(scene: Scene, q: ArrayLike) -> None:
     if q.shape != (scene.n,):
         names = ", ".join(joint.name for joint in scene.moving)
         raise RegionError(
-            "seed_wrong_length", f"the seed has {q.size} numbers, the scene {scene.n} joints", field="seed.q", hint=f"in order: {names}"
+            "seed_wrong_length", f"the seed has {q.size} numbers, the scene {scene.n} joints", field=field, hint=f"in order: {names}"
         )
     for joint, value in zip(scene.moving, q, strict=True):
-        field = f"seed.q[{joint.index}]"
+        where = f"{field}[{joint.index}]"
         if not np.isfinite(value):
-            raise RegionError("seed_not_finite", f"joint {joint.name} is at {value}", field=field)
+            raise RegionError("seed_not_finite", f"joint {joint.name} is at {value}", field=where)
         if value <= joint.lower or value >= joint.upper:
             raise RegionError(
                 "seed_outside_limits",
                 f"joint {joint.name} is at {value:g}, not between its limits {joint.lower:g} and {joint.upper:g}",
-                field=field,
+                field=where,
             )
-    _check_free(scene, q)
+    _check_free(scene, q, field)
 
 
-def _check_free(scene: Scene, q: Array) -> None:
+def _check_free(scene: Scene, q: Array, field: str) -> None:
     """Refuse a configuration in which a pair is closer than twice the padding."""
     if not scene.pairs:
         return
@@ -84,7 +86,7 @@ def _check_free(scene: Scene, q: Array) -> None:
             else f"are {distance:.3g} m apart, with a padding of {scene.padding:g} m on each"
         )
         raise RegionError(
-            "seed_in_collision", f"{pair.a} and {pair.b} {how}", field="seed.q", hint="move the seed, or ignore the pair in the scene"
+            "seed_in_collision", f"{pair.a} and {pair.b} {how}", field=field, hint="move the seed, or ignore the pair in the scene"
         )
 
 
@@ -95,9 +97,12 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
 
     Raises:
         RegionError: as :func:`check_seed` and ``polytope.check``; ``polytope_shape``; ``center_outside``;
-            ``seed_cut_off`` when IRIS' region does not contain the seed; ``seeding_failed`` with Drake's words.
+            ``seed_cut_off`` when the polytope does not contain the seed and ``contain``; ``seeding_failed`` with Drake's words.
     """
     start = time.perf_counter()
+    for i, q in enumerate(options.contain):
+        check_seed(scene, q, f"seed.contain[{i}]")
+    contain = scene.to_s(np.array(options.contain)) if options.contain else np.zeros((0, scene.n))
     if options.method is Method.POLYTOPE:
         C, d, center = _given(scene, options)
         said: dict[str, Any] = {}
@@ -106,13 +111,16 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
         check_seed(scene, options.q)
         center = scene.to_s(options.q)
         if options.method is Method.BOX:
-            C, d = _box(scene, center, options.half_width)
+            C, d = _box(scene, np.concatenate([center[None], contain]), options.half_width)
             said = {}
         else:
-            C, d, said = iris(scene, center, options)
+            C, d, said = iris(scene, np.concatenate([center[None], contain]), options)
+    if not (d[:, None] > C @ np.concatenate([center[None], contain]).T).all():
+        problem = f"the polytope of {options.method} does not contain the seed" + (" and all of contain" if options.contain else "")
+        raise RegionError("seed_cut_off", problem, field="seed", hint="allow fewer iterations, or give points that see one another")
     guarantee = said.pop("guarantee", Guarantee.NONE)
     info = {"method": options.method.value, "guarantee": guarantee.value, "faces": len(d), "seconds": time.perf_counter() - start, **said}
-    return Proposal(C, d, center, guarantee, info)
+    return Proposal(C, d, center, contain, guarantee, info)
 
 
 def _given(scene: Scene, options: SeedOptions) -> tuple[Array, Array, Array]:
@@ -132,7 +140,7 @@ def _given(scene: Scene, options: SeedOptions) -> tuple[Array, Array, Array]:
     return C, d, center
 
 
-def _box(scene: Scene, center: Array, half_width: float) -> tuple[Array, Array]:
-    eye = np.eye(scene.n)
-    above, below = center + half_width < scene.s_upper, center - half_width > scene.s_lower
-    return np.concatenate([eye[above], -eye[below]]), np.concatenate([(center + half_width)[above], (half_width - center)[below]])
+def _box(scene: Scene, points: Array, half_width: float) -> tuple[Array, Array]:
+    eye, upper, lower = np.eye(scene.n), points.max(axis=0) + half_width, points.min(axis=0) - half_width
+    above, below = upper < scene.s_upper, lower > scene.s_lower
+    return np.concatenate([eye[above], -eye[below]]), np.concatenate([upper[above], -lower[below]])

@@ -55,6 +55,8 @@ class Settings(BaseSettings):
     """How often the process of a pair or step dies, alone, before that counts as poison and ends as an error."""
     sweep_seconds: float = 2.0
     """Pause between two rounds of the sweeper."""
+    heartbeat_file: Path | None = None
+    """A file that a worker touches every ten seconds while it is well, for health checks."""
     verify_timeout_seconds: float = 600.0
     """Limit of one check of a stored proof on request."""
     webhook_private: bool = False

@@ -26,11 +26,13 @@ def main() -> None:
     from db.session import database
     from db.settings import settings
     from workers.app import CONTROL, celery_app
+    from workers.heartbeat import Heartbeat
     from workers.processes import die_with_parent
     from workers.tasks import register
 
     app = celery_app()
     register(app, queue)
+    app.steps["worker"].add(Heartbeat)
     pool = ["--pool=threads", "--concurrency=2"] if queue == CONTROL else ["--pool=prefork", f"--concurrency={settings().solve_processes}"]
     stop = threading.Event()
 

@@ -96,7 +96,7 @@ def _propose(scene: Scene, claim: steps.Claim) -> Done:
 def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:
     """The seeding, as its child process runs it: documents in, the report out."""
     found = propose(Scene.from_document(payload["scene"]), SeedOptions.from_document(payload["seed"]))
-    return asdict(Proposed(found.C.tolist(), found.d.tolist(), found.center.tolist(), found.info))
+    return asdict(Proposed(found.C.tolist(), found.d.tolist(), found.center.tolist(), found.contain.tolist(), found.info))
 
 
 def _step(scene: Scene, claim: steps.Claim) -> Done:
@@ -110,7 +110,7 @@ def _step(scene: Scene, claim: steps.Claim) -> Done:
             return _proofs(session, claim.job_id, accepted["proofs"])
 
     polytope = Polytope(np.array(action["C"]), np.array(action["d"]))
-    return Done(asdict(stepped(polytope_step(scene, polytope, persistently(read)))))
+    return Done(asdict(stepped(polytope_step(scene, polytope, persistently(read), witnesses=np.array(action["contain"])))))
 
 
 def _accept(scene: Scene, claim: steps.Claim) -> Done:

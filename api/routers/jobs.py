@@ -158,7 +158,7 @@ def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge
 
 
 @router.get("/{job_id}/pairs/{pair}/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
-def download_pair_proof(job_id: str, pair: int, iteration: Annotated[int, Query(ge=0)], db: Db) -> Response:
+def download_pair_proof(job_id: str, pair: int, iteration: Annotated[int, Query(ge=0, le=MAX_INT)], db: Db) -> Response:
     """The proof of what became of a pair, its scene in it: certified, refuted or not certifiable; `ciris verify` checks it offline."""
     with db.read() as session:
         job = jobs.get(session, job_id)

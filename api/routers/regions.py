@@ -11,10 +11,12 @@ from fastapi import APIRouter, Query, Response, status
 
 from api import exports
 from api.access import ADMIN, READ, Db
+from api.children import Children
 from api.schemas.common import Cursor
 from api.schemas.regions import RegionDetail, RegionPage, RegionSummary, Verification
 from certifier.child import run_in_child
 from db import jobs, proofs, regions, scenes
+from db.session import Database
 from db.settings import settings
 
 router = APIRouter(prefix="/v1/regions", tags=["regions"], dependencies=[READ])
@@ -64,8 +66,12 @@ def download_region_proof(region_id: str, db: Db) -> Response:
 
 
 @router.post("/{region_id}/verify")
-def verify_region(region_id: str, db: Db) -> Verification:
+async def verify_region(region_id: str, db: Db, children: Children) -> Verification:
     """Check the stored proof again, whole, in a process of its own with limits on time and memory; what it proves, in plain words."""
+    return await children.run(_verify, db, region_id)
+
+
+def _verify(db: Database, region_id: str) -> Verification:
     with db.read() as session:
         row = regions.get(session, region_id)
         payload = {

@@ -5,23 +5,18 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Annotated, BinaryIO
 
-from anyio import CapacityLimiter, to_thread
-from fastapi import APIRouter, File, Query, Request, Response, UploadFile, status
+from fastapi import APIRouter, File, Query, Response, UploadFile, status
 
 from api.access import READ, SUBMIT, Db
+from api.children import Children
 from api.schemas.common import Cursor
 from api.schemas.scenes import IgnoredPair, LintReport, PairForecast, SceneDetail, ScenePage, ScenePairs, SceneSummary, Substitution
-from certifier.errors import CirisError
 from certifier.forecast import forecast
 from certifier.model import Scene
 from certifier.scene.bundle import load_bundle
 from db import scenes
 from db.models import SceneRow
 from db.session import Database
-
-UPLOADS_AT_ONCE = 2
-"""Each may take a minute and gigabytes, and none may take the threads of other requests."""
-UPLOADS_WAITING = 16
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"], dependencies=[READ])
 
@@ -30,14 +25,11 @@ router = APIRouter(prefix="/v1/scenes", tags=["scenes"], dependencies=[READ])
 async def create_scene(
     bundle: Annotated[UploadFile, File(description="A zip with the scene file and every file it refers to.")],
     db: Db,
-    request: Request,
+    children: Children,
     response: Response,
 ) -> SceneDetail:
     """Upload a scene. It is parsed in a process that may die without harm; the same content is the same scene."""
-    parsers: CapacityLimiter = request.app.state.parsers
-    if parsers.statistics().tasks_waiting >= UPLOADS_WAITING:
-        raise CirisError("busy", "too many uploads wait to be read", hint="try again in a while")
-    row = await to_thread.run_sync(_add_scene, db, bundle.file, limiter=parsers)
+    row = await children.run(_add_scene, db, bundle.file)
     response.headers["Location"] = f"/v1/scenes/{row.id}"
     return SceneDetail.of(row)
 

@@ -22,6 +22,9 @@ class GrowOptions(Request):
     contraction: Annotated[
         Literal["targeted", "uniform"], Field(description="Faces where pairs fail, or every face moved in by as much.")
     ] = "targeted"
+    contractions: Annotated[
+        int, Field(ge=1, le=3, description="Targeted contractions, each cutting in another way; the largest region counts.")
+    ] = 2
     bisection_steps: Annotated[int, Field(ge=0, le=60, description="Certifications spent on uniform contraction after its two ends.")] = 6
     pushes: Annotated[int, Field(ge=0, le=1000, description="How often the faces are pushed out after the contraction.")] = 3
     max_rounds: Annotated[int, Field(ge=0, le=1000, description="Rounds of the polytope step; 0 ends after contraction.")] = 3
@@ -35,6 +38,7 @@ class Seed(Request):
 
     method: Method = Method.IRIS_NP2
     q: Vector | None = Field(None, description="Joint positions, radians or metres, in position order; for every method but `polytope`.")
+    contain: Rows | None = Field(None, description="More joint positions that the region has to contain, as where it meets another one.")
     C: Rows | None = Field(None, description="Faces of the first polytope, in s; for the method `polytope`.")
     d: Offsets | None = None
     center: Vector | None = Field(None, description="A point inside that polytope, in s.")

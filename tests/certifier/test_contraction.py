@@ -18,8 +18,8 @@ from certifier.polytope import inscribed_ellipsoid
 from tests.certifier.scenes import box, cube, planar_arm
 
 SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
-PROPOSAL = Proposed([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [1.0] * 4, [0.0, 0.0], {})
-OPTIONS = GrowthOptions(seed={}, pushes=0, max_rounds=0)
+PROPOSAL = Proposed([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]], [1.0] * 4, [0.0, 0.0], [], {})
+OPTIONS = GrowthOptions(seed={}, contractions=1, pushes=0, max_rounds=0)
 
 
 def grow(disc, radius, options, spread=0.0, limit=300):
@@ -94,9 +94,20 @@ def test_a_contraction_is_a_subset_that_keeps_what_is_to_be_kept(seed):
     region = cube(SCENE, 0.0, 0.5)
     keep = rng.uniform(-0.2, 0.2, (2, 2))
     failures = [Failure(joints, rng.uniform(-0.5, 0.5, (3, 2)), rng.uniform(0, 0.3, 2), int(rng.integers(5))) for joints in ((0,), (0, 1))]
-    smaller = contract(SCENE, region, measure(region, np.zeros(2)), keep, failures)
+    smaller = contract(SCENE, region, measure(region, np.zeros(2)), keep, failures, rng.uniform(0.1, 1.0))
     assert smaller is not None
     samples = rng.uniform(-0.6, 0.6, (500, 2))
     assert region.contains(samples[smaller.contains(samples)]).all()
     assert (smaller.d[:, None] > smaller.C @ keep.T).all()
     assert smaller.contains(samples).sum() < region.contains(samples).sum()
+
+
+@pytest.mark.parametrize("disc", [(0.8, 0.3), (-0.5, -0.7), (0.1, 0.5)])
+def test_several_contractions_keep_the_largest(disc):
+    """The second one is given up as soon as it is smaller than the first one's region."""
+    single = [grow(np.array(disc), 0.2, replace(OPTIONS, contractions=1), spread=0.1)[0][-1]]
+    several, end = grow(np.array(disc), 0.2, replace(OPTIONS, contractions=3), spread=0.1)
+    volumes = [inscribed_ellipsoid(Polytope(np.array(a.C), np.array(a.d))).volume for a in (*single, *several)]
+    assert volumes[1:] == sorted(volumes[1:])
+    assert volumes[0] == volumes[1]
+    assert end.outcome is Outcome.CERTIFIED

@@ -23,12 +23,13 @@ from certifier.growth import (
     advance,
     begin,
 )
+from certifier.local import grow
 from certifier.model import WORLD
 from certifier.outcome import Outcome
 from tests.certifier.scenes import box, planar_arm
 
 SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
-PROPOSAL = Proposed([[1.0, 0.0], [-1.0, 0.0], [0.0, 2.0], [0.0, -2.0]], [1.0, 1.0, 2.0, 2.0], [0.0, 0.0], {})
+PROPOSAL = Proposed([[1.0, 0.0], [-1.0, 0.0], [0.0, 2.0], [0.0, -2.0]], [1.0, 1.0, 2.0, 2.0], [0.0, 0.0], [], {})
 UNIFORM = GrowthOptions(seed={}, contraction="uniform", pushes=0, max_rounds=0)
 
 
@@ -145,6 +146,7 @@ def test_a_given_polytope_is_certified_once_with_every_pair():
         ({"kind": "shrink"}, "options.kind"),
         ({"contraction": "hope"}, "options.contraction"),
         ({"pushes": -1}, "options.pushes"),
+        ({"contractions": 0}, "options.contractions"),
         ({"bisection_steps": -1}, "options.bisection_steps"),
         ({"max_rounds": True}, "options.max_rounds"),
         ({"tolerance": 0}, "options.tolerance"),
@@ -169,3 +171,27 @@ def test_bad_options_are_named(document, field):
 def test_bad_polytopes_are_refused(seed):
     with pytest.raises(RegionError):
         begin(SCENE, GrowthOptions(kind="certify", seed=seed))
+
+
+def test_what_has_to_be_contained_stays_in_every_region():
+    scene = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
+    contain = [[-0.6, 0.7], [-0.9, -0.4]]
+    options = GrowthOptions(seed={"q": [0.0, 0.0], "contain": contain, "method": "box", "half_width": 0.2}, max_rounds=1)
+    region = grow(scene, options)
+    points = scene.to_s(np.array([[0.0, 0.0], *contain]))
+    C, d = (np.array(region.manifest[name]) for name in ("halfspace_normals", "halfspace_offsets"))
+    assert (d[:, None] > C @ points.T).all()
+    assert len(region.manifest["provenance"]["growth_curve"]) > 1
+
+
+def test_points_that_cannot_be_contained_together_are_refused():
+    scene = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
+    with pytest.raises(RegionError) as refusal:
+        grow(scene, GrowthOptions(seed={"q": [0.0, 0.0], "contain": [[0.9, 0.1]]}, max_rounds=0))
+    assert refusal.value.field == "seed.contain[0]"
+    with pytest.raises(CirisError) as refusal:
+        grow(scene, GrowthOptions(seed={"q": [0.0, 0.0], "contain": [[1.9, 0.1]], "method": "box"}, max_rounds=0, pushes=0))
+    assert refusal.value.code == "not_grown"
+    with pytest.raises(RegionError) as refusal:
+        GrowthOptions.from_document({"seed": {"q": [0.0, 0.0], "contain": [[0.1, 0.1]]}, "contraction": "uniform"})
+    assert refusal.value.field == "options.contraction"

@@ -14,7 +14,7 @@ OURS = ["migrate", "api", "control", "solve"]
 
 def test_the_services() -> None:
     assert set(SERVICES) == {"postgres", "valkey", *OURS}
-    for name in ("postgres", "valkey", "api"):
+    for name in ("postgres", "valkey", "api", "control", "solve"):
         assert "healthcheck" in SERVICES[name]
     for name in ("api", "control", "solve"):
         assert SERVICES[name]["depends_on"] == {

@@ -140,6 +140,16 @@ def test_iris_stops_at_the_tolerance():
     assert info["iterations"] < 50
 
 
+@pytest.mark.parametrize("method", [Method.IRIS_NP2, Method.IRIS_ZO, Method.BOX])
+def test_what_has_to_be_contained_is(method):
+    """Far from the seed, and near to the ball, where IRIS by itself would not go."""
+    scene, contain = crane(), ((-1.5, -0.3), (0.2, 0.5))
+    proposal = propose(scene, SeedOptions(method, q=(0.3, 0.2), contain=contain, max_iterations=1, half_width=0.01))
+    points = scene.to_s(np.array([(0.3, 0.2), *contain]))
+    assert np.allclose(proposal.contain, points[1:])
+    assert (proposal.d[:, None] > proposal.C @ points.T).all()
+
+
 def test_box_is_clipped_to_the_limits():
     scene = crane()
     q = np.array([1.9, 0.0])

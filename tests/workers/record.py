@@ -53,7 +53,7 @@ def region_of(job_id: str) -> dict[str, Any]:
         region = regions.get(session, jobs.get(session, job_id).region_id or "")
         statement = verify_region(proofs.get(session, region.proof_digest))
     manifest = region.manifest
-    assert len(statement.pairs) == len(manifest["pairs"])
+    assert len(statement.gaps) == len(manifest["pairs"])
     assert np.array_equal(region.arrays["C"], manifest["halfspace_normals"])
     kept = ("scene", "space", "halfspace_normals", "halfspace_offsets", "interior_point", "inscribed_ellipsoid", "volume", "guarantee")
     return {name: manifest[name] for name in kept} | {"pairs": [(pair["a"], pair["b"], pair["outcome"]) for pair in manifest["pairs"]]}

@@ -107,6 +107,7 @@ class Service:
 def running_service(database_url: str, queue_url: str, logs: Path, **variables: str) -> Iterator[Service]:
     """A control worker and two solving processes."""
     given = {"CIRIS_DATABASE_URL": database_url, "CIRIS_REDIS_URL": queue_url, "CIRIS_SOLVE_PROCESSES": "2", "CIRIS_SWEEP_SECONDS": "0.5"}
+    given["CIRIS_HEARTBEAT_FILE"] = str(logs / "alive")
     with environment(**{**given, **variables}):
         service = Service(logs)
         try:

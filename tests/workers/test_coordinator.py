@@ -13,7 +13,7 @@ from workers.coordinator import ending, next_transition, step_report
 
 
 def test_the_report_of_a_step_is_what_it_found_or_its_error() -> None:
-    found = {"C": [[1.0]], "d": [1.0], "center": [0.0], "info": {}}
+    found = {"C": [[1.0]], "d": [1.0], "center": [0.0], "contain": [], "info": {}}
     assert step_report(StepKind.PROPOSE, StepState.DONE, found) == Proposed(**found)
     assert step_report(StepKind.STEP, StepState.FAILED, {"code": "x"}) == Failed({"code": "x"})
 

@@ -11,6 +11,7 @@ from certifier.model import Scene
 from certifier.verify.region import verify_region
 from db import jobs, pairs, proofs, regions
 from db.session import database
+from db.settings import settings
 from tests.workers.options import box_around, grow_box
 from tests.workers.service import ended, events_of, eventually, kill_holder, pairs_of, submit
 from workers.app import send_coordinate
@@ -38,6 +39,14 @@ def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(plana
     assert [event.seq for event in events] == list(range(1, len(events) + 1))
     assert (events[0].data["state"], events[-1].data["state"]) == ("queued", "succeeded")
     assert {"iteration", "pairs", "step", "region"} < {event.kind for event in events}
+
+
+def test_the_workers_say_that_they_are_alive() -> None:
+    file = settings().heartbeat_file
+    assert file is not None
+    eventually(file.exists, "the file is made")
+    since = file.stat().st_mtime
+    eventually(lambda: file.stat().st_mtime > since, "the file is touched again")
 
 
 def test_a_given_polytope_gets_a_verdict_for_every_pair(planar: Scene) -> None:
