@@ -30,6 +30,7 @@ AGAINST = ("planar_2dof", "arm_3dof")
 """Examples on which Drake's alternation ends within minutes."""
 HALF_WIDTH, ROUNDS, TOLERANCE = 0.05, 10, 1e-3
 """Of the cube that both sides start from, and Drake's own limits for the alternation."""
+PUSHES = 10
 
 
 def growth(names: list[str], against: bool, progress: Progress) -> dict[str, Any]:
@@ -46,7 +47,7 @@ def growth(names: list[str], against: bool, progress: Progress) -> dict[str, Any
 
 
 def _against(name: str, progress: Progress) -> list[dict[str, Any]]:
-    """Drake's alternation from a cube about the seed; our alternation from the same cube; our default from the seed itself.
+    """Drake's alternation from a cube about the seed; our alternation and our pushes from the same cube; our default from the seed.
 
     ``reached_seconds``: when our certified region first had at least the volume of Drake's last; None if never.
     """
@@ -55,9 +56,11 @@ def _against(name: str, progress: Progress) -> list[dict[str, Any]]:
     C, d = catalogue.cube(center, HALF_WIDTH)
     cube = {"method": "polytope", "C": C.tolist(), "d": d.tolist(), "center": center.tolist()}
     alternation = {"pushes": 0, "max_rounds": ROUNDS, "tolerance": TOLERANCE}
+    pushes = {"pushes": PUSHES, "max_rounds": 0}
     sides: dict[str, Callable[[], dict[str, Any]]] = {
         "Drake's alternation": lambda: _drakes(scene, C, d),
         "our alternation": lambda: _grown(name, cube, alternation),
+        "our pushes": lambda: _grown(name, cube, pushes),
         "our default, from the seed": lambda: _grown(name, _seed(name), {}),
     }
     rows: list[dict[str, Any]] = []

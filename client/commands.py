@@ -88,7 +88,11 @@ def grow(args: Namespace) -> int:
     if args.method is not None:
         common["method"] = args.method
     seeds = [{"q": seed_of(args.scene, q), **common} for q in args.q or [None]]
-    options = {name: value for name, value in (("max_rounds", args.rounds), ("random_seed", args.random_seed)) if value is not None}
+    options = {
+        name: value
+        for name, value in (("pushes", args.pushes), ("max_rounds", args.rounds), ("random_seed", args.random_seed))
+        if value is not None
+    }
     if len(seeds) > 1:
         return _grow_many(args, seeds, options, screen)
     seed = seeds[0]
