@@ -131,9 +131,9 @@ def _accept(scene: Scene, claim: steps.Claim) -> Done:
 
 
 def _proofs(session: Session, job_id: str, iteration_of: Mapping[str, int]) -> dict[int, bytes]:
-    """Pair index -> proof file, from the iterations that hold them."""
+    """Pair index -> proof file, from the iterations that hold them, in the order given: the last digits of a sum depend on its order."""
     rows = pairs.proving(session, job_id, {int(index): iteration for index, iteration in iteration_of.items()})
-    return {index: proofs.get(session, row.proof_digest or "") for index, row in rows.items()}
+    return {index: proofs.get(session, rows[index].proof_digest or "") for index in map(int, iteration_of)}
 
 
 def _provenance(session: Session, scene: Scene, job: JobRow) -> dict[str, Any]:

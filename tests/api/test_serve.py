@@ -21,7 +21,7 @@ def serve(directory: Path, module: str = "api", **variables: str) -> subprocess.
 
 
 def test_an_address_that_others_can_reach_is_refused_without_keys(tmp_path: Path) -> None:
-    migrate.upgrade(Settings(data_dir=tmp_path).database)
+    migrate.upgrade(Settings(data_dir=tmp_path, database_url="").database)
     done = serve(tmp_path)
     assert done.returncode == 2
     assert done.stderr == (
@@ -43,7 +43,7 @@ def test_the_stack_refuses_too(tmp_path: Path) -> None:
 
 
 def test_a_key_that_was_revoked_still_lets_the_service_bind_and_nobody_in(tmp_path: Path) -> None:
-    settings = Settings(data_dir=tmp_path, host="0.0.0.0")
+    settings = Settings(data_dir=tmp_path, database_url="", host="0.0.0.0")
     migrate.upgrade(settings.database)
     database = Database(settings.database)
     with database.write() as session:

@@ -20,8 +20,9 @@ pytestmark = pytest.mark.usefixtures("service")
 SEED = [0.0, 0.0]
 
 
-def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(planar: Scene) -> None:
-    options = grow_box(SEED, 0.4, pushes=1, max_rounds=1)
+@pytest.mark.parametrize("contraction", ["targeted", "uniform"])
+def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(planar: Scene, contraction: str) -> None:
+    options = grow_box(SEED, 0.4, contraction=contraction, pushes=1, max_rounds=1)
     job = ended(submit(planar, options))
     assert (job.state, job.outcome, job.error) == ("succeeded", "certified", None)
     with database().read() as session:
