@@ -53,7 +53,12 @@ def _demonstrate(url: str) -> bool:
         print(f"ciris is up at {url} (data: {data_dir()})")
         size = f"{scene['joints']} joints, {scene['geometries']} convex bodies, {scene['pairs']} pairs to separate"
         print(f"scene {scene['name']}: {size}", flush=True)
-        request = {"kind": "grow", "scene": scene["id"], "seed": {"q": seed_of(str(SCENE), None)}}
+        request = {
+            "kind": "grow",
+            "scene": scene["id"],
+            "seed": {"q": seed_of(str(SCENE), None)},
+            "options": {"contractions": 1, "pushes": 0},
+        }
         grown = service.grow(client, request, Screen(), idempotency_key=_key(request))
     path = save_proof(grown.manifest, grown.proof, str(data_dir() / f"{scene['name']}.proof"))
     print("\nevery pair of bodies:")
