@@ -1,8 +1,8 @@
 """Targeted contraction: faces that cut away where the program (11) of a pair fails, and little else.
 
 A pair that is not certifiable comes with the means of its dual point's pseudo-moments, where no plane of this degree works, and with the
-derivatives of the program's optimum for the joints' ranges. The polytope is measured by an ellipsoid about its analytic centre, a distance in it being seen from
-the hull of the centre and the points to keep.
+derivatives of the program's optimum for the joints' ranges. The polytope is measured by an ellipsoid about its analytic centre, a
+distance in it being seen from the hull of the centre and the points to keep.
 
     a mean farther than ``near``     -> a face between it and the hull
     all means nearer                 -> the pair fails because it turns too far: the joint where that helps most gets a shorter
