@@ -14,12 +14,14 @@ from certifier.local import grow
 from certifier.model import Array, Scene
 from certifier.polytope import inscribed_ellipsoid
 from certifier.reference import Reference
+from certifier.verify.region import verify_region
 
 WAYS: dict[str, dict[str, Any]] = {
     "uniform contraction": {"contraction": "uniform", "pushes": 0, "max_rounds": 0},
-    "targeted contraction": {"pushes": 0, "max_rounds": 0},
-    "targeted, then (12)": {"pushes": 0},
-    "targeted, then pushes": {"max_rounds": 0},
+    "targeted contraction": {"contractions": 1, "pushes": 0, "max_rounds": 0},
+    "two of them": {"pushes": 0, "max_rounds": 0},
+    "one, then (12)": {"contractions": 1, "pushes": 0, "max_rounds": 3},
+    "one, then pushes": {"contractions": 1, "max_rounds": 0},
     "default": {},
 }
 """Options of a grow job, each with the default seeding."""
@@ -28,6 +30,7 @@ AGAINST = ("planar_2dof", "arm_3dof")
 """Examples on which Drake's alternation ends within minutes."""
 HALF_WIDTH, ROUNDS, TOLERANCE = 0.05, 10, 1e-3
 """Of the cube that both sides start from, and Drake's own limits for the alternation."""
+PUSHES = 10
 
 
 def growth(names: list[str], against: bool, progress: Progress) -> dict[str, Any]:
@@ -44,7 +47,7 @@ def growth(names: list[str], against: bool, progress: Progress) -> dict[str, Any
 
 
 def _against(name: str, progress: Progress) -> list[dict[str, Any]]:
-    """Drake's alternation from a cube about the seed; our alternation from the same cube; our default from the seed itself.
+    """Drake's alternation from a cube about the seed; our alternation and our pushes from the same cube; our default from the seed.
 
     ``reached_seconds``: when our certified region first had at least the volume of Drake's last; None if never.
     """
@@ -53,9 +56,11 @@ def _against(name: str, progress: Progress) -> list[dict[str, Any]]:
     C, d = catalogue.cube(center, HALF_WIDTH)
     cube = {"method": "polytope", "C": C.tolist(), "d": d.tolist(), "center": center.tolist()}
     alternation = {"pushes": 0, "max_rounds": ROUNDS, "tolerance": TOLERANCE}
+    pushes = {"pushes": PUSHES, "max_rounds": 0}
     sides: dict[str, Callable[[], dict[str, Any]]] = {
         "Drake's alternation": lambda: _drakes(scene, C, d),
         "our alternation": lambda: _grown(name, cube, alternation),
+        "our pushes": lambda: _grown(name, cube, pushes),
         "our default, from the seed": lambda: _grown(name, _seed(name), {}),
     }
     rows: list[dict[str, Any]] = []
@@ -78,12 +83,15 @@ def _grown(name: str, seed: dict[str, Any], options: dict[str, Any]) -> dict[str
     """One region of ours, its proof verified. Where none could be certified, the row says why."""
     start = time.perf_counter()
     try:
-        manifest = grow(catalogue.scene(name), GrowthOptions(seed=seed, **options)).manifest
+        region = grow(catalogue.scene(name), GrowthOptions(seed=seed, **options))
     except CirisError as error:
         return {"seconds": time.perf_counter() - start, "ellipsoid": 0.0, "faces": 0, "curve": [], "ended": str(error)}
-    seconds = time.perf_counter() - start
+    seconds, start, manifest = time.perf_counter() - start, time.perf_counter(), region.manifest
+    verify_region(region.proof)
     return {
         "seconds": seconds,
+        "verify_seconds": time.perf_counter() - start,
+        "proof_bytes": len(region.proof),
         "ellipsoid": manifest["volume"]["ellipsoid"],
         "faces": len(manifest["halfspace_offsets"]),
         "curve": manifest["provenance"]["growth_curve"],

@@ -109,8 +109,8 @@ def _growth(document: Document) -> list[str]:
         return [row["scene"], row["way"], f"{row['ellipsoid']:.3g}", seconds(row["seconds"]), str(row["faces"])]
 
     header = ["example", "way", "ellipsoid", "seconds", "faces"]
-    rows = [[*line(row), str(len(row["curve"])), row["ended"]] for row in document["ways"]]
-    parts = [_table([*header, "certified regions", "ended"], rows)]
+    rows = [[*line(row), str(len(row["curve"])), *_proof(row), row["ended"]] for row in document["ways"]]
+    parts = [_table([*header, "certified regions", "proof MB", "verified in", "ended"], rows)]
     if document["against"]:
         rows = []
         for row in document["against"]:
@@ -118,6 +118,10 @@ def _growth(document: Document) -> list[str]:
             rows.append([*line(row), f"{row['volume_ratio']:.3g}", *reached])
         parts.append(_table([*header, "volume / Drake's", "reached Drake's after", "times as fast"], rows))
     return parts
+
+
+def _proof(row: Document) -> list[str]:
+    return [f"{row['proof_bytes'] / 1e6:.2f}", seconds(row["verify_seconds"])] if "proof_bytes" in row else ["", ""]
 
 
 def _agreement(document: Document) -> list[str]:

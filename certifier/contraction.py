@@ -1,12 +1,12 @@
 """Targeted contraction: faces that cut away where the program (11) of a pair fails, and little else.
 
-A pair that is not certifiable comes with the pseudo-moments of its dual point: where no plane of this degree works (means), and how
-far around (spread). The polytope is measured by an ellipsoid about its analytic centre, a distance in it being seen from
-the hull of the centre and the points to keep.
+A pair that is not certifiable comes with the means of its dual point's pseudo-moments, where no plane of this degree works, and with the
+derivatives of the program's optimum for the joints' ranges. The polytope is measured by an ellipsoid about its analytic centre, a
+distance in it being seen from the hull of the centre and the points to keep.
 
     a mean farther than ``near``     -> a face between it and the hull
-    all means nearer                 -> the pair fails because it turns too far: the joint that turns farthest gets a shorter range,
-                                        all its joints do when that has not helped for long
+    all means nearer                 -> the pair fails because it turns too far: the joint where that helps most gets a shorter
+                                        range, all its joints do when that has not helped for long
     a collision                      -> a face, wherever it is
 
 Faces have normals in the joints between the two bodies only: the other joints do not move the one relative to the other.
@@ -41,13 +41,13 @@ class Failure:
     Attributes:
         joints: position indices of the joints between its bodies.
         points: (w, n) where it fails; without points nothing is known but that it fails.
-        spread: (n,) how far around the points; 0 where bodies are in contact at the points.
+        pull: (n,) how much it would help to shorten each joint's range; 0 where bodies are in contact at the points.
         attempts: how often faces were added for this pair before.
     """
 
     joints: tuple[int, ...]
     points: Array
-    spread: Array
+    pull: Array
     attempts: int
 
 
@@ -126,7 +126,7 @@ def _face(ellipsoid: Measure, keep: Array, failure: Failure, near: float) -> tup
             best = distance, point, nearest
     assert best is not None
     distance, point, nearest = best
-    if distance == 0 or (distance < near and failure.spread.any()):
+    if distance == 0 or (distance < near and failure.pull.any()):
         return None
     backoff = min(LARGEST_BACKOFF, BACKOFF * BACKOFF_GROWTH**failure.attempts)
     normal = root.T @ root @ (point - nearest)
@@ -137,13 +137,13 @@ def _face(ellipsoid: Measure, keep: Array, failure: Failure, near: float) -> tup
 
 
 def _shorter_range(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, failure: Failure) -> tuple[Array, Array] | None:
-    """Two faces about the centre that shorten the range of the joint along which the pseudo-moments turn farthest."""
+    """Two faces about the centre that shorten the range of the joint that turns far and where that helps."""
     lower, upper = bounds(polytope)
-    spread = failure.spread if len(failure.points) else (upper - lower) / 2
     center = ellipsoid.center
-    turn = np.where(scene.revolute, 2 * (np.arctan(center + spread) - np.arctan(center - spread)), 2 * spread)
-    widest = max(failure.joints, key=lambda i: float(turn[i]))
-    joints = [widest] if failure.attempts < PATIENCE else list(failure.joints)
+    turn = np.where(scene.revolute, 2 * (np.arctan(upper) - np.arctan(lower)), upper - lower)
+    gain = turn * failure.pull if len(failure.points) else turn
+    best = max(failure.joints, key=lambda i: float(gain[i]))
+    joints = [best] if failure.attempts < PATIENCE else list(failure.joints)
     width = (upper - lower)[joints]
     if width.min() < SMALLEST_RANGE:
         return None

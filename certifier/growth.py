@@ -7,8 +7,8 @@ State, actions and reports are JSON-able, so a job can be resumed from its rows 
 Contraction, targeted: faces are added where pairs fail (:mod:`certifier.contraction`) until every pair is certified. What was certified
 stays so, since the polytope only shrinks. Tried a few times with another balance between faces and shorter ranges; the largest counts.
 Contraction, uniform (B.4): the largest {C s <= d - delta} that certifies, by bisection; it keeps its Chebyshev centre and shrinks to it.
-Pushing: all faces of the certified polytope move out from its centre, within the proposal, and the result is contracted by targeted faces;
-it counts when the ellipsoid has grown.
+Pushing: all faces of the certified polytope move out from its centre, within IRIS' proposal or the joint limits, and the result is
+contracted by targeted faces; it counts when the ellipsoid has grown.
 """
 
 from __future__ import annotations
@@ -25,7 +25,11 @@ from certifier.kinematics import Kinematics
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytope import chebyshev_center, drop_redundant, inscribed_ellipsoid
+from certifier.seed_options import Method
 
+LIGHT_JOINTS = 4
+LIGHT, HEAVY = {"pushes": 10, "max_rounds": 3}, {"pushes": 2, "max_rounds": 0}
+"""Defaults where no pair has more than LIGHT_JOINTS joints between its bodies, and elsewhere, where a round of (12) takes a minute."""
 SMALLEST_SCALE = 1e-3
 """The last trial of the uniform contraction, relative to the proposal."""
 NEAR = (1.0, 0.6, 0.3)
@@ -47,7 +51,7 @@ class GrowthOptions:
         contractions: how many targeted contractions of the proposal are tried; each is given up when it is smaller than the best so far.
         bisection_steps: certifications spent on uniform contraction after the two ends are known.
         pushes: how often the faces are pushed out after the contractions; each push that fails is followed by a shorter one.
-        max_rounds: rounds of the polytope step (12) after the pushes.
+        max_rounds: rounds of the polytope step (12) after the pushes. None, of either, is what pays: see LIGHT and HEAVY.
         tolerance: relative growth of the ellipsoid's volume that is still worth a push or a round.
         backoff: how many times a stepped polytope that fails to certify is halved towards the last certified one.
         random_seed: seeds every random choice of the certification.
@@ -58,8 +62,8 @@ class GrowthOptions:
     contraction: Literal["targeted", "uniform"] = "targeted"
     contractions: int = 2
     bisection_steps: int = 6
-    pushes: int = 3
-    max_rounds: int = 3
+    pushes: int | None = None
+    max_rounds: int | None = None
     tolerance: float = 0.02
     backoff: int = 2
     random_seed: int = 0
@@ -91,6 +95,8 @@ class GrowthOptions:
         integers = (("bisection_steps", 60), ("pushes", 1000), ("max_rounds", 1000), ("backoff", 20), ("random_seed", 2**63 - 1))
         for name, upper in integers:
             value = getattr(options, name)
+            if name in LIGHT and value is None:
+                continue
             if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= upper:
                 raise RegionError("option_value", f"{name} must be an integer from 0 to {upper}", field=f"options.{name}")
         if options.contraction == "uniform" and options.seed.get("contain"):
@@ -192,7 +198,7 @@ class Certification:
     """Outcome of each pair that was reached; reused pairs are left out.
 
     Attributes:
-        weak: pair index -> where it fails, ``points`` (w, n) and ``spread`` (n,); pairs of which nothing is known are left out.
+        weak: pair index -> where it fails, ``points`` (w, n) and ``pull`` (n,); pairs of which nothing is known are left out.
     """
 
     iteration: int
@@ -407,7 +413,7 @@ def _certified(scene: Scene, state: dict[str, Any], report: Certification) -> Tr
     elif not complete:
         transition = _cut(scene, state, action, report, failures)
     else:
-        transition = _push(scene, state) if action.label == "push" else _contract(scene, state)
+        transition = _push_on(scene, state) if action.label == "push" else _contract(scene, state)
     return Transition(transition.state, transition.action, accepted)
 
 
@@ -419,9 +425,9 @@ def _cut(scene: Scene, state: dict[str, Any], action: Certify, report: Certifica
     polytope, keep = Polytope(np.array(action.C), np.array(action.d)), np.array(state["keep"])
     found = []
     for index in failures:
-        weak = report.weak.get(index, {"points": [], "spread": []})
-        points, spread = np.array(weak["points"]).reshape(-1, scene.n), np.array(weak["spread"])
-        found.append(Failure(_joints(scene, index), points, spread, attempts.get(str(index), 0)))
+        weak = report.weak.get(index, {"points": [], "pull": []})
+        points, pull = np.array(weak["points"]).reshape(-1, scene.n), np.array(weak["pull"])
+        found.append(Failure(_joints(scene, index), points, pull, attempts.get(str(index), 0)))
         attempts[str(index)] = attempts.get(str(index), 0) + 1
     smaller = contract(scene, polytope, measure(polytope, keep[0]), keep, found, state["near"])
     if smaller is None or max(attempts.values()) > MAX_ATTEMPTS:
@@ -442,14 +448,21 @@ def _no_smaller(scene: Scene, state: dict[str, Any], label: str, failures: list[
 def _push(scene: Scene, state: dict[str, Any], reach: float = PUSH) -> Transition:
     """The next push from the best region, or the alternation when there were enough."""
     pushes = state.get("pushes", 0)
-    if pushes >= state["options"]["pushes"] or reach - 1 < SMALLEST_PUSH:
-        return _step(state)
-    best, rows = state["best"], state["rows"]
-    limits = 2 * scene.n
+    if pushes >= _most(scene, state, "pushes") or reach - 1 < SMALLEST_PUSH:
+        return _step(scene, state)
+    best, limits = state["best"], 2 * scene.n
     C, d, center = np.array(best["C"])[:-limits], np.array(best["d"])[:-limits], np.array(best["center"])
-    pushed = Polytope(np.concatenate([C, rows["C"]]), np.concatenate([C @ center + reach * (d - C @ center), rows["d"]]))
+    # What IRIS cut off collides; around a given polytope nothing is known.
+    given = state["proposal"].get("method") in (Method.BOX, Method.POLYTOPE)
+    rows = scene.polytope([], []) if given else Polytope(np.array(state["rows"]["C"]), np.array(state["rows"]["d"]))
+    pushed = Polytope(np.concatenate([C, rows.C]), np.concatenate([C @ center + reach * (d - C @ center), rows.d]))
     kept = drop_redundant(pushed, fixed=limits)
     return _trim(scene, {**state, "pushes": pushes + 1, "reach": reach}, "push", Polytope(pushed.C[kept], pushed.d[kept]))
+
+
+def _push_on(scene: Scene, state: dict[str, Any]) -> Transition:
+    """After a push that came through: twice as far when nothing had to be cut."""
+    return _push(scene, state, PUSH if state["trim"]["attempts"] else 1 + 2 * (state["reach"] - 1))
 
 
 def _push_less(scene: Scene, state: dict[str, Any]) -> Transition:
@@ -480,10 +493,16 @@ def _bisect(scene: Scene, state: dict[str, Any], action: Certify, report: Certif
     return _shrink(scene, state, math.sqrt(uniform["certified"] * uniform["failed"]))
 
 
-def _step(state: dict[str, Any]) -> Transition:
+def _most(scene: Scene, state: dict[str, Any], option: str) -> int:
+    given = state["options"][option]
+    light = all(len(_joints(scene, index)) <= LIGHT_JOINTS for index in range(len(scene.pairs)))
+    return (LIGHT if light else HEAVY)[option] if given is None else int(given)
+
+
+def _step(scene: Scene, state: dict[str, Any]) -> Transition:
     """The next round of (12) on the best region, or the end."""
     rounds = state.get("rounds", 0)
-    if rounds >= state["options"]["max_rounds"]:
+    if rounds >= _most(scene, state, "max_rounds"):
         return Transition(state, Finish(Outcome.CERTIFIED, "certified; the limit of rounds was reached" if rounds else "certified"))
     best = state["best"]
     action = Step(best["iteration"], best["C"], best["d"], best["center"], state["keep"])
@@ -495,7 +514,7 @@ def _alternate(scene: Scene, state: dict[str, Any], accepted: bool) -> Transitio
     if accepted:
         if state["growth"] < state["options"]["tolerance"]:
             return Transition(state, Finish(Outcome.CERTIFIED, "certified; growth is under the tolerance"))
-        return _step(state)
+        return _step(scene, state)
     if state["halvings"] == state["options"]["backoff"]:
         return Transition(state, Finish(Outcome.CERTIFIED, "certified; the last step could not be certified"))
     base, target = state["base"], state["target"]

@@ -84,10 +84,10 @@ class _Run:
 def weakness(result: PairResult) -> dict[str, Any] | None:
     """Where a pair failed, for the report of its certification; None when nothing is known."""
     if result.witness_s is not None:
-        return {"points": [result.witness_s.tolist()], "spread": [0.0] * len(result.witness_s)}
-    if result.weak_points is None or result.spread is None:
+        return {"points": [result.witness_s.tolist()], "pull": [0.0] * len(result.witness_s)}
+    if result.weak_points is None or result.pull is None:
         return None
-    return {"points": result.weak_points.tolist(), "spread": result.spread.tolist()}
+    return {"points": result.weak_points.tolist(), "pull": result.pull.tolist()}
 
 
 def stepped(found: PolytopeStep) -> Stepped:

@@ -39,7 +39,7 @@ APART = 0.15
 FEW_ITERATIONS = 4
 """Those that are settled at all are settled at once."""
 CONE_SAMPLES = 300
-FACES_AT_A_TIME = 8
+FACES_AT_A_TIME = 16
 """A polytope with many faces is first replaced by its box; then this many faces are added at a time, as the dual asks for them."""
 
 MIDDLE = 1.0
@@ -57,7 +57,7 @@ class PairResult:
         proof: verified, as bytes: a :class:`certifier.proof.PairProof` when certified, a :class:`certifier.disproof.WitnessProof` when
             refuted, a :class:`certifier.disproof.DualProof` when not certifiable.
         weak_points: (w, n) configurations near which no plane of this degree works, when not certifiable.
-        spread: (n,) how far around them, along each joint between the bodies, when not certifiable.
+        pull: (n,) how much it would help to shorten each joint's range, when not certifiable; only the proportions matter.
     """
 
     outcome: Outcome
@@ -68,7 +68,7 @@ class PairResult:
     witness_s: Array | None = None
     proof: bytes | None = None
     weak_points: Array | None = None
-    spread: Array | None = None
+    pull: Array | None = None
 
 
 class Certification:
@@ -150,14 +150,14 @@ class Certification:
             if more == sides.faces:
                 break
             sides = self._sides(more)
-        weak, spread = self._weak_points(frame, sides, solution)
+        weak, pull = self._weak_points(frame, sides, solution), self._pull(frame, sides, solution)
         witness = self._contact(volumes, frame, np.concatenate([self._screen, weak[self._faces.contains(weak)]]))
         if isinstance(witness, _Witness):
             return self._refute(pair, witness, Stage.SOS)
         if solution.status is Status.INFEASIBLE:
-            return replace(self._disprove(pair, frame, sides, blocks, solution), weak_points=weak, spread=spread)
+            return replace(self._disprove(pair, frame, sides, blocks, solution), weak_points=weak, pull=pull)
         detail = f"{solution.status.value} after {solution.iterations} iterations"
-        return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak, spread=spread)
+        return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak, pull=pull)
 
     def _sides(self, faces: tuple[int, ...]) -> Sides:
         return Sides(self._kinematics, self._faces, self._box, faces, self.center, self._samples)
@@ -246,12 +246,26 @@ class Certification:
             factors.append(Side.from_gram(chain, Q * (monomial[:, None] * monomial) / sides.scales[:, None, None], kind))
         return PairProof(self.scene, volumes, frame.body, self.ground, plane, solution.t, kappa, sides.faces, (factors[0], factors[1]))
 
-    def _weak_points(self, frame: Frame, sides: Sides, solution: Solution) -> tuple[Array, Array]:
-        """Means (w, n) of the pseudo-moments that carry weight, and how far they spread along each joint of the pair, (n,)."""
+    def _pull(self, frame: Frame, sides: Sides, solution: Solution) -> Array:
+        """What the program's optimum gains, to first order, when a joint's range shrinks towards the centre, (n,).
+
+        The derivative for a face's offset is <Q_j, Lambda_0(x)>. A box's face belongs to its joint, any other to its joints by
+        their parts in its reach.
+        """
+        n = self.scene.n
+        share = np.abs(np.concatenate([self._faces.C * self._box.half, np.eye(n), np.eye(n)]))
+        share /= share.sum(axis=1, keepdims=True)
+        gains = np.zeros(len(sides.faces))
+        for chain, Q, x in zip((frame.chain_a, frame.chain_b), solution.Q[:2], solution.x[:2], strict=True):
+            gains += np.einsum("rkij,rij->k", Q[:, 1:], sides.cone(chain)[0].adjoint(x)[:, 0])
+        pull: Array = gains @ share[list(sides.faces)]
+        return pull
+
+    def _weak_points(self, frame: Frame, sides: Sides, solution: Solution) -> Array:
+        """Means (w, n) of the pseudo-moments that carry weight."""
         found = [sides.means(chain, x) for chain, x in zip((frame.chain_a, frame.chain_b), solution.x[:2], strict=True)]
-        means, deviations, mass = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        heavy = mass > 0.15 * mass.max()
-        return means[heavy], deviations[heavy].max(axis=0)
+        means, mass = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return means[mass > 0.15 * mass.max()]
 
 
 @dataclass(frozen=True)

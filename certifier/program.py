@@ -117,16 +117,15 @@ class Sides:
             self._centres[chain] = cone, Centre(cone, unit, start)
         return self._centres[chain]
 
-    def means(self, chain: tuple[int, ...], x: Array) -> tuple[Array, Array, Array]:
-        """Means of s under pseudo-moments x, (R, N) -> (R, n), standard deviations of the chain's joints (R, n), masses x(1), (R,)."""
+    def means(self, chain: tuple[int, ...], x: Array) -> tuple[Array, Array]:
+        """Means of s under pseudo-moments x, (R, N) -> (R, n), and masses x(1), (R,)."""
         space, inside, outside = basis(len(chain)), list(chain), self.outside(chain)
         first, rest = x[:, : len(space.points)], x[:, len(space.points) :].reshape(len(x), len(outside), space.grid)
         mass = first.sum(axis=1)
-        u, deviation = np.zeros((len(x), self.kinematics.scene.n)), np.zeros((len(x), self.kinematics.scene.n))
+        u = np.zeros((len(x), self.kinematics.scene.n))
         u[:, inside] = first @ space.points / mass[:, None]
         u[:, outside] = rest.sum(axis=2) / mass[:, None]
-        deviation[:, inside] = np.sqrt(np.maximum(first @ space.points**2 / mass[:, None] - u[:, inside] ** 2, 0.0))
-        return self.box.mid + self.box.half * u, self.box.half * deviation, mass
+        return self.box.mid + self.box.half * u, mass
 
 
 def _denominator(s: Array, revolute: Array) -> Array:

@@ -69,8 +69,8 @@ def _joined(arguments: Sequence[str]) -> list[str]:
     """``--q -0.5,1`` as ``--q=-0.5,1``: argparse takes a list that begins with a minus for an option."""
     joined: list[str] = []
     for argument in arguments:
-        if joined and joined[-1] == "--q" and re.match(r"-[\d.]", argument):
-            joined[-1] = f"--q={argument}"
+        if joined and joined[-1] in ("--q", "--contain") and re.match(r"-[\d.]", argument):
+            joined[-1] = f"{joined[-1]}={argument}"
         else:
             joined.append(argument)
     return joined
@@ -122,9 +122,22 @@ def _parser() -> argparse.ArgumentParser:
 
     grow = verbs.add_parser("grow", parents=[remote, json], help="grow a certified region around a configuration")
     grow.add_argument("scene", metavar="SCENE")
-    grow.add_argument("--q", metavar='"0,0.3,..."', help="seed: joint positions; default: q of the seed.yaml beside the scene file")
+    grow.add_argument(
+        "--q",
+        metavar='"0,0.3,..."',
+        action="append",
+        help="seed: joint positions; default: q of the seed.yaml beside the scene file; given several times, one job a seed, all at once",
+    )
+    grow.add_argument(
+        "--contain",
+        metavar='"0,0.3,..."',
+        action="append",
+        default=[],
+        help="joint positions to contain as well; may be given several times",
+    )
     grow.add_argument("--method", help="how the first polytope is found; default: the service's")
-    grow.add_argument("--rounds", type=int, help="rounds of the polytope step; 0 ends after contraction")
+    grow.add_argument("--pushes", type=int, help="how often faces are pushed out again; default: more for small arms than for large ones")
+    grow.add_argument("--rounds", type=int, help="rounds of the polytope step; default: a few for small arms, none for large ones")
     grow.add_argument("--random-seed", type=int, help="seeds every random choice; default 0")
     grow.add_argument("--out", metavar="FILE", help="where the proof goes; default: named after scene and proof, here")
     grow.add_argument("--watch", action="store_true", help="a line for every pair as it is settled")

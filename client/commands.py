@@ -84,10 +84,18 @@ def scene_show(args: Namespace) -> int:
 
 def grow(args: Namespace) -> int:
     screen = Screen()
-    seed: dict[str, Any] = {"q": seed_of(args.scene, args.q)}
+    common: dict[str, Any] = {"contain": [configuration(q, "--contain") for q in args.contain]} if args.contain else {}
     if args.method is not None:
-        seed["method"] = args.method
-    options = {name: value for name, value in (("max_rounds", args.rounds), ("random_seed", args.random_seed)) if value is not None}
+        common["method"] = args.method
+    seeds = [{"q": seed_of(args.scene, q), **common} for q in args.q or [None]]
+    options = {
+        name: value
+        for name, value in (("pushes", args.pushes), ("max_rounds", args.rounds), ("random_seed", args.random_seed))
+        if value is not None
+    }
+    if len(seeds) > 1:
+        return _grow_many(args, seeds, options, screen)
+    seed = seeds[0]
     if args.local:
         from client import local
 
@@ -104,6 +112,33 @@ def grow(args: Namespace) -> int:
     extra = [("time", output.seconds(grown.seconds)), ("ended", grown.remark), ("proof", f"{path} (check it: ciris verify {path})")]
     output.print_region(grown.manifest, [*extra, *([("region", url)] if url else [])])
     return OK
+
+
+def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, Any], screen: Screen) -> int:
+    """One job a seed; the regions stay on the service."""
+    if args.local or args.out is not None:
+        raise CirisError(
+            "several_seeds", "several seeds need a service, which keeps their regions", field="--q", hint="leave --local and --out out"
+        )
+    with _client(args) as client:
+        scene = service.known_scene(client, args.scene)
+        requests = [{"kind": "grow", "scene": scene["id"], "seed": seed, "options": options} for seed in seeds]
+        jobs = service.grow_many(client, requests, screen, args.watch)
+        volumes = {job["region"]: client.region(job["region"])["ellipsoid_volume"] for job in jobs if job["region"]}
+    if args.json:
+        print_json(jobs)
+    else:
+        rows = [
+            (
+                ", ".join(f"{x:g}" for x in seed["q"]),
+                job["region"] or "none",
+                f"{volumes[job['region']]:.4g}" if job["region"] else "",
+                job["reason"] or "",
+            )
+            for seed, job in zip(seeds, jobs, strict=True)
+        ]
+        output.print_table(("q", "region", "ellipsoid", "ended"), rows, right="ellipsoid")
+    return OK if len(volumes) == len(jobs) else NO
 
 
 def save_proof(manifest: dict[str, Any], proof: bytes, out: str | None) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -53,6 +54,14 @@ def grow(client: Client, request: Document, screen: Screen, watch: bool = False,
         raise _error(job)
     region = client.region(job["region"])
     return Grown(region["manifest"], client.proof(job["region"]), _seconds(job), job["region"], job["reason"] or "")
+
+
+def grow_many(client: Client, requests: Sequence[Document], screen: Screen, watch: bool = False) -> list[Document]:
+    """Has the service grow regions, all at once, and waits for them; the ended jobs, with a region or without."""
+    jobs = [client.create_job(request)[0]["id"] for request in requests]
+    for job in jobs:
+        screen.line(f"job {job}: {client.url}/jobs/{job}")
+    return [_wait(client, job, screen, watch) for job in jobs]
 
 
 def certify(client: Client, scene: Document, polytope: PolytopeFile, screen: Screen, watch: bool = False) -> Document:

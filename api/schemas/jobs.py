@@ -26,8 +26,18 @@ class GrowOptions(Request):
         int, Field(ge=1, le=3, description="Targeted contractions, each cutting in another way; the largest region counts.")
     ] = 2
     bisection_steps: Annotated[int, Field(ge=0, le=60, description="Certifications spent on uniform contraction after its two ends.")] = 6
-    pushes: Annotated[int, Field(ge=0, le=1000, description="How often the faces are pushed out after the contraction.")] = 3
-    max_rounds: Annotated[int, Field(ge=0, le=1000, description="Rounds of the polytope step; 0 ends after contraction.")] = 3
+    max_rounds: Annotated[
+        int | None,
+        Field(
+            ge=0,
+            le=1000,
+            description="Rounds of the polytope step; default: 3 for arms of at most four joints between two bodies, else 0.",
+        ),
+    ] = None
+    pushes: Annotated[
+        int | None,
+        Field(ge=0, le=1000, description="How often the faces are pushed out after the contractions; default: 10 for such arms, else 2."),
+    ] = None
     tolerance: Annotated[Real, Field(gt=0, lt=10, description="Growth of the ellipsoid's volume under which the alternation stops.")] = 0.02
     backoff: Annotated[int, Field(ge=0, le=20, description="How often a step that fails to certify is halved.")] = 2
     random_seed: RandomSeed = 0

@@ -41,7 +41,7 @@ def grow(disc, radius, options, spread=0.0, limit=300):
         meets = Polytope(np.array(action.C), np.array(action.d)).contains(nearest[None])[0]
         failing = [i for i in action.pairs if meets and "link2" in SCENE.pairs[i].a]
         outcomes = {i: Outcome.NOT_CERTIFIABLE if i in failing else Outcome.CERTIFIED for i in action.pairs}
-        weak = {i: {"points": [nearest.tolist()], "spread": [spread, spread]} for i in failing}
+        weak = {i: {"points": [nearest.tolist()], "pull": [spread, spread]} for i in failing}
         transition = advance(SCENE, state, Certification(action.iteration, outcomes, weak))
     raise AssertionError("growth does not end")
 

@@ -60,7 +60,7 @@ def test_a_polytope_is_certified_and_answers_questions(machine: Machine) -> None
 
 
 def test_a_region_is_grown_and_its_proof_holds_offline(machine: Machine) -> None:
-    done = machine.ciris("grow", PLANAR, "--method", "box", "--rounds", "0", "--json", "--watch")
+    done = machine.ciris("grow", PLANAR, "--method", "box", "--pushes", "1", "--rounds", "0", "--json", "--watch")
     assert done.status == 0, done.stderr
     manifest = done.json
     assert manifest["seconds"] > 0
@@ -69,6 +69,17 @@ def test_a_region_is_grown_and_its_proof_holds_offline(machine: Machine) -> None
     verified = machine.ciris("verify", manifest["proof"])
     assert verified.status == 0
     assert f"hash {manifest['scene']['hash']}" in verified.stdout
+
+
+def test_several_seeds_grow_at_once_and_each_says_what_became_of_it(machine: Machine) -> None:
+    seeds = ("--q", "0.0,0.1", "--q", "-1.2,1.0", "--q", "0.05,-0.05", "--contain", "0.02,0.02")
+    done = machine.ciris("grow", PLANAR, *seeds, "--method", "box", "--pushes", "1", "--rounds", "0")
+    assert done.status == 1
+    rows = done.stdout.splitlines()[-3:]
+    assert ["none" in row for row in rows] == [False, True, False]
+    assert "overlap" in rows[1]
+    assert machine.ciris("contains", "planar-2dof", "--q", "0.02,0.02").status == 0
+    assert machine.ciris("grow", PLANAR, *seeds, "--local").status == 2
 
 
 def test_bad_input_fails_the_job_with_a_reason_and_nothing_else(machine: Machine) -> None:
