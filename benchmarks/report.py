@@ -145,9 +145,9 @@ def _scaling(document: Document) -> list[str]:
     for curve in ("obstacles", "joints", "faces"):
         for point in document[curve]:
             cells = [curve, str(point["n"]), str(point["pairs"]), _counts(point["outcomes"])]
-            cells += [seconds(point[f"{part}_seconds"]) for part in ("setup", "solve", "verify")]
+            cells += [seconds(point[part]) for part in ("setup_seconds", "seconds", "verify_seconds")]
             rows.append([*cells, seconds(point["drake_seconds"]) if "drake_seconds" in point else ""])
-    return [_table(["curve", "number", "pairs", "outcomes", "setup", "solve", "verify", "Drake"], rows)]
+    return [_table(["curve", "number", "pairs", "outcomes", "setup", "certify", "verify again", "Drake"], rows)]
 
 
 def _survey(document: Document) -> list[str]:
