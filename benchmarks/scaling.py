@@ -51,7 +51,7 @@ def picture(document: dict[str, Any]) -> str:
     panels = []
     for name, title in (("obstacles", "obstacles around 3 joints"), ("joints", "joints, last link"), ("faces", "faces, link 5 of 7")):
         points = document[name]
-        series = {"ciris: everything": "seconds", "ciris: the proofs once more": "verify_seconds", "Drake: build and solve": "drake_seconds"}
+        series = {"ciris: everything": "seconds", "ciris: verify again": "verify_seconds", "Drake: build and solve": "drake_seconds"}
         curves = {label: [(point["n"], point[key]) for point in points if key in point] for label, key in series.items()}
         panels.append(Panel(title, {label: curve for label, curve in curves.items() if curve}))
     return draw(panels, "seconds")
