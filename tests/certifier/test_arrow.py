@@ -16,6 +16,7 @@ from certifier.arrow import Group, Method
 from certifier.basis import basis
 from certifier.cone import Centre, Cone, conjugate
 from certifier.face_terms import Objective, face_barrier, objective_term
+from tests.certifier.clarabel import add_rationals
 
 
 def box_cone(k, n):
@@ -76,21 +77,7 @@ def optimum(groups, k, c):
     for group in groups:
         z = program.NewContinuousVariables(len(group.start))
         program.AddLorentzConeConstraint(np.concatenate([[1.0], z]))
-        for block in group.blocks:
-            cone = block.cone
-            for constant, local, coupled in zip(*block.columns(), strict=True):
-                columns, variables = [], []
-                for j in range(cone.K):
-                    Q = program.NewSymmetricContinuousVariables(cone.L)
-                    program.AddPositiveSemidefiniteConstraint(Q)
-                    for row in range(cone.L):
-                        for col in range(cone.L):
-                            unit = np.zeros((1, cone.K, cone.L, cone.L))
-                            unit[0, j, row, col] = 1.0
-                            columns.append(cone.values(unit)[0])
-                            variables.append(Q[row, col])
-                matrix = np.column_stack([*columns, -local, -coupled])
-                program.AddLinearEqualityConstraint(matrix, constant, np.concatenate([variables, z, y[block.coupled]]))
+        add_rationals(program, group, z, y)
     program.AddLinearCost(c, y)
     result = ClarabelSolver().Solve(program)
     assert result.is_success()

@@ -25,6 +25,7 @@ from certifier.polytope_step import step, trust_box
 from certifier.program import Box
 from certifier.proof import PairProof
 from certifier.verify.pair import verify_pair
+from tests.certifier.clarabel import add_rationals
 from tests.certifier.scenes import ball, box, cube, planar_arm
 
 SCENES = {
@@ -216,20 +217,7 @@ def clarabel(scene, groups, m, cap, objective):
     y = program.NewContinuousVariables(m * (n + 2))
     for group in groups:
         z = program.NewContinuousVariables(len(group.start))
-        for block in group.blocks:
-            cone = block.cone
-            for constant, local, coupled in zip(*block.columns(), strict=True):
-                columns, variables = [], []
-                for j in range(cone.K):
-                    Q = program.NewSymmetricContinuousVariables(cone.L) if cone.L > 1 else program.NewContinuousVariables(1, 1)
-                    program.AddPositiveSemidefiniteConstraint(Q) if cone.L > 1 else program.AddBoundingBoxConstraint(0, np.inf, Q)
-                    for row, col in np.ndindex(cone.L, cone.L):
-                        unit = np.zeros((1, cone.K, cone.L, cone.L))
-                        unit[0, j, row, col] = 1.0
-                        columns.append(cone.values(unit)[0])
-                        variables.append(Q[row, col])
-                matrix = np.column_stack([*columns, -local, -coupled])
-                program.AddLinearEqualityConstraint(matrix, constant, np.concatenate([variables, z, y[block.coupled]]))
+        add_rationals(program, group, z, y)
     v = y.reshape(m, n + 2)
     for c, d, delta in zip(v[:, :n], v[:, n], v[:, n + 1], strict=True):
         program.AddLorentzConeConstraint(np.concatenate([[1.0], c]))

@@ -1,0 +1,23 @@
+"""The cones of certifier.arrow as semidefinite constraints, for an oracle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def add_rationals(program, group, z, y):
+    """constant + local z + coupled y in K for every rational of the group: its coordinates are those of a sum of squares."""
+    for block in group.blocks:
+        cone = block.cone
+        for constant, local, coupled in zip(*block.columns(), strict=True):
+            columns, variables = [], []
+            for j in range(cone.K):
+                Q = program.NewSymmetricContinuousVariables(cone.L) if cone.L > 1 else program.NewContinuousVariables(1, 1)
+                program.AddPositiveSemidefiniteConstraint(Q) if cone.L > 1 else program.AddBoundingBoxConstraint(0, np.inf, Q)
+                for row, col in np.ndindex(cone.L, cone.L):
+                    unit = np.zeros((1, cone.K, cone.L, cone.L))
+                    unit[0, j, row, col] = 1.0
+                    columns.append(cone.values(unit)[0])
+                    variables.append(Q[row, col])
+            matrix = np.column_stack([*columns, -local, -coupled])
+            program.AddLinearEqualityConstraint(matrix, constant, np.concatenate([variables, z, y[block.coupled]]))
