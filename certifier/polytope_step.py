@@ -11,14 +11,14 @@ faces (C, d), the margins delta, every plane z_p, and the multipliers of 1 and o
 |E c_j| <= 1 where the paper has |c_j| <= 1: margins are measured against the ellipsoid, whatever the units of the joints.
 A pair that holds on all of B constrains nothing and is left out, and a face that no pair needs is dropped, B standing in for it. Before
 that, (11) is tried against the faces of B for every proof that does not hold there, so that few pairs ask for few faces.
-The program is an arrow (certifier.arrow). The current polytope is feasible, so the ellipsoid cannot shrink; what comes out is a proposal
-that has to be certified by (11).
+The program is an arrow (certifier.arrow). The polytope that it starts from is feasible, so the ellipsoid cannot shrink; where the proofs have
+too little margin it starts from a slightly smaller one. What comes out is a proposal that has to be certified by (11).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,9 @@ TRUST = 1.3
 MARGIN_SHARE = 0.25
 START_LENGTH = 0.9
 """|E c_j| of the faces at the start, inside |E c_j| <= 1."""
+RETREATS = (1.0, 0.95, 0.85)
+"""Scales of the polytope from which the step is tried, one after the other: targeted contraction ends where some pair has hardly any
+margin, and from there no proof is strictly feasible."""
 PUSH = 0.5
 """Share of the way to the first boundary by which all faces are moved out first, to have delta > 0."""
 WEIGHT = 512.0
@@ -102,10 +105,53 @@ def step(
     Raises:
         RegionError: ``witness_outside``; ``step_failed``, and the current region stands.
     """
-    n = scene.n
-    points = np.zeros((0, n)) if witnesses is None else witnesses
+    points = np.zeros((0, scene.n)) if witnesses is None else witnesses
     if not polytope.contains(points).all():
         raise RegionError("witness_outside", "a witness point is not in the polytope", field="witnesses")
+    before = inscribed_ellipsoid(polytope)
+    failure: Exception | None = None
+    for scale in RETREATS:
+        smaller = polytope if scale == 1.0 else _about(before.center, polytope, scale, fixed=2 * scene.n)
+        if not smaller.contains(points).all():
+            break
+        try:
+            found = _step(scene, smaller, proofs, objective, normals, points, trust, progress)
+        except np.linalg.LinAlgError as error:
+            failure = error
+            continue
+        growth = found.info["volume_after"] / before.volume - 1
+        if scale < 1.0 and growth <= 0:
+            raise RegionError(
+                "step_failed", f"nothing larger was found from {scale} of the polytope, where the proofs are strictly feasible"
+            )
+        return replace(found, growth=growth, info=found.info | {"volume_before": before.volume, "from": scale})
+    raise RegionError("step_failed", f"the proofs are not strictly feasible on the trust box: {failure}", hint="a smaller trust")
+
+
+def _about(center: Array, polytope: Polytope, scale: float, fixed: int) -> Polytope:
+    """Scaled about a point, all but the last rows."""
+    height = polytope.C @ center
+    d = height + scale * (polytope.d - height)
+    d[-fixed:] = polytope.d[-fixed:]
+    return Polytope(polytope.C, d)
+
+
+def _step(
+    scene: Scene,
+    polytope: Polytope,
+    proofs: dict[int, bytes],
+    objective: Objective,
+    normals: bool,
+    points: Array,
+    trust: float,
+    progress: Progress,
+) -> Step:
+    """The step from a polytope on which the proofs are strictly feasible; its growth is from there.
+
+    Raises:
+        np.linalg.LinAlgError: they are not.
+    """
+    n = scene.n
     before = inscribed_ellipsoid(polytope)
     box = trust_box(scene, polytope, before, trust)
     kept = drop_redundant(polytope, fixed=2 * n)[: -2 * n]
@@ -120,18 +166,13 @@ def step(
     C, d = faces.rows(faces.start)
     base = scene.polytope(*_rows(scene, box, C, d))
     if needed:
-        try:
-            method = Method(
-                [certificates.group(proof, Y[:, used]) for proof, Y in needed],
-                faces.start,
-                faces.free(normals),
-                lambda iteration: progress(f"polytope step: iteration {iteration}"),
-            )
-            method.shift(PUSH * min(1.0, method.reach(faces.push)) * faces.push)
-        except np.linalg.LinAlgError as error:
-            raise RegionError(
-                "step_failed", f"the proofs are not strictly feasible on the trust box: {error}", hint="a smaller trust"
-            ) from error
+        method = Method(
+            [certificates.group(proof, Y[:, used]) for proof, Y in needed],
+            faces.start,
+            faces.free(normals),
+            lambda iteration: progress(f"polytope step: iteration {iteration}"),
+        )
+        method.shift(PUSH * min(1.0, method.reach(faces.push)) * faces.push)
         reach = float(np.linalg.norm(np.abs(box.mid - start.center) + box.half) / np.linalg.eigvalsh(start.shape)[0])
         barrier = face_barrier(n, 2 * max(reach, float(faces.start.max())), np.linalg.solve(start.shape, (points - start.center).T).T)
         method.minimise(_weighted(objective_term(objective, n), barrier), TOLERANCE * WEIGHT * len(used))
@@ -139,7 +180,7 @@ def step(
         info |= {"iterations": method.iterations, "rationals": sum(len(p) for group in method.groups for p in group.blocks)}
     moved = scene.polytope(*_rows(scene, box, C, d))
     after = inscribed_ellipsoid(moved)
-    info |= {"volume_before": before.volume, "volume_after": after.volume}
+    info["volume_after"] = after.volume
     return Step(moved.C, moved.d, after.center, base.C, base.d, after.volume / before.volume - 1, info)
 
 

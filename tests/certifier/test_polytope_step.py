@@ -127,6 +127,23 @@ def test_a_certificate_that_is_not_feasible_on_the_trust_box_is_refused(monkeypa
     assert refusal.value.code == "step_failed"
 
 
+def test_from_where_hardly_any_margin_is_left_it_steps_back_first():
+    scene = SCENES["ball"]
+    holds, fails = 0.05, 1.0
+    while fails - holds > 1e-5:
+        half = (holds + fails) / 2
+        shared = Certification(scene, crosscut(scene, half))
+        if all(shared.certify(i).outcome is Outcome.CERTIFIED for i in range(len(scene.pairs))):
+            holds = half
+        else:
+            fails = half
+    region = crosscut(scene, holds)
+    moved = step(scene, region, certified(scene, region))
+    assert moved.info["from"] < 1.0
+    assert moved.growth > 0.1
+    assert inscribed_ellipsoid(Polytope(moved.C, moved.d)).volume > inscribed_ellipsoid(region).volume * 1.1
+
+
 def test_an_exception_of_the_progress_ends_the_step():
     scene, region, said = SCENES["revolute"], crosscut(SCENES["revolute"], 0.15), []
 
