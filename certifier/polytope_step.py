@@ -11,8 +11,8 @@ faces (C, d), the margins delta, every plane z_p, and the multipliers of 1 and o
 |E c_j| <= 1 where the paper has |c_j| <= 1: margins are measured against the ellipsoid, whatever the units of the joints.
 A pair that holds on all of B constrains nothing and is left out, and a face that no pair needs is dropped, B standing in for it. Before
 that, (11) is tried against the faces of B for every proof that does not hold there, so that few pairs ask for few faces.
-The program is an arrow (certifier.arrow). The polytope that it starts from is feasible, so the ellipsoid cannot shrink; where the proofs have
-too little margin it starts from a slightly smaller one. What comes out is a proposal that has to be certified by (11).
+The program is an arrow (certifier.arrow). The polytope that it starts from is feasible, so the ellipsoid cannot shrink; where the proofs
+have too little margin it starts from a slightly smaller one. What comes out is a proposal that has to be certified by (11).
 """
 
 from __future__ import annotations
@@ -121,9 +121,7 @@ def step(
             continue
         growth = found.info["volume_after"] / before.volume - 1
         if scale < 1.0 and growth <= 0:
-            raise RegionError(
-                "step_failed", f"nothing larger was found from {scale} of the polytope, where the proofs are strictly feasible"
-            )
+            raise RegionError("step_failed", f"nothing larger was found from {scale} of the polytope")
         return replace(found, growth=growth, info=found.info | {"volume_before": before.volume, "from": scale})
     raise RegionError("step_failed", f"the proofs are not strictly feasible on the trust box: {failure}", hint="a smaller trust")
 
