@@ -14,6 +14,7 @@ contracted by targeted faces; it counts when the ellipsoid has grown.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal
 
@@ -36,6 +37,8 @@ NEAR = (1.0, 0.6, 0.3)
 """Of the contractions, one after the other: from how near on a pair's failure calls for a shorter range and not for a face."""
 MAX_ATTEMPTS = 60
 """Faces added for one pair before the targeted contraction gives up."""
+FAILURES = 2
+"""Pairs for which faces are added at once, so that two workers can look for them."""
 PUSH, SMALLEST_PUSH = 1.5, 0.1
 """Factor by which faces are pushed out from the centre at first, and the least growth of it that is tried."""
 
@@ -124,7 +127,8 @@ class Certify:
         center: interior point, (n,); None for the Chebyshev centre.
         pairs: indices into ``scene.pairs`` to certify, most likely failures first.
         reuse: pair index -> earlier iteration whose proof, on a superset, serves here too.
-        stop_at_first_failure: end early (B.3); pairs not reached are reported as absent.
+        hard: pairs that failed on a larger polytope; nothing less than all faces is tried for them.
+        failures: end after this many, in the order of ``pairs`` (B.3); pairs not reached are reported as absent. None for all pairs.
     """
 
     iteration: int
@@ -134,7 +138,8 @@ class Certify:
     center: list[float] | None
     pairs: list[int]
     reuse: dict[int, int]
-    stop_at_first_failure: bool
+    hard: list[int]
+    failures: int | None
     kind: Literal["certify"] = "certify"
 
 
@@ -273,7 +278,7 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
         raise RegionError("polytope_missing", "a polytope needs C and d", field="polytope")
     C, d = given_rows(scene, options.seed["C"], options.seed["d"])
     limited = scene.polytope(C, d)
-    return _certify(scene, state, "given", limited.C, limited.d, options.seed.get("center"), stop=False)
+    return _certify(scene, state, "given", limited.C, limited.d, options.seed.get("center"), failures=None)
 
 
 def given_rows(scene: Scene, C: Any, d: Any) -> tuple[Array, Array]:
@@ -322,13 +327,14 @@ def _certify(
     d: Array,
     center: list[float] | None,
     reuse: dict[int, int] | None = None,
-    stop: bool = True,
+    hard: Sequence[int] = (),
+    failures: int | None = 1,
 ) -> Transition:
     """Certify {C s <= d}: the pairs that failed last first, then those with few joints between them, which are cheap and fail early."""
     reuse = reuse or {}
     suspects = [i for i in state.get("suspects", []) if i not in reuse]
     others = [i for i in _by_joints(scene) if i not in reuse and i not in set(suspects)]
-    action = Certify(state["next"], label, C.tolist(), d.tolist(), center, suspects + others, reuse, stop)
+    action = Certify(state["next"], label, C.tolist(), d.tolist(), center, suspects + others, reuse, list(hard), failures)
     state = {**state, "phase": label, "next": action.iteration + 1, "current": action_to_document(action)}
     return Transition(state, action)
 
@@ -378,7 +384,8 @@ def _trim(scene: Scene, state: dict[str, Any], label: str, polytope: Polytope, t
     trim = trim or {"holds": {}, "attempts": {}}
     center = measure(polytope, np.array(state["keep"][0])).center
     holds = {int(index): iteration for index, iteration in trim["holds"].items()}
-    return _certify(scene, {**state, "trim": trim}, label, polytope.C, polytope.d, center.tolist(), holds)
+    hard = sorted(int(index) for index in trim["attempts"] if index not in trim["holds"])
+    return _certify(scene, {**state, "trim": trim}, label, polytope.C, polytope.d, center.tolist(), holds, hard, FAILURES)
 
 
 def _shrink(scene: Scene, state: dict[str, Any], scale: float) -> Transition:

@@ -52,13 +52,15 @@ class _Run:
         center = None if action.center is None else np.array(action.center)
         shared = PairCertification(self.scene, Polytope(np.array(action.C), np.array(action.d)), center, self.seed)
         found = self.results.setdefault(action.iteration, {})
+        failures = 0
         for index in action.pairs:
-            found[index] = shared.certify(index)
+            found[index] = shared.certify(index, every_face=index in action.hard)
             pair = self.scene.pairs[index]
             self.progress(
                 f"{action.label} {action.iteration}: {len(found)}/{len(action.pairs)} {pair.a} - {pair.b}: {found[index].outcome}"
             )
-            if action.stop_at_first_failure and found[index].outcome is not Outcome.CERTIFIED:
+            failures += found[index].outcome is not Outcome.CERTIFIED
+            if failures == action.failures:
                 break
         return Certification(
             action.iteration, {i: r.outcome for i, r in found.items()}, {i: w for i, r in found.items() if (w := weakness(r))}

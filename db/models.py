@@ -27,6 +27,7 @@ class Base(DeclarativeBase):
     type_annotation_map: ClassVar[dict[Any, Any]] = {
         datetime: Utc,
         Document: JSON(none_as_null=True),
+        list[int]: JSON(none_as_null=True),
         Arrays: Npz,
         bytes: LargeBinary,
         str: Text,
@@ -145,7 +146,10 @@ class IterationRow(Base):
     arrays: Mapped[Arrays]
     """C (m, n), d (m,) with the joint limits, and center (n,) where one was given."""
     state: Mapped[str] = mapped_column(String(16), default=states.IterationState.RUNNING)
-    stop_at_first_failure: Mapped[bool]
+    hard: Mapped[list[int]]
+    """Pairs for which nothing less than all faces is tried."""
+    failures: Mapped[int | None]
+    """How many failures end the iteration; None when none does."""
     reuse: Mapped[Document]
     """Pair index (as a string) -> the iteration whose proof serves here too."""
     ellipsoid_volume: Mapped[float | None]

@@ -94,7 +94,8 @@ def add_iteration(
     center: ArrayLike | None,
     pairs: Sequence[NewPair],
     reuse: Mapping[int, int],
-    stop_at_first_failure: bool,
+    hard: Sequence[int],
+    failures: int | None,
 ) -> None:
     """Adds an iteration and its pairs; one without pairs is certified at once. The caller holds the job's lock."""
     certified = {} if pairs else {"state": IterationState.CERTIFIED, "finished_at": utcnow()}
@@ -105,7 +106,8 @@ def add_iteration(
             label=label,
             arrays={"C": np.asarray(C), "d": np.asarray(d), **({} if center is None else {"center": np.asarray(center)})},
             reuse={str(pair): iteration for pair, iteration in reuse.items()},
-            stop_at_first_failure=stop_at_first_failure,
+            hard=list(hard),
+            failures=failures,
             **certified,
         )
     )
@@ -163,7 +165,7 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
 def save(session: Session, claim: Claim, results: Sequence[Result]) -> Saved:
     """Saves results with their proofs, in one transaction, if they are still held.
 
-    A failure skips the pairs after it, where the iteration ends early; whoever holds one of them stops (leases.kept).
+    Enough failures skip the pairs after them; whoever holds one of those stops (leases.kept).
     """
     job = jobs.lock(session, claim.job_id)
     where = (PairRow.job_id == claim.job_id, PairRow.iteration == claim.iteration, leases.held(PairRow, claim.token))
@@ -182,12 +184,11 @@ def save(session: Session, claim: Claim, results: Sequence[Result]) -> Saved:
         row.proof_digest = None if result.proof is None else digests[result.proof]
     job.error = next((result.error for result in saved if result.error is not None), job.error)
     events.emit(session, job, "pairs", {"iteration": claim.iteration, "pairs": [_public(result) for result in saved]})
-    label, stop_at_first_failure = session.execute(
-        select(IterationRow.label, IterationRow.stop_at_first_failure).where(*_iteration(job.id, claim.iteration))
-    ).one()
-    failed = [held[result.index].id for result in saved if result.state != PairState.CERTIFIED]
-    if stop_at_first_failure and failed:
-        skip(session, claim.job_id, PairRow.id > min(failed))
+    label, enough = session.execute(select(IterationRow.label, IterationRow.failures).where(*_iteration(job.id, claim.iteration))).one()
+    if enough is not None and any(result.state != PairState.CERTIFIED for result in saved):
+        last = session.scalar(_failed(job.id, claim.iteration).order_by(PairRow.id).offset(enough - 1).limit(1))
+        if last is not None:
+            skip(session, claim.job_id, PairRow.id > last)
     finished = _finish_iteration(session, job, claim.iteration, label)
     still_held = session.scalar(select(PairRow.id).where(leases.held(PairRow, claim.token)).limit(1)) is not None
     return Saved(still_held, finished)
@@ -216,11 +217,11 @@ def skip_iterations(session: Session, job_id: str) -> None:
 
 
 def reached(session: Session, iteration: IterationRow) -> Sequence[PairRow]:
-    """The settled pairs of an iteration in their order; up to the first failure where that ended it, though others were settled too."""
+    """The settled pairs of an iteration in their order; up to the failure that ended it, though others were settled too."""
     rows = session.scalars(_pairs(iteration.job_id, iteration.index).where(PairRow.state != PairState.SKIPPED).order_by(PairRow.id)).all()
-    if iteration.stop_at_first_failure:
-        first = next((place for place, row in enumerate(rows, start=1) if row.state != PairState.CERTIFIED), None)
-        rows = rows[:first]
+    places = [place for place, row in enumerate(rows, start=1) if row.state != PairState.CERTIFIED]
+    if iteration.failures is not None and len(places) >= iteration.failures:
+        rows = rows[: places[iteration.failures - 1]]
     return rows
 
 
@@ -253,6 +254,12 @@ def proving(session: Session, job_id: str, iteration_of: Mapping[int, int]) -> d
 
 def _iteration(job_id: str, index: int) -> tuple[ColumnElement[bool], ColumnElement[bool]]:
     return IterationRow.job_id == job_id, IterationRow.index == index
+
+
+def _failed(job_id: str, iteration: int) -> Select[int]:
+    """Identities of the pairs that are settled and not certified."""
+    settled = PairRow.state.not_in([*UNFINISHED, PairState.CERTIFIED, PairState.SKIPPED])
+    return select(PairRow.id).where(PairRow.job_id == job_id, PairRow.iteration == iteration, settled)
 
 
 def _pairs(job_id: str, iteration: int) -> Select[PairRow]:

@@ -62,7 +62,8 @@ def _certify(claim: pairs.Claim, pair: pairs.Claimed) -> pairs.Result:
         problem = f"{LOST.format(deaths=pair.deaths, attempts=pair.attempt - 1)} this pair"
         return _error(pair, CirisError("worker_lost", problem), start)
     try:
-        found = _certification(claim.scene_id, claim.job_id, claim.iteration).certify(pair.index)
+        certification, hard = _certification(claim.scene_id, claim.job_id, claim.iteration)
+        found = certification.certify(pair.index, every_face=pair.index in hard)
     except CirisError as error:
         return _error(pair, error, start)
     except Exception as error:
@@ -86,16 +87,16 @@ def _error(pair: pairs.Claimed, error: CirisError, start: float) -> pairs.Result
 
 
 @lru_cache(maxsize=2)
-def _certification(scene_id: str, job_id: str, iteration: int) -> Certification:
-    """What the pairs of an iteration share; its polytope never changes, so the last two are kept."""
+def _certification(scene_id: str, job_id: str, iteration: int) -> tuple[Certification, list[int]]:
+    """What the pairs of an iteration share, and which are hard; its polytope never changes, so the last two are kept."""
 
-    def read() -> tuple[Arrays, int]:
+    def read() -> tuple[Arrays, list[int], int]:
         with database().read() as session:
-            arrays = session.get_one(IterationRow, (job_id, iteration)).arrays
-            return arrays, GrowthOptions.from_document(jobs.get(session, job_id).options).random_seed
+            row = session.get_one(IterationRow, (job_id, iteration))
+            return row.arrays, row.hard, GrowthOptions.from_document(jobs.get(session, job_id).options).random_seed
 
-    arrays, seed = persistently(read)
-    return Certification(load_scene(scene_id), Polytope(arrays["C"], arrays["d"]), arrays.get("center"), seed)
+    arrays, hard, seed = persistently(read)
+    return Certification(load_scene(scene_id), Polytope(arrays["C"], arrays["d"]), arrays.get("center"), seed), hard
 
 
 def _save(claim: pairs.Claim, results: Sequence[pairs.Result]) -> pairs.Saved:

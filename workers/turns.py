@@ -161,7 +161,8 @@ def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: A
         center=action.center,
         pairs=new,
         reuse=action.reuse,
-        stop_at_first_failure=action.stop_at_first_failure,
+        hard=action.hard,
+        failures=action.failures,
     )
     pieces = pairs.batches([(pair.index, pair.forecast_seconds) for pair in new], settings().batch_seconds)
     afterwards.append(partial(send_work, len(pieces)))

@@ -113,7 +113,8 @@ def store_region(database: Database, certified: Region) -> str:
             center=manifest["interior_point"],
             pairs=[pairs.NewPair(index, a, b, 0.1) for index, a, b in names],
             reuse={},
-            stop_at_first_failure=True,
+            hard=[],
+            failures=1,
         )
         claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
         assert claim is not None

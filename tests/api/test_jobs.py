@@ -158,9 +158,7 @@ def test_a_witness_is_given_in_joint_positions(client: TestClient, database: Dat
         jobs.start(session, job)
         new = [pairs.NewPair(0, scene.pairs[0].a, scene.pairs[0].b, 1.0)]
         C, d = [[1.0], [-1.0]], [1.0, 1.0]
-        pairs.add_iteration(
-            session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={1: 0}, stop_at_first_failure=False
-        )
+        pairs.add_iteration(session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={1: 0}, hard=[], failures=None)
         claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
         assert claim is not None
         refuted = pairs.Result(0, pairs.PairState.REFUTED, seconds=0.1, stage="screen", margin=None, detail="", witness_s=[0.25])

@@ -56,7 +56,7 @@ def drive(scene, options, verdict, limit=100):
             outcomes = {}
             for index in action.pairs:
                 outcomes[index] = verdict(index, np.array(action.d))
-                if action.stop_at_first_failure and outcomes[index] is not Outcome.CERTIFIED:
+                if sum(outcome is not Outcome.CERTIFIED for outcome in outcomes.values()) == action.failures:
                     break
             report = Certification(action.iteration, outcomes)
         transition = advance(scene, state, report)
@@ -134,9 +134,20 @@ def test_a_given_polytope_is_certified_once_with_every_pair():
     options = GrowthOptions(kind="certify", seed={"C": [[1.0, 0.0]], "d": [0.5]})
     made, accepted, end = drive(SCENE, options, lambda index, d: Outcome.NOT_CERTIFIABLE if index == 0 else Outcome.CERTIFIED)
     assert made[0].pairs == [0, 1]
-    assert not made[0].stop_at_first_failure
+    assert made[0].failures is None
     assert not accepted
     assert end.outcome is Outcome.NOT_CERTIFIABLE
+
+
+def test_pairs_that_failed_are_hard_until_they_are_certified():
+    options = GrowthOptions(seed={"q": [0.0, 0.0]}, contractions=1, pushes=0, max_rounds=0)
+    begun = advance(SCENE, begin(SCENE, options).state, PROPOSAL)
+    assert begun.action.hard == []
+    weak = {"points": [[0.9, 0.0]], "pull": [1.0, 1.0]}
+    failed = advance(SCENE, begun.state, Certification(0, {0: Outcome.CERTIFIED, 1: Outcome.NOT_CERTIFIABLE}, {1: weak}))
+    assert (failed.action.hard, failed.action.pairs, failed.action.reuse) == ([1], [1], {0: 0})
+    held = advance(SCENE, failed.state, Certification(1, {1: Outcome.CERTIFIED}))
+    assert held.accepted.proofs == {0: 0, 1: 1}
 
 
 @pytest.mark.parametrize(

@@ -119,8 +119,10 @@ def test_chosen_faces_give_the_verdict_of_all_faces(half, monkeypatch):
     scene = planar_arm(3, obstacle(0.9))
     region = many_faces(scene, half, 60, seed=1)
     chosen = [Certification(scene, region, np.zeros(3)).certify(i) for i in range(3)]
+    at_once = [Certification(scene, region, np.zeros(3)).certify(i, every_face=True) for i in range(3)]
     monkeypatch.setattr("certifier.pair.FACES_AT_A_TIME", 10**6)
     every = [Certification(scene, region, np.zeros(3)).certify(i) for i in range(3)]
+    assert [result.outcome for result in at_once] == [result.outcome for result in every]
     assert [result.outcome for result in chosen] == [result.outcome for result in every]
     used = [len(PairProof.from_bytes(result.proof, scene).faces) for result in chosen if result.outcome is Outcome.CERTIFIED]
     assert all(count < 40 for count in used)

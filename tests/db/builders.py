@@ -18,15 +18,15 @@ def a_job(session: Session, **values: object) -> JobRow:
     return job
 
 
-def a_running_job(session: Session, pair_count: int = 4, *, stop_at_first_failure: bool = True) -> JobRow:
+def a_running_job(session: Session, pair_count: int = 4, *, failures: int | None = 1) -> JobRow:
     """A running job whose iteration 0 has ``pair_count`` open pairs of 1 s each."""
     job = a_job(session)
     jobs.start(session, job)
-    add_pairs(session, job, pair_count, stop_at_first_failure=stop_at_first_failure)
+    add_pairs(session, job, pair_count, failures=failures)
     return job
 
 
-def add_pairs(session: Session, job: JobRow, pair_count: int, *, stop_at_first_failure: bool = True) -> None:
+def add_pairs(session: Session, job: JobRow, pair_count: int, *, failures: int | None = 1) -> None:
     """Iteration 0 with so many open pairs of 1 s each."""
     pairs.add_iteration(
         session,
@@ -38,7 +38,8 @@ def add_pairs(session: Session, job: JobRow, pair_count: int, *, stop_at_first_f
         center=[0.0],
         pairs=[pairs.NewPair(i, f"a{i}", f"b{i}", 1.0) for i in range(pair_count)],
         reuse={},
-        stop_at_first_failure=stop_at_first_failure,
+        hard=[],
+        failures=failures,
     )
 
 

@@ -107,6 +107,25 @@ def test_the_first_failure_in_the_order_of_the_pairs_counts_whenever_it_comes(db
         assert len(session.scalars(select(ProofRow)).all()) == 1
 
 
+def test_an_iteration_may_wait_for_several_failures(db: Database) -> None:
+    with db.write() as session:
+        job_id = a_running_job(session, 5, failures=2).id
+    first, second, third = claim(db, job_id, batch_seconds=2.5), claim(db, job_id), claim(db, job_id)
+    assert first is not None
+    assert second is not None
+    assert third is not None
+    assert save(db, third, [refuted(3)]) == pairs.Saved(held=False, finished=False)
+    assert save(db, second, [refuted(2)]) == pairs.Saved(held=False, finished=False)
+    with db.read() as session:
+        assert [row.state for row in pairs.of_job(session, job_id)] == ["running", "running", "refuted", "refuted", "skipped"]
+    assert save(db, first, [refuted(0)]) == pairs.Saved(held=True, finished=False)
+    assert save(db, first, [certified(1)]) == pairs.Saved(held=False, finished=True)
+    with db.read() as session:
+        iteration = session.get_one(IterationRow, (job_id, 0))
+        assert [row.pair_index for row in pairs.reached(session, iteration)] == [0, 1, 2]
+        assert iteration.state == IterationState.FAILED
+
+
 def test_a_failure_ends_the_batch_that_it_is_in(db: Database) -> None:
     with db.write() as session:
         job_id = a_running_job(session, 3).id
@@ -117,7 +136,7 @@ def test_a_failure_ends_the_batch_that_it_is_in(db: Database) -> None:
 
 def test_without_early_end_every_pair_gets_its_verdict(db: Database) -> None:
     with db.write() as session:
-        job_id = a_running_job(session, 2, stop_at_first_failure=False).id
+        job_id = a_running_job(session, 2, failures=None).id
     held = claim(db, job_id, batch_seconds=3)
     assert held is not None
     assert not save(db, held, [pairs.Result(0, PairState.NOT_CERTIFIABLE, seconds=0.1, weak_points=[[0.1]])]).finished

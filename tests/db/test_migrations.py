@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import inspect
 
+from certifier.growth import Certify, action_from_document, action_to_document
 from db import jobs, migrate, pairs, scenes
 from db.session import Database
 from tests.db.builders import a_running_job
@@ -52,10 +53,15 @@ def test_jobs_and_their_pairs_survive_the_way_down_and_up(empty_database_url: st
     migrate.upgrade(empty_database_url)
     database = Database(empty_database_url)
     with database.write() as session:
-        job_id = a_running_job(session, pair_count=3).id
+        job = a_running_job(session, pair_count=3)
+        certify = Certify(0, "contract", [[1.0], [-1.0]], [1.0, 1.0], [0.0], [0, 1, 2], {}, [], 1)
+        job.action, job.growth, job_id = action_to_document(certify), {"current": action_to_document(certify)}, job.id
     migrate.downgrade(empty_database_url, "0001")
     migrate.upgrade(empty_database_url)
     assert migrate.drift(empty_database_url) == []
     with database.read() as session:
-        assert (jobs.get(session, job_id).state, len(pairs.of_job(session, job_id))) == ("running", 3)
+        job = jobs.get(session, job_id)
+        assert (job.state, len(pairs.of_job(session, job_id))) == ("running", 3)
+        assert action_from_document(job.action or {}) == action_from_document((job.growth or {})["current"]) == certify
+        assert [(row.hard, row.failures) for row in pairs.iterations(session, job_id)] == [([], 1)]
     database.close()
