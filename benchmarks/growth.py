@@ -8,11 +8,11 @@ from typing import Any
 
 from benchmarks import catalogue, measure
 from benchmarks.measure import Progress
+from certifier.ellipsoid import inscribed_ellipsoid
 from certifier.errors import CirisError
 from certifier.growth import GrowthOptions
 from certifier.local import grow
 from certifier.model import Array, Scene
-from certifier.polytope import inscribed_ellipsoid
 from certifier.reference import Reference
 from certifier.verify.region import verify_region
 

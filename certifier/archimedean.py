@@ -16,7 +16,7 @@ def archimedean(polytope: Polytope) -> Archimedean:
     arithmetic: ``certifier.verify.archimedean.check_archimedean`` tells.
 
     Raises:
-        RegionError: ``polytope_without_limits`` when an axis is not bounded by single rows, or as ``polytope.check``.
+        RegionError: ``polytope_without_limits`` when an axis is not bounded by single rows, or as ``polytope.chebyshev_center``.
     """
     lower, upper, Y_lower, Y_upper = bound_multipliers(polytope)
     value, y = support(polytope, lower + upper)

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 from certifier.arrow import Group, Term
 from certifier.basis import basis, rho, subsets
 from certifier.cone import Cone
+from certifier.ellipsoid import Ellipsoid
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Polytope, Scene
-from certifier.polytope import Ellipsoid, support
+from certifier.polytope import support
 from certifier.program import Box, Sides
 from certifier.proof import PairProof, Side
 

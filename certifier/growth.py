@@ -21,11 +21,12 @@ from typing import Any, Literal
 import numpy as np
 
 from certifier.contraction import Failure, contract, measure
+from certifier.ellipsoid import inscribed_ellipsoid
 from certifier.errors import CirisError, RegionError
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, combine
-from certifier.polytope import chebyshev_center, drop_redundant, inscribed_ellipsoid
+from certifier.polytope import chebyshev_center, drop_redundant
 from certifier.seed_options import Method
 
 LIGHT_JOINTS = 4

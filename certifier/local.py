@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from certifier.ellipsoid import inscribed_ellipsoid
 from certifier.errors import CirisError
 from certifier.growth import (
     Accepted,
@@ -29,7 +30,6 @@ from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee, Outcome, combine
 from certifier.pair import Certification as PairCertification
 from certifier.pair import PairResult
-from certifier.polytope import inscribed_ellipsoid
 from certifier.polytope_step import Step as PolytopeStep
 from certifier.polytope_step import step
 from certifier.region import Region, certified_region

@@ -23,7 +23,7 @@ from certifier.interior_point import Block, Solution, Status, solve
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Pair, Polytope, Scene
 from certifier.outcome import Outcome, Stage
-from certifier.polytope import bound_multipliers, chebyshev_center, check, drop_redundant
+from certifier.polytope import bound_multipliers, chebyshev_center, drop_redundant
 from certifier.program import Box, Sides, build
 from certifier.proof import BITS, Ground, PairProof, Side, Volume
 from certifier.proof_file import ProofError
@@ -85,9 +85,9 @@ class Certification:
     """
 
     def __init__(self, scene: Scene, polytope: Polytope, center: Array | None = None, seed: int = 0, box: Box | None = None) -> None:
-        check(polytope, tuple(joint.name for joint in scene.moving))
+        middle, _ = chebyshev_center(polytope, tuple(joint.name for joint in scene.moving))
         self.scene = scene
-        self.center = chebyshev_center(polytope)[0] if center is None else center
+        self.center = middle if center is None else center
         kept = drop_redundant(polytope)
         self._faces = faces = Polytope(polytope.C[kept], polytope.d[kept])
         lower, upper, Y_lower, Y_upper = bound_multipliers(scene.polytope(faces.C, faces.d))

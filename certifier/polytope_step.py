@@ -25,12 +25,13 @@ import numpy as np
 
 from certifier.arrow import Method, Term
 from certifier.certificates import Certificates, face_multipliers, holds_on
+from certifier.ellipsoid import Ellipsoid, inscribed_ellipsoid
 from certifier.errors import RegionError
 from certifier.face_terms import Objective, face_barrier, objective_term
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome
 from certifier.pair import Certification
-from certifier.polytope import Ellipsoid, bounds, drop_redundant, inscribed_ellipsoid
+from certifier.polytope import bounds, drop_redundant
 from certifier.program import Box
 from certifier.proof import PairProof
 

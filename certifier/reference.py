@@ -32,7 +32,7 @@ from certifier.local import Progress, document
 from certifier.model import Array, Scene
 from certifier.outcome import Guarantee, Outcome, Stage
 from certifier.pair import PairResult
-from certifier.polytope import check
+from certifier.polytope import chebyshev_center
 
 
 class Solver(StrEnum):
@@ -172,7 +172,7 @@ def certify(scene: Scene, C: Array, d: Array, solver: str, progress: Progress = 
     """
     start = time.perf_counter()
     rows, offsets = given_rows(scene, C, d)
-    check(scene.polytope(rows, offsets), tuple(joint.name for joint in scene.moving))
+    chebyshev_center(scene.polytope(rows, offsets), tuple(joint.name for joint in scene.moving))
     reference = Reference(scene, solver)
     results: dict[int, PairResult] = {}
     for index, pair in enumerate(scene.pairs):

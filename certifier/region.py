@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from certifier.archimedean import archimedean
+from certifier.ellipsoid import inscribed_ellipsoid, volume
 from certifier.growth import Accepted
 from certifier.model import SCHEMA_VERSION, Polytope, Scene
 from certifier.outcome import Guarantee
-from certifier.polytope import chebyshev_center, inscribed_ellipsoid, support, volume
+from certifier.polytope import chebyshev_center, support
 from certifier.proof import Implied, PairProof, RegionProof, digest
 from certifier.verify.region import RegionStatement, verify_region
 

@@ -15,7 +15,7 @@ from certifier.errors import RegionError
 from certifier.iris import iris
 from certifier.model import Array, Scene
 from certifier.outcome import Guarantee
-from certifier.polytope import chebyshev_center, check
+from certifier.polytope import chebyshev_center
 from certifier.seed_options import Method, SeedOptions
 
 __all__ = ["Method", "Proposal", "SeedOptions", "check_seed", "propose"]
@@ -96,7 +96,7 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
     IRIS may take minutes, and native code runs: call it in a process that may die.
 
     Raises:
-        RegionError: as :func:`check_seed` and ``polytope.check``; ``polytope_shape``; ``center_outside``;
+        RegionError: as :func:`check_seed` and ``polytope.chebyshev_center``; ``polytope_shape``; ``center_outside``;
             ``seed_cut_off`` when the polytope does not contain the seed and ``contain``; ``seeding_failed`` with Drake's words.
     """
     start = time.perf_counter()
@@ -129,9 +129,9 @@ def _given(scene: Scene, options: SeedOptions) -> tuple[Array, Array, Array]:
         raise RegionError("polytope_shape", f"C must have a row of {scene.n} numbers for each of the {len(d)} numbers in d", field="seed.C")
     C = C.astype(float)
     limited = scene.polytope(C, d)
-    check(limited, tuple(joint.name for joint in scene.moving))
+    middle, _ = chebyshev_center(limited, tuple(joint.name for joint in scene.moving))
     if options.center is None:
-        return C, d, chebyshev_center(limited)[0]
+        return C, d, middle
     center = np.array(options.center)
     if center.shape != (scene.n,) or not np.all(limited.C @ center < limited.d):
         raise RegionError(

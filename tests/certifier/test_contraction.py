@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from certifier.contraction import Failure, contract, measure
+from certifier.ellipsoid import inscribed_ellipsoid
 from certifier.growth import Certification, Certify, Finish, GrowthOptions, Propose, Proposed, action_to_document, advance, begin
 from certifier.model import WORLD, Polytope
 from certifier.outcome import Outcome
-from certifier.polytope import inscribed_ellipsoid
 from tests.certifier.scenes import box, cube, planar_arm
 
 SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))

@@ -14,13 +14,13 @@ import certifier.arrow
 import certifier.polytope_step as polytope_step
 from certifier.basis import basis
 from certifier.certificates import Certificates, face_multipliers
+from certifier.ellipsoid import inscribed_ellipsoid
 from certifier.errors import RegionError
 from certifier.face_terms import EPSILON, Objective
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, JointKind, Polytope
 from certifier.outcome import Outcome
 from certifier.pair import Certification
-from certifier.polytope import inscribed_ellipsoid
 from certifier.polytope_step import step, trust_box
 from certifier.program import Box
 from certifier.proof import PairProof

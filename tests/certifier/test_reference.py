@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from certifier import reference
+from certifier.ellipsoid import inscribed_ellipsoid
 from certifier.errors import CirisError
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
 from certifier.outcome import Outcome
 from certifier.pair import certify_pair
-from certifier.polytope import inscribed_ellipsoid
 from certifier.reference import Reference, Solver, available
 from tests.certifier.scenes import ball, box, planar_arm, pose
 

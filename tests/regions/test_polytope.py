@@ -8,19 +8,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydrake.geometry.optimization import HPolyhedron
 from scipy.optimize import linprog
 
+from certifier.ellipsoid import inscribed_ellipsoid, volume
 from certifier.errors import RegionError
 from certifier.model import Polytope
 from certifier.polytope import (
     bound_multipliers,
     bounds,
     chebyshev_center,
-    check,
     drop_redundant,
-    inscribed_ellipsoid,
     support,
-    volume,
 )
 from certifier.sampling import hit_and_run
 from certifier.verify.box import check_box, upper_bound
@@ -121,7 +120,7 @@ def test_bound_multipliers_need_the_limits():
 
 def test_check_accepts_a_bounded_polytope():
     for polytope in (box([-1, 0], [1, 1e-3]), simplex(6), cross_polytope(4)):
-        check(polytope)
+        chebyshev_center(polytope)
 
 
 @pytest.mark.parametrize(
@@ -138,7 +137,7 @@ def test_check_accepts_a_bounded_polytope():
 )
 def test_check_refuses(polytope, code, words):
     with pytest.raises(RegionError) as error:
-        check(polytope, ("shoulder", "elbow"))
+        chebyshev_center(polytope, ("shoulder", "elbow"))
     assert error.value.code == code
     assert words in error.value.message
 
@@ -161,10 +160,10 @@ def test_boundedness_agrees_with_the_support_values(n, seed):
     polytope = Polytope(rng.normal(size=(m, n)), rng.uniform(0.1, 1, m))
     finite = all(linprog(c, polytope.C, polytope.d, bounds=(None, None)).status == 0 for c in np.concatenate([np.eye(n), -np.eye(n)]))
     if finite:
-        check(polytope)
+        chebyshev_center(polytope)
     else:
         with pytest.raises(RegionError, match=r"unbounded|bounds"):
-            check(polytope)
+            chebyshev_center(polytope)
 
 
 def test_chebyshev_center_refuses():
@@ -235,6 +234,16 @@ def test_inscribed_ellipsoid_is_inside_and_as_large_as_a_ball(case):
     n, (_, radius) = len(E.center), chebyshev_center(polytope)
     ball = math.pi ** (n / 2) / math.gamma(n / 2 + 1) * radius**n
     assert E.volume >= ball * (1 - 1e-4)
+
+
+@settings(max_examples=25, deadline=None)
+@given(limited_polytopes())
+def test_inscribed_ellipsoid_is_as_large_as_drakes(case):
+    polytope, center = case
+    size = (polytope.d - polytope.C @ center).max()
+    scaled = HPolyhedron(polytope.C, (polytope.d - polytope.C @ center) / size)
+    drakes = abs(np.linalg.det(np.linalg.inv(scaled.MaximumVolumeInscribedEllipsoid().A()))) * size ** len(center)
+    assert np.linalg.det(inscribed_ellipsoid(polytope).shape) == pytest.approx(drakes, rel=1e-4)
 
 
 def test_inscribed_ellipsoid_of_a_thin_sheared_box():
