@@ -93,7 +93,7 @@ def _scattered(rng: np.random.Generator, count: int, s: Array) -> Iterator[Geome
 
 def _bodies(scene: Scene, s: Array) -> list[Array]:
     """The vertices of every body in the world when the arm is at s."""
-    kinematics = Kinematics(scene)
+    kinematics = Kinematics.of(scene)
     return [kinematics.points(WORLD, body.body, body.vertices, s[None])[0] for body in scene.geometries]
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -53,18 +54,8 @@ class BroadPhase(Generic[R]):
 
     def __init__(self, kinematics: Kinematics, attempt: Callable[[Volumes], R | None]) -> None:
         self._attempt = attempt
-        self._partners: dict[str, set[str]] = {}
-        for pair in kinematics.scene.pairs:
-            self._partners.setdefault(pair.a, set()).add(pair.b)
-            self._partners.setdefault(pair.b, set()).add(pair.a)
+        self._partners, self._root = _trees(kinematics)
         self._tried: dict[tuple[Node, Node], R | None] = {}
-        self._root: dict[str, tuple[int, Node]] = {}
-        parts: dict[str, list[Geometry]] = {}
-        for geometry in map(kinematics.scene.geometry, self._partners):
-            parts.setdefault(kinematics.rigid_root(geometry.body), []).append(geometry)
-        for number, (body, geometries) in enumerate(parts.items()):
-            root = _tree(kinematics, body, geometries)
-            self._root |= {geometry.name: (number, root) for geometry in geometries}
 
     def find(self, pair: Pair) -> R | None:
         """The result for the largest volumes that have one and hold the pair; None when it has to be settled by itself."""
@@ -85,6 +76,23 @@ class BroadPhase(Generic[R]):
         others = set(b.volume.geometries)
         pairs = sum(len(self._partners[name] & others) for name in a.volume.geometries)
         return pairs > 1 or max(len(a.volume.geometries), len(b.volume.geometries)) == 1
+
+
+@lru_cache(maxsize=8)
+def _trees(kinematics: Kinematics) -> tuple[dict[str, set[str]], dict[str, tuple[int, Node]]]:
+    """Of every geometry: those that it makes a pair with; the number and the root of its tree."""
+    partners: dict[str, set[str]] = {}
+    for pair in kinematics.scene.pairs:
+        partners.setdefault(pair.a, set()).add(pair.b)
+        partners.setdefault(pair.b, set()).add(pair.a)
+    parts: dict[str, list[Geometry]] = {}
+    for geometry in map(kinematics.scene.geometry, partners):
+        parts.setdefault(kinematics.rigid_root(geometry.body), []).append(geometry)
+    roots: dict[str, tuple[int, Node]] = {}
+    for number, (body, geometries) in enumerate(parts.items()):
+        root = _tree(kinematics, body, geometries)
+        roots |= {geometry.name: (number, root) for geometry in geometries}
+    return partners, roots
 
 
 def _tree(kinematics: Kinematics, body: str, geometries: list[Geometry]) -> Node:

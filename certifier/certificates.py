@@ -152,7 +152,7 @@ class Certificates:
 
     def __init__(self, scene: Scene, box: Box, ellipsoid: Ellipsoid, scale: Array, share: float) -> None:
         self._scene, self._box, self._scale, self._share = scene, box, scale, share
-        self._kinematics = Kinematics(scene)
+        self._kinematics = Kinematics.of(scene)
         n = scene.n
         samples = np.random.default_rng(0).uniform(box.lower, box.upper, (CONE_SAMPLES, n))
         self._sides = Sides(self._kinematics, Polytope(np.zeros((0, n)), np.zeros(0)), box, tuple(range(2 * n)), box.mid, samples)

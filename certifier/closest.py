@@ -43,3 +43,19 @@ def closest(A: Array, B: Array) -> Closest:
     distance = float(np.linalg.norm(p_a - p_b))
     normal = (p_a - p_b) / distance if distance > 0 else np.zeros(3)
     return Closest(p_a, p_b, distance, normal, float((A @ normal).min() - (B @ normal).max()), (wa, wb))
+
+
+def first_within(A: Array, B: Array, reach: float) -> tuple[int, Closest] | None:
+    """The first of S configurations at which the hulls of A (S, v, 3) and B (S, w, 3) are not shown to be farther apart than ``reach``.
+
+    Most directions that keep bodies apart at one configuration do so at most of the others.
+    """
+    left = np.arange(len(A))
+    while len(left):
+        found = closest(A[left[0]], B[left[0]])
+        if not found.gap > reach:
+            return int(left[0]), found
+        left = left[1:]
+        gaps = (A[left] @ found.normal).min(axis=1) - (B[left] @ found.normal).max(axis=1)
+        left = left[~(gaps > reach)]
+    return None

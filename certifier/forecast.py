@@ -51,7 +51,7 @@ class PairCost:
 
 def forecast(scene: Scene) -> list[PairCost]:
     """One forecast for every pair of the scene, in the order of ``scene.pairs``."""
-    kinematics = Kinematics(scene)
+    kinematics = Kinematics.of(scene)
     costs = []
     for pair in scene.pairs:
         volumes = (Volume.of(scene.geometry(pair.a)), Volume.of(scene.geometry(pair.b)))

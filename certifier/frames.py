@@ -7,6 +7,7 @@ frame sits in the middle of the chain, nearer to the body with more vertices.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from certifier.basis import dimension
 from certifier.kinematics import Kinematics
@@ -24,13 +25,18 @@ class Frame:
 
 def choose_frame(kinematics: Kinematics, volumes: tuple[Volume, Volume]) -> Frame:
     """The cheapest frame on the path between the two volumes' bodies; ties go to the one nearer to a."""
-    scene = kinematics.scene
     a, b = volumes
+    return _cheapest(kinematics, a.body, b.body, len(a.vertices), len(b.vertices))
+
+
+@lru_cache(maxsize=4096)
+def _cheapest(kinematics: Kinematics, a: str, b: str, vertices_a: int, vertices_b: int) -> Frame:
+    n = kinematics.scene.n
     best: tuple[float, Frame] | None = None
-    for body in kinematics.bodies_between(a.body, b.body):
-        frame = Frame(body, _chain(kinematics, body, a.body), _chain(kinematics, body, b.body))
-        sides = ((a, frame.chain_a), (b, frame.chain_b))
-        cost = sum(len(volume.vertices) * dimension(len(chain), scene.n) ** 2 for volume, chain in sides)
+    for body in kinematics.bodies_between(a, b):
+        frame = Frame(body, _chain(kinematics, body, a), _chain(kinematics, body, b))
+        sides = ((vertices_a, frame.chain_a), (vertices_b, frame.chain_b))
+        cost = sum(vertices * dimension(len(chain), n) ** 2 for vertices, chain in sides)
         if best is None or cost < best[0]:
             best = cost, frame
     assert best is not None, "a path has at least one body"

@@ -341,7 +341,7 @@ def _certify(
 
 
 def _joints(scene: Scene, index: int) -> tuple[int, ...]:
-    kinematics = Kinematics(scene)
+    kinematics = Kinematics.of(scene)
     a, b = (scene.geometry(name).body for name in (scene.pairs[index].a, scene.pairs[index].b))
     return tuple(sorted(kinematics.chain(a, b)))
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -35,11 +35,17 @@ class Factor:
 
 
 class Kinematics:
-    """Paths and numerators of one scene."""
+    """Paths and numerators of one scene; see :meth:`of`."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self._paths: dict[tuple[str, str], list[Factor]] = {}
+
+    @staticmethod
+    @lru_cache(maxsize=8)
+    def of(scene: Scene) -> Kinematics:
+        """The scene's, made once."""
+        return Kinematics(scene)
 
     @cached_property
     def _joint_above(self) -> dict[str, Joint]:

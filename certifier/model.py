@@ -99,9 +99,9 @@ class Ignored:
     reason: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene:
-    """A kinematic tree with convex geometries and the pairs to certify.
+    """A kinematic tree with convex geometries and the pairs to certify; equal to itself alone, so that what is derived from it can be kept.
 
     Attributes:
         joints: every joint of the tree, welds included; each body but ``world`` is the child of exactly one.

@@ -15,7 +15,7 @@ import numpy as np
 
 from certifier.basis import subsets
 from certifier.broad_phase import BroadPhase, Volumes
-from certifier.closest import Closest, closest
+from certifier.closest import first_within
 from certifier.disproof import WitnessProof
 from certifier.dual import dual_proof
 from certifier.frames import Frame, choose_frame
@@ -98,7 +98,7 @@ class Certification:
         self._check = PairCheck(scene, self.ground)
         samples = hit_and_run(faces, self.center, CONE_SAMPLES, seed)
         self._screen = np.concatenate([self.center[None], samples])
-        self._kinematics = Kinematics(scene)
+        self._kinematics = Kinematics.of(scene)
         self._box, self._samples = box, samples
         m = len(kept)
         self._every = tuple(range(m))
@@ -137,7 +137,7 @@ class Certification:
         volumes = (Volume.of(self.scene.geometry(pair.a)), Volume.of(self.scene.geometry(pair.b)))
         frame = choose_frame(self._kinematics, volumes)
         contact = self._contact(volumes, frame, self._screen[:SCREEN_SAMPLES])
-        if isinstance(contact, _Witness):
+        if contact:
             return self._refute(pair, contact, Stage.SCREEN)
         while True:
             try:
@@ -158,7 +158,7 @@ class Certification:
             sides = self._sides(more)
         weak, pull = self._weak_points(frame, sides, solution), self._pull(frame, sides, solution)
         witness = self._contact(volumes, frame, np.concatenate([self._screen, weak[self._faces.contains(weak)]]))
-        if isinstance(witness, _Witness):
+        if witness:
             return self._refute(pair, witness, Stage.SOS)
         if solution.status is Status.INFEASIBLE:
             return replace(self._disprove(pair, frame, sides, blocks, solution), weak_points=weak, pull=pull)
@@ -226,20 +226,15 @@ class Certification:
         A, B = (self._points(volume, frame, self._screen[:GAP_SAMPLES]) for volume in volumes)
         least = APART * sum(float(np.linalg.norm(np.ptp(points, axis=0), axis=1).max()) for points in (A, B))
         least += sum(volume.radius for volume in volumes) + 2 * self.scene.padding
-        return all(closest(a, b).gap > least for a, b in zip(A, B, strict=True))
+        return first_within(A, B, least) is None
 
-    def _contact(self, volumes: Volumes, frame: Frame, s: Array) -> Closest | _Witness:
-        """A configuration among s (S, n), the centre first, at which the padded bodies touch; else the closest points at the centre."""
+    def _contact(self, volumes: Volumes, frame: Frame, s: Array) -> _Witness | None:
+        """A configuration among s (S, n), the centre first, at which the padded bodies touch."""
         a, b = volumes
         reach = a.radius + b.radius + 2 * self.scene.padding
         A, B = self._points(a, frame, s), self._points(b, frame, s)
-        first = closest(A[0], B[0])
-        gaps = (A @ first.normal).min(axis=1) - (B @ first.normal).max(axis=1)
-        for i in np.flatnonzero(gaps <= reach):
-            found = closest(A[i], B[i])
-            if found.gap <= reach:
-                return _Witness(s[i], found.weights)
-        return first
+        found = first_within(A, B, reach)
+        return None if found is None else _Witness(s[found[0]], found[1].weights)
 
     def _proof(self, volumes: Volumes, frame: Frame, sides: Sides, solution: Solution, kind: str) -> PairProof:
         n, u_c = self.scene.n, sides.u_c

@@ -14,12 +14,12 @@ Every bound, and the affine remainder in brackets, is a nonnegative combination 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 
 from certifier.model import Array
 from certifier.verify.box import check_box, upper_bound
+from certifier.verify.kinematics import exact
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def check_archimedean(C: Array, d: Array, proof: Archimedean) -> bool:
     if bound is None or not np.isfinite(proof.N):
         return False
     for lower, upper, rounded in zip(proof.lower, proof.upper, c, strict=True):
-        low, high = Fraction(float(lower)), Fraction(float(upper))
-        rest = low + high - Fraction(float(rounded))
+        low, high = exact(lower), exact(upper)
+        rest = low + high - exact(rounded)
         bound += rest * (high if rest > 0 else low) - low * high
-    return bound <= Fraction(proof.N)
+    return bound <= exact(proof.N)

@@ -6,14 +6,14 @@ r rarely vanishes; what is left of it is bounded by rows that bound one coordina
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import numpy as np
+from flint import fmpq
 
 from certifier.model import Array
+from certifier.verify.kinematics import exact
 
 
-def upper_bound(C: Array, d: Array, c: Array, y: Array) -> Fraction | None:
+def upper_bound(C: Array, d: Array, c: Array, y: Array) -> fmpq | None:
     """An exact upper bound of c's on {C s <= d}, with C (m, n), d (m,), c (n,), y (m,).
 
     None when y proves nothing: a multiplier is negative or not finite, or a residual meets no row that bounds its
@@ -21,13 +21,13 @@ def upper_bound(C: Array, d: Array, c: Array, y: Array) -> Fraction | None:
     """
     if y.shape != d.shape or not np.all(np.isfinite(y)) or np.any(y < 0):
         return None
-    bound = Fraction(0)
-    residual = [Fraction(float(x)) for x in c]
+    bound = fmpq(0)
+    residual = [exact(x) for x in c]
     for j in np.flatnonzero(y):
-        weight = Fraction(float(y[j]))
-        bound += weight * Fraction(float(d[j]))
+        weight = exact(y[j])
+        bound += weight * exact(d[j])
         for k in np.flatnonzero(C[j]):
-            residual[k] -= weight * Fraction(float(C[j, k]))
+            residual[k] -= weight * exact(C[j, k])
     for i, r in enumerate(residual):
         if r:
             limits = _single_row_limits(C, d, i, upper=r > 0)
@@ -37,11 +37,11 @@ def upper_bound(C: Array, d: Array, c: Array, y: Array) -> Fraction | None:
     return bound
 
 
-def _single_row_limits(C: Array, d: Array, i: int, upper: bool) -> list[Fraction]:
+def _single_row_limits(C: Array, d: Array, i: int, upper: bool) -> list[fmpq]:
     """Upper (or lower) bounds of s_i by the rows in which no other coordinate occurs."""
     alone = np.count_nonzero(C, axis=1) == 1
     rows = np.flatnonzero(alone & (C[:, i] > 0 if upper else C[:, i] < 0))
-    return [Fraction(float(d[j])) / Fraction(float(C[j, i])) for j in rows]
+    return [exact(d[j]) / exact(C[j, i]) for j in rows]
 
 
 def check_box(C: Array, d: Array, lower: Array, upper: Array, Y_lower: Array, Y_upper: Array) -> bool:
@@ -53,7 +53,7 @@ def check_box(C: Array, d: Array, lower: Array, upper: Array, Y_lower: Array, Y_
     return all(holds(C, d, eye[i], float(upper[i]), Y_upper[i]) and holds(C, d, -eye[i], -float(lower[i]), Y_lower[i]) for i in range(n))
 
 
-def holds(C: Array, d: Array, c: Array, value: float | Fraction, y: Array) -> bool:
+def holds(C: Array, d: Array, c: Array, value: float, y: Array) -> bool:
     """True when y proves c's <= value on {C s <= d}, exactly."""
     bound = upper_bound(C, d, c, y)
-    return bound is not None and bound <= value
+    return bound is not None and bool(np.isfinite(value)) and bound <= exact(value)

@@ -95,7 +95,7 @@ def test_the_exact_bound_is_exact():
     C, d = np.array([[0.1], [1.0], [-1.0]]), np.array([0.1, 5.0, 0.0])
     bound = upper_bound(C, d, np.ones(1), np.array([10.0, 0, 0]))
     tenth = Fraction(0.1)
-    assert bound == 10 * tenth  # 1 - 10 * tenth < 0 meets the lower bound, which is 0
+    assert Fraction(int(bound.p), int(bound.q)) == 10 * tenth  # 1 - 10 * tenth < 0 meets the lower bound, which is 0
     assert upper_bound(C[:2], d[:2], np.ones(1), np.array([10.0, 0])) is None
 
 
@@ -108,7 +108,7 @@ def test_support_is_proved_and_attained(case, seed):
     exact = upper_bound(polytope.C, polytope.d, c, y)
     reached = -linprog(-c, polytope.C, polytope.d, bounds=(None, None)).fun
     assert exact is not None
-    assert exact <= Fraction(value)
+    assert Fraction(int(exact.p), int(exact.q)) <= Fraction(value)
     assert abs(value - reached) <= 1e-7 * (1 + abs(reached))
 
 
