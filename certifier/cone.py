@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import blas, lapack
 
 from certifier.basis import Basis
-from certifier.kernels import cholesky_inverse, schur
+from certifier.kernels import cholesky_inverse, line_search, schur
 from certifier.model import Array
 
 MAX_NEWTON = 12
@@ -172,7 +172,7 @@ def conjugate(cone: Cone, s: Array, start: Array, tolerance: float, max_iteratio
         if decrement.max() < tolerance or iteration == max_iterations:
             break
         relative = np.linalg.eigvalsh(inverse_chol @ cone.adjoint(step) @ np.swapaxes(inverse_chol, -1, -2)).reshape(len(x), -1)
-        lengths = np.where(decrement < 0.1, 1.0, _line_search(relative, np.einsum("rn,rn->r", s, step)))
+        lengths = np.where(decrement < 0.1, 1.0, line_search(relative, np.einsum("rn,rn->r", s, step)))
         x = x + lengths[:, None] * step
     determinants = -2 * np.log(np.diagonal(inverse_chol, axis1=2, axis2=3)).sum(axis=(1, 2))
     return Conjugate(x, Q, step, decrement, factor, determinants - np.einsum("rn,rn->r", s, x) + square / 2)
@@ -206,18 +206,3 @@ class Centre:
     def solve(self, v: Array) -> Array:
         """H^-1 v, (R, N) -> (R, N)."""
         return self.factor.solve(v.T[None])[0].T
-
-
-def _line_search(eigenvalues: Array, slope: Array) -> Array:
-    """The minimisers a, (R,), of a slope_r - sum_i log(1 + a eigenvalue_ri), by safeguarded Newton from 0."""
-    lowest = eigenvalues.min(axis=1)
-    upper = np.where(lowest < 0, -0.99 / np.minimum(lowest, -1e-300), 1e3)
-    a = np.zeros(len(slope))
-    for _ in range(30):
-        terms = eigenvalues / (1 + a[:, None] * eigenvalues)
-        change = (terms.sum(axis=1) - slope) / np.square(terms).sum(axis=1)
-        following = np.minimum(np.maximum(a + change, 0.0), a + 0.9 * (upper - a))
-        if (np.abs(following - a) < 1e-3 * np.maximum(following, 1e-3)).all():
-            return following
-        a = following
-    return a

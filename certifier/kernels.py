@@ -123,6 +123,27 @@ def lowest_relative_eigenvalue(inverse: Array, D: Array, tolerance: float) -> fl
 
 
 @njit(cache=True)
+def line_search(eigenvalues: Array, slope: Array) -> Array:
+    """The minimisers a, (R,), of a slope_r - sum_i log(1 + a eigenvalue_ri), by safeguarded Newton from 0."""
+    lengths = np.empty(len(slope))
+    for r in range(len(slope)):
+        lowest, a, following = eigenvalues[r].min(), 0.0, 0.0
+        upper = -0.99 / lowest if lowest < 0 else 1e3
+        for _ in range(30):
+            first, second = 0.0, 0.0
+            for value in eigenvalues[r]:
+                term = value / (1 + a * value)
+                first += term
+                second += term * term
+            following = min(max(a + (first - slope[r]) / second, 0.0), a + 0.9 * (upper - a))
+            if abs(following - a) < 1e-3 * max(following, 1e-3):
+                break
+            a = following
+        lengths[r] = following
+    return lengths
+
+
+@njit(cache=True)
 def _count_below(diagonal: Array, off: Array, x: float) -> int:
     """1 if the tridiagonal matrix has an eigenvalue below x, else 0 (Sturm)."""
     if x == np.inf:

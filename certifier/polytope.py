@@ -233,16 +233,21 @@ def _proved_bounds(polytope: Polytope, directions: Array, Y: Array, lo: Array, h
 
 def _axis_limits(polytope: Polytope) -> tuple[Array, NDArray[np.int64]]:
     """(2n,) bounds of the directions e_i, then -e_i, by single rows, rounded up or inf, and the row (2n,) that each comes from."""
-    C, d = polytope.C, polytope.d
-    n = C.shape[1]
+    return _single_rows(polytope.C, polytope.d)
+
+
+@njit(cache=True)
+def _single_rows(C: Array, d: Array) -> tuple[Array, NDArray[np.int64]]:
+    m, n = C.shape
     limits, rows = np.full(2 * n, np.inf), np.zeros(2 * n, dtype=np.int64)
-    for j in np.flatnonzero((C != 0).sum(axis=1) == 1):
-        i = int(np.flatnonzero(C[j])[0])
-        a = abs(C[j, i])
-        limit = d[j] if a == 1 else np.nextafter(d[j] / a, np.inf)
-        side = i if C[j, i] > 0 else n + i
-        if limit < limits[side]:
-            limits[side], rows[side] = limit, j
+    for j in range(m):
+        if np.count_nonzero(C[j]) == 1:
+            i = np.flatnonzero(C[j])[0]
+            a = abs(C[j, i])
+            limit = d[j] if a == 1 else np.nextafter(d[j] / a, np.inf)
+            side = i if C[j, i] > 0 else n + i
+            if limit < limits[side]:
+                limits[side], rows[side] = limit, j
     return limits, rows
 
 

@@ -251,7 +251,7 @@ class _Pool:
         self._scene = scene
         self.arrays: dict[str, np.ndarray] = {}
         self._volumes: list[dict[str, Any]] = []
-        self._known: dict[str, int] = {}
+        self._known: dict[tuple[str | bytes, ...], int] = {}
         self._proofs = 0
 
     def add(self, proof: PairProof) -> dict[str, Any]:
@@ -289,10 +289,9 @@ class _Pool:
 
     def _once(self, kind: str, header: dict[str, Any], arrays: dict[str, np.ndarray]) -> int:
         """The number of these arrays among those of their kind, stored if they are new."""
-        content = hashlib.sha256(b"".join(npy(a) for a in arrays.values())).hexdigest()
-        key = f"{kind} {json.dumps(header)} {content}"
+        key: tuple[str | bytes, ...] = (kind, json.dumps(header), *(npy(a) for a in arrays.values()))
         if key not in self._known:
-            self._known[key] = index = sum(known.startswith(f"{kind} ") for known in self._known)
+            self._known[key] = index = sum(known[0] == kind for known in self._known)
             self.arrays |= {f"{kind}/{index}/{name}": value for name, value in arrays.items()}
         return self._known[key]
 

@@ -11,6 +11,7 @@ below 2^48, and up to 16 such arrays may be added before :func:`normal`. There 2
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -45,10 +46,13 @@ def normal(x: Array) -> Array:
     """The same integers in normal limbs; the limbs given are integers below 2^52 in magnitude."""
     # Three limbs more take up what reaches beyond the last one.
     limbs = np.concatenate([x, np.zeros((3, *x.shape[1:]))])
-    for i in range(len(limbs) - 1):
-        carry = np.floor(limbs[i] * (1 / BASE))
-        limbs[i] -= BASE * carry
-        limbs[i + 1] += carry
+    carry = np.empty(x.shape[1:])
+    for low, high in itertools.pairwise(limbs):
+        np.multiply(low, 1 / BASE, out=carry)
+        np.floor(carry, out=carry)
+        high += carry
+        carry *= BASE
+        low -= carry
     return _trimmed(limbs)
 
 
