@@ -40,7 +40,7 @@ MAX_ATTEMPTS = 60
 """Faces added for one pair before the targeted contraction gives up."""
 FAILURES = 2
 """Pairs for which faces are added at once, so that two workers can look for them."""
-PUSH, SMALLEST_PUSH = 1.5, 0.1
+FAR, PUSH, SMALLEST_PUSH = 8.0, 1.5, 0.1
 """Factor by which faces are pushed out from the centre at first, and the least growth of it that is tried."""
 
 
@@ -453,15 +453,16 @@ def _no_smaller(scene: Scene, state: dict[str, Any], label: str, failures: list[
     return Transition(state, Finish(combine(outcomes), reason))
 
 
-def _push(scene: Scene, state: dict[str, Any], reach: float = PUSH) -> Transition:
+def _push(scene: Scene, state: dict[str, Any], reach: float | None = None) -> Transition:
     """The next push from the best region, or the alternation when there were enough."""
     pushes = state.get("pushes", 0)
+    # What IRIS cut off collides; around a given polytope nothing is known.
+    given = state["proposal"].get("method") in (Method.BOX, Method.POLYTOPE)
+    reach = reach or (FAR if given and not pushes else PUSH)
     if pushes >= _most(scene, state, "pushes") or reach - 1 < SMALLEST_PUSH:
         return _step(scene, state)
     best, limits = state["best"], 2 * scene.n
     C, d, center = np.array(best["C"])[:-limits], np.array(best["d"])[:-limits], np.array(best["center"])
-    # What IRIS cut off collides; around a given polytope nothing is known.
-    given = state["proposal"].get("method") in (Method.BOX, Method.POLYTOPE)
     rows = scene.polytope([], []) if given else Polytope(np.array(state["rows"]["C"]), np.array(state["rows"]["d"]))
     pushed = Polytope(np.concatenate([C, rows.C]), np.concatenate([C @ center + reach * (d - C @ center), rows.d]))
     kept = drop_redundant(pushed, fixed=limits)

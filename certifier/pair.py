@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -114,7 +115,7 @@ class Certification:
         """
         start, pair = time.perf_counter(), self.scene.pairs[index]
         if every_face:
-            result = self._certify(pair, max_iterations, self._sides(self._every))
+            result = self._certify(pair, max_iterations, self._all)
         else:
             result = self._broad_phase.find(pair) or self._certify(pair, max_iterations, self._first)
         return replace(result, seconds=time.perf_counter() - start)
@@ -148,14 +149,14 @@ class Certification:
             except np.linalg.LinAlgError as error:
                 if sides.faces == self._every:
                     return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"numerical trouble: {error}")
-                sides = self._sides(self._every)
+                sides = self._all
                 continue
             if solution.status is Status.FEASIBLE:
                 return self._prove(volumes, frame, sides, solution)
             more = self._more_faces(frame, sides, solution)
             if more == sides.faces:
                 break
-            sides = self._sides(more)
+            sides = self._all if more == self._every else self._sides(more)
         weak, pull = self._weak_points(frame, sides, solution), self._pull(frame, sides, solution)
         witness = self._contact(volumes, frame, np.concatenate([self._screen, weak[self._faces.contains(weak)]]))
         if witness:
@@ -164,6 +165,11 @@ class Certification:
             return replace(self._disprove(pair, frame, sides, blocks, solution), weak_points=weak, pull=pull)
         detail = f"{solution.status.value} after {solution.iterations} iterations"
         return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak, pull=pull)
+
+    @cached_property
+    def _all(self) -> Sides:
+        """Those of all faces."""
+        return self._first if self._first.faces == self._every else self._sides(self._every)
 
     def _sides(self, faces: tuple[int, ...]) -> Sides:
         return Sides(self._kinematics, self._faces, self._box, faces, self.center, self._samples)
