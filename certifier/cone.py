@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import blas, lapack
 
 from certifier.basis import Basis
-from certifier.kernels import cholesky_inverse, line_search, schur
+from certifier.kernels import adjoint, cholesky_inverse, line_search, schur, values
 from certifier.model import Array
 
 MAX_NEWTON = 12
@@ -36,10 +36,11 @@ class Cone:
     """
 
     def __init__(self, rho: Array, grid: int, weights: Array, slopes: Array) -> None:
-        self.rho, self.grid, self.weights, self.slopes = rho, grid, weights, slopes
+        self.rho, self.grid, self.weights, self.slopes = rho, grid, np.ascontiguousarray(weights), np.ascontiguousarray(slopes)
         self.N = len(rho) + slopes.shape[1] * grid
         self.K, self.L = len(weights), rho.shape[1]
         self._products = (rho[:, :, None] * rho[:, None, :]).reshape(len(rho), -1)
+        self._transposed = np.ascontiguousarray(self._products.T)
 
     @classmethod
     def of_faces(cls, basis: Basis, constant: Array, chain: Array, outside: Array) -> Cone:
@@ -55,19 +56,12 @@ class Cone:
 
     def adjoint(self, x: Array) -> Array:
         """Lambda_j(x): (R, N) -> (R, K, L, L)."""
-        NA, M = len(self.rho), self.grid
-        scaled = self.weights * x[:, None, :NA]
-        if self.slopes.shape[1]:
-            scaled[:, :, :M] += np.matmul(self.slopes, x[:, NA:].reshape(len(x), -1, M))
-        return (scaled.reshape(-1, NA) @ self._products).reshape(len(x), self.K, self.L, self.L)
+        found = adjoint(self.weights, self.slopes, self.grid, self._products, np.ascontiguousarray(x))
+        return found.reshape(len(x), self.K, self.L, self.L)
 
     def values(self, Q: Array) -> Array:
         """Coordinates of sum_j g_j rho' Q_j rho: (R, K, L, L) -> (R, N)."""
-        R = len(Q)
-        squares = (Q.reshape(R * self.K, -1) @ self._products.T).reshape(R, self.K, -1)
-        first = np.einsum("kn,rkn->rn", self.weights, squares)
-        rest = np.matmul(self.slopes.T, squares[:, :, : self.grid]).reshape(R, -1)
-        return np.concatenate([first, rest], axis=1)
+        return values(self.weights, self.slopes, self.grid, self._transposed, Q.reshape(-1, self.L**2))
 
     def schur(self, Q: Array, S: Array) -> Array:
         """H of x -> values(Q Lambda(x) S), symmetrised: (R, K, L, L) twice -> (R, N, N), lower triangles only."""

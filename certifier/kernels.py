@@ -123,6 +123,43 @@ def lowest_relative_eigenvalue(inverse: Array, D: Array, tolerance: float) -> fl
 
 
 @njit(cache=True)
+def adjoint(weights: Array, slopes: Array, grid: int, products: Array, x: Array) -> Array:
+    """Lambda_j(x), (R K, L^2), as certifier.cone has it; x (R, N), products (N_A, L^2) of rho."""
+    R, (K, NA) = len(x), weights.shape
+    scaled = np.empty((R * K, NA))
+    for r in range(R):
+        for k in range(K):
+            row = scaled[r * K + k]
+            for i in range(NA):
+                row[i] = weights[k, i] * x[r, i]
+            for joint in range(slopes.shape[1]):
+                slope, start = slopes[k, joint], NA + joint * grid
+                if slope != 0.0:
+                    for i in range(grid):
+                        row[i] += slope * x[r, start + i]
+    return np.dot(scaled, products)
+
+
+@njit(cache=True)
+def values(weights: Array, slopes: Array, grid: int, products: Array, Q: Array) -> Array:
+    """Coordinates of sum_j g_j rho' Q_j rho, (R, N), as certifier.cone has it; Q (R K, L^2), products (L^2, N_A) of rho."""
+    K, NA = weights.shape
+    R, squares = len(Q) // K, np.dot(Q, products)
+    sums = np.zeros((R, NA + slopes.shape[1] * grid))
+    for r in range(R):
+        for k in range(K):
+            row = squares[r * K + k]
+            for i in range(NA):
+                sums[r, i] += weights[k, i] * row[i]
+            for joint in range(slopes.shape[1]):
+                slope, start = slopes[k, joint], NA + joint * grid
+                if slope != 0.0:
+                    for i in range(grid):
+                        sums[r, start + i] += slope * row[i]
+    return sums
+
+
+@njit(cache=True)
 def line_search(eigenvalues: Array, slope: Array) -> Array:
     """The minimisers a, (R,), of a slope_r - sum_i log(1 + a eigenvalue_ri), by safeguarded Newton from 0."""
     lengths = np.empty(len(slope))

@@ -107,7 +107,7 @@ class Kinematics:
     def points(self, frame: str, body: str, vertices: Array, s: Array) -> Array:
         """Positions in F, metres, of vertices (V, 3) of B at the rows of s: (N, V, 3)."""
         X = self.numerators(frame, body, s)
-        return (np.einsum("nij,vj->nvi", X[:, :3, :3], vertices) + X[:, None, :3, 3]) / X[:, 3, 3, None, None]
+        return (vertices @ np.swapaxes(X[:, :3, :3], 1, 2) + X[:, None, :3, 3]) / X[:, 3, 3, None, None]
 
 
 def skew(u: Array) -> Array:
