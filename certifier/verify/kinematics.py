@@ -7,11 +7,14 @@ tau + s, up to the common factor (1 + tau^2)(1 + s^2), which is the joint's deno
 
 from __future__ import annotations
 
+from typing import Any
+
 from flint import arb, ctx, fmpq, fmpq_mpoly, fmpq_mpoly_ctx
 
 from certifier.model import WORLD, Array, Joint, JointKind, Scene
 
 Matrix = list[list[fmpq_mpoly]]
+Numbers = list[list[fmpq]]
 _TAU_BITS = 110
 
 
@@ -56,11 +59,16 @@ class ExactKinematics:
 
     def pose(self, frame: str, body: str) -> Matrix:
         """(4, 4) polynomials: X_FB times its denominator, the entry [3][3] = prod (1 + tau_i^2)(1 + s_i^2)."""
-        X = self._constant([[fmpq(int(i == j)) for j in range(4)] for i in range(4)])
+        # Constant factors are multiplied as numbers.
+        fixed = _identity()
+        X = self._constant(fixed)
         for joint, upwards in self.path(frame, body):
-            for factor in self._joint(joint, upwards):
-                X = _multiply(X, factor)
-        return X
+            outer, middle, inner = self._joint(joint, upwards)
+            fixed = _multiply(fixed, outer)
+            if middle is not None:
+                X, fixed = _multiply(X, _multiply(fixed, middle)), _identity()
+            fixed = _multiply(fixed, inner)
+        return _multiply(X, fixed)
 
     def fixed_pose(self, frame: str, body: str) -> list[list[fmpq]] | None:
         """(4, 4) X_FB of two bodies that are welded together, perhaps through others; None if a joint between them moves."""
@@ -80,24 +88,25 @@ class ExactKinematics:
     def _constant(self, rows: list[list[fmpq]]) -> Matrix:
         return [[self._ring.constant(x) for x in row] for row in rows]
 
-    def _joint(self, joint: Joint, upwards: bool) -> list[Matrix]:
+    def _joint(self, joint: Joint, upwards: bool) -> tuple[Numbers, Matrix | None, Numbers]:
+        """The joint's fixed frame, its motion, and the other one."""
         parent, child = _rational(joint.X_PF), _rational(joint.X_BM)
         if upwards:
             outer, inner = child, _inverse(parent)
         else:
             outer, inner = parent, _inverse(child)
         if joint.index is None:
-            return [self._constant(outer), self._constant(inner)]
+            return outer, None, inner
         axis = [exact(-x if upwards else x) for x in joint.axis]
         s, q = self._s[joint.index], float(self._q_star[joint.index])
         if joint.kind is JointKind.PRISMATIC:
-            middle = self._constant([[fmpq(int(i == j)) for j in range(4)] for i in range(4)])
+            middle = self._constant(_identity())
             for i in range(3):
                 middle[i][3] = axis[i] * (s + exact(q))
         else:
             tau = half_tangent(q)
             middle = self._rotation(axis, 1 - tau * s, tau + s)
-        return [self._constant(outer), middle, self._constant(inner)]
+        return outer, middle, inner
 
     def _rotation(self, axis: list[fmpq], cosine: fmpq_mpoly, sine: fmpq_mpoly) -> Matrix:
         """(c^2 + s^2) R about the axis for half-angle cosine and sine: (c^2 + s^2) I + 2 c s [u] + 2 s^2 [u]^2."""
@@ -111,18 +120,23 @@ class ExactKinematics:
         return [*rows, [none, none, none, norm]]
 
 
-def _rational(X: Array) -> list[list[fmpq]]:
+def _identity() -> Numbers:
+    return [[fmpq(int(i == j)) for j in range(4)] for i in range(4)]
+
+
+def _rational(X: Array) -> Numbers:
     return [[exact(x) for x in row] for row in X]
 
 
-def _inverse(X: list[list[fmpq]]) -> list[list[fmpq]]:
+def _inverse(X: Numbers) -> Numbers:
     """Of a rigid transform: the rotation is transposed."""
     R = [[X[j][i] for j in range(3)] for i in range(3)]
     p = [-sum((R[i][j] * X[j][3] for j in range(3)), fmpq(0)) for i in range(3)]
     return [[*R[i], p[i]] for i in range(3)] + [[fmpq(0), fmpq(0), fmpq(0), fmpq(1)]]
 
 
-def _multiply(A: Matrix, B: Matrix) -> Matrix:
+def _multiply(A: Any, B: Any) -> Any:
+    """Of numbers, polynomials, or either and the other."""
     product = []
     for row in A:
         terms = [(k, x) for k, x in enumerate(row) if x != 0]
