@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from certifier.errors import RegionError
 from certifier.model import Array, Polytope
@@ -61,7 +60,6 @@ def inscribed_ellipsoid(polytope: Polytope) -> Ellipsoid:
     return Ellipsoid(center, shape * (min(1.0, reach) * _SHRINK))
 
 
-@njit(cache=True)
 def _largest(A: Array) -> tuple[Array, Array]:
     """Centre x (n,) and square E^2 (n, n) of the largest ellipsoid {x + E u} in {A x <= 1}: maximise log det E, |E a_i| + a_i'x <= 1.
 
@@ -74,35 +72,35 @@ def _largest(A: Array) -> tuple[Array, Array]:
         np.linalg.LinAlgError: it does not converge.
     """
     m, n = A.shape
-    transposed = np.ascontiguousarray(A.T)
     x, slack = np.zeros(n), np.ones(m)
-    h = np.sqrt(np.diag(A @ np.linalg.inv(transposed @ A) @ transposed))
+    h = np.sqrt(np.einsum("ij,ij->i", A @ np.linalg.inv(A.T @ A), A))
     y = np.full(m, h.max() ** 2)
     z = np.maximum(0.1, 1 - h / h.max())
     for _ in range(_ITERATIONS):
-        square = np.linalg.inv((transposed * y) @ A)
-        Q = A @ square @ transposed
-        h = np.sqrt(np.diag(Q))
-        gap = np.sum(y * z) / m
+        yA = y[:, None] * A
+        square = np.linalg.inv(A.T @ yA)
+        Q = A @ square @ A.T
+        h = np.sqrt(Q.diagonal())
+        yz = y * z
+        gap = float(yz.sum()) / m
         mu = max(min(0.5, gap) * gap, _GAP)
-        central, primal, dual = mu - y * z, slack - h - z, transposed @ (y * h)
-        residual = max(np.abs(central).max(), np.abs(primal).max(), np.abs(dual).max())
+        central, primal, dual = mu - yz, slack - h - z, h @ yA
+        residual = max(float(np.abs(r).max()) for r in (central, primal, dual))
         if residual < _RESIDUAL and mu == _GAP:
             return x, square
         weight = 2 * y * h
-        G = Q * Q * np.outer(y, y) + np.diag(weight * z)
-        P = np.linalg.solve(G, A * (y * (h + z)).reshape(-1, 1)) * weight.reshape(-1, 1) - A * y.reshape(-1, 1)
-        P = np.ascontiguousarray(P.T)
+        G = Q * Q * (y[:, None] * y)
+        G.flat[:: m + 1] += weight * z
         missing = primal - central / y
+        # Both systems with one factorisation: dy = T dx - v.
+        solved = np.linalg.solve(G, np.column_stack([(h + z)[:, None] * yA, weight * missing, weight[:, None] * A]))
+        P = (weight[:, None] * solved[:, :n] - yA).T
         dx = np.linalg.solve(P @ A, P @ missing - dual)
         towards = A @ dx
-        dy = np.linalg.solve(G, weight * (towards - missing))
+        dy = solved[:, n + 1 :] @ dx - solved[:, n]
         dz = central / y - z * dy
-        length = max(0.75, 1 - residual) / max(1.0, (towards / slack).max(), (-dy).max(), (-dz / z).max())
-        x += length * dx
-        slack -= length * towards
-        y *= 1 + length * dy
-        z += length * dz
+        length = max(0.75, 1 - residual) / max(1.0, float((towards / slack).max()), -float(dy.min()), float((-dz / z).max()))
+        x, slack, y, z = x + length * dx, slack - length * towards, y * (1 + length * dy), z + length * dz
     raise np.linalg.LinAlgError("no convergence")
 
 

@@ -233,22 +233,30 @@ def _proved_bounds(polytope: Polytope, directions: Array, Y: Array, lo: Array, h
 
 def _axis_limits(polytope: Polytope) -> tuple[Array, NDArray[np.int64]]:
     """(2n,) bounds of the directions e_i, then -e_i, by single rows, rounded up or inf, and the row (2n,) that each comes from."""
-    return _single_rows(polytope.C, polytope.d)
+    C, d = polytope.C, polytope.d
+    n = C.shape[1]
+    rows = np.full(2 * n, -1)
+    _single_rows(C, d, rows)
+    a = np.abs(C[rows, np.tile(np.arange(n), 2)])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        limits = np.where(a == 1, d[rows], np.nextafter(d[rows] / a, np.inf))
+    return np.where(rows < 0, np.inf, limits), rows
 
 
 @njit(cache=True)
-def _single_rows(C: Array, d: Array) -> tuple[Array, NDArray[np.int64]]:
+def _single_rows(C: Array, d: Array, rows: NDArray[np.int64]) -> None:
+    """The row that gives the least bound alone, for e_i, then -e_i; -1 stays where there is none."""
     m, n = C.shape
-    limits, rows = np.full(2 * n, np.inf), np.zeros(2 * n, dtype=np.int64)
     for j in range(m):
-        if np.count_nonzero(C[j]) == 1:
-            i = np.flatnonzero(C[j])[0]
-            a = abs(C[j, i])
-            limit = d[j] if a == 1 else np.nextafter(d[j] / a, np.inf)
-            side = i if C[j, i] > 0 else n + i
-            if limit < limits[side]:
-                limits[side], rows[side] = limit, j
-    return limits, rows
+        axis, entries = 0, 0
+        for i in range(n):
+            if C[j, i] != 0:
+                axis, entries = i, entries + 1
+        if entries == 1:
+            side = axis if C[j, axis] > 0 else n + axis
+            held = rows[side]
+            if held < 0 or d[j] / abs(C[j, axis]) < d[held] / abs(C[held, axis]):
+                rows[side] = j
 
 
 def _need_limits(limits: Array) -> None:

@@ -31,62 +31,57 @@ def hit_and_run(polytope: Polytope, start: ArrayLike, count: int, seed: int) -> 
         RegionError: ``start_outside`` when C s < d does not hold at the start; ``polytope_unbounded`` when a chord of P has no end.
     """
     start = np.asarray(start, dtype=float)
-    n, blocks = len(start), -(-count // CHAINS)
+    n = len(start)
     if not np.all(polytope.C @ start < polytope.d):
         raise RegionError("start_outside", "sampling must start at a point inside the polytope", field="start")
-    adapting = np.array([n, 2 * n, 4 * n, 8 * n])
-    steps = np.concatenate([adapting, [30 * n], np.full(blocks, 2 * n + 10)])
-    random = np.random.default_rng(seed).random((2, steps.sum(), CHAINS))
-    samples = np.zeros((blocks + 1, CHAINS, n))
-    if not _sample(polytope.C, polytope.d, start, steps, len(adapting), random, samples):
+    rng = np.random.default_rng(seed)
+    s, shape = np.tile(start, (CHAINS, 1)), np.eye(n)
+    for steps in (n, 2 * n, 4 * n, 8 * n):
+        s = _walk(polytope, s, shape, steps, rng)
+        spread = s - s.mean(axis=0)
+        covariance = spread.T @ spread / (CHAINS - 1)
+        shape = np.linalg.cholesky(covariance + 1e-9 * np.trace(covariance) * np.eye(n))
+    s = _walk(polytope, s, shape, 30 * n, rng)
+    blocks = [s[:0]]
+    for _ in range(-(-count // CHAINS)):
+        s = _walk(polytope, s, shape, 2 * n + 10, rng)
+        blocks.append(s)
+    return np.concatenate(blocks)[:count]
+
+
+def _walk(polytope: Polytope, s: Array, shape: Array, steps: int, rng: np.random.Generator) -> Array:
+    """The chains s (k, n) after that many steps along columns of the shape."""
+    columns, places = rng.integers(len(shape), size=(len(s), steps)), rng.random((len(s), steps))
+    moves, slack = np.zeros(s.shape), np.maximum(polytope.d - s @ polytope.C.T, 0)
+    if not _steps((polytope.C @ shape).T.copy(), slack, columns, places, moves):
         raise RegionError(
             "polytope_unbounded", "a line through the polytope does not end", field="polytope", hint="add the joint limits as rows"
         )
-    return samples[1:].reshape(-1, n)[:count]
+    return s + moves @ shape.T
 
 
 @njit(cache=True)
-def _sample(C: Array, d: Array, start: Array, steps: Array, adapting: int, random: Array, samples: Array) -> bool:
-    """Walks of so many steps, the first few followed by a new covariance, the last ones' ends into samples[0], [1], ...; False when a chord
-    has no end.
+def _steps(speed: Array, slack: Array, columns: Array, places: Array, moves: Array) -> bool:
+    """Adds up the chains' moves (k, n), steps to places (k, steps) in [0, 1) of their chords; False when one has no end.
 
     Args:
-        random: (2, steps.sum(), k) uniform numbers in [0, 1): which column, which place on the chord.
+        speed: (n, m) by which the faces come nearer along a column; slack: (k, m), changed.
     """
-    chains, n = samples.shape[1:]
-    s, shape, done = np.zeros((chains, n)) + start, np.eye(n), 0
-    for phase in range(len(steps)):
-        speed, moves = np.ascontiguousarray((C @ shape).T), np.zeros((chains, n))
-        for chain in range(chains):
-            slack = np.maximum(d - C @ s[chain], 0)
-            for step in range(done, done + steps[phase]):
-                column = int(n * random[0, step, chain])
-                length = _move(slack, speed[column], random[1, step, chain])
-                if not np.isfinite(length):
-                    return False
-                moves[chain, column] += length
-        s += moves @ np.ascontiguousarray(shape.T)
-        done += steps[phase]
-        if phase < adapting:
-            spread = s - s.sum(axis=0) / chains
-            covariance = spread.T @ spread / (chains - 1)
-            shape = np.linalg.cholesky(covariance + 1e-9 * np.trace(covariance) * np.eye(n))
-        else:
-            samples[phase - adapting] = s
+    m = slack.shape[1]
+    for chain in range(len(moves)):
+        for step in range(columns.shape[1]):
+            column = columns[chain, step]
+            forth, back = np.inf, -np.inf
+            for j in range(m):
+                if speed[column, j] > 0:
+                    forth = min(forth, slack[chain, j] / speed[column, j])
+                elif speed[column, j] < 0:
+                    back = max(back, slack[chain, j] / speed[column, j])
+            if forth == np.inf or back == -np.inf:
+                return False
+            # The last digits stay inside, so that rounding never carries a chain through a face.
+            length = (1 - 1e-12) * (back + (forth - back) * places[chain, step])
+            moves[chain, column] += length
+            for j in range(m):
+                slack[chain, j] = max(slack[chain, j] - length * speed[column, j], 0.0)
     return True
-
-
-@njit(cache=True)
-def _move(slack: Array, speed: Array, place: float) -> float:
-    """The length of the step to a place of the chord along which the faces come nearer with this speed; the slack after it."""
-    forth, back = np.inf, -np.inf
-    for j in range(len(slack)):
-        if speed[j] > 0:
-            forth = min(forth, slack[j] / speed[j])
-        elif speed[j] < 0:
-            back = max(back, slack[j] / speed[j])
-    # The last digits stay inside, so that rounding never carries a chain through a face.
-    length = (1 - 1e-12) * (back + (forth - back) * place)
-    for j in range(len(slack)):
-        slack[j] = max(slack[j] - length * speed[j], 0.0)
-    return length

@@ -17,7 +17,7 @@ _PARALLEL = 1e-9
 _OPTIMAL = 1e-11
 """Most negative multiplier of an optimal vertex, relative to the objective."""
 _LEVEL = 1e-13
-"""Steps, relative to the offsets, that count as none."""
+"""Lengths of steps that count as none; the unknowns are of order one."""
 _PIVOTS = 50
 """Edges followed at most, for every row and unknown."""
 
@@ -38,116 +38,170 @@ def maximise(A: Array, b: Array, directions: Array, start: Array) -> tuple[Array
     rows = np.ascontiguousarray(A / norms[:, None])
     slack = np.maximum(b / norms - rows @ start, 0.0)
     points, multipliers = np.zeros(directions.shape), np.zeros((len(directions), len(b)))
-    _walk(rows, slack, np.ascontiguousarray(directions, dtype=float), points, multipliers)
+    if not _walk(rows, slack, np.ascontiguousarray(directions, dtype=float), points, multipliers):
+        raise np.linalg.LinAlgError("no vertex is the best")
     return start + points, multipliers / norms
 
 
 @njit(cache=True)
-def _walk(A: Array, b: Array, directions: Array, points: Array, multipliers: Array) -> None:
+def _walk(A: Array, b: Array, directions: Array, points: Array, multipliers: Array) -> bool:
     n = A.shape[1]
     basis = np.zeros(n, dtype=np.int64)
-    _vertex(A, b, directions[0], basis)
+    solved = _vertex(A, b, directions[0], basis)
     for k in range(len(directions)):
-        _along_edges(A, b, directions[k], basis, points[k], multipliers[k])
+        solved = solved and _along_edges(A, b, directions[k], basis, points[k], multipliers[k])
+    return solved
 
 
 @njit(cache=True)
-def _vertex(A: Array, b: Array, c: Array, basis: Array) -> None:
-    """Rows of a vertex that is reached from 0 without going down in c."""
+def _vertex(A: Array, b: Array, c: Array, basis: Array) -> bool:
+    """Rows of a vertex that is reached from 0 without going down in c; False when no face ends the way."""
     n = A.shape[1]
-    x, frame = np.zeros(n), np.zeros((n, n))
+    x, frame, v, unit = np.zeros(n), np.zeros((n, n)), np.zeros(n), np.zeros(n)
     for k in range(n):
-        v = _rest(frame, k, c)
-        size = np.sqrt(np.sum(c * c))
-        rising = np.sqrt(np.sum(v * v)) > _PARALLEL * size
+        rising = _rest(frame, k, c, v) > _PARALLEL * np.sqrt(_dot(c, c))
         if not rising:
-            longest = -1.0
+            longest, axis = -1.0, 0
             for i in range(n):
-                unit = np.zeros(n)
+                unit[:] = 0.0
                 unit[i] = 1.0
-                rest = _rest(frame, k, unit)
-                if np.sum(rest * rest) > longest:
-                    longest, v = np.sum(rest * rest), rest
-        v /= np.sqrt(np.sum(v * v))
-        entering, step = _first(A, b, x, v, basis[:k], False)
+                length = _rest(frame, k, unit, v)
+                if length > longest:
+                    longest, axis = length, i
+            unit[:] = 0.0
+            unit[axis] = 1.0
+            _rest(frame, k, unit, v)
+        _scale(v, 1 / np.sqrt(_dot(v, v)))
+        entering, step = _first(A, b, x, v, basis, k, False)
         if entering < 0 and not rising:
-            v = -v
-            entering, step = _first(A, b, x, v, basis[:k], False)
+            _scale(v, -1.0)
+            entering, step = _first(A, b, x, v, basis, k, False)
         if entering < 0:
-            raise np.linalg.LinAlgError("no face ends the way")
-        x += step * v
+            return False
+        for i in range(n):
+            x[i] += step * v[i]
         basis[k] = entering
-        row = _rest(frame, k, A[entering])
-        frame[k] = row / np.sqrt(np.sum(row * row))
+        length = _rest(frame, k, A[entering], v)
+        for i in range(n):
+            frame[k, i] = v[i] / length
+    return True
 
 
 @njit(cache=True)
-def _rest(frame: Array, k: int, v: Array) -> Array:
-    """The part of v that is orthogonal to the first k rows, which are orthonormal."""
-    rest = v.copy()
+def _dot(v: Array, w: Array) -> float:
+    total = 0.0
+    for i in range(len(v)):
+        total += v[i] * w[i]
+    return total
+
+
+@njit(cache=True)
+def _scale(v: Array, factor: float) -> None:
+    for i in range(len(v)):
+        v[i] *= factor
+
+
+@njit(cache=True)
+def _rest(frame: Array, k: int, v: Array, rest: Array) -> float:
+    """The part of v that is orthogonal to the first k rows, which are orthonormal, and its length."""
+    for i in range(len(v)):
+        rest[i] = v[i]
     for _ in range(2):
-        for i in range(k):
-            rest -= np.sum(frame[i] * rest) * frame[i]
-    return rest
+        for j in range(k):
+            along = _dot(frame[j], rest)
+            for i in range(len(v)):
+                rest[i] -= along * frame[j, i]
+    return np.sqrt(_dot(rest, rest))
 
 
 @njit(cache=True)
-def _first(A: Array, b: Array, x: Array, v: Array, basis: Array, lowest: bool) -> tuple[int, float]:
-    """The row that ends the way from x along v, none of the basis, and the length of the way; -1 if there is none.
+def _first(A: Array, b: Array, x: Array, v: Array, basis: Array, size: int, lowest: bool) -> tuple[int, float]:
+    """The row that ends the way from x along v, none of the first in the basis, and the length of the way; -1 if there is none.
 
     Of several the one that is met most squarely, or the one with the lowest number.
     """
-    m, n = A.shape
     entering, step, speed = -1, np.inf, 0.0
-    for j in range(m):
-        approach, slack = 0.0, b[j]
-        for i in range(n):
-            approach += A[j, i] * v[i]
-            slack -= A[j, i] * x[i]
+    for j in range(len(b)):
+        approach = _dot(A[j], v)
         if approach <= _PARALLEL:
             continue
-        time = max(slack, 0.0) / approach
+        time = max(b[j] - _dot(A[j], x), 0.0) / approach
         if time > step + _LEVEL or (time > step - _LEVEL and (lowest or approach <= speed)):
             continue
         used = False
-        for i in basis:
-            used = used or i == j
+        for i in range(size):
+            used = used or basis[i] == j
         if not used:
             entering, step, speed = j, min(time, step), approach
     return entering, step
 
 
 @njit(cache=True)
-def _along_edges(A: Array, b: Array, c: Array, basis: Array, x: Array, multipliers: Array) -> None:
-    """From the basis' vertex to the best one, which the basis then is; fills x and the multipliers."""
+def _edges(A: Array, basis: Array, edges: Array) -> bool:
+    """The columns of the inverse of the basis' rows (Gauss-Jordan, pivoted), row by row; False when they are numerically dependent."""
+    n = len(basis)
+    work = np.zeros((n, n))
+    for i in range(n):
+        for j in range(n):
+            work[i, j] = A[basis[j], i]
+            edges[i, j] = 1.0 if i == j else 0.0
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(work[i, k]) > abs(work[pivot, k]):
+                pivot = i
+        if abs(work[pivot, k]) < 1e-14:
+            return False
+        for j in range(n):
+            work[k, j], work[pivot, j] = work[pivot, j], work[k, j]
+            edges[k, j], edges[pivot, j] = edges[pivot, j], edges[k, j]
+        factor = 1 / work[k, k]
+        _scale(work[k], factor)
+        _scale(edges[k], factor)
+        for i in range(n):
+            if i != k:
+                factor = work[i, k]
+                for j in range(n):
+                    work[i, j] -= factor * work[k, j]
+                    edges[i, j] -= factor * edges[k, j]
+    return True
+
+
+@njit(cache=True)
+def _along_edges(A: Array, b: Array, c: Array, basis: Array, x: Array, multipliers: Array) -> bool:
+    """From the basis' vertex to the best one, which the basis then is; fills x and the multipliers. False when there is none."""
     m, n = A.shape
-    size = np.sqrt(np.sum(c * c))
-    inverse = np.linalg.inv(A[basis])
+    size = np.sqrt(_dot(c, c))
+    edges, v = np.zeros((n, n)), np.zeros(n)
+    if not _edges(A, basis, edges):
+        return False
     lowest = False
     for _ in range(_PIVOTS * (m + n)):
-        for i in range(n):
-            x[i] = np.sum(inverse[i] * b[basis])
         leaving, least, largest = -1, 0.0, 0.0
+        x[:] = 0.0
         for k in range(n):
-            y = np.sum(c * inverse[:, k])
+            for i in range(n):
+                x[i] += edges[k, i] * b[basis[k]]
+            y = _dot(c, edges[k])
             multipliers[basis[k]] = max(y, 0.0)
             largest = max(largest, abs(y))
             if y < -_OPTIMAL * size and (basis[k] < basis[leaving] if lowest and leaving >= 0 else y < least):
                 leaving, least = k, y
         if leaving < 0 or least > -1e-15 * largest:
-            return
-        multipliers[basis] = 0.0
-        v = -inverse[:, leaving]
-        length = np.sqrt(np.sum(v * v))
-        entering, step = _first(A, b, x, v / length, basis, lowest)
+            return True
+        for k in range(n):
+            multipliers[basis[k]] = 0.0
+            v[k] = -edges[leaving, k]
+        _scale(v, 1 / np.sqrt(_dot(v, v)))
+        entering, step = _first(A, b, x, v, basis, n, lowest)
         if entering < 0:
-            raise np.linalg.LinAlgError("no face ends the way")
+            return False
         lowest = step <= _LEVEL
-        pivot = np.sum(A[entering] * inverse[:, leaving])
-        column = inverse[:, leaving] / pivot
+        _scale(edges[leaving], 1 / _dot(A[entering], edges[leaving]))
         for k in range(n):
             if k != leaving:
-                inverse[:, k] -= np.sum(A[entering] * inverse[:, k]) * column
-        inverse[:, leaving] = column
+                rate = _dot(A[entering], edges[k])
+                for i in range(n):
+                    edges[k, i] -= rate * edges[leaving, i]
         basis[leaving] = entering
-    raise np.linalg.LinAlgError("too many edges")
+    return False
