@@ -41,7 +41,7 @@ MAX_ATTEMPTS = 60
 FAILURES = 2
 """Pairs for which faces are added at once, so that two workers can look for them."""
 FAR, PUSH, SMALLEST_PUSH = 8.0, 1.5, 0.1
-"""Factor by which faces are pushed out from the centre at first, and the least growth of it that is tried."""
+"""Factors by which faces are pushed out from the centre: at first around a given polytope, at first elsewhere; the least growth tried."""
 
 
 @dataclass(frozen=True)
