@@ -33,7 +33,7 @@ class PairCost:
         N_a, N_b: dimensions of the polynomial spaces (B.2).
         rationals: vertices of both bodies.
         seconds: on one thread of a 2.5 GHz core, roughly.
-        memory_bytes: peak of the solver's factors, of whatever may be tried.
+        memory_bytes: of the solver's factors and tables, for whatever may be tried.
     """
 
     a: str
@@ -58,7 +58,7 @@ def forecast(scene: Scene) -> list[PairCost]:
     for pair in scene.pairs:
         volumes = (Volume.of(scene.geometry(pair.a)), Volume.of(scene.geometry(pair.b)))
         frames = frames_to_try(kinematics, volumes)
-        frame, memory = frames[0], max(frame.memory(volumes) for frame in frames)
+        frame, memory = frames[0], max(frame.memory(volumes) + frame.tables for frame in frames)
         vertices = [len(volume.vertices) for volume in volumes]
         lengths, N = [len(frame.chain_a), len(frame.chain_b)], list(frame.dimensions)
         seconds = float(terms(len(frame.joints), vertices, N) @ SECONDS)

@@ -64,6 +64,15 @@ class Frame:
         columns = 2 * (4 * len(self.joints) + 5)
         return sum(8 * len(volume.vertices) * N * (N + columns) for volume, N in zip(volumes, self.dimensions, strict=True))
 
+    @property
+    def tables(self) -> int:
+        """Bytes of the products of the functions of either chain at its points (certifier.cone)."""
+        found = 0
+        for k in (len(self.chain_a), len(self.chain_b)):
+            products = 4**k + k * 4**k // 4 if self.at_rest else 4**k
+            found += 8 * self._dimension(k, k) * products
+        return found
+
 
 def frames_to_try(kinematics: Kinematics, volumes: tuple[Volume, Volume]) -> list[Frame]:
     """What is tried for two volumes, one after the other until one has a plane."""
