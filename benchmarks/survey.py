@@ -23,7 +23,7 @@ from certifier.proof import PairProof
 DECIDED = (Outcome.CERTIFIED, Outcome.REFUTED, Outcome.NOT_CERTIFIABLE)
 
 SizeClass = tuple[int, tuple[int, int], tuple[int, int]]
-"""n, the vertices of A and of B, the dimensions N of their polynomial spaces."""
+"""How many joints the plane moves with, the vertices of A and of B, the dimensions N of their polynomial spaces."""
 
 
 def survey(names: Iterable[str], most: float, progress: Progress) -> dict[str, Any]:
@@ -75,12 +75,12 @@ def _certified(scene: Scene, region: Region) -> Iterator[tuple[PairResult, float
 
 def _sizes(scene: Scene) -> list[SizeClass]:
     vertices = {geometry.name: len(geometry.vertices) for geometry in scene.geometries}
-    return [(scene.n, (vertices[cost.a], vertices[cost.b]), (cost.N_a, cost.N_b)) for cost in forecast(scene)]
+    return [(cost.joints, (vertices[cost.a], vertices[cost.b]), (cost.N_a, cost.N_b)) for cost in forecast(scene)]
 
 
 def _fit(seconds: dict[SizeClass, float]) -> dict[str, Any]:
     """The constants of the forecast that fit these mean times best, by relative error, and how well they and the present ones do."""
-    rows = np.array([terms(n, list(vertices), list(N)) for n, vertices, N in seconds])
+    rows = np.array([terms(joints, list(vertices), list(N)) for joints, vertices, N in seconds])
     measured = np.array(list(seconds.values()))
     constants, _ = nnls(rows / measured[:, None], np.ones(len(measured)))
     quantiles = {

@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from certifier.cone import Cone, Factor, conjugate
+from certifier.cone import Cone, Factor, conjugate, inverse_cholesky, relative_eigenvalues
 from certifier.model import Array
 
 CENTRED = 0.3
@@ -185,16 +185,15 @@ class Method:
             for block, x, factor in zip(group.blocks, xs, factors, strict=True):
                 _, local, coupled = block.columns()
                 ds = local @ dz_p + coupled @ dy[block.coupled]
-                chol = np.linalg.cholesky(block.cone.adjoint(x))
-                inverse = np.linalg.inv(chol)
+                inverse = [inverse_cholesky(Z) for Z in block.cone.adjoint(x)]
                 if factor is None:
-                    Q = np.swapaxes(inverse, -1, -2) @ inverse
+                    Q = [np.swapaxes(Li, -1, -2) @ Li for Li in inverse]
                     factor = Factor(block.cone.schur(Q, Q))
                 v = factor.solve(ds[:, :, None])[:, :, 0]
-                relative = np.linalg.eigvalsh(inverse @ block.cone.adjoint(v) @ np.swapaxes(inverse, -1, -2))
+                relative = relative_eigenvalues(inverse, block.cone.adjoint(v))
                 longest = min(longest, 1 / max(-float(relative.min()), 1e-300))
                 # x - a v is where Newton's method starts next; it must stay inside the dual cone.
-                row.append(v / np.maximum(1.0, relative.max(axis=(1, 2)) / 0.7)[:, None])
+                row.append(v / np.maximum(1.0, relative.max(axis=1) / 0.7)[:, None])
             moves.append(row)
             self.tick(self.iterations)
         return longest, moves

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from certifier.arrow import Group, Term
-from certifier.basis import basis, rho, subsets
+from certifier.basis import rho, subsets
 from certifier.cone import Cone
 from certifier.ellipsoid import Ellipsoid
 from certifier.kinematics import Kinematics
@@ -155,7 +155,8 @@ class Certificates:
         self._kinematics = Kinematics.of(scene)
         n = scene.n
         samples = np.random.default_rng(0).uniform(box.lower, box.upper, (CONE_SAMPLES, n))
-        self._sides = Sides(self._kinematics, Polytope(np.zeros((0, n)), np.zeros(0)), box, tuple(range(2 * n)), box.mid, samples)
+        none, every = Polytope(np.zeros((0, n)), np.zeros(0)), tuple(range(n))
+        self._sides = Sides(self._kinematics, none, box, every, tuple(range(2 * n)), box.mid, samples)
         inverse = np.linalg.inv(ellipsoid.shape)
         self._ball = inverse @ np.column_stack([box.mid - ellipsoid.center, np.diag(box.half)])
         self._center = ellipsoid.center
@@ -174,7 +175,7 @@ class Certificates:
         height = np.zeros(4 * (n + 1))
         for volume, radius, side, sign in zip(proof.volumes, radii, proof.sides, (1.0, -1.0), strict=True):
             chain = side.chain
-            space, (cone, centre) = basis(len(chain)), self._sides.cone(chain)
+            space, (cone, centre) = self._sides.space(chain), self._sides.cone(chain)
             u = self._sides.points(chain)
             s = box.mid + box.half * u
             lift = Lift(u, space.grid, self._sides.outside(chain), self._ball)

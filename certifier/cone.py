@@ -7,17 +7,19 @@
 Because rho_i rho_i' has rank one, the Schur complement is a sum of Hadamard products
 H = sum_j (g_j g_j') o (rho Q_j rho') o (rho S_j rho'), formed over the chain's points only (basis.py) and expanded by the
 slopes e_jl (Papp and Yildiz 2019; Loefberg and Parrilo 2004).
-Shapes: R rationals, K weights, L = 2^k, N_A chain points, M = 3^k of them the grid, o outside joints, N = N_A + o M.
+Shapes: R rationals, K weights, L functions, N_A chain points, M = 3^k of them the grid, o outside joints, N = N_A + o M.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import blas, lapack
 
-from certifier.basis import Basis
+from certifier.basis import Basis, subsets
 from certifier.kernels import adjoint, cholesky_inverse, line_search, schur, values
 from certifier.model import Array
 
@@ -25,48 +27,87 @@ MAX_NEWTON = 12
 NEWTON_TOLERANCE = 1e-3
 
 
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """Weights g_j that multiply sums of squares of the same functions.
+
+    Attributes:
+        rho: (N_A, L) values of the functions at the chain's points.
+        values: (K, N_A) chain part of every g_j at the points.
+        slopes: (K, o) coefficient of every outside coordinate in every g_j.
+    """
+
+    rho: Array
+    values: Array
+    slopes: Array
+
+    @cached_property
+    def products(self) -> Array:
+        """(N_A, L^2) the products rho_i rho_i'."""
+        return (self.rho[:, :, None] * self.rho[:, None, :]).reshape(len(self.rho), -1)
+
+    @cached_property
+    def transposed(self) -> Array:
+        """The same, (L^2, N_A)."""
+        return np.ascontiguousarray(self.products.T)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(K, L, L), of a rational's Gram matrices."""
+        K, L = len(self.values), self.rho.shape[1]
+        return K, L, L
+
+
 class Cone:
     """The cone of one side.
 
     Args:
-        rho: (N_A, L) values of rho at the chain's points.
         grid: M, how many leading points carry the outside joints.
-        weights: (K, N_A) chain part of every g_j at the points; row 0 is 1 for a pair's side.
-        slopes: (K, o) coefficient of every outside coordinate in every g_j.
+        parts: the weights, one part for every set of functions; the first weight is 1 for a pair's side. Gram matrices are lists over
+            the parts.
     """
 
-    def __init__(self, rho: Array, grid: int, weights: Array, slopes: Array) -> None:
-        self.rho, self.grid, self.weights, self.slopes = rho, grid, np.ascontiguousarray(weights), np.ascontiguousarray(slopes)
-        self.N = len(rho) + slopes.shape[1] * grid
-        self.K, self.L = len(weights), rho.shape[1]
-        self._products = (rho[:, :, None] * rho[:, None, :]).reshape(len(rho), -1)
-        self._transposed = np.ascontiguousarray(self._products.T)
+    def __init__(self, grid: int, *parts: Weights) -> None:
+        self.grid, self.parts = grid, parts
+        self._points, outside = len(parts[0].rho), parts[0].slopes.shape[1]
+        self.N = self._points + outside * grid
 
     @classmethod
     def of_faces(cls, basis: Basis, constant: Array, chain: Array, outside: Array) -> Cone:
-        """The cone of 1 and the faces g_j = constant_j + chain_j' u_A + outside_j' u_out, (m,), (m, k), (m, o)."""
+        """The cone of 1, the faces g_j = constant_j + chain_j' u_A + outside_j' u_out, (m,), (m, k), (m, o), and, for every chain
+        coordinate that may not have degree 3, of 1 - u_i^2 with the functions without u_i."""
         weights = np.concatenate([np.ones((1, len(basis.points))), constant[:, None] + chain @ basis.points.T])
         slopes = np.concatenate([np.zeros((1, outside.shape[1])), outside])
-        return cls(basis.rho, basis.grid, weights, slopes)
+        still, functions = np.zeros((1, outside.shape[1])), subsets(basis.k)
+        ranges = [
+            Weights(np.ascontiguousarray(basis.rho[:, functions[:, i] == 0]), 1 - basis.points[None, :, i] ** 2, still)
+            for i in range(basis.k)
+            if i not in basis.cubic
+        ]
+        return cls(basis.grid, Weights(basis.rho, weights, slopes), *ranges)
 
     @property
     def degree(self) -> int:
         """Barrier parameter of one rational."""
-        return self.K * self.L
+        return sum(K * L for K, L, _ in (part.shape for part in self.parts))
 
-    def adjoint(self, x: Array) -> Array:
-        """Lambda_j(x): (R, N) -> (R, K, L, L)."""
-        found = adjoint(self.weights, self.slopes, self.grid, self._products, np.ascontiguousarray(x))
-        return found.reshape(len(x), self.K, self.L, self.L)
+    def adjoint(self, x: Array) -> list[Array]:
+        """Lambda_j(x): (R, N) -> (R, K, L, L) for every part."""
+        x = np.ascontiguousarray(x)
+        return [adjoint(p.values, p.slopes, self.grid, p.products, x).reshape(len(x), *p.shape) for p in self.parts]
 
-    def values(self, Q: Array) -> Array:
-        """Coordinates of sum_j g_j rho' Q_j rho: (R, K, L, L) -> (R, N)."""
-        return values(self.weights, self.slopes, self.grid, self._transposed, Q.reshape(-1, self.L**2))
+    def values(self, Q: Sequence[Array]) -> Array:
+        """Coordinates of sum_j g_j rho' Q_j rho: (R, K, L, L) for every part -> (R, N)."""
+        total = np.zeros((len(Q[0]), self.N))
+        for part, matrices in zip(self.parts, Q, strict=True):
+            total += values(part.values, part.slopes, self.grid, part.transposed, matrices.reshape(-1, part.products.shape[1]))
+        return total
 
-    def schur(self, Q: Array, S: Array) -> Array:
-        """H of x -> values(Q Lambda(x) S), symmetrised: (R, K, L, L) twice -> (R, N, N), lower triangles only."""
-        H = np.zeros((len(Q), self.N, self.N))
-        schur(self.rho, self.weights, self.slopes, self.grid, Q, S, H)
+    def schur(self, Q: Sequence[Array], S: Sequence[Array]) -> Array:
+        """H of x -> values(Q Lambda(x) S), symmetrised: (R, K, L, L) for every part, twice -> (R, N, N), lower triangles only."""
+        H = np.zeros((len(Q[0]), self.N, self.N))
+        for part, left, right in zip(self.parts, Q, S, strict=True):
+            schur(part.rho, part.values, part.slopes, self.grid, left, right, H)
         return H
 
 
@@ -123,20 +164,26 @@ def symmetrise(X: Array) -> Array:
     return 0.5 * (X + np.swapaxes(X, -1, -2))
 
 
+def relative_eigenvalues(inverse_chol: Sequence[Array], D: Sequence[Array]) -> Array:
+    """Eigenvalues of all L^-1 D L^-T of a rational, (R, degree), from (R, K, L, L) for every part."""
+    found = [np.linalg.eigvalsh(Li @ d @ np.swapaxes(Li, -1, -2)) for Li, d in zip(inverse_chol, D, strict=True)]
+    return np.concatenate([part.reshape(len(part), -1) for part in found], axis=1)
+
+
 @dataclass(frozen=True)
 class Conjugate:
     """Where -grad F(x_r) = s_r, for R points s_r inside the cone: F*(s) = max over x of -s'x - F(x), with gradient -x and Hessian H(x)^-1.
 
     Attributes:
         x: (R, N), near the maximisers.
-        Q: (R, K, L, L) = Lambda(x)^-1.
+        Q: Lambda(x)^-1, (R, K, L, L) for every part.
         step: (R, N) Newton's next step, not taken; decrement: (R,) its length in the metric of the Hessian.
         factor: Cholesky factors of the Hessians at x.
         value: (R,) F*(s) to second order in the step.
     """
 
     x: Array
-    Q: Array
+    Q: list[Array]
     step: Array
     decrement: Array
     factor: Factor
@@ -156,8 +203,8 @@ def conjugate(cone: Cone, s: Array, start: Array, tolerance: float, max_iteratio
         raise np.linalg.LinAlgError("the point is not in the cone")
     x = start * (cone.degree / inner)[:, None]
     for iteration in range(max_iterations + 1):
-        inverse_chol = inverse_cholesky(cone.adjoint(x))
-        Q = np.swapaxes(inverse_chol, -1, -2) @ inverse_chol
+        inverse_chol = [inverse_cholesky(Z) for Z in cone.adjoint(x)]
+        Q = [np.swapaxes(Li, -1, -2) @ Li for Li in inverse_chol]
         residual = cone.values(Q) - s
         factor = Factor(cone.schur(Q, Q))
         step = factor.solve(residual[:, :, None])[:, :, 0]
@@ -165,10 +212,10 @@ def conjugate(cone: Cone, s: Array, start: Array, tolerance: float, max_iteratio
         decrement = np.sqrt(square)
         if decrement.max() < tolerance or iteration == max_iterations:
             break
-        relative = np.linalg.eigvalsh(inverse_chol @ cone.adjoint(step) @ np.swapaxes(inverse_chol, -1, -2)).reshape(len(x), -1)
+        relative = relative_eigenvalues(inverse_chol, cone.adjoint(step))
         lengths = np.where(decrement < 0.1, 1.0, line_search(relative, np.einsum("rn,rn->r", s, step)))
         x = x + lengths[:, None] * step
-    determinants = -2 * np.log(np.diagonal(inverse_chol, axis1=2, axis2=3)).sum(axis=(1, 2))
+    determinants = sum(-2 * np.log(np.diagonal(Li, axis1=2, axis2=3)).sum(axis=(1, 2)) for Li in inverse_chol)
     return Conjugate(x, Q, step, decrement, factor, determinants - np.einsum("rn,rn->r", s, x) + square / 2)
 
 
@@ -183,9 +230,9 @@ class Centre:
 
     Attributes:
         x: (N,) the point; w: (N,) = values(Q).
-        Q: (K, L, L) = Lambda(x)^-1.
+        Q: Lambda(x)^-1, (1, K, L, L) for every part.
         factor: Cholesky factor of the Hessian H at x.
-        unit_Q: (K, L, L) with values(unit_Q) = unit, the smallest in the metric of x.
+        unit_Q: like Q, with values(unit_Q) = unit, the smallest in the metric of x.
 
     Raises:
         np.linalg.LinAlgError: the cone is numerically degenerate.
@@ -193,9 +240,9 @@ class Centre:
 
     def __init__(self, cone: Cone, unit: Array, start: Array) -> None:
         found = conjugate(cone, unit[None], start[None], NEWTON_TOLERANCE, MAX_NEWTON)
-        self.x, self.Q, self.factor = found.x[0], found.Q[0], found.factor
+        self.x, self.Q, self.factor = found.x[0], found.Q, found.factor
         self.w = cone.values(found.Q)[0]
-        self.unit_Q = self.Q @ cone.adjoint(self.solve(unit[None]))[0] @ self.Q
+        self.unit_Q = [Q @ Z @ Q for Q, Z in zip(self.Q, cone.adjoint(self.solve(unit[None])), strict=True)]
 
     def solve(self, v: Array) -> Array:
         """H^-1 v, (R, N) -> (R, N)."""

@@ -9,12 +9,13 @@ distance in it being seen from the hull of the centre and the points to keep.
                                         range, all its joints do when that has not helped for long
     a collision                      -> a face, wherever it is
 
-Faces have normals in the joints between the two bodies only: the other joints do not move the one relative to the other.
+Faces have normals in the joints between the two bodies only: the other joints do not move the one relative to the other. Where only planes
+at rest were tried the program knows the joints' ranges alone, and faces have normals in one joint.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import nnls
@@ -31,6 +32,8 @@ PATIENCE = 12
 KEPT_SLACK = 0.05
 """Part of a joint's range that stays free around the points to keep."""
 SMALLEST_RANGE = 1e-6
+NEAR_RANGES = 0.5
+"""Share of the distance at which a mean gets a face, where a face is a shorter range on one side."""
 _HULL_WEIGHT = 1e3
 
 
@@ -43,12 +46,14 @@ class Failure:
         points: (w, n) where it fails; without points nothing is known but that it fails.
         pull: (n,) how much it would help to shorten each joint's range; 0 where bodies are in contact at the points.
         attempts: how often faces were added for this pair before.
+        ranges_alone: the program that failed knows nothing of the polytope but the joints' ranges: a face helps in one joint alone.
     """
 
     joints: tuple[int, ...]
     points: Array
     pull: Array
     attempts: int
+    ranges_alone: bool = False
 
 
 @dataclass(frozen=True)
@@ -97,7 +102,11 @@ def contract(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, 
     limits = 2 * scene.n
     C, d = [polytope.C[:-limits]], [polytope.d[:-limits]]
     for failure in failures:
-        found = _face(ellipsoid, keep, failure, near)
+        if failure.ranges_alone:
+            worst = replace(failure, joints=(_worst_joint(scene, polytope, failure),))
+            found = _face(ellipsoid, keep, worst, NEAR_RANGES * near)
+        else:
+            found = _face(ellipsoid, keep, failure, near)
         if found is None:
             found = _shorter_range(scene, polytope, ellipsoid, keep, failure)
         if found is None:
@@ -140,10 +149,7 @@ def _shorter_range(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: A
     """Two faces about the centre that shorten the range of the joint that turns far and where that helps."""
     lower, upper = bounds(polytope)
     center = ellipsoid.center
-    turn = np.where(scene.revolute, 2 * (np.arctan(upper) - np.arctan(lower)), upper - lower)
-    gain = turn * failure.pull if len(failure.points) else turn
-    best = max(failure.joints, key=lambda i: float(gain[i]))
-    joints = [best] if failure.attempts < PATIENCE else list(failure.joints)
+    joints = [_worst_joint(scene, polytope, failure)] if failure.attempts < PATIENCE else list(failure.joints)
     width = (upper - lower)[joints]
     if width.min() < SMALLEST_RANGE:
         return None
@@ -152,3 +158,11 @@ def _shorter_range(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: A
     high = np.maximum(middle + SHORTER * (upper[joints] - middle), kept.max(axis=0) + KEPT_SLACK * width)
     rows = np.eye(len(center))[joints]
     return np.concatenate([rows, -rows]), np.concatenate([high, -low])
+
+
+def _worst_joint(scene: Scene, polytope: Polytope, failure: Failure) -> int:
+    """The joint of the pair that turns far and where a shorter range helps."""
+    lower, upper = bounds(polytope)
+    turn = np.where(scene.revolute, 2 * (np.arctan(upper) - np.arctan(lower)), upper - lower)
+    gain = turn * failure.pull if len(failure.points) else turn
+    return max(failure.joints, key=lambda i: float(gain[i]))

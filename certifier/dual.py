@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import qr
 
-from certifier.basis import basis
 from certifier.disproof import DualProof
 from certifier.frames import Frame
 from certifier.interior_point import Block
@@ -48,25 +47,26 @@ def dual_proof(sides: Sides, pair: Pair, frame: Frame, ground: Ground, blocks: l
         moments[side][vertex, monomial] += c
     normal = (np.zeros((0, 0)), np.zeros((0, 0)))
     if rounded:
-        Y = blocks[2].cone.adjoint(x[2])[0, 0]
-        aa, bb = (Y[:3, :3] + Y[:3, :3].T) / 2, (Y[3:, 3:] + Y[3:, 3:].T) / 2
+        Y = blocks[2].cone.adjoint(x[2])[0][0, 0]
+        aa, bb = (Y[:3, :3] + Y[:3, :3].T) / 2, _lifted((Y[3:, 3:] + Y[3:, 3:].T) / 2, sides)
         normal = (aa - TRACE_SHARE * np.trace(Y) * np.eye(3), bb)
     return DualProof(scene, pair, frame.body, ground, (moments[0], moments[1]), tuple(int(k) for k in np.sort(equations)), entries, normal)
 
 
 def _moments(sides: Sides, chain: tuple[int, ...], x: Array) -> Array:
-    """Values on the monomials, (R, N), of functionals x in the sampled basis, (R, N)."""
-    space, outside = basis(len(chain)), sides.outside(chain)
+    """Values on the monomials, (R, N), of functionals x in the sampled basis, (R, N'), joints that are not in play being at the centre."""
+    space, outside = sides.space(chain), sides.outside(chain)
     exponents = monomials(chain, sides.kinematics.scene.n)
     inside = np.prod(space.points[:, None, :] ** exponents[None, :, list(chain)], axis=2)
     size = len(space.points)
-    moments = np.zeros(x.shape)
-    own = exponents[:, outside].sum(axis=1) == 0
-    moments[:, own] = x[:, :size] @ inside[:, own]
-    for place, joint in enumerate(outside):
+    moments = x[:, :size] @ inside
+    for joint in (i for i in range(exponents.shape[1]) if i not in chain):
         others = exponents[:, joint] == 1
-        start = size + place * space.grid
-        moments[:, others] = x[:, start : start + space.grid] @ inside[: space.grid, others]
+        if joint in outside:
+            start = size + outside.index(joint) * space.grid
+            moments[:, others] = x[:, start : start + space.grid] @ inside[: space.grid, others]
+        else:
+            moments[:, others] *= sides.u_c[joint]
     return moments
 
 
@@ -75,9 +75,9 @@ def _equations(sides: Sides, pair: Pair, frame: Frame, moments: list[Array]) -> 
     scene, n = sides.kinematics.scene, sides.kinematics.scene.n
     rows, where = [], []
     for side, (name, chain, held) in enumerate(zip((pair.a, pair.b), (frame.chain_a, frame.chain_b), moments, strict=True)):
-        geometry, space, index = scene.geometry(name), basis(len(chain)), table(chain, n)
+        geometry, index = scene.geometry(name), table(chain, n)
         grid = np.arange(index.shape[1])[:, None] // 3 ** np.arange(len(chain)) % 3
-        u = sides.points(chain)[: space.grid]
+        u = sides.points(chain)[: len(grid)]
         X = sides.kinematics.numerators(frame.body, geometry.body, sides.box.mid + sides.box.half * u)
         p = np.einsum("sij,vj->svi", X, np.column_stack([geometry.vertices, np.ones(len(geometry.vertices))]))
         monomial_values = np.prod(u[:, None, list(chain)] ** grid[None], axis=2)
@@ -99,3 +99,15 @@ def _independent(A: Array) -> tuple[np.ndarray, np.ndarray]:
     equations = np.sort(order[: int((diagonal > RANK_TOLERANCE * diagonal[0]).sum())])
     _, _, pivots = qr(A[:, equations].T, mode="economic", pivoting=True)
     return equations, pivots[: len(equations)]
+
+
+def _lifted(bb: Array, sides: Sides) -> Array:
+    """Ybb of all joints, (n + 1, n + 1), from that of the joints in play, the others at the centre; their diagonal is free up to Ybb_00."""
+    n, at = len(sides.u_c), [0, *(1 + i for i in sides.joints)]
+    lift = np.zeros((n + 1, len(at)))
+    lift[1:, 0] = sides.u_c
+    lift[at] = np.eye(len(at))
+    lifted = lift @ bb @ lift.T
+    rest = [i for i in range(n + 1) if i not in at]
+    lifted[rest, rest] = lifted[0, 0]
+    return (lifted + lifted.T) / 2

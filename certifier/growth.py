@@ -204,7 +204,8 @@ class Certification:
     """Outcome of each pair that was reached; reused pairs are left out.
 
     Attributes:
-        weak: pair index -> where it fails, ``points`` (w, n) and ``pull`` (n,); pairs of which nothing is known are left out.
+        weak: pair index -> where it fails, ``points`` (w, n), ``pull`` (n,) and whether ``ranges_alone`` count; pairs of which nothing
+            is known are left out.
     """
 
     iteration: int
@@ -435,7 +436,8 @@ def _cut(scene: Scene, state: dict[str, Any], action: Certify, report: Certifica
     for index in failures:
         weak = report.weak.get(index, {"points": [], "pull": []})
         points, pull = np.array(weak["points"]).reshape(-1, scene.n), np.array(weak["pull"])
-        found.append(Failure(_joints(scene, index), points, pull, attempts.get(str(index), 0)))
+        ranges_alone = bool(weak.get("ranges_alone"))
+        found.append(Failure(_joints(scene, index), points, pull, attempts.get(str(index), 0), ranges_alone))
         attempts[str(index)] = attempts.get(str(index), 0) + 1
     smaller = contract(scene, polytope, measure(polytope, keep[0]), keep, found, state["near"])
     if smaller is None or max(attempts.values()) > MAX_ATTEMPTS:

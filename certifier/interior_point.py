@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import islice
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
@@ -67,12 +68,12 @@ class Block:
 
 @dataclass(frozen=True)
 class Solution:
-    """What the method ended with; Q, x are lists over blocks of (R, K, L, L) and (R, N)."""
+    """What the method ended with; Q, x are lists over blocks, of (R, K, L, L) for every part of the cone and of (R, N)."""
 
     status: Status
     y: Array
     lam: float
-    Q: list[Array]
+    Q: list[list[Array]]
     x: list[Array]
     iterations: int
 
@@ -101,6 +102,8 @@ def solve(blocks: list[Block], max_iterations: int = 60, gap: float = np.inf) ->
 
 
 class _Method:
+    """The iteration; Gram matrices and their duals are lists over the parts of all blocks' cones, one after the other."""
+
     def __init__(self, blocks: list[Block], gap: float) -> None:
         self.gap = gap
         self.blocks, self.p = blocks, blocks[0].columns.shape[2]
@@ -112,13 +115,13 @@ class _Method:
         self.y = self._least_deviation()
         deviations = [b.columns @ self.y for b in blocks]
         images = [_preimage(b, v) for b, v in zip(blocks, deviations, strict=True)]
-        T = max(float(np.abs(relative).max()) for _, relative in images) / START_SPREAD
+        T = max(float(np.abs(relative).max()) for part in images for _, relative in part) / START_SPREAD
         self.y[-1] -= T
-        self.Q = [T * b.centre.Q + dQ for b, (dQ, _) in zip(blocks, images, strict=True)]
+        self.Q = [T * Q + dQ for b, part in zip(blocks, images, strict=True) for Q, (dQ, _) in zip(b.centre.Q, part, strict=True)]
         x = [b.centre.x - b.centre.solve(v) / T for b, v in zip(blocks, deviations, strict=True)]
         mass = sum(float(-b.columns[0, :, -1] @ v.sum(axis=0)) for b, v in zip(blocks, x, strict=True))
         self.x = [v / mass for v in x]
-        self.Z = [b.cone.adjoint(v) for b, v in zip(blocks, self.x, strict=True)]
+        self.Z = self._adjoint(self.x)
         self.lam = float(self.a @ self._moments())
 
     def _least_deviation(self) -> Array:
@@ -126,6 +129,16 @@ class _Method:
         images = [b.centre.factor.forward(np.moveaxis(b.columns, 0, 1).reshape(1, b.cone.N, -1)).reshape(-1, self.p) for b in self.blocks]
         y = np.linalg.solve(_ridged(np.sum([image.T @ image for image in images], axis=0)), self.a)
         return y / (self.a @ y)
+
+    def _adjoint(self, x: list[Array]) -> list[Array]:
+        return [Z for b, v in zip(self.blocks, x, strict=True) for Z in b.cone.adjoint(v)]
+
+    def _by_block(self, Q: list[Array]) -> list[list[Array]]:
+        rest = iter(Q)
+        return [list(islice(rest, len(b.cone.parts))) for b in self.blocks]
+
+    def _values(self, Q: list[Array]) -> list[Array]:
+        return [b.cone.values(part) for b, part in zip(self.blocks, self._by_block(Q), strict=True)]
 
     def _moments(self) -> Array:
         """sum_r B_r' x_r, (p,)."""
@@ -137,12 +150,12 @@ class _Method:
         return self.y[-1] > 0 and self._settle(self.y, self.Q)
 
     def solution(self, status: Status, iterations: int) -> Solution:
-        return Solution(status, self.y, self.lam, self.Q, self.x, iterations)
+        return Solution(status, self.y, self.lam, self._by_block(self.Q), self.x, iterations)
 
     def iterate(self) -> Status | None:
         """Test for an answer, then take one predictor-corrector step."""
         blocks = self.blocks
-        primal = [b.columns @ self.y - b.cone.values(Q) for b, Q in zip(blocks, self.Q, strict=True)]
+        primal = [b.columns @ self.y - v for b, v in zip(blocks, self._values(self.Q), strict=True)]
         dual = self.target + self.lam * self.a - self._moments()
         gap = self._inner(self.Q, self.Z)
         if self.y[-1] > 0 and self._settle(self.y, self.Q):
@@ -156,7 +169,7 @@ class _Method:
         inverse_chol_Z = [inverse_cholesky(Z) for Z in self.Z]
         S = [np.swapaxes(Li, -1, -2) @ Li for Li in inverse_chol_Z]
         factors, images, M = [], [], np.zeros((self.p, self.p))
-        for b, Q, Si in zip(blocks, self.Q, S, strict=True):
+        for b, Q, Si in zip(blocks, self._by_block(self.Q), self._by_block(S), strict=True):
             factor = Factor(b.cone.schur(Q, Si))
             image = factor.forward(b.columns)
             flat = image.reshape(-1, self.p)
@@ -170,14 +183,14 @@ class _Method:
         def direction(centres: list[Array]) -> tuple[Array, float, list[Array], list[Array], list[Array]]:
             """Newton step for Q Z = centre: values(dQ) - B dy = primal, dZ = Lambda(dx)."""
             forwards, right = [], np.zeros(self.p)
-            for b, C, r, factor, image in zip(blocks, centres, primal, factors, images, strict=True):
-                v = factor.forward((b.cone.values(C) - r)[:, :, None])
+            for value, r, factor, image in zip(self._values(centres), primal, factors, images, strict=True):
+                v = factor.forward((value - r)[:, :, None])
                 right += np.einsum("rnp,rnq->p", image, v)
                 forwards.append(v)
             solution = lu_solve(lu, np.append(right - dual, 0.0), check_finite=False)
             dy, dlam = solution[:-1], float(solution[-1])
             dx = [f.backward(v - (image @ dy)[:, :, None])[:, :, 0] for f, v, image in zip(factors, forwards, images, strict=True)]
-            dZ = [b.cone.adjoint(d) for b, d in zip(blocks, dx, strict=True)]
+            dZ = self._adjoint(dx)
             dQ = [C - symmetrise(Q @ d @ Si) for C, Q, d, Si in zip(centres, self.Q, dZ, S, strict=True)]
             return dy, dlam, dx, dZ, dQ
 
@@ -200,7 +213,7 @@ class _Method:
         self.Q = [symmetrise(Q + step_Q * d) for Q, d in zip(self.Q, dQ, strict=True)]
         self.lam += step_Z * dlam
         self.x = [x + step_Z * d for x, d in zip(self.x, dx, strict=True)]
-        self.Z = [b.cone.adjoint(x) for b, x in zip(blocks, self.x, strict=True)]
+        self.Z = self._adjoint(self.x)
         return None
 
     def _settle(self, y: Array, Q: list[Array]) -> bool:
@@ -213,20 +226,22 @@ class _Method:
         if self._inner(Q, self.Z) > self.gap * y[-1]:
             return False
         whole, margin = [], np.inf
-        for b, given in zip(self.blocks, Q, strict=True):
-            candidate = given + y[-1] * b.centre.Q
-            candidate = symmetrise(candidate + _correction(b, b.columns @ z - b.cone.values(candidate)))
-            try:
-                inverse_chol = inverse_cholesky(candidate)
-            except np.linalg.LinAlgError:
-                return False
-            margin = min(margin, _longest(inverse_chol, np.broadcast_to(-b.centre.unit_Q, candidate.shape)))
-            whole.append(candidate)
+        for b, given in zip(self.blocks, self._by_block(Q), strict=True):
+            shifted = [matrices + y[-1] * centre for matrices, centre in zip(given, b.centre.Q, strict=True)]
+            corrections = _correction(b, b.columns @ z - b.cone.values(shifted))
+            for matrices, correction, unit_Q in zip(shifted, corrections, b.centre.unit_Q, strict=True):
+                candidate = symmetrise(matrices + correction)
+                try:
+                    inverse_chol = inverse_cholesky(candidate)
+                except np.linalg.LinAlgError:
+                    return False
+                margin = min(margin, _longest(inverse_chol, np.broadcast_to(-unit_Q, candidate.shape)))
+                whole.append(candidate)
         t = margin / 2
         if not np.isfinite(t):
             return False
         self.y = np.append(y[:-1], t)
-        self.Q = [symmetrise(W - t * b.centre.unit_Q) for b, W in zip(self.blocks, whole, strict=True)]
+        self.Q = [symmetrise(W - t * Q) for W, Q in zip(whole, (Q for b in self.blocks for Q in b.centre.unit_Q), strict=True)]
         return True
 
     @staticmethod
@@ -248,16 +263,18 @@ def _ridged(M: Array) -> Array:
     return M + np.diag(RIDGE * (diagonal + diagonal.max()))
 
 
-def _correction(block: Block, v: Array) -> Array:
-    """The smallest dQ in the metric of the centre with values(dQ) = v, (R, N) -> (R, K, L, L): Q_w Lambda(H^-1 v) Q_w."""
-    return block.centre.Q @ block.cone.adjoint(block.centre.solve(v)) @ block.centre.Q
+def _correction(block: Block, v: Array) -> list[Array]:
+    """The smallest dQ in the metric of the centre with values(dQ) = v, (R, N) -> (R, K, L, L) for every part: Q_w Lambda(H^-1 v) Q_w."""
+    return [Q @ Z @ Q for Q, Z in zip(block.centre.Q, block.cone.adjoint(block.centre.solve(v)), strict=True)]
 
 
-def _preimage(block: Block, v: Array) -> tuple[Array, Array]:
-    """That dQ, and its eigenvalues relative to Q_w."""
-    inner = block.cone.adjoint(block.centre.solve(v))
-    chol = np.linalg.cholesky(block.centre.Q)
-    return block.centre.Q @ inner @ block.centre.Q, np.linalg.eigvalsh(np.swapaxes(chol, -1, -2) @ inner @ chol)
+def _preimage(block: Block, v: Array) -> list[tuple[Array, Array]]:
+    """That dQ, and its eigenvalues relative to Q_w, for every part."""
+    found = []
+    for Q, inner in zip(block.centre.Q, block.cone.adjoint(block.centre.solve(v)), strict=True):
+        chol = np.linalg.cholesky(Q)
+        found.append((Q @ inner @ Q, np.linalg.eigvalsh(np.swapaxes(chol, -1, -2) @ inner @ chol)))
+    return found
 
 
 def _longest(inverse_chol: Array, direction: Array) -> float:

@@ -58,10 +58,14 @@ class Kinematics:
             bodies.append(self._joint_above[bodies[-1]].parent)
         return bodies
 
+    def common(self, a: str, b: str) -> str:
+        """The body at which the ways from a and from b up to the world meet."""
+        up_b = self.ancestors(b)
+        return next(body for body in self.ancestors(a) if body in up_b)
+
     def bodies_between(self, a: str, b: str) -> list[str]:
         """The bodies on the path from a to b, both included."""
-        up_a, up_b = self.ancestors(a), self.ancestors(b)
-        common = next(body for body in up_a if body in up_b)
+        up_a, up_b, common = self.ancestors(a), self.ancestors(b), self.common(a, b)
         return up_a[: up_a.index(common) + 1] + up_b[: up_b.index(common)][::-1]
 
     def rigid_root(self, body: str) -> str:

@@ -89,7 +89,7 @@ def weakness(result: PairResult) -> dict[str, Any] | None:
         return {"points": [result.witness_s.tolist()], "pull": [0.0] * len(result.witness_s)}
     if result.weak_points is None or result.pull is None:
         return None
-    return {"points": result.weak_points.tolist(), "pull": result.pull.tolist()}
+    return {"points": result.weak_points.tolist(), "pull": result.pull.tolist(), "ranges_alone": result.ranges_alone}
 
 
 def stepped(found: PolytopeStep) -> Stepped:

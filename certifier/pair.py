@@ -3,6 +3,7 @@
 centre or a sample in contact, verified              -> refuted, with the configuration
 program (11) feasible, proof verified exactly        -> certified, with the proof
 program (11) infeasible, dual proof verified         -> not_certifiable, with the proof and the points where no plane of this degree works
+planes at rest infeasible, (11) too dear             -> inconclusive, with those points all the same
 anything else                                        -> inconclusive, with the reason
 """
 
@@ -10,28 +11,28 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
-from certifier.basis import subsets
 from certifier.broad_phase import BroadPhase, Volumes
 from certifier.closest import first_within
 from certifier.disproof import WitnessProof
 from certifier.dual import dual_proof
-from certifier.frames import Frame, choose_frame
+from certifier.frames import Frame, choose_frame, frames_to_try
 from certifier.interior_point import Block, Solution, Status, solve
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Pair, Polytope, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.polytope import bound_multipliers, chebyshev_center, drop_redundant
+from certifier.primal import pair_proof
 from certifier.program import Box, Sides, build
-from certifier.proof import BITS, Ground, PairProof, Side, Volume
+from certifier.proof import BITS, Ground, Volume
 from certifier.proof_file import ProofError
 from certifier.sampling import hit_and_run
 from certifier.verify.dual import verify_dual
 from certifier.verify.pair import PairCheck, check_ground
 from certifier.verify.witness import verify_witness
+from certifier.weakness import pull, weak_points
 
 SCREEN_SAMPLES = 64
 GAP_SAMPLES = 16
@@ -42,7 +43,8 @@ FEW_ITERATIONS = 4
 CONE_SAMPLES = 300
 FACES_AT_A_TIME = 16
 """A polytope with many faces is first replaced by its box; then this many faces are added at a time, as the dual asks for them."""
-
+DEAR_JOINTS = 10.0
+"""Few faces that couple the path's joints with others are all tried at once, unless the other joints make the program dearer by this."""
 MIDDLE = 1.0
 """Gap of a certificate near the middle, relative to its margin."""
 
@@ -57,8 +59,9 @@ class PairResult:
         witness_s: (n,) a configuration in contact, when refuted.
         proof: verified, as bytes: a :class:`certifier.proof.PairProof` when certified, a :class:`certifier.disproof.WitnessProof` when
             refuted, a :class:`certifier.disproof.DualProof` when not certifiable.
-        weak_points: (w, n) configurations near which no plane of this degree works, when not certifiable.
-        pull: (n,) how much it would help to shorten each joint's range, when not certifiable; only the proportions matter.
+        weak_points: (w, n) configurations near which no plane of those tried works, when the program had no solution.
+        pull: (n,) how much it would help to shorten each joint's range, like ``weak_points``; only the proportions matter.
+        ranges_alone: only planes at rest were tried, for which of the polytope the joints' ranges count and nothing else.
     """
 
     outcome: Outcome
@@ -70,6 +73,7 @@ class PairResult:
     proof: bytes | None = None
     weak_points: Array | None = None
     pull: Array | None = None
+    ranges_alone: bool = False
 
 
 class Certification:
@@ -101,78 +105,112 @@ class Certification:
         self._screen = np.concatenate([self.center[None], samples])
         self._kinematics = Kinematics.of(scene)
         self._box, self._samples = box, samples
-        m = len(kept)
-        self._every = tuple(range(m))
-        few = tuple(range(m, m + 2 * scene.n))
-        self._first = self._sides(few if self._whole or m > len(few) + FACES_AT_A_TIME else self._every)
+        self._every = tuple(range(len(kept)))
+        self._moved = faces.C != 0
+        self._known: dict[tuple[tuple[int, ...], tuple[int, ...]], Sides] = {}
         self._broad_phase = BroadPhase(self._kinematics, self._together)
 
     def certify(self, index: int, max_iterations: int = 60, every_face: bool = False) -> PairResult:
         """Certify pair ``scene.pairs[index]``, alone or with others that the same proof covers; the first of them takes the time.
 
         Args:
-            every_face: try nothing less than all faces, which saves time where less is known to fail.
+            every_face: begin with all of P's faces in the joints of the pair's path, which saves time where less is known to fail.
         """
         start, pair = time.perf_counter(), self.scene.pairs[index]
-        if every_face:
-            result = self._certify(pair, max_iterations, self._all)
-        else:
-            result = self._broad_phase.find(pair) or self._certify(pair, max_iterations, self._first)
+        found = None if every_face else self._broad_phase.find(pair)
+        result = found or self._certify(pair, max_iterations, every_face)
         return replace(result, seconds=time.perf_counter() - start)
 
     def _together(self, volumes: Volumes) -> PairResult | None:
         """One proof for all pairs of two volumes, if they are clearly apart and it takes no more than the first faces."""
-        frame = choose_frame(self._kinematics, volumes)
+        frame = frames_to_try(self._kinematics, volumes)[0]
         if not self._apart(volumes, frame):
             return None
+        sides = self._sides(frame, self._first(frame))
         try:
-            solution = solve(build(self._first, volumes, frame), FEW_ITERATIONS)
+            solution = solve(build(sides, volumes, frame), FEW_ITERATIONS)
         except np.linalg.LinAlgError:
             return None
         if solution.status is not Status.FEASIBLE:
             return None
-        result = self._prove(volumes, frame, self._first, solution)
+        result = self._prove(volumes, frame, sides, solution)
         return result if result.outcome is Outcome.CERTIFIED else None
 
-    def _certify(self, pair: Pair, max_iterations: int, sides: Sides) -> PairResult:
+    def _certify(self, pair: Pair, max_iterations: int, every_face: bool) -> PairResult:
         volumes = (Volume.of(self.scene.geometry(pair.a)), Volume.of(self.scene.geometry(pair.b)))
-        frame = choose_frame(self._kinematics, volumes)
-        contact = self._contact(volumes, frame, self._screen[:SCREEN_SAMPLES])
+        frames = frames_to_try(self._kinematics, volumes)
+        contact = self._contact(volumes, frames[0], self._screen[:SCREEN_SAMPLES])
         if contact:
             return self._refute(pair, contact, Stage.SCREEN)
-        while True:
+        for frame in frames:
             try:
-                blocks = build(sides, volumes, frame)
-                # Multipliers of P's own faces are what the polytope step holds fixed: they should come from the middle.
-                gap = MIDDLE if self._whole and sides is not self._first else np.inf
-                solution = solve(blocks, max_iterations, gap)
+                sides, blocks, solution = self._solve(volumes, frame, max_iterations, every_face)
             except np.linalg.LinAlgError as error:
-                if sides.faces == self._every:
-                    return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"numerical trouble: {error}")
-                sides = self._all
-                continue
+                return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"numerical trouble: {error}")
             if solution.status is Status.FEASIBLE:
                 return self._prove(volumes, frame, sides, solution)
-            more = self._more_faces(frame, sides, solution)
-            if more == sides.faces:
-                break
-            sides = self._all if more == self._every else self._sides(more)
-        weak, pull = self._weak_points(frame, sides, solution), self._pull(frame, sides, solution)
+        weak, gains = weak_points(frame, sides, solution), pull(frame, sides, self._faces, solution)
         witness = self._contact(volumes, frame, np.concatenate([self._screen, weak[self._faces.contains(weak)]]))
         if witness:
             return self._refute(pair, witness, Stage.SOS)
-        if solution.status is Status.INFEASIBLE:
-            return replace(self._disprove(pair, frame, sides, blocks, solution), weak_points=weak, pull=pull)
+        if solution.status is Status.INFEASIBLE and not frame.at_rest:
+            return replace(self._disprove(pair, frame, sides, blocks, solution), weak_points=weak, pull=gains)
         detail = f"{solution.status.value} after {solution.iterations} iterations"
-        return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak, pull=pull)
+        if frame.at_rest:
+            memory = choose_frame(self._kinematics, volumes).memory(volumes)
+            detail = f"no plane at rest in the frame of {frame.body}; one that moves would need {memory / 2**30:.1f} GiB ({detail})"
+        return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weak_points=weak, pull=gains, ranges_alone=frame.at_rest)
 
-    @cached_property
-    def _all(self) -> Sides:
-        """Those of all faces."""
-        return self._first if self._first.faces == self._every else self._sides(self._every)
+    def _solve(self, volumes: Volumes, frame: Frame, max_iterations: int, every_face: bool) -> tuple[Sides, list[Block], Solution]:
+        """The program with the faces that matter.
 
-    def _sides(self, faces: tuple[int, ...]) -> Sides:
-        return Sides(self._kinematics, self._faces, self._box, faces, self.center, self._samples)
+        Raises:
+            np.linalg.LinAlgError: a cone of P itself is numerically degenerate.
+        """
+        faces = first = self._first(frame, every_face)
+        while True:
+            sides = self._sides(frame, faces)
+            try:
+                blocks = build(sides, volumes, frame)
+                # Multipliers of P's own faces are what the polytope step holds fixed: they should come from the middle.
+                solution = solve(blocks, max_iterations, MIDDLE if self._whole and faces != first else np.inf)
+            except np.linalg.LinAlgError:
+                if faces == self._every or frame.at_rest:
+                    raise
+                faces = self._every
+                continue
+            more = faces if solution.status is Status.FEASIBLE else self._more_faces(frame, sides, solution)
+            if more == faces:
+                return sides, blocks, solution
+            faces = more
+
+    def _first(self, frame: Frame, every_face: bool = False) -> tuple[int, ...]:
+        """The faces to begin with: P's in the joints that the plane moves with, and its box's where those may not bound them; unless it
+        has to be every face, its box's alone where P has many. Where P has few and they couple those joints with others, all of them."""
+        m, n, joints = len(self._every), self.scene.n, list(frame.joints)
+        box = [(m + n * (sign > 0) + i, i, sign) for sign in (-1, 1) for i in joints]
+        others = self._moved.copy()
+        others[:, joints] = False
+        own = np.flatnonzero(~others.any(axis=1))
+        alone = own[self._moved[own].sum(axis=1) == 1]
+        C = self._faces.C[alone]
+        needed = [face for face, i, sign in box if len(own) < m and not (C[:, i] * sign > 0).any()]
+        coupled = bool((others.any(axis=1) & self._moved[:, joints].any(axis=1)).any())
+        if coupled and not self._whole and m <= 2 * n + FACES_AT_A_TIME and frame.growth(n) < DEAR_JOINTS:
+            return self._every
+        many = self._whole or len(own) + len(needed) > len(box) + FACES_AT_A_TIME
+        if not joints or (many and not every_face):
+            return tuple(face for face, _, _ in box)
+        return (*own.tolist(), *needed)
+
+    def _sides(self, frame: Frame, faces: tuple[int, ...]) -> Sides:
+        joints = set(frame.joints)
+        for j in faces:
+            joints |= set(np.flatnonzero(self._moved[j]).tolist()) if j < len(self._every) else set()
+        key = tuple(sorted(joints)), faces
+        if key not in self._known:
+            self._known[key] = Sides(self._kinematics, self._faces, self._box, *key, self.center, self._samples)
+        return self._known[key]
 
     def _more_faces(self, frame: Frame, sides: Sides, solution: Solution) -> tuple[int, ...]:
         """The faces to go on with after a program on a superset of P had no solution; the same ones when it had none on P either.
@@ -180,23 +218,26 @@ class Certification:
         The dual point shows infeasibility for every face j with Lambda_j(x) psd; the faces where it is not are worth having.
         """
         unused = tuple(j for j in self._every if j not in sides.faces)
-        if not unused:
+        if not unused or frame.at_rest:
             return sides.faces
-        if solution.status is not Status.INFEASIBLE or 2 * (len(sides.faces) + FACES_AT_A_TIME) > len(self._every) + len(self._first.faces):
+        if solution.status is not Status.INFEASIBLE:
             return self._every
         lowest = np.full(len(unused), np.inf)
         for chain, x in zip((frame.chain_a, frame.chain_b), solution.x[:2], strict=True):
-            Z = sides.cone_of(chain, unused).adjoint(x)
+            Z = sides.cone_of(chain, unused).adjoint(x)[0]
             mass = np.trace(Z[:, 0], axis1=1, axis2=2)[:, None]
             lowest = np.minimum(lowest, (np.linalg.eigvalsh(Z[:, 1:])[:, :, 0] / mass).min(axis=0))
-        worst = [unused[i] for i in np.argsort(lowest)[:FACES_AT_A_TIME] if lowest[i] < 0]
-        return (*sides.faces, *worst)
+        wanted = [i for i in np.argsort(lowest) if lowest[i] < 0]
+        inside = [i for i in wanted if not np.delete(self._moved[unused[i]], sides.joints).any()]
+        # Where most faces are used already, it is not worth being choosy.
+        most = 2 * (len(sides.faces) + FACES_AT_A_TIME) > len(self._every) + 2 * len(frame.joints)
+        return (*sides.faces, *(unused[i] for i in (inside or wanted)[: None if most else FACES_AT_A_TIME]))
 
     def _prove(self, volumes: Volumes, frame: Frame, sides: Sides, solution: Solution) -> PairResult:
         """The proof in as few bits as hold."""
         failure = ""
         for kind in BITS:
-            proof, check = self._proof(volumes, frame, sides, solution, kind), self._check
+            proof, check = pair_proof(sides, volumes, frame, self.ground, solution, kind), self._check
             if self._whole and proof.needs_box_alone:
                 proof, check = proof.on_its_box(), self._whole
             try:
@@ -241,38 +282,6 @@ class Certification:
         A, B = self._points(a, frame, s), self._points(b, frame, s)
         found = first_within(A, B, reach)
         return None if found is None else _Witness(s[found[0]], found[1].weights)
-
-    def _proof(self, volumes: Volumes, frame: Frame, sides: Sides, solution: Solution, kind: str) -> PairProof:
-        n, u_c = self.scene.n, sides.u_c
-        plane = solution.y[: 4 * (n + 1)].reshape(4, n + 1).copy()
-        plane[:, 0] -= plane[:, 1:] @ u_c
-        kappa = float(solution.y[4 * (n + 1)]) if len(solution.y) > 4 * (n + 1) + 1 else 0.0
-        factors = []
-        for chain, Q in zip((frame.chain_a, frame.chain_b), solution.Q[:2], strict=True):
-            monomial = np.sqrt(3.0) ** subsets(len(chain)).sum(axis=1)
-            factors.append(Side.from_gram(chain, Q * (monomial[:, None] * monomial) / sides.scales[:, None, None], kind))
-        return PairProof(self.scene, volumes, frame.body, self.ground, plane, solution.t, kappa, sides.faces, (factors[0], factors[1]))
-
-    def _pull(self, frame: Frame, sides: Sides, solution: Solution) -> Array:
-        """What the program's optimum gains, to first order, when a joint's range shrinks towards the centre, (n,).
-
-        The derivative for a face's offset is <Q_j, Lambda_0(x)>. A box's face belongs to its joint, any other to its joints by
-        their parts in its reach.
-        """
-        n = self.scene.n
-        share = np.abs(np.concatenate([self._faces.C * self._box.half, np.eye(n), np.eye(n)]))
-        share /= share.sum(axis=1, keepdims=True)
-        gains = np.zeros(len(sides.faces))
-        for chain, Q, x in zip((frame.chain_a, frame.chain_b), solution.Q[:2], solution.x[:2], strict=True):
-            gains += np.einsum("rkij,rij->k", Q[:, 1:], sides.cone(chain)[0].adjoint(x)[:, 0])
-        pull: Array = gains @ share[list(sides.faces)]
-        return pull
-
-    def _weak_points(self, frame: Frame, sides: Sides, solution: Solution) -> Array:
-        """Means (w, n) of the pseudo-moments that carry weight."""
-        found = [sides.means(chain, x) for chain, x in zip((frame.chain_a, frame.chain_b), solution.x[:2], strict=True)]
-        means, mass = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        return means[mass > 0.15 * mass.max()]
 
 
 @dataclass(frozen=True)

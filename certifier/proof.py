@@ -99,15 +99,10 @@ class Side:
     exponent: np.ndarray
 
     @classmethod
-    def from_gram(cls, chain: tuple[int, ...], Q: Array, kind: str = "int32") -> Side:
-        """Rounded factors of positive definite Gram matrices Q, (V, f + 1, L, L), in plain monomials; ``kind`` as in BITS.
-
-        Raises:
-            np.linalg.LinAlgError: a matrix is not positive definite.
-        """
-        factor = np.linalg.cholesky(Q)
+    def rounded(cls, chain: tuple[int, ...], factor: Array, kind: str = "int32") -> Side:
+        """Rounded factors, (V, f + 1, L, L) lower triangular, of Gram matrices in plain monomials; ``kind`` as in BITS."""
         exponent = np.frexp(np.abs(factor).max(axis=(0, 2, 3)))[1].astype(np.int32) - BITS[kind]
-        rows, columns = np.tril_indices(Q.shape[-1])
+        rows, columns = np.tril_indices(factor.shape[-1])
         mantissa = np.rint(np.ldexp(factor[:, :, rows, columns], -exponent[:, None])).astype(kind)
         return cls(chain, mantissa, exponent)
 
@@ -155,7 +150,7 @@ class PairProof:
     @property
     def needs_box_alone(self) -> bool:
         """Whether it uses no face of the polytope but those of the box."""
-        return min(self.faces) >= len(self.ground.d)
+        return all(j >= len(self.ground.d) for j in self.faces)
 
     def on_its_box(self) -> PairProof:
         """The same proof, stated on all of its box; only if it needs no other face."""

@@ -17,10 +17,16 @@ class Method(StrEnum):
     """Drake's IrisNp2."""
     IRIS_ZO = "iris_zo"
     """Drake's IrisZo: no nonlinear programs, more faces."""
+    LIMITS = "limits"
+    """The joint limits: what cannot be certified is cut off pair by pair, by faces in the pair's joints alone."""
     BOX = "box"
     """A box around the seed, clipped to the joint limits."""
     POLYTOPE = "polytope"
     """The given C and d."""
+
+
+MOST_IRIS_JOINTS = 8
+"""IRIS' faces have normals in all joints, which is dear where a pair has few of them between its bodies."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +34,7 @@ class SeedOptions:
     """What to propose.
 
     Attributes:
-        method: one of :class:`Method`.
+        method: one of :class:`Method`; None for IRIS_NP2 up to MOST_IRIS_JOINTS joints and LIMITS beyond.
         q: (n,) the seed, joint positions; for every method but ``polytope``.
         contain: (n,) each, joint positions that the region has to contain besides q.
         C, d: (m, n), (m,) the polytope in s, for ``polytope``; the joint limits are added to it.
@@ -43,7 +49,7 @@ class SeedOptions:
         random_seed: seeds IRIS.
     """
 
-    method: Method = Method.IRIS_NP2
+    method: Method | None = None
     q: tuple[float, ...] | None = None
     contain: tuple[tuple[float, ...], ...] = ()
     C: tuple[tuple[float, ...], ...] | None = None
@@ -75,16 +81,16 @@ class SeedOptions:
                 raise _refuse(name, f"there is no option {name!r}", "unknown_option", f"options: {', '.join(sorted(known))}")
         given = {name: value for name, value in document.items() if value is not None}
         try:
-            method = Method(given.pop("method", Method.IRIS_NP2))
+            method = Method(given.pop("method")) if "method" in given else None
         except ValueError:
             raise _refuse("method", f"method is one of {', '.join(Method)}") from None
         needed, idle = (("C", "d"), ("q",)) if method is Method.POLYTOPE else (("q",), ("C", "d", "center"))
         for name in needed:
             if name not in given:
-                raise _refuse(name, f"the method {method} needs {name}", "missing_option")
+                raise _refuse(name, f"the method {method or Method.IRIS_NP2} needs {name}", "missing_option")
         for name in idle:
             if name in given:
-                raise _refuse(name, f"the method {method} has no use for {name}")
+                raise _refuse(name, f"the method {method or Method.IRIS_NP2} has no use for {name}")
         for name in ("q", "d", "center"):
             if name in given:
                 given[name] = _numbers(name, given[name])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from certifier.iris import iris
 from certifier.model import Array, Scene
 from certifier.outcome import Guarantee
 from certifier.polytope import chebyshev_center
-from certifier.seed_options import Method, SeedOptions
+from certifier.seed_options import MOST_IRIS_JOINTS, Method, SeedOptions
 
 __all__ = ["Method", "Proposal", "SeedOptions", "check_seed", "propose"]
 
@@ -100,26 +100,30 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
             ``seed_cut_off`` when the polytope does not contain the seed and ``contain``; ``seeding_failed`` with Drake's words.
     """
     start = time.perf_counter()
+    method = options.method or (Method.IRIS_NP2 if scene.n <= MOST_IRIS_JOINTS else Method.LIMITS)
     for i, q in enumerate(options.contain):
         check_seed(scene, q, f"seed.contain[{i}]")
     contain = scene.to_s(np.array(options.contain)) if options.contain else np.zeros((0, scene.n))
-    if options.method is Method.POLYTOPE:
+    if method is Method.POLYTOPE:
         C, d, center = _given(scene, options)
         said: dict[str, Any] = {}
     else:
         assert options.q is not None, "every method but polytope has a seed"
         check_seed(scene, options.q)
         center = scene.to_s(options.q)
-        if options.method is Method.BOX:
+        if method is Method.LIMITS:
+            C, d = np.zeros((0, scene.n)), np.zeros(0)
+            said = {}
+        elif method is Method.BOX:
             C, d = _box(scene, np.concatenate([center[None], contain]), options.half_width)
             said = {}
         else:
-            C, d, said = iris(scene, np.concatenate([center[None], contain]), options)
+            C, d, said = iris(scene, np.concatenate([center[None], contain]), replace(options, method=method))
     if not (d[:, None] > C @ np.concatenate([center[None], contain]).T).all():
-        problem = f"the polytope of {options.method} does not contain the seed" + (" and all of contain" if options.contain else "")
+        problem = f"the polytope of {method} does not contain the seed" + (" and all of contain" if options.contain else "")
         raise RegionError("seed_cut_off", problem, field="seed", hint="allow fewer iterations, or give points that see one another")
     guarantee = said.pop("guarantee", Guarantee.NONE)
-    info = {"method": options.method.value, "guarantee": guarantee.value, "faces": len(d), "seconds": time.perf_counter() - start, **said}
+    info = {"method": method.value, "guarantee": guarantee.value, "faces": len(d), "seconds": time.perf_counter() - start, **said}
     return Proposal(C, d, center, contain, guarantee, info)
 
 

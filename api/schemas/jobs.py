@@ -46,7 +46,7 @@ class GrowOptions(Request):
 class Seed(Request):
     """Where growing begins, and how the first polytope is found; what is left out has the certifier's default."""
 
-    method: Method = Method.IRIS_NP2
+    method: Method | None = Field(None, description="Default: `iris_np2` up to 8 joints, `limits` beyond.")
     q: Vector | None = Field(None, description="Joint positions, radians or metres, in position order; for every method but `polytope`.")
     contain: Rows | None = Field(None, description="More joint positions that the region has to contain, as where it meets another one.")
     C: Rows | None = Field(None, description="Faces of the first polytope, in s; for the method `polytope`.")

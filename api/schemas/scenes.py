@@ -96,10 +96,12 @@ class PairForecast(PairInfo):
     chain_b: list[str]
     gram_a: int = Field(description="Rows of the Gram matrices, 2^k for k joints in the chain.")
     gram_b: int
+    joints: int = Field(description="How many joints the plane tried first moves with: all of both chains, or 0 for one at rest.")
     N_a: int = Field(description="Dimension of the space of polynomials.")
     N_b: int
     rationals: int = Field(description="Polynomial identities: one for each vertex of both bodies.")
     seconds: float = Field(description="Roughly, on one thread.")
+    memory_bytes: int = Field(description="Of the largest program that may be tried for the pair.")
 
 
 class ScenePairs(BaseModel):

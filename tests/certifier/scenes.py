@@ -42,6 +42,21 @@ def planar_arm(links=2, obstacle=None, q_star=None, limit=2.0, kind=JointKind.RE
     return Scene("planar", tuple(joints), tuple(bodies), (*geometries, obstacle), pairs, (), center, padding)
 
 
+def two_arms(links=3, apart=7.0, limit=2.0):
+    """Two arms of links of length 1 in the xy-plane that reach for each other from ``apart`` metres; pairs left bar - right bar."""
+    joints, bodies, geometries = [], [WORLD], []
+    for arm, X_base in (("left", pose((-apart / 2, 0.0, 0.0))), ("right", pose((apart / 2, 0.0, 0.0), angle=np.pi))):
+        for i in range(links):
+            parent, body = WORLD if i == 0 else f"{arm}/link{i}", f"{arm}/link{i + 1}"
+            X_PF = X_base if i == 0 else pose((1.0, 0.0, 0.0))
+            axis, index = np.array([0.0, 0.0, 1.0]), len(joints)
+            joints.append(Joint(f"{arm}/joint{i + 1}", JointKind.REVOLUTE, parent, body, axis, X_PF, np.eye(4), index, -limit, limit))
+            bodies.append(body)
+            geometries.append(box(f"{body}/bar", body, (1.0, 0.1, 0.1), (0.5, 0.0, 0.0)))
+    pairs = tuple(Pair(a.name, b.name) for a in geometries[:links] for b in geometries[links:])
+    return Scene("two arms", tuple(joints), tuple(bodies), tuple(geometries), pairs, (), np.zeros(2 * links))
+
+
 def random_tree(seed, kinds=(JointKind.REVOLUTE, JointKind.PRISMATIC, JointKind.WELD), bodies=6):
     """A random tree with offset frames and every joint kind; no geometry."""
     rng = np.random.default_rng(seed)

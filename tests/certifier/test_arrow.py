@@ -21,7 +21,7 @@ from tests.certifier.clarabel import add_rationals
 
 def box_cone(k, n):
     """The cone over the box [-1, 1]^n with k chain joints, and its centre for 1."""
-    space, axes = basis(k), np.concatenate([np.eye(n), -np.eye(n)])
+    space, axes = basis(k, tuple(range(k))), np.concatenate([np.eye(n), -np.eye(n)])
     cone = Cone.of_faces(space, np.ones(2 * n), axes[:, :k], axes[:, k:])
     one = np.zeros(cone.N)
     one[: len(space.points)] = 1.0
@@ -165,8 +165,9 @@ def test_memory_does_not_grow_with_the_groups(monkeypatch):
 def test_the_conjugate_barrier_has_the_gradient_that_it_states(seed):
     cone, _, centre = box_cone(1, 2)
     rng = np.random.default_rng(seed)
-    Q = rng.normal(size=(1, cone.K, cone.L, cone.L))
-    s = cone.values(Q @ np.swapaxes(Q, -1, -2) + 0.05 * np.eye(cone.L))
+    ((K, L, _),) = (part.shape for part in cone.parts)
+    Q = rng.normal(size=(1, K, L, L))
+    s = cone.values([Q @ np.swapaxes(Q, -1, -2) + 0.05 * np.eye(L)])
     ds = 1e-5 * rng.normal(size=s.shape) * np.abs(s).max()
     at = conjugate(cone, s, centre.x[None], 1e-8, 100)
     assert np.abs(cone.values(at.Q) - s).max() < 1e-6 * np.abs(s).max()

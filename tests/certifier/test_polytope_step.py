@@ -188,8 +188,9 @@ def test_identities_are_the_polynomials_of_the_proofs(name):
             block, chain = next(blocks), list(side.chain)
             constant, local, coupled = block.columns()
             values = constant + local @ group.start + coupled @ v.ravel()[block.coupled]
-            u = np.zeros((len(basis(len(chain)).points), n))
-            u[:, chain] = basis(len(chain)).points
+            space = basis(len(chain), tuple(range(len(chain))))
+            u = np.zeros((len(space.points), n))
+            u[:, chain] = space.points
             s = box.mid + box.half * u
             X = kinematics.numerators(proof.frame, body.body, s)
             ab = np.column_stack([np.ones(len(u)), (s - proof.ground.mid) / proof.ground.half]) @ proof.plane.T

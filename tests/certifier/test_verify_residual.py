@@ -151,8 +151,8 @@ def test_the_bound_of_the_residual_is_the_sum_of_its_coefficients(links, kind):
     volume = Volume.of(scene.geometries[links - 1])
     volume = replace(volume, vertices=volume.vertices[:2] + rng.normal(size=(2, 3)))
     L, f = 2**links, 3
-    Q = rng.normal(size=(2, f + 1, L, L))
-    side = Side.from_gram(chain, Q @ np.swapaxes(Q, 2, 3) * 10.0 ** rng.integers(-6, 6, (1, f + 1, 1, 1)), kind)
+    factor = np.tril(rng.normal(size=(2, f + 1, L, L))) * 10.0 ** rng.integers(-3, 3, (1, f + 1, 1, 1))
+    side = Side.rounded(chain, factor, kind)
     mid, half = rng.uniform(-0.5, 0.5, links), rng.uniform(0.1, 1, links)
     plane = [[exact(x) for x in row] for row in rng.normal(size=(4, links + 1))]
     weights = [[exact(x) for x in row] for row in rng.normal(size=(f + 1, links + 1))]

@@ -40,7 +40,7 @@ def test_no_sample_of_a_grown_region_collides_three_joints():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["iiwa_shelf", "ur3e_bin"])
+@pytest.mark.parametrize("name", ["iiwa_shelf", "ur3e_bin", "dual_ur3e"])
 def test_no_sample_of_a_grown_region_collides_real_arms(name):
     free_region(name, {"bisection_steps": 4, "max_rounds": 0})
 
