@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import math
 import time
 from dataclasses import dataclass
 from typing import Annotated
@@ -19,6 +21,9 @@ from db.session import Database
 
 COOKIE = "ciris_key"
 KEYS_SECONDS = 1.0
+"""How long what was read of the keys is believed."""
+AGAIN_SECONDS = 0.1
+"""Between two looks for keys that are not known yet, whoever and however many ask for them."""
 _BEARER = HTTPBearer(auto_error=False, scheme_name="key", description="An API key. The service on loopback needs none until one is made.")
 
 
@@ -34,36 +39,55 @@ class Caller:
 class Keyring:
     """Tells callers by their keys, which are read from the database once in ``KEYS_SECONDS`` and not for every request.
 
-    A key that was revoked is refused after that time at the latest; one that was just made is looked for at once.
+    A key that was revoked is refused after that time at the latest. What strangers send is not kept, and makes nobody read more than
+    once in ``AGAIN_SECONDS``.
     """
 
     def __init__(self, database: Database, *, open_without_keys: bool) -> None:
         self._database, self._open = database, open_without_keys
-        self._ring: Ring | None = None
-        self._read_at = -KEYS_SECONDS
+        self._ring = Ring({})
+        self._read_at = -math.inf
+        self._reading: asyncio.Future[None] | None = None
 
-    async def caller(self, headers: Headers) -> Caller | None:
-        """The caller by the key in the Authorization header or else the cookie; None for those who may not come in."""
-        given, ring = presented_key(headers), self._ring
-        if ring is None or time.monotonic() - self._read_at > KEYS_SECONDS or (given is not None and not ring.knows(given)):
-            self._read_at = time.monotonic()
-            ring = self._ring = await run_in_threadpool(self._read)
+    async def caller(self, given: str | None) -> Caller | None:
+        """The caller by the key that came with a request; None for those who may not come in by what is known."""
+        ring = await self._as_of(time.monotonic() - KEYS_SECONDS)
         if given is not None:
-            row = ring.check(given)
-            return None if row is None else Caller(Scope(row.scope), row.id, row.name)
-        return Caller(Scope.ADMIN) if self._open and not ring.rows else None
+            key = ring.check(given)
+            return None if key is None else Caller(key.scope, key.id, key.name)
+        return Caller(Scope.ADMIN) if self._open and not ring.keys else None
+
+    async def newcomer(self, given: str | None) -> Caller | None:
+        """The caller by a key that :meth:`caller` does not know, in case it has just been made."""
+        if given is None or not self._ring.misses(given):
+            return None
+        await self._as_of(time.monotonic(), pause=AGAIN_SECONDS)
+        return await self.caller(given)
+
+    async def _as_of(self, moment: float, pause: float = 0.0) -> Ring:
+        """The keys as they were at that moment or later. Of many who ask one reads, ``pause`` after the last reading; it fails for all."""
+        while self._read_at < moment:
+            if self._reading is None:
+                self._reading = asyncio.ensure_future(self._read_again(self._read_at + pause))
+            await asyncio.shield(self._reading)
+        return self._ring
+
+    async def _read_again(self, not_before: float) -> None:
+        try:
+            await asyncio.sleep(not_before - time.monotonic())
+            began = time.monotonic()
+            self._ring = await run_in_threadpool(self._read)
+            self._read_at = began
+        finally:
+            self._reading = None
 
     def _read(self) -> Ring:
-        try:
-            with self._database.read() as session:
-                return keys.ring(session)
-        except Exception:
-            self._ring = None  # nobody gets in by what was known before
-            raise
+        with self._database.read() as session:
+            return keys.ring(session)
 
 
 def presented_key(headers: Headers) -> str | None:
-    """The key that came with a request."""
+    """The key that came with a request, in the Authorization header or else the cookie."""
     kind, _, value = headers.get("authorization", "").partition(" ")
     if kind.lower() == "bearer":
         return value.strip()

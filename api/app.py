@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from functools import partial
 
+from anyio import to_thread
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
 from api import guard, login, pages, problems
 from api.access import Keyring
 from api.access_log import AccessLog
-from api.children import ChildLimiter
+from api.announce import Announcer
+from api.children import AT_ONCE, ChildLimiter
 from api.metrics import Requests
 from api.routers import events, jobs, planning, regions, scenes, service
-from db.session import Database, database
+from db.session import CONNECTIONS, Database, database
 from db.settings import LOOPBACK_NAMES, settings
 
 DESCRIPTION = """Certified collision-free regions of robot configuration space.
 
 A scene goes in, a job grows or certifies a polytope, its regions come out with proofs that anyone can check offline.
 Errors are problem+json (RFC 9457) with a `code`, the `field` and a `hint`; unknown fields and numbers that are not finite are refused."""
+
+
+THREADS = CONNECTIONS - AT_ONCE
+"""What is left of the connections when two uploads or checks have theirs."""
 
 
 def create_app(db: Database | None = None) -> FastAPI:
@@ -32,10 +40,12 @@ def create_app(db: Database | None = None) -> FastAPI:
         redoc_url=None,
         generate_unique_id_function=_operation_id,
         separate_input_output_schemas=False,
+        lifespan=_few_threads,
     )
     app.state.database = db or database()
     app.state.requests = Requests()
     app.state.children = ChildLimiter()
+    app.state.announcer = Announcer()
     app.add_middleware(
         guard.Guard,
         keyring=Keyring(app.state.database, open_without_keys=settings().loopback),
@@ -51,6 +61,13 @@ def create_app(db: Database | None = None) -> FastAPI:
     pages.install(app)
     app.openapi = partial(problems.describe, app)  # type: ignore[method-assign]
     return app
+
+
+@asynccontextmanager
+async def _few_threads(_app: FastAPI) -> AsyncIterator[None]:
+    """Requests are answered by a few threads, each with its connection to the database: more would only wait for each other."""
+    to_thread.current_default_thread_limiter().total_tokens = THREADS
+    yield
 
 
 def _operation_id(route: APIRoute) -> str:

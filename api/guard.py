@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from http import HTTPStatus
+from ipaddress import ip_address, ip_network
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
@@ -19,8 +20,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from api.access import Keyring, presented_key
 from api.limits import Buckets
-from api.problems import UNAVAILABLE
 from certifier.errors import CirisError
+from db.session import UNAVAILABLE
 
 BODY_BYTES = 16 * 2**20
 """More than the largest request of every route but uploads."""
@@ -59,7 +60,7 @@ class Guard:
         self, app: ASGIApp, keyring: Keyring, hosts: frozenset[str] | None, rate: float, respond: Callable[[Request, Exception], Response]
     ) -> None:
         self._app, self._keyring, self._hosts, self._respond = app, keyring, hosts, respond
-        self._buckets = Buckets(rate)
+        self._keys, self._addresses = Buckets(rate), Buckets(rate)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -86,16 +87,33 @@ class Guard:
             raise CirisError("cross_site", f"requests from {origin} are not accepted", field="Origin")
 
     async def _check_caller(self, scope: Scope, headers: Headers) -> None:
-        """Finds out who asks (``request.state.caller``), unless anybody may, and counts the request."""
+        """Finds out who asks (``request.state.caller``), unless anybody may, and counts the request.
+
+        Who has a valid key is counted by it, wherever they are, so that nobody who shares their address can use up what they may ask.
+        Everybody else is counted by address, before anything is done for them.
+        """
         public = scope["path"] in PUBLIC or scope["path"].startswith(STATIC)
-        caller = None if public else await self._keyring.caller(headers)
-        address = scope["client"][0] if scope.get("client") else "unknown"
-        wait = self._buckets.take(f"key {caller.key_id}" if caller and caller.key_id else f"address {address}")
+        given = None if public else presented_key(headers)
+        caller = None if public else await self._keyring.caller(given)
+        key_id = caller and caller.key_id
+        wait = self._keys.take(key_id) if key_id else self._addresses.take(_network(scope))
         if wait > 0:
             raise TooManyRequests(wait)
         if caller is None and not public:
-            raise KeyNeeded(presented_key(headers))
+            caller = await self._keyring.newcomer(given)
+            if caller is None:
+                raise KeyNeeded(given)
         scope.setdefault("state", {})["caller"] = caller
+
+
+def _network(scope: Scope) -> str:
+    """Where a request comes from: its address, or the network of an IPv6 one, since who has one of those has all of its network's."""
+    address = str(scope["client"][0]) if scope.get("client") else ""
+    try:
+        ip = ip_address(address.partition("%")[0])
+    except ValueError:
+        return address
+    return str(ip if ip.version == 4 else ip.ipv4_mapped or ip_network((ip, 64), strict=False))
 
 
 def _name(host: str) -> str:

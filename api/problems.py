@@ -13,10 +13,10 @@ from fastapi.openapi.utils import get_openapi
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict
 from pydantic.json_schema import models_json_schema
-from sqlalchemy.exc import InterfaceError, OperationalError, TimeoutError
 from starlette.exceptions import HTTPException
 
 from certifier.errors import CirisError
+from db.session import UNAVAILABLE
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -36,8 +36,6 @@ _STATUS_OF_CODE = {
     "busy": HTTPStatus.SERVICE_UNAVAILABLE,
 }
 
-UNAVAILABLE = (OperationalError, InterfaceError, TimeoutError)
-"""The database cannot be reached, or not in time."""
 RETRY_SECONDS = 5
 
 

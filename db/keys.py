@@ -88,28 +88,41 @@ def exist(session: Session) -> bool:
 
 
 @dataclass(frozen=True)
+class Key:
+    """A key that was made; ``digest`` is the SHA-256 of it."""
+
+    id: str
+    name: str
+    digest: str
+    scope: Scope
+    revoked: bool
+
+
+@dataclass(frozen=True)
 class Ring:
     """Every key that was made, by its id, as of one moment."""
 
-    rows: dict[str, ApiKeyRow]
+    keys: dict[str, Key]
 
-    def knows(self, key: str) -> bool:
-        """Whether the ring has a key of this id, valid or not."""
+    def misses(self, key: str) -> bool:
+        """Whether this could be a key that was made after that moment: it looks like one, and has an id of its own."""
         parts = _KEY.fullmatch(key)
-        return parts is not None and parts[1] in self.rows
+        return parts is not None and parts[1] not in self.keys
 
-    def check(self, key: str) -> ApiKeyRow | None:
-        """The row of a valid key; None for anything else."""
+    def check(self, key: str) -> Key | None:
+        """What is known of a valid key; None for anything else."""
         parts = _KEY.fullmatch(key)
-        row = self.rows.get(parts[1]) if parts else None
-        if row is None or row.revoked_at is not None or not hmac.compare_digest(row.digest, _digest(key)):
+        known = self.keys.get(parts[1]) if parts else None
+        if known is None or known.revoked or not hmac.compare_digest(known.digest, _digest(key)):
             return None
-        return row
+        return known
 
 
 def ring(session: Session) -> Ring:
     """The keys as they are now."""
-    return Ring({row.id: row for row in session.scalars(select(ApiKeyRow))})
+    columns = (ApiKeyRow.id, ApiKeyRow.name, ApiKeyRow.digest, ApiKeyRow.scope, ApiKeyRow.revoked_at.is_not(None))
+    rows = session.execute(select(*columns))
+    return Ring({id: Key(id, name, digest, Scope(scope), revoked) for id, name, digest, scope, revoked in rows})
 
 
 def check_bind(settings: Settings) -> None:

@@ -29,7 +29,7 @@ def connection_for_migrations(url: str) -> Iterator[Connection]:
     """
     database = Database(url)
     if database.sqlite:
-        event.listen(database.engine, "connect", lambda connection, _record: connection.execute("PRAGMA foreign_keys=OFF"))
+        event.listen(database.writer, "connect", lambda connection, _record: connection.execute("PRAGMA foreign_keys=OFF"))
     try:
         with database.writer.begin() as connection:
             if not database.sqlite:

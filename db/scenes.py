@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sqlalchemy import select
+from sqlalchemy import or_, select
 from sqlalchemy.orm import Session
 
 from certifier.errors import SceneError
@@ -25,17 +25,26 @@ def add(session: Session, scene: Scene) -> SceneRow:
     raise AssertionError("a full hash can only be taken by the scene that has it")
 
 
-def get(session: Session, name: str) -> SceneRow:
-    """The scene with this id, or else the newest one with this name.
+def find(session: Session, name: str) -> str:
+    """The id of the scene with this id, or else of the newest one with this name. Its document is not read, which may be long.
 
     Raises:
         SceneError: scene_not_found.
     """
-    row = session.get(SceneRow, name)
-    row = row or session.scalar(select(SceneRow).where(SceneRow.name == name).order_by(SceneRow.created_at.desc()).limit(1))
-    if row is None:
+    named = select(SceneRow.id).where(or_(SceneRow.id == name, SceneRow.name == name))
+    found = session.scalar(named.order_by((SceneRow.id == name).desc(), SceneRow.created_at.desc()).limit(1))
+    if found is None:
         raise SceneError("scene_not_found", f"there is no scene {name!r}", field="scene")
-    return row
+    return found
+
+
+def get(session: Session, name: str) -> SceneRow:
+    """The scene that :func:`find` finds.
+
+    Raises:
+        SceneError: scene_not_found.
+    """
+    return session.get_one(SceneRow, find(session, name))
 
 
 def page(session: Session, after: str | None = None, limit: int = 100) -> Page[SceneRow]:

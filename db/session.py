@@ -1,30 +1,42 @@
 """Engines and transactions on SQLite and PostgreSQL.
 
 SQLite runs in WAL mode, and a transaction that will write begins with ``BEGIN IMMEDIATE``: one that begins by reading and writes
-later would fail, or lose an update, whenever another process wrote in between. A committed transaction outlives the process; with
-``synchronous=NORMAL`` a power cut may take back the last ones, never leave half of one.
+later would fail, or lose an update, whenever another process wrote in between. Who waits for another process' write looks again ever
+more seldom, so the writers of one process share one connection: they queue for that instead. A committed transaction outlives the
+process; with ``synchronous=NORMAL`` a power cut may take back the last ones, never leave half of one.
+
+PostgreSQL gives every statement its own view of the database unless told otherwise, so there reading needs no transaction, and no
+messages that begin and end one.
 """
 
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event
+from sqlalchemy import Connection, Dialect, Engine, QueuePool, create_engine, event
 from sqlalchemy.dialects import postgresql, sqlite
-from sqlalchemy.engine import make_url
+from sqlalchemy.engine import URL, make_url
+from sqlalchemy.exc import DisconnectionError, InterfaceError, OperationalError, TimeoutError
 from sqlalchemy.orm import DeclarativeBase, Session
 
 from db.settings import settings
 
+CONNECTIONS = 10
+"""The most that one process has. They are opened when needed, and kept: opening one costs more than most of what it is used for."""
 BUSY_SECONDS = 30.0
-"""How long a writer waits for another one (SQLite)."""
+"""How long one waits for a connection, or a writer for another one (SQLite)."""
+IDLE_SECONDS = 1.0
+"""A connection to PostgreSQL that was not used for so long is tried before it is: the server may have been restarted."""
 SILENCE_SECONDS = 20
 """A PostgreSQL server or client that says nothing for so long is believed gone, and with the client its locks."""
+UNAVAILABLE = (OperationalError, InterfaceError, TimeoutError)
+"""What is raised when the database cannot be reached, or not in time."""
 _LINK = {
     "connect_timeout": 5,
     "keepalives_idle": SILENCE_SECONDS // 4,
@@ -35,30 +47,17 @@ _LINK = {
 
 
 class Database:
-    """One database: an engine and the two kinds of transaction."""
+    """One database: its engines for reading and for writing, and the two kinds of transaction."""
 
     def __init__(self, url: str) -> None:
         parsed = make_url(url)
         self.sqlite = parsed.get_backend_name() == "sqlite"
-        options: dict[str, Any] = {"json_serializer": _strict_json, "pool_pre_ping": not self.sqlite, "hide_parameters": True}
-        if self.sqlite:
-            if parsed.database:
-                Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
-            options["connect_args"] = {"timeout": BUSY_SECONDS}
-        else:
-            options["connect_args"] = _LINK
-        self.engine: Engine = create_engine(parsed, **options)
-        if self.sqlite:
-            event.listen(self.engine, "connect", _configure_sqlite)
-            event.listen(self.engine, "begin", _begin_sqlite)
-        else:
-            event.listen(self.engine, "connect", _configure_postgresql)
-        self.writer = self.engine.execution_options(sqlite_begin="BEGIN IMMEDIATE")
+        self.reader, self.writer = _sqlite(parsed) if self.sqlite else _postgresql(parsed)
 
     @contextmanager
     def read(self) -> Iterator[Session]:
-        """A transaction that only reads; rows stay usable after it."""
-        with Session(self.engine, expire_on_commit=False) as session:
+        """A session that only reads; rows stay usable after it."""
+        with Session(self.reader, expire_on_commit=False) as session:
             yield session
 
     @contextmanager
@@ -68,7 +67,8 @@ class Database:
             yield session
 
     def close(self) -> None:
-        self.engine.dispose()
+        self.reader.dispose()
+        self.writer.dispose()
 
 
 def insert_new(session: Session, model: type[DeclarativeBase], rows: list[dict[str, Any]]) -> int:
@@ -90,18 +90,60 @@ def _strict_json(value: Any) -> str:
     return json.dumps(value, allow_nan=False)
 
 
+def _sqlite(url: URL) -> tuple[Engine, Engine]:
+    if url.database:
+        Path(url.database).parent.mkdir(parents=True, exist_ok=True)
+    engines = _engine(url, connect_args={"timeout": BUSY_SECONDS}), _engine(url, 1, connect_args={"timeout": BUSY_SECONDS})
+    for engine, begin in zip(engines, ("BEGIN", "BEGIN IMMEDIATE"), strict=True):
+        event.listen(engine, "connect", _configure_sqlite)
+        event.listen(engine, "begin", partial(_begin_sqlite, begin))
+    return engines
+
+
+def _postgresql(url: URL) -> tuple[Engine, Engine]:
+    engine = _engine(url, connect_args=_LINK)
+    event.listen(engine, "connect", _configure_postgresql)
+    event.listen(engine, "checkin", _note_use)
+    event.listen(engine, "checkout", partial(_try_if_idle, engine.dialect))
+    return engine.execution_options(isolation_level="AUTOCOMMIT"), engine
+
+
+def _engine(url: URL, connections: int = CONNECTIONS, **options: Any) -> Engine:
+    pool = {"poolclass": QueuePool, "pool_size": connections, "max_overflow": 0, "pool_timeout": BUSY_SECONDS}
+    return create_engine(url, **pool, **options, json_serializer=_strict_json, hide_parameters=True)
+
+
 def _configure_sqlite(connection: Any, _record: Any) -> None:
     connection.isolation_level = None
     for pragma in ("journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON"):
         connection.execute(f"PRAGMA {pragma}")
 
 
-def _configure_postgresql(connection: Any, _record: Any) -> None:
+def _begin_sqlite(begin: str, connection: Connection) -> None:
+    connection.exec_driver_sql(begin)
+
+
+def _configure_postgresql(connection: Any, record: Any) -> None:
     """Has the server end a transaction whose client is gone or hangs, so that it locks nobody out."""
     with connection.cursor() as cursor:
         cursor.execute(f"SET idle_in_transaction_session_timeout = '{SILENCE_SECONDS}s'")
     connection.commit()
+    _note_use(connection, record)
 
 
-def _begin_sqlite(connection: Connection) -> None:
-    connection.exec_driver_sql(connection.get_execution_options().get("sqlite_begin", "BEGIN"))
+def _note_use(_connection: Any, record: Any) -> None:
+    record.info["used"] = time.monotonic()
+
+
+def _try_if_idle(dialect: Dialect, connection: Any, record: Any, _proxy: Any) -> None:
+    """Has the pool replace a connection that was idle and is dead.
+
+    Raises:
+        DisconnectionError: to tell the pool so.
+    """
+    if time.monotonic() - record.info["used"] < IDLE_SECONDS:
+        return
+    try:
+        dialect.do_ping(connection)
+    except dialect.loaded_dbapi.Error as error:
+        raise DisconnectionError from error

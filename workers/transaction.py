@@ -8,10 +8,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
-from sqlalchemy.exc import InterfaceError, OperationalError
 from sqlalchemy.orm import Session
 
-from db.session import database
+from db.session import UNAVAILABLE, database
 
 log = logging.getLogger(__name__)
 
@@ -35,6 +34,6 @@ def persistently(save: Callable[[], Saved]) -> Saved:
     while True:
         try:
             return save()
-        except (InterfaceError, OperationalError) as error:
+        except UNAVAILABLE as error:
             log.warning("the database cannot be used; trying again: %s", error)
             time.sleep(RETRY_SECONDS)

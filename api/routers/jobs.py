@@ -14,6 +14,8 @@ from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 
 from api import checks
 from api.access import READ, SUBMIT, Db, Submitter
+from api.announce import Announcements
+from api.scene_cache import scene_of
 from api.schemas.common import MAX_INT, Cursor
 from api.schemas.jobs import (
     CertifyRequest,
@@ -38,7 +40,6 @@ from db import jobs, pairs, proofs, regions, scenes, webhooks
 from db.models import IterationRow, PairRow
 from db.states import IterationState, JobKind, JobState, PairState
 from db.types import utcnow
-from workers.app import send_coordinate
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ])
 
@@ -50,30 +51,31 @@ def create_job(
     db: Db,
     response: Response,
     background: BackgroundTasks,
+    announcements: Announcements,
     idempotency_key: Annotated[str | None, Header(min_length=1, max_length=200)] = None,
 ) -> Job:
     """Start growing a region, or certifying a polytope. The same request under the same Idempotency-Key is the same job."""
     with db.read() as session:
-        scene = scenes.get(session, body.scene)
-    options = _options(body, Scene.from_document(scene.document))
+        scene_id = scenes.find(session, body.scene)
+    options = _options(body, scene_of(db, scene_id))
     if body.webhook is not None:
         checks.webhook(body.webhook)
     with db.write() as session:
         job, made = jobs.create(
             session,
             kind=body.kind,
-            scene_id=scene.id,
+            scene_id=scene_id,
             options=options,
             deadline_at=utcnow() + timedelta(seconds=body.deadline_seconds) if body.deadline_seconds else None,
             idempotency_key=idempotency_key and f"{caller.key_id or 'open'}:{idempotency_key}",
-            request_digest=_digest(scene.id, options, body),
+            request_digest=_digest(scene_id, options, body),
             key_id=caller.key_id,
             priority=body.priority,
         )
         if made and body.webhook is not None:
             webhooks.add(session, job.id, body.webhook.url, body.webhook.secret)
     if made:
-        background.add_task(send_coordinate, job.id)
+        background.add_task(announcements.announce, job.id)
     else:
         response.status_code = status.HTTP_200_OK
     response.headers["Location"] = f"/v1/jobs/{job.id}"
@@ -104,7 +106,7 @@ def list_jobs(
 ) -> JobPage:
     """Jobs, newest first."""
     with db.read() as session:
-        scene_id = scenes.get(session, scene).id if scene else None
+        scene_id = scenes.find(session, scene) if scene else None
         page = jobs.page(session, state=state, kind=kind, scene_id=scene_id, after=after, limit=limit)
     return JobPage(jobs=[Job.of(row) for row in page.rows], next=page.next)
 
@@ -117,20 +119,20 @@ def get_job(job_id: str, db: Db) -> Job:
 
 
 @router.post("/{job_id}/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
-def cancel_job(job_id: str, db: Db, background: BackgroundTasks) -> Job:
+def cancel_job(job_id: str, db: Db, background: BackgroundTasks, announcements: Announcements) -> Job:
     """Ask a job to end; regions certified before remain. Nothing happens to a job that has ended."""
     with db.write() as session:
         job = jobs.cancel(session, job_id)
-    background.add_task(send_coordinate, job_id)
+    background.add_task(announcements.announce, job_id)
     return Job.of(job)
 
 
 @router.post("/{job_id}/retry", status_code=status.HTTP_201_CREATED)
-def retry_job(job_id: str, caller: Submitter, db: Db, response: Response, background: BackgroundTasks) -> Job:
+def retry_job(job_id: str, caller: Submitter, db: Db, response: Response, background: BackgroundTasks, announcements: Announcements) -> Job:
     """A new job like one that failed or was cancelled; asking again gives the same new job."""
     with db.write() as session:
         job = jobs.retry(session, job_id, caller.key_id)
-    background.add_task(send_coordinate, job.id)
+    background.add_task(announcements.announce, job.id)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return Job.of(job)
 
@@ -147,9 +149,9 @@ def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge
     """The pair matrix: what became of every pair on every iteration's polytope, or on one of them."""
     with db.read() as session:
         job = jobs.get(session, job_id)
-        scene = Scene.from_document(scenes.get(session, job.scene_id).document)
         rows = pairs.of_job(session, job_id) if iteration is None else pairs.of_iteration(session, job_id, iteration)
         iterations = [row for row in pairs.iterations(session, job_id) if iteration in (None, row.index)]
+    scene = scene_of(db, job.scene_id)
     return PairMatrix(
         pairs=[PairInfo(index=index, a=pair.a, b=pair.b) for index, pair in enumerate(scene.pairs)],
         iterations=[_iteration(row) for row in iterations],
@@ -166,9 +168,8 @@ def download_pair_proof(job_id: str, pair: int, iteration: Annotated[int, Query(
         if row is None or row.proof_digest is None:
             raise CirisError("proof_not_found", f"there is no proof of pair {pair} in iteration {iteration}", field="pair")
         data = proofs.get(session, row.proof_digest)
-        scene = Scene.from_document(scenes.get(session, job.scene_id).document)
     headers = {"Content-Disposition": f'attachment; filename="{job_id}-{iteration}-{pair}.proof"'}
-    return Response(with_scene(data, scene), media_type="application/octet-stream", headers=headers)
+    return Response(with_scene(data, scene_of(db, job.scene_id)), media_type="application/octet-stream", headers=headers)
 
 
 def _iteration(row: IterationRow) -> Iteration:

@@ -7,8 +7,9 @@ from fastapi import APIRouter
 
 from api import checks
 from api.access import READ, Db
+from api.scene_cache import scene_of
 from api.schemas.regions import Containment, ContainsRequest, ContainsResponse, Hit
-from certifier.model import Polytope, Scene
+from certifier.model import Polytope
 from certifier.outcome import Guarantee
 from db import regions, scenes
 from planner.membership import MembershipIndex, to_s
@@ -20,9 +21,9 @@ router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ]
 def contains(body: ContainsRequest, db: Db) -> ContainsResponse:
     """Which certified regions of the scene hold each of these points, and how deep inside they are."""
     with db.read() as session:
-        row = scenes.get(session, body.scene)
-        stored = regions.polytopes(session, row.id)
-    scene = Scene.from_document(row.document)
+        scene_id = scenes.find(session, body.scene)
+        stored = regions.polytopes(session, scene_id)
+    scene = scene_of(db, scene_id)
     points = to_s(scene, checks.points(scene, body.q, "q")) if body.q is not None else checks.points(scene, body.s or [], "s")
     found = MembershipIndex([Polytope(r.C, r.d) for r in stored], scene.n).locate(points)
     answers = []
@@ -31,4 +32,4 @@ def contains(body: ContainsRequest, db: Db) -> ContainsResponse:
         hits = [Hit(region=stored[i].id, margin=margin[i], guarantee=Guarantee(stored[i].guarantee)) for i in deepest if inside[i]]
         best = float(margin.max(initial=-np.inf))
         answers.append(Containment(inside=bool(hits), regions=hits, margin=best if np.isfinite(best) else None))
-    return ContainsResponse(scene=row.id, regions=len(stored), points=answers)
+    return ContainsResponse(scene=scene_id, regions=len(stored), points=answers)

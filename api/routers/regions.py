@@ -43,7 +43,7 @@ def list_regions(
 ) -> RegionPage:
     """Certified regions, newest first."""
     with db.read() as session:
-        scene_id = scenes.get(session, scene).id if scene else None
+        scene_id = scenes.find(session, scene) if scene else None
         job_id = jobs.get(session, job).id if job else None
         page = regions.page(session, scene_id=scene_id, job_id=job_id, after=after, limit=limit)
     return RegionPage(regions=[RegionSummary.of(row) for row in page.rows], next=page.next)

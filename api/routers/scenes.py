@@ -9,10 +9,10 @@ from fastapi import APIRouter, File, Query, Response, UploadFile, status
 
 from api.access import READ, SUBMIT, Db
 from api.children import Children
+from api.scene_cache import scene_of
 from api.schemas.common import Cursor
 from api.schemas.scenes import IgnoredPair, LintReport, PairForecast, SceneDetail, ScenePage, ScenePairs, SceneSummary, Substitution
 from certifier.forecast import forecast
-from certifier.model import Scene
 from certifier.scene.bundle import load_bundle
 from db import scenes
 from db.models import SceneRow
@@ -59,7 +59,8 @@ def get_scene(scene_id: str, db: Db) -> SceneDetail:
 def get_scene_pairs(scene_id: str, db: Db) -> ScenePairs:
     """The pairs to certify, with the reference frame chosen for each and a forecast of its cost."""
     with db.read() as session:
-        scene = Scene.from_document(scenes.get(session, scene_id).document)
+        scene_id = scenes.find(session, scene_id)
+    scene = scene_of(db, scene_id)
     names = [joint.name for joint in scene.moving]
     pairs = []
     for index, cost in enumerate(forecast(scene)):

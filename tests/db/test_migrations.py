@@ -14,7 +14,7 @@ from tests.scenes import slider
 def tables(url: str) -> set[str]:
     database = Database(url)
     try:
-        return set(inspect(database.engine).get_table_names())
+        return set(inspect(database.reader).get_table_names())
     finally:
         database.close()
 

@@ -22,7 +22,7 @@ MODELS = {JobRow: JobState, PairRow: PairState, StepRow: StepState}
 def session() -> Iterator[Session]:
     """One writing transaction on a database in memory."""
     database = Database("sqlite://")
-    Base.metadata.create_all(database.engine)
+    Base.metadata.create_all(database.writer)
     with database.write() as session:
         a_running_job(session, pair_count=1)
         yield session
