@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
+import secrets
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import httpx2
 import pytest
 from fastapi.routing import APIRoute
 from fastapi.testclient import TestClient
+from sqlalchemy import event
+from sqlalchemy.exc import OperationalError
 from starlette.routing import Mount
 
-from api.access import KEYS_SECONDS, _authorize
+from api.access import KEYS_SECONDS, Caller, Keyring, _authorize
 from api.app import create_app
-from api.guard import PUBLIC
+from api.guard import PUBLIC, _network
 from api.limits import MAX_BUCKETS, Buckets
 from certifier.errors import CirisError
 from certifier.model import Scene
@@ -206,6 +211,102 @@ def test_every_key_has_its_own_rate(hasty: TestClient, database: Database) -> No
 def test_guessing_keys_is_slow(hasty: TestClient, database: Database) -> None:
     a_key(database, Scope.READ)
     assert [hasty.get("/v1/jobs", headers=bearer(f"guess{i}")).status_code for i in range(8)].count(401) < 8
+
+
+@contextmanager
+def readings(database: Database) -> Iterator[list[str]]:
+    """Grows by one with every reading of the keys."""
+    seen: list[str] = []
+
+    def look(_connection: object, _cursor: object, statement: str, *_: object) -> None:
+        if "api_keys" in statement:
+            seen.append(statement)
+
+    event.listen(database.reader, "before_cursor_execute", look)
+    yield seen
+    event.remove(database.reader, "before_cursor_execute", look)
+
+
+def an_invented_key() -> str:
+    return f"ciris_{secrets.token_hex(6)}_{secrets.token_urlsafe(32)}"
+
+
+def test_strangers_wait_before_anything_is_read_for_them(hasty: TestClient, database: Database) -> None:
+    key = a_key(database, Scope.READ)
+    assert hasty.get("/v1/jobs", headers=bearer(key)).status_code == 200
+    while hasty.get("/v1/jobs", headers=bearer(an_invented_key())).status_code == 401:
+        pass
+    with readings(database) as seen:
+        began = time.monotonic()
+        statuses = [hasty.get("/v1/jobs", headers=bearer(an_invented_key())).status_code for _ in range(50)]
+        allowed = statuses.count(401)
+        assert statuses.count(429) == 50 - allowed
+        assert len(seen) <= allowed + 1 + (time.monotonic() - began) / KEYS_SECONDS
+    assert hasty.get("/v1/jobs", headers=bearer(key)).status_code == 200, "who has a key does not wait for those behind the same address"
+
+
+def test_a_wrong_secret_counts_against_the_address_and_reads_nothing(hasty: TestClient, database: Database) -> None:
+    key = a_key(database, Scope.READ)
+    guess = key[:19] + secrets.token_urlsafe(32)
+    assert hasty.get("/v1/jobs", headers=bearer(key)).status_code == 200
+    with readings(database) as seen:
+        began = time.monotonic()
+        statuses = [hasty.get("/v1/jobs", headers=bearer(guess)).status_code for _ in range(20)]
+        assert len(seen) <= 1 + (time.monotonic() - began) / KEYS_SECONDS
+    assert set(statuses) == {401, 429}
+    assert hasty.get("/v1/jobs", headers=bearer(key)).status_code == 200
+
+
+def test_of_many_unknown_keys_at_once_one_has_the_keys_read(database: Database) -> None:
+    key = a_key(database, Scope.READ)
+    keyring = Keyring(database, open_without_keys=False)
+
+    async def ask() -> list[Caller | None]:
+        assert await keyring.caller(None) is None
+        new = a_key(database, Scope.ADMIN)
+        with readings(database) as seen:
+            found = await asyncio.gather(*(keyring.newcomer(given) for given in [*(an_invented_key() for _ in range(100)), new]))
+        assert len(seen) == 1
+        return found
+
+    *strangers, caller = asyncio.run(ask())
+    assert set(strangers) == {None}
+    assert caller is not None
+    assert caller.scope == Scope.ADMIN
+    assert set(keyring._ring.keys) == {key.split("_")[1], caller.key_id}, "nothing is kept of what strangers sent"
+
+
+def test_keys_that_cannot_be_read_let_nobody_in_and_are_read_again(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    key = a_key(database, Scope.READ)
+    keyring = Keyring(database, open_without_keys=True)
+
+    def fail(_session: object) -> None:
+        raise OperationalError("SELECT 1", {}, Exception("connection refused"))
+
+    async def ask() -> Caller | None:
+        with monkeypatch.context() as patch:
+            patch.setattr(keys, "ring", fail)
+            failures = await asyncio.gather(*(keyring.caller(given) for given in (key, None)), return_exceptions=True)
+        assert [type(failure) for failure in failures] == [OperationalError] * 2
+        return await keyring.caller(key)
+
+    caller = asyncio.run(ask())
+    assert caller is not None
+    assert caller.scope == Scope.READ
+
+
+@pytest.mark.parametrize(
+    ("address", "network"),
+    [
+        ("192.0.2.7", "192.0.2.7"),
+        ("2001:db8:1:2:3:4:5:6", "2001:db8:1:2::/64"),
+        ("fe80::1%eth0", "fe80::/64"),
+        ("::ffff:192.0.2.7", "192.0.2.7"),
+        ("testclient", "testclient"),
+    ],
+)
+def test_an_address_is_counted_with_those_that_its_holder_has_too(address: str, network: str) -> None:
+    assert _network({"client": (address, 1)}) == network
 
 
 @pytest.fixture
