@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TypeVar
 from uuid import uuid4
 
-from sqlalchemy import ColumnElement, select, update
+from sqlalchemy import BindParameter, ColumnElement, Select, bindparam, select, update
 from sqlalchemy.orm import Session
 
 from db.models import JobRow, PairRow, StepRow
@@ -97,7 +97,7 @@ def take(session: Session, model: type[Row], rows: Sequence[Row], *, seconds: fl
     return token
 
 
-def held(model: type[Row], token: str) -> ColumnElement[bool]:
+def held(model: type[Row], token: str | BindParameter[str]) -> ColumnElement[bool]:
     """Condition: the row is still held under this token."""
     return (model.lease_token == token) & (model.state == RUNNING)
 
@@ -136,9 +136,15 @@ def kept(database: Database, model: type[Row], token: str, seconds: float, job_s
 
 
 def _is_wanted(database: Database, model: type[Row], token: str, job_states: Collection[str]) -> bool:
-    wanted = select(model.id).join(JobRow, JobRow.id == model.job_id).where(held(model, token), JobRow.state.in_(job_states))
     with database.read() as session:
-        return session.scalar(wanted.limit(1)) is not None
+        return session.scalar(_wanted(model), {"token": token, "job_states": list(job_states)}) is not None
+
+
+@cache
+def _wanted(model: type[Row]) -> Select[int]:
+    """What is held under a token, of a job in one of some states; built once, because it is asked so often."""
+    in_time = JobRow.state.in_(bindparam("job_states", expanding=True))
+    return select(model.id).join(JobRow, JobRow.id == model.job_id).where(held(model, bindparam("token")), in_time).limit(1)
 
 
 def _renew(database: Database, model: type[Row], token: str, seconds: float) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, cast
 
-from sqlalchemy import ColumnElement, CursorResult, select, update
+from sqlalchemy import BindParameter, ColumnElement, CursorResult, select, update
 from sqlalchemy.orm import Session
 
 from db import events, jobs, leases
@@ -43,7 +43,7 @@ def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any], du
 
 def claim(session: Session, job: JobRow, kinds: Collection[StepKind], *, lease_seconds: float) -> Claim | None:
     """Claims the job's latest step of these kinds that is open and due; None when there is none. The caller holds the job's lock."""
-    query = select(StepRow).where(StepRow.job_id == job.id, is_due(StepRow), StepRow.kind.in_(kinds))
+    query = select(StepRow).where(StepRow.job_id == job.id, is_due(StepRow, utcnow()), StepRow.kind.in_(kinds))
     step = session.scalar(query.order_by(StepRow.turn.desc()).limit(1))
     if step is None:
         return None
@@ -70,9 +70,9 @@ def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any
     return True
 
 
-def is_due(step: type[StepRow]) -> ColumnElement[bool]:
+def is_due(step: type[StepRow], now: datetime | BindParameter[datetime]) -> ColumnElement[bool]:
     """Condition: the step is open and may be begun."""
-    return (step.state == StepState.OPEN) & (step.due_at <= utcnow())
+    return (step.state == StepState.OPEN) & (step.due_at <= now)
 
 
 def hasten(session: Session, job_id: str) -> bool:

@@ -3,16 +3,21 @@
 Messages to the solvers only say that there is work; which, is decided here when one of them is free. Every key has the same share of
 the workers, however many jobs it has, and within a key a job's share doubles with each step of its priority. ``jobs.served`` counts the
 seconds that a job was given, divided by its share; the job with the least goes next (stride scheduling: Waldspurger, Weihl 1995).
+
+The questions are built once, with the time and the job left open: that takes longer than asking them.
 """
 
 from __future__ import annotations
 
-from sqlalchemy import ColumnElement, and_, exists, func, or_, select
+from functools import cache
+
+from sqlalchemy import ColumnElement, Select, and_, bindparam, exists, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
 from db import jobs, pairs, steps
 from db.models import JobRow, PairRow, StepRow
 from db.states import JobState, PairState, StepKind, StepState
+from db.types import Utc, utcnow
 
 URGENT = (StepKind.PROPOSE, StepKind.STEP)
 """The job waits for these; for accepting a region it does not."""
@@ -20,7 +25,7 @@ URGENT = (StepKind.PROPOSE, StepKind.STEP)
 
 def next_job(session: Session) -> str | None:
     """The job for which something is to be done next; None when nothing is to be done."""
-    return session.scalar(select(JobRow.id).where(_has_work()).order_by(JobRow.served, JobRow.created_at, JobRow.id).limit(1))
+    return session.scalar(_next_job(), {"now": utcnow()})
 
 
 def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds: float) -> pairs.Claim | steps.Claim | None:
@@ -33,14 +38,14 @@ def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds:
     if job.state == JobState.RUNNING:
         claimed = steps.claim(session, job, URGENT, lease_seconds=lease_seconds)
         claimed = claimed or pairs.claim(session, job, lease_seconds=lease_seconds, batch_seconds=batch_seconds)
-    if claimed is None and session.scalar(select(JobRow.id).where(JobRow.id == job_id, _has_region())):
+    if claimed is None and session.scalar(_has_region_now(), {"job": job_id, "now": utcnow()}):
         claimed = steps.claim(session, job, [StepKind.ACCEPT], lease_seconds=lease_seconds)
     return claimed
 
 
 def served_by_now(session: Session) -> float:
     """What a job that starts now counts as having been served: no advantage over those that wait for work, nor a debt."""
-    waiting = session.scalar(select(func.min(JobRow.served)).where(_has_work()))
+    waiting = session.scalar(_least_served(), {"now": utcnow()})
     if waiting is None:
         waiting = session.scalar(select(func.max(JobRow.served)).where(JobRow.state == JobState.RUNNING))
     return waiting or 0.0
@@ -48,20 +53,38 @@ def served_by_now(session: Session) -> float:
 
 def open_pieces(session: Session) -> int:
     """How many messages are enough for all that is open and due."""
-    conditions = (PairRow.state == PairState.OPEN, steps.is_due(StepRow))
+    conditions = (PairRow.state == PairState.OPEN, steps.is_due(StepRow, utcnow()))
     return sum(session.scalar(select(func.count()).where(condition)) or 0 for condition in conditions)
+
+
+_NOW = bindparam("now", type_=Utc())
+
+
+@cache
+def _next_job() -> Select[str]:
+    return select(JobRow.id).where(_has_work()).order_by(JobRow.served, JobRow.created_at, JobRow.id).limit(1)
+
+
+@cache
+def _least_served() -> Select[float]:
+    return select(func.min(JobRow.served)).where(_has_work())
+
+
+@cache
+def _has_region_now() -> Select[str]:
+    return select(JobRow.id).where(JobRow.id == bindparam("job"), _has_region())
 
 
 def _has_work() -> ColumnElement[bool]:
     """Condition: :func:`claim` would find something."""
     pair = exists().where(PairRow.job_id == JobRow.id, PairRow.state == PairState.OPEN)
-    step = exists().where(StepRow.job_id == JobRow.id, steps.is_due(StepRow), StepRow.kind.in_(URGENT))
+    step = exists().where(StepRow.job_id == JobRow.id, steps.is_due(StepRow, _NOW), StepRow.kind.in_(URGENT))
     return or_(and_(JobRow.state == JobState.RUNNING, or_(pair, step)), _has_region())
 
 
 def _has_region() -> ColumnElement[bool]:
     """Condition: the job has a region to accept and nobody is accepting one of its regions."""
     step, other = aliased(StepRow), aliased(StepRow)
-    waits = exists().where(step.job_id == JobRow.id, step.kind == StepKind.ACCEPT, steps.is_due(step))
+    waits = exists().where(step.job_id == JobRow.id, step.kind == StepKind.ACCEPT, steps.is_due(step, _NOW))
     accepting = exists().where(other.job_id == JobRow.id, other.kind == StepKind.ACCEPT, other.state == StepState.RUNNING)
     return and_(JobRow.state.in_((JobState.RUNNING, JobState.CANCELLING)), waits, ~accepting)

@@ -53,7 +53,8 @@ class Turn:
 
 def coordinate(job_id: str) -> None:
     """Takes the job as far as it goes without waiting for a worker. Harmless however often and whenever it is called."""
-    while (turn := _begin(job_id)) is not None:
+    goes_on = True
+    while goes_on and (turn := _begin(job_id)) is not None:
         try:
             transition = _decide(turn)
         except CirisError as error:
@@ -64,7 +65,7 @@ def coordinate(job_id: str) -> None:
             decision = partial(_give_up, turn, problem)
         else:
             decision = partial(_save, turn, transition)
-        persistently(decision)
+        goes_on = persistently(decision)
 
 
 def _decide(turn: Turn) -> Transition:
@@ -121,12 +122,12 @@ def _report(session: Session, job: JobRow) -> Report | None:
     return step_report(StepKind(step.kind), StepState(step.state), step.report or {})
 
 
-def _save(turn: Turn, transition: Transition) -> None:
-    """Saves a transition and the work it asks for, unless the job has moved on."""
+def _save(turn: Turn, transition: Transition) -> bool:
+    """Saves a transition and the work it asks for, unless the job has moved on; whether there is more to decide before work is done."""
     with writing() as (session, afterwards):
         job = jobs.lock(session, turn.job_id)
         if job.turn != turn.number or job.state not in (JobState.QUEUED, JobState.RUNNING):
-            return
+            return True
         if job.state == JobState.QUEUED:
             jobs.start(session, job, work.served_by_now(session))
         _advance(job, transition.action)
@@ -139,6 +140,7 @@ def _save(turn: Turn, transition: Transition) -> None:
                 _add_iteration(session, job, action, afterwards)
         if transition.accepted is not None:
             steps.add(session, job, StepKind.ACCEPT, asdict(transition.accepted), utcnow() + timedelta(seconds=ACCEPT_SECONDS))
+    return isinstance(transition.action, Finish) or (isinstance(transition.action, Certify) and not transition.action.pairs)
 
 
 def _advance(job: JobRow, action: Propose | Certify | Step | Finish) -> None:
@@ -168,13 +170,14 @@ def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: A
     afterwards.append(partial(send_work, len(pieces)))
 
 
-def _give_up(turn: Turn, error: CirisError) -> None:
-    """Lets the job end with this error."""
+def _give_up(turn: Turn, error: CirisError) -> bool:
+    """Lets the job end with this error, which is to be decided next."""
     with database().write() as session:
         job = jobs.lock(session, turn.job_id)
         if job.turn == turn.number and job.state in (JobState.QUEUED, JobState.RUNNING):
             job.error = error.to_document()
             _finish_growth(session, job, Finish(Outcome.ERROR, error.message))
+    return True
 
 
 def _finish_growth(session: Session, job: JobRow, finish: Finish) -> None:
