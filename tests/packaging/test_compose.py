@@ -1,5 +1,6 @@
 """The production shape: the services it must have, and that it speaks of commands and settings that exist."""
 
+import re
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -36,6 +37,19 @@ def test_the_commands_exist() -> None:
 def test_the_settings_exist() -> None:
     names = {f"CIRIS_{name.upper()}" for name in Settings.model_fields}
     assert {name for service in OURS for name in SERVICES[service]["environment"]} <= names
+
+
+def test_no_secret_has_a_default() -> None:
+    text = (ROOT / "docker-compose.yml").read_text()
+    secrets = re.findall(r"\$\{(\w*(?:PASSWORD|SECRET|KEY)\w*)(:.)?", text)
+    assert secrets
+    assert {operator for _, operator in secrets} == {":?"}, "whoever starts it without one is told so"
+
+
+def test_no_container_is_the_only_one_of_its_kind() -> None:
+    """Fixed names and host ports would keep ``--scale`` from starting a second one."""
+    for name in ("control", "solve"):
+        assert not {"container_name", "ports"} & set(SERVICES[name])
 
 
 def test_nothing_is_published_beyond_this_machine() -> None:
