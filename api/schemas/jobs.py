@@ -118,7 +118,7 @@ class CertifyRequest(JobRequest):
     """One outcome per pair for a given polytope."""
 
     model_config = ConfigDict(
-        json_schema_extra={"examples": [{"kind": "certify", "scene": "planar2", "polytope": {"C": [[1, 0], [-1, 0]], "d": [0.1, 0.1]}}]}
+        json_schema_extra={"examples": [{"kind": "certify", "scene": "planar-2dof", "polytope": {"C": [[1, 0], [-1, 0]], "d": [0.1, 0.1]}}]}
     )
 
     kind: Literal["certify"]

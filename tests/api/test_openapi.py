@@ -1,5 +1,6 @@
 """The OpenAPI document: operation ids are stable, errors are problems, examples hold."""
 
+from pathlib import Path
 from typing import Any
 
 from fastapi.testclient import TestClient
@@ -9,7 +10,12 @@ from api import checks
 from api.problems import Problem
 from api.schemas.jobs import NewJob, WebhookRequest
 from api.schemas.regions import ContainsRequest
+from certifier.scene import load_scene
+from db import scenes
 from db.keys import Scope
+from db.session import Database
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 OPERATIONS = {
     "create_scene": "POST /v1/scenes",
@@ -76,6 +82,21 @@ def test_the_examples_are_accepted_by_the_schemas(client: TestClient) -> None:
         checks.webhook(WebhookRequest.model_validate(example))
     for example in schemas["Problem"]["examples"]:
         Problem.model_validate(example)
+
+
+def test_the_examples_work_on_the_scenes_that_they_name(client: TestClient, database: Database) -> None:
+    with database.write() as session:
+        for name in ("iiwa_shelf", "planar_2dof"):
+            scenes.add(session, load_scene(EXAMPLES / name / "scene.yaml"))
+    schemas = client.get("/openapi.json").json()["components"]["schemas"]
+    for name, path, status in (
+        ("GrowRequest", "/v1/jobs", 201),
+        ("CertifyRequest", "/v1/jobs", 201),
+        ("ContainsRequest", "/v1/planning/contains", 200),
+    ):
+        for example in schemas[name]["examples"]:
+            answer = client.post(path, json=example)
+            assert answer.status_code == status, answer.text
 
 
 def test_every_operation_says_which_scope_it_needs(client: TestClient) -> None:
