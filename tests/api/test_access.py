@@ -194,11 +194,9 @@ def hasty(database: Database, environment: pytest.MonkeyPatch) -> Iterator[TestC
 
 
 def test_who_asks_too_often_is_to_wait(hasty: TestClient, database: Database) -> None:
-    answers = [hasty.get("/v1/jobs") for _ in range(8)]
-    refused = [answer for answer in answers if answer.status_code == 429]
-    assert [answer.status_code for answer in answers[:4]] == [200] * 4
-    assert refused
-    assert (refused[0].json()["code"], refused[0].headers["retry-after"]) == ("too_many_requests", "1")
+    assert [hasty.get("/v1/jobs").status_code for _ in range(4)] == [200] * 4
+    refused = next(answer for _ in range(100) if (answer := hasty.get("/v1/jobs")).status_code != 200)
+    assert (refused.status_code, refused.json()["code"], refused.headers["retry-after"]) == (429, "too_many_requests", "1")
 
 
 def test_every_key_has_its_own_rate(hasty: TestClient, database: Database) -> None:
@@ -210,7 +208,8 @@ def test_every_key_has_its_own_rate(hasty: TestClient, database: Database) -> No
 
 def test_guessing_keys_is_slow(hasty: TestClient, database: Database) -> None:
     a_key(database, Scope.READ)
-    assert [hasty.get("/v1/jobs", headers=bearer(f"guess{i}")).status_code for i in range(8)].count(401) < 8
+    statuses = (hasty.get("/v1/jobs", headers=bearer(f"guess{i}")).status_code for i in range(100))
+    assert next(status for status in statuses if status != 401) == 429
 
 
 @contextmanager
@@ -251,9 +250,9 @@ def test_a_wrong_secret_counts_against_the_address_and_reads_nothing(hasty: Test
     assert hasty.get("/v1/jobs", headers=bearer(key)).status_code == 200
     with readings(database) as seen:
         began = time.monotonic()
-        statuses = [hasty.get("/v1/jobs", headers=bearer(guess)).status_code for _ in range(20)]
+        statuses = (hasty.get("/v1/jobs", headers=bearer(guess)).status_code for _ in range(100))
+        assert next(status for status in statuses if status != 401) == 429
         assert len(seen) <= 1 + (time.monotonic() - began) / KEYS_SECONDS
-    assert set(statuses) == {401, 429}
     assert hasty.get("/v1/jobs", headers=bearer(key)).status_code == 200
 
 

@@ -54,7 +54,7 @@ def test_events_are_listed_in_order(client: TestClient, database: Database, job_
 
 
 def test_events_arrive_as_they_happen_and_the_stream_closes_with_the_job(url: str, database: Database, job_id: str) -> None:
-    with httpx2.stream("GET", f"{url}/v1/jobs/{job_id}/events/stream", timeout=10) as response:
+    with httpx2.stream("GET", f"{url}/v1/jobs/{job_id}/events/stream", timeout=60) as response:
         assert response.headers["content-type"].startswith("text/event-stream")
         lines = response.iter_lines()
         first = read(lines)
@@ -70,13 +70,13 @@ def test_events_arrive_as_they_happen_and_the_stream_closes_with_the_job(url: st
 def test_an_interrupted_stream_goes_on_where_it_was(url: str, database: Database, job_id: str) -> None:
     add(database, job_id, 1)
     finish(database, job_id)
-    answer = httpx2.get(f"{url}/v1/jobs/{job_id}/events/stream", headers={"Last-Event-ID": "2"})
+    answer = httpx2.get(f"{url}/v1/jobs/{job_id}/events/stream", headers={"Last-Event-ID": "2"}, timeout=60)
     ids = [line.removeprefix("id: ") for line in answer.text.splitlines() if line.startswith("id: ")]
     assert ids == ["3", "4"]
-    nothing_new = httpx2.get(f"{url}/v1/jobs/{job_id}/events/stream", params={"after": 4})
+    nothing_new = httpx2.get(f"{url}/v1/jobs/{job_id}/events/stream", params={"after": 4}, timeout=60)
     assert [line for line in nothing_new.text.splitlines() if line.startswith("event: ")] == ["event: end"]
 
 
 def test_an_open_stream_does_not_keep_the_server_from_stopping(database: Database, job_id: str, url: str) -> None:
-    with httpx2.stream("GET", f"{url}/v1/jobs/{job_id}/events/stream", timeout=10) as response:
+    with httpx2.stream("GET", f"{url}/v1/jobs/{job_id}/events/stream", timeout=60) as response:
         read(response.iter_lines())

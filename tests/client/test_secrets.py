@@ -78,7 +78,7 @@ def use(machine: dict[str, str], admin: str, reader: str, directory: Path) -> No
     box = {"C": [[1, 0], [-1, 0], [0, 1], [0, -1]], "d": [0.01] * 4}
     body: dict[str, Any] = {"kind": "certify", "scene": added.json["id"], "polytope": box}
     hook = {"url": "http://127.0.0.1:9/nobody-listens", "secret": WEBHOOK_SECRET}
-    with httpx2.Client(base_url=url, trust_env=False, headers={"Authorization": f"Bearer {admin}"}) as http:
+    with httpx2.Client(base_url=url, trust_env=False, timeout=60, headers={"Authorization": f"Bearer {admin}"}) as http:
         job = http.post("/v1/jobs", json=body | {"webhook": hook}).json()
         assert http.post("/v1/jobs", json=body | {"webhook": hook | {"secret": WEBHOOK_SECRET + "A"}}).status_code == 422
         assert http.post("/v1/jobs", json=body | {"scene": WEBHOOK_SECRET}).status_code == 404
