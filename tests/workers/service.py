@@ -84,6 +84,12 @@ class Service:
         self._workers[name].kill()
         self._workers[name].wait()
 
+    def start_again(self) -> None:
+        """Starts what ended by itself, as a supervisor does: a worker that finds a child dead as it reconnects to Redis ends."""
+        for name, worker in list(self._workers.items()):
+            if worker.poll() is not None:
+                self.start(name)
+
     def children(self, name: str) -> list[int]:
         """The processes that a worker has forked."""
         pid = self._workers[name].pid

@@ -123,6 +123,7 @@ def test_every_job_ends_as_if_nothing_had_died(running: tuple[Service, Queue], p
         while killer.killed.total() < KILLS or running_jobs:
             assert time.monotonic() - began < LIMIT_SECONDS, f"{running_jobs} do not end"
             killer.act()
+            service.start_again()
             while killer.killed.total() < KILLS and len(running_jobs) < JOBS_AT_A_TIME:
                 name = next(names)
                 job, _ = ask(client.create_job, requests[name], f"{seed}: {ended + len(running_jobs)}")
