@@ -19,9 +19,9 @@ from certifier.verify.region import verify_region
 WAYS: dict[str, dict[str, Any]] = {
     "uniform contraction": {"contraction": "uniform", "pushes": 0, "max_rounds": 0},
     "targeted contraction": {"contractions": 1, "pushes": 0, "max_rounds": 0},
-    "two of them": {"pushes": 0, "max_rounds": 0},
+    "two of them": {"contractions": 2, "pushes": 0, "max_rounds": 0},
     "one, then (12)": {"contractions": 1, "pushes": 0, "max_rounds": 3},
-    "one, then pushes": {"contractions": 1, "max_rounds": 0},
+    "one, then pushes": {"contractions": 1, "pushes": 2, "max_rounds": 0},
     "default": {},
 }
 """Options of a grow job, each with the default seeding."""

@@ -29,9 +29,12 @@ from certifier.outcome import Outcome, combine
 from certifier.polytope import chebyshev_center, drop_redundant
 from certifier.seed_options import Method
 
-LIGHT_JOINTS = 4
-LIGHT, HEAVY = {"pushes": 10, "max_rounds": 3}, {"pushes": 2, "max_rounds": 0}
-"""Defaults where no pair has more than LIGHT_JOINTS joints between its bodies, and elsewhere, where a round of (12) takes a minute."""
+EFFORT = (
+    (4, {"contractions": 2, "pushes": 10, "max_rounds": 3}),
+    (6, {"contractions": 2, "pushes": 2, "max_rounds": 0}),
+    (math.inf, {"contractions": 1, "pushes": 0, "max_rounds": 0}),
+)
+"""Defaults, by the most joints that any pair has between its bodies: for seconds, a minute, or the first region, itself a minute."""
 SMALLEST_SCALE = 1e-3
 """The last trial of the uniform contraction, relative to the proposal."""
 NEAR = (1.0, 0.6, 0.3)
@@ -53,9 +56,10 @@ class GrowthOptions:
         seed: the document of :class:`certifier.seeding.SeedOptions`; for ``certify`` its ``C``, ``d`` and optional ``center``.
         contraction: ``targeted`` or ``uniform``.
         contractions: how many targeted contractions of the proposal are tried; each is given up when it is smaller than the best so far.
+            None, of this and the two that follow it, is what pays: see EFFORT.
         bisection_steps: certifications spent on uniform contraction after the two ends are known.
         pushes: how often the faces are pushed out after the contractions; each push that fails is followed by a shorter one.
-        max_rounds: rounds of the polytope step (12) after the pushes. None, of either, is what pays: see LIGHT and HEAVY.
+        max_rounds: rounds of the polytope step (12) after the pushes.
         tolerance: relative growth of the ellipsoid's volume that is still worth a push or a round.
         backoff: how many times a stepped polytope that fails to certify is halved towards the last certified one.
         random_seed: seeds every random choice of the certification.
@@ -64,7 +68,7 @@ class GrowthOptions:
     kind: Literal["grow", "certify"] = "grow"
     seed: dict[str, Any] = field(default_factory=dict)
     contraction: Literal["targeted", "uniform"] = "targeted"
-    contractions: int = 2
+    contractions: int | None = None
     bisection_steps: int = 6
     pushes: int | None = None
     max_rounds: int | None = None
@@ -94,12 +98,12 @@ class GrowthOptions:
             raise RegionError("option_value", "kind is 'grow' or 'certify'", field="options.kind")
         if options.contraction not in ("targeted", "uniform"):
             raise RegionError("option_value", "contraction is 'targeted' or 'uniform'", field="options.contraction")
-        if not isinstance(options.contractions, int) or not 1 <= options.contractions <= len(NEAR):
+        if options.contractions is not None and not (isinstance(options.contractions, int) and 1 <= options.contractions <= len(NEAR)):
             raise RegionError("option_value", f"contractions must be an integer from 1 to {len(NEAR)}", field="options.contractions")
         integers = (("bisection_steps", 60), ("pushes", 1000), ("max_rounds", 1000), ("backoff", 20), ("random_seed", 2**63 - 1))
         for name, upper in integers:
             value = getattr(options, name)
-            if name in LIGHT and value is None:
+            if name in EFFORT[0][1] and value is None:
                 continue
             if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= upper:
                 raise RegionError("option_value", f"{name} must be an integer from 0 to {upper}", field=f"options.{name}")
@@ -368,7 +372,7 @@ def _proposed(scene: Scene, state: dict[str, Any], report: Proposed) -> Transiti
 def _contract(scene: Scene, state: dict[str, Any]) -> Transition:
     """The next targeted contraction of the proposal, or pushes from the largest when there were enough."""
     tried = state["contractions"]
-    if tried == state["options"]["contractions"]:
+    if tried == _most(scene, state, "contractions"):
         return _push(scene, state)
     rows = Polytope(np.array(state["rows"]["C"]), np.array(state["rows"]["d"]))
     return _trim(scene, {**state, "contractions": tried + 1, "near": NEAR[tried]}, "contract", rows)
@@ -448,7 +452,7 @@ def _cut(scene: Scene, state: dict[str, Any], action: Certify, report: Certifica
 def _no_smaller(scene: Scene, state: dict[str, Any], label: str, failures: list[int], outcomes: list[Outcome]) -> Transition:
     if label == "push":
         return _push_less(scene, state)
-    if state["best"] is not None or state["contractions"] < state["options"]["contractions"]:
+    if state["best"] is not None or state["contractions"] < _most(scene, state, "contractions"):
         return _contract(scene, state)
     pair = scene.pairs[failures[0]]
     reason = f"not even a small region around the seed can be certified: {pair.a} and {pair.b} are too close there"
@@ -506,8 +510,10 @@ def _bisect(scene: Scene, state: dict[str, Any], action: Certify, report: Certif
 
 def _most(scene: Scene, state: dict[str, Any], option: str) -> int:
     given = state["options"][option]
-    light = all(len(_joints(scene, index)) <= LIGHT_JOINTS for index in range(len(scene.pairs)))
-    return (LIGHT if light else HEAVY)[option] if given is None else int(given)
+    if given is not None:
+        return int(given)
+    joints = max((len(_joints(scene, index)) for index in range(len(scene.pairs))), default=0)
+    return next(effort for most, effort in EFFORT if joints <= most)[option]
 
 
 def _step(scene: Scene, state: dict[str, Any]) -> Transition:

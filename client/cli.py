@@ -136,7 +136,7 @@ def _parser() -> argparse.ArgumentParser:
         help="joint positions to contain as well; may be given several times",
     )
     grow.add_argument("--method", help="how the first polytope is found; default: the service's")
-    grow.add_argument("--pushes", type=int, help="how often faces are pushed out again; default: more for small arms than for large ones")
+    grow.add_argument("--pushes", type=int, help="how often faces are pushed out again; default: the more, the smaller the arm")
     grow.add_argument("--rounds", type=int, help="rounds of the polytope step; default: a few for small arms, none for large ones")
     grow.add_argument("--random-seed", type=int, help="seeds every random choice; default 0")
     grow.add_argument("--out", metavar="FILE", help="where the proof goes; default: named after scene and proof, here")

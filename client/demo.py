@@ -23,8 +23,6 @@ from client.inputs import seed_of
 from client.output import Screen
 
 SCENE = Path(__file__).resolve().parent.parent / "examples" / "iiwa_shelf" / "scene.yaml"
-QUICK = {"contractions": 1, "pushes": 0}
-"""Options of the first region that can be had."""
 STOP_SECONDS = 30
 
 
@@ -55,7 +53,7 @@ def _demonstrate(url: str) -> bool:
         print(f"ciris is up at {url} (data: {data_dir()})")
         size = f"{scene['joints']} joints, {scene['geometries']} convex bodies, {scene['pairs']} pairs to separate"
         print(f"scene {scene['name']}: {size}", flush=True)
-        request = {"kind": "grow", "scene": scene["id"], "seed": {"q": seed_of(str(SCENE), None)}, "options": QUICK}
+        request = {"kind": "grow", "scene": scene["id"], "seed": {"q": seed_of(str(SCENE), None)}}
         grown = service.grow(client, request, Screen(), idempotency_key=_key(request))
     path = save_proof(grown.manifest, grown.proof, str(data_dir() / f"{scene['name']}.proof"))
     print("\nevery pair of bodies:")

@@ -23,8 +23,14 @@ class GrowOptions(Request):
         Literal["targeted", "uniform"], Field(description="Faces where pairs fail, or every face moved in by as much.")
     ] = "targeted"
     contractions: Annotated[
-        int, Field(ge=1, le=3, description="Targeted contractions, each cutting in another way; the largest region counts.")
-    ] = 2
+        int | None,
+        Field(
+            ge=1,
+            le=3,
+            description="Targeted contractions, each cutting in another way; the largest region counts. "
+            "Default: 2 for arms of at most six joints between two bodies, else 1.",
+        ),
+    ] = None
     bisection_steps: Annotated[int, Field(ge=0, le=60, description="Certifications spent on uniform contraction after its two ends.")] = 6
     max_rounds: Annotated[
         int | None,
@@ -36,7 +42,11 @@ class GrowOptions(Request):
     ] = None
     pushes: Annotated[
         int | None,
-        Field(ge=0, le=1000, description="How often the faces are pushed out after the contractions; default: 10 for such arms, else 2."),
+        Field(
+            ge=0,
+            le=1000,
+            description="How often the faces are pushed out after the contractions; default: 10 for such arms, 2 up to six joints, else 0.",
+        ),
     ] = None
     tolerance: Annotated[Real, Field(gt=0, lt=10, description="Growth of the ellipsoid's volume under which the alternation stops.")] = 0.02
     backoff: Annotated[int, Field(ge=0, le=20, description="How often a step that fails to certify is halved.")] = 2

@@ -139,6 +139,26 @@ def test_a_given_polytope_is_certified_once_with_every_pair():
     assert end.outcome is Outcome.NOT_CERTIFIABLE
 
 
+@pytest.mark.parametrize(("joints", "pushes", "rounds"), [(2, 10, 3), (5, 2, 0), (7, 0, 0)])
+def test_the_longer_the_chains_the_less_is_done_unasked(joints, pushes, rounds):
+    scene = planar_arm(joints)
+    proposal = replace(PROPOSAL, C=np.eye(joints).tolist(), d=[0.01] * joints, center=[0.0] * joints, info={"method": "iris_np2"})
+    transition, said = begin(scene, GrowthOptions(seed={}, tolerance=1e-6)), []
+    while not isinstance(transition.action, Finish):
+        report = proposal
+        if isinstance(transition.action, Certify):
+            said.append(transition.action.label)
+            whole = transition.action.label == "contract" and len(transition.action.d) == 3 * joints
+            outcome = Outcome.NOT_CERTIFIABLE if whole else Outcome.CERTIFIED
+            report = Certification(transition.action.iteration, dict.fromkeys(transition.action.pairs, outcome))
+        elif isinstance(transition.action, Step):
+            said.append("step")
+            report = Failed(CirisError("step_failed", "no").to_document())
+        transition = advance(scene, transition.state, report)
+    assert said.count("push") <= pushes
+    assert ("push" in said, "step" in said) == (pushes > 0, rounds > 0)
+
+
 def test_pairs_that_failed_are_hard_until_they_are_certified():
     options = GrowthOptions(seed={"q": [0.0, 0.0]}, contractions=1, pushes=0, max_rounds=0)
     begun = advance(SCENE, begin(SCENE, options).state, PROPOSAL)
