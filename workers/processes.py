@@ -11,8 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1
-NICENESS = 5
-"""A third of what others get of a core that both want: little enough for these to answer at once, enough to go on beside them."""
+NICENESS = 10
+"""A tenth of what others get of a core that both want: little enough for the API to answer at once, enough to go on beside it."""
 
 
 def die_with_parent(sig: int = signal.SIGKILL) -> None:
