@@ -288,3 +288,8 @@ class Certification:
 class _Witness:
     s: Array
     weights: tuple[Array, Array]
+
+
+def certify_pair(scene: Scene, index: int, polytope: Polytope, center: Array | None = None, seed: int = 0) -> PairResult:
+    """Certify one pair on one polytope; :class:`Certification` shares the preparation between pairs."""
+    return Certification(scene, polytope, center, seed).certify(index)

@@ -6,7 +6,7 @@ import pytest
 from benchmarks.arms import random_arm, random_faces
 from certifier.model import WORLD, JointKind
 from certifier.outcome import Outcome
-from certifier.pair import Certification
+from certifier.pair import certify_pair
 from certifier.reference import Reference
 from tests.certifier.scenes import ball, box, planar_arm
 
@@ -35,7 +35,7 @@ def drake_certifies(scene, index, C, d):
 
 def agree(scene, index, C, d, center):
     """The common verdict."""
-    ours = Certification(scene, scene.polytope(C, d), center).certify(index).outcome
+    ours = certify_pair(scene, index, scene.polytope(C, d), center).outcome
     assert ours in (Outcome.CERTIFIED, Outcome.REFUTED, Outcome.NOT_CERTIFIABLE)
     assert (ours is Outcome.CERTIFIED) == drake_certifies(scene, index, C, d)
     return ours
@@ -91,10 +91,10 @@ def test_the_largest_certifiable_scale_is_drakes(seed, limit):
         return C, C @ center + k * (d - C @ center)
 
     certified, failed = 0.02, 1.5
-    assert Certification(scene, scene.polytope(*scaled(certified)), center).certify(index).outcome is Outcome.CERTIFIED
+    assert certify_pair(scene, index, scene.polytope(*scaled(certified)), center).outcome is Outcome.CERTIFIED
     while failed > 1.07 * certified:
         middle = float(np.sqrt(certified * failed))
-        outcome = Certification(scene, scene.polytope(*scaled(middle)), center).certify(index).outcome
+        outcome = certify_pair(scene, index, scene.polytope(*scaled(middle)), center).outcome
         if outcome is Outcome.CERTIFIED:
             certified = middle
         else:
