@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import Depends, Request, Security
-from fastapi.security import HTTPBearer, SecurityScopes
+from fastapi.security import HTTPBearer
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
 from starlette.requests import cookie_parser
@@ -24,7 +24,6 @@ KEYS_SECONDS = 1.0
 """How long what was read of the keys is believed."""
 AGAIN_SECONDS = 0.1
 """Between two looks for keys that are not known yet, whoever and however many ask for them."""
-_BEARER = HTTPBearer(auto_error=False, scheme_name="key", description="An API key. The service on loopback needs none until one is made.")
 
 
 @dataclass(frozen=True)
@@ -94,21 +93,27 @@ def presented_key(headers: Headers) -> str | None:
     return cookie_parser(headers.get("cookie", "")).get(COOKIE)
 
 
-async def _authorize(request: Request, needed: SecurityScopes, _documented: Annotated[object, Depends(_BEARER)]) -> Caller:
-    """The caller that the guard has let in, if the scope suffices.
+class _Needs(HTTPBearer):
+    """The dependency of a route that needs a scope: the caller that the guard has let in. What it inherits documents the key."""
 
-    Raises:
-        CirisError: scope_missing.
-    """
-    caller: Caller = request.state.caller
-    for scope in needed.scopes:
-        if not caller.scope.includes(Scope(scope)):
-            problem = f"this needs a key of the scope {scope}; the key {caller.name!r} has {caller.scope}"
+    def __init__(self, scope: Scope) -> None:
+        super().__init__(scheme_name="key", description="An API key. The service on loopback needs none until one is made.")
+        self._scope = scope
+
+    async def __call__(self, request: Request) -> Caller:  # type: ignore[override]
+        """The caller, if the scope suffices.
+
+        Raises:
+            CirisError: scope_missing.
+        """
+        caller: Caller = request.state.caller
+        if not caller.scope.includes(self._scope):
+            problem = f"this needs a key of the scope {self._scope}; the key {caller.name!r} has {caller.scope}"
             raise CirisError("scope_missing", problem, field="Authorization")
-    return caller
+        return caller
 
 
-READ, SUBMIT, ADMIN = (Security(_authorize, scopes=[scope.value]) for scope in Scope)
+READ, SUBMIT, ADMIN = (Security(_Needs(scope), scopes=[scope.value]) for scope in Scope)
 """Dependencies of a route: the scope that it needs."""
 
 Submitter = Annotated[Caller, SUBMIT]

@@ -16,6 +16,7 @@ from api.access_log import AccessLog
 from api.announce import Announcer
 from api.children import AT_ONCE, ChildLimiter
 from api.metrics import Requests
+from api.reading import READERS
 from api.routers import events, jobs, planning, regions, scenes, service
 from db.session import CONNECTIONS, Database, database
 from db.settings import LOOPBACK_NAMES, settings
@@ -26,8 +27,8 @@ A scene goes in, a job grows or certifies a polytope, its regions come out with 
 Errors are problem+json (RFC 9457) with a `code`, the `field` and a `hint`; unknown fields and numbers that are not finite are refused."""
 
 
-THREADS = CONNECTIONS - AT_ONCE
-"""What is left of the connections when two uploads or checks have theirs."""
+THREADS = CONNECTIONS - AT_ONCE - READERS
+"""What is left of the connections when two uploads or checks and the routes that only read have theirs."""
 
 
 def create_app(db: Database | None = None) -> FastAPI:

@@ -145,6 +145,8 @@ class IterationRow(Base):
     """What this polytope is, for people."""
     arrays: Mapped[Arrays]
     """C (m, n), d (m,) with the joint limits, and center (n,) where one was given."""
+    faces: Mapped[int]
+    """m."""
     state: Mapped[str] = mapped_column(String(16), default=states.IterationState.RUNNING)
     hard: Mapped[list[int]]
     """Pairs for which nothing less than all faces is tried."""
@@ -236,6 +238,8 @@ class RegionRow(Base):
     manifest: Mapped[Document]
     arrays: Mapped[Arrays]
     """C (m, n), d (m,) with the joint limits, in s."""
+    faces: Mapped[int]
+    """m."""
     proof_digest: Mapped[str] = mapped_column(ForeignKey("proofs.digest"))
     ellipsoid_volume: Mapped[float]
     created_at: Mapped[datetime] = mapped_column(default=utcnow, index=True)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from sqlalchemy import ColumnElement, Select, insert, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, defer
 
 from db import events, jobs, leases, proofs
 from db.models import IterationRow, JobRow, PairRow
@@ -104,6 +104,7 @@ def add_iteration(
             job_id=job.id,
             index=index,
             label=label,
+            faces=np.size(d),
             arrays={"C": np.asarray(C), "d": np.asarray(d), **({} if center is None else {"center": np.asarray(center)})},
             reuse={str(pair): iteration for pair, iteration in reuse.items()},
             hard=list(hard),
@@ -236,8 +237,9 @@ def of_job(session: Session, job_id: str) -> Sequence[PairRow]:
 
 
 def iterations(session: Session, job_id: str) -> Sequence[IterationRow]:
-    """The job's iterations, in order."""
-    return session.scalars(select(IterationRow).where(IterationRow.job_id == job_id).order_by(IterationRow.index)).all()
+    """The job's iterations, in order, without their arrays."""
+    query = select(IterationRow).where(IterationRow.job_id == job_id).order_by(IterationRow.index)
+    return session.scalars(query.options(defer(IterationRow.arrays, raiseload=True))).all()
 
 
 def proving(session: Session, job_id: str, iteration_of: Mapping[int, int]) -> dict[int, PairRow]:

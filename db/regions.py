@@ -9,7 +9,7 @@ from uuid import uuid4
 
 import numpy as np
 from sqlalchemy import Select, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, defer
 
 from certifier.errors import CirisError
 from certifier.model import Array
@@ -17,10 +17,13 @@ from db import events, jobs, pages, proofs
 from db.models import IterationRow, JobRow, ProofRow, RegionRow
 from db.pages import Page
 
+_UNREAD = defer(RegionRow.manifest, raiseload=True), defer(RegionRow.arrays, raiseload=True)
+
 
 def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any], proof: bytes) -> RegionRow:
     """Stores a region whose proof has been verified; the caller holds the job's lock."""
     volume = manifest["volume"]["ellipsoid"]
+    d = np.array(manifest["halfspace_offsets"])
     region = RegionRow(
         id=str(uuid4()),
         job_id=job.id,
@@ -28,7 +31,8 @@ def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any],
         iteration=iteration,
         guarantee=manifest["guarantee"],
         manifest=manifest,
-        arrays={"C": np.array(manifest["halfspace_normals"]), "d": np.array(manifest["halfspace_offsets"])},
+        arrays={"C": np.array(manifest["halfspace_normals"]), "d": d},
+        faces=len(d),
         proof_digest=proofs.put(session, [proof])[proof],
         ellipsoid_volume=volume,
     )
@@ -56,19 +60,19 @@ def get(session: Session, region_id: str) -> RegionRow:
 def page(
     session: Session, *, scene_id: str | None = None, job_id: str | None = None, after: str | None = None, limit: int = 100
 ) -> Page[RegionRow]:
-    """One page of the regions: of one scene, of one job, or all.
+    """One page of the regions, without their manifests and arrays: of one scene, of one job, or all.
 
     Raises:
         CirisError: cursor.
     """
     wanted = {RegionRow.scene_id: scene_id, RegionRow.job_id: job_id}
-    query = select(RegionRow).where(*(column == value for column, value in wanted.items() if value is not None))
+    query = select(RegionRow).where(*(column == value for column, value in wanted.items() if value is not None)).options(*_UNREAD)
     return pages.page(session, RegionRow, query, after, limit)
 
 
 def of_job(session: Session, job_id: str) -> Sequence[RegionRow]:
-    """The job's regions, in the order of their iterations."""
-    return session.scalars(select(RegionRow).where(RegionRow.job_id == job_id).order_by(RegionRow.iteration)).all()
+    """The job's regions, in the order of their iterations, without their manifests and arrays."""
+    return session.scalars(select(RegionRow).where(RegionRow.job_id == job_id).order_by(RegionRow.iteration).options(*_UNREAD)).all()
 
 
 @dataclass(frozen=True)

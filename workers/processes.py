@@ -16,7 +16,12 @@ NICENESS = 10
 
 
 def die_with_parent(sig: int = signal.SIGKILL) -> None:
-    """Has the kernel send this process a signal when its parent dies (Linux only; elsewhere nothing happens)."""
+    """Has the kernel send this process a signal when its parent dies (Linux only; elsewhere nothing happens).
+
+    The signal ends it even where it came to be ignored by inheritance, as SIGINT is by what a script starts in the background.
+    """
+    if sig != signal.SIGKILL:
+        signal.signal(sig, signal.SIG_DFL)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, sig)
 

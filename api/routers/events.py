@@ -11,6 +11,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from api.access import READ, Db
+from api.reading import ReadingRoute
 from api.schemas.common import MAX_INT
 from api.schemas.jobs import Event, EventList
 from db import events, jobs
@@ -20,7 +21,7 @@ After = Annotated[int, Query(ge=0, le=MAX_INT, description="Only events with a l
 POLL_SECONDS = 0.3
 PAGE = 500
 
-router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ])
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ], route_class=ReadingRoute)
 
 
 @router.get("/{job_id}/events")

@@ -15,6 +15,7 @@ from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 from api import checks
 from api.access import READ, SUBMIT, Db, Submitter
 from api.announce import Announcements
+from api.reading import ReadingRoute
 from api.scene_cache import scene_of
 from api.schemas.common import MAX_INT, Cursor
 from api.schemas.jobs import (
@@ -41,7 +42,7 @@ from db.models import IterationRow, PairRow
 from db.states import IterationState, JobKind, JobState, PairState
 from db.types import utcnow
 
-router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ])
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ], route_class=ReadingRoute)
 
 
 @router.post("", status_code=status.HTTP_201_CREATED, responses={200: {"model": Job, "description": "Made earlier under the same key."}})
@@ -177,7 +178,7 @@ def _iteration(row: IterationRow) -> Iteration:
         index=row.index,
         label=row.label,
         state=IterationState(row.state),
-        faces=len(row.arrays["d"]),
+        faces=row.faces,
         ellipsoid_volume=row.ellipsoid_volume,
         reused={int(pair): iteration for pair, iteration in row.reuse.items()},
         started_at=row.started_at,

@@ -12,6 +12,7 @@ from fastapi import APIRouter, Query, Response, status
 from api import exports
 from api.access import ADMIN, READ, Db
 from api.children import Children
+from api.reading import ReadingRoute
 from api.schemas.common import Cursor
 from api.schemas.regions import RegionDetail, RegionPage, RegionSummary, Verification
 from certifier.child import run_in_child
@@ -19,7 +20,7 @@ from db import jobs, proofs, regions, scenes
 from db.session import Database
 from db.settings import settings
 
-router = APIRouter(prefix="/v1/regions", tags=["regions"], dependencies=[READ])
+router = APIRouter(prefix="/v1/regions", tags=["regions"], dependencies=[READ], route_class=ReadingRoute)
 
 
 class ExportFormat(StrEnum):

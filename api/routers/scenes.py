@@ -9,6 +9,7 @@ from fastapi import APIRouter, File, Query, Response, UploadFile, status
 
 from api.access import READ, SUBMIT, Db
 from api.children import Children
+from api.reading import ReadingRoute
 from api.scene_cache import scene_of
 from api.schemas.common import Cursor
 from api.schemas.scenes import IgnoredPair, LintReport, PairForecast, SceneDetail, ScenePage, ScenePairs, SceneSummary, Substitution
@@ -18,7 +19,7 @@ from db import scenes
 from db.models import SceneRow
 from db.session import Database
 
-router = APIRouter(prefix="/v1/scenes", tags=["scenes"], dependencies=[READ])
+router = APIRouter(prefix="/v1/scenes", tags=["scenes"], dependencies=[READ], route_class=ReadingRoute)
 
 
 @router.post("", dependencies=[SUBMIT], status_code=status.HTTP_201_CREATED)

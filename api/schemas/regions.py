@@ -35,7 +35,7 @@ class RegionSummary(BaseModel):
             scene=row.scene_id,
             iteration=row.iteration,
             guarantee=Guarantee(row.guarantee),
-            faces=len(row.arrays["d"]),
+            faces=row.faces,
             ellipsoid_volume=row.ellipsoid_volume,
             proof=row.proof_digest,
             created_at=row.created_at,

@@ -63,5 +63,5 @@ def test_jobs_and_their_pairs_survive_the_way_down_and_up(empty_database_url: st
         job = jobs.get(session, job_id)
         assert (job.state, len(pairs.of_job(session, job_id))) == ("running", 3)
         assert action_from_document(job.action or {}) == action_from_document((job.growth or {})["current"]) == certify
-        assert [(row.hard, row.failures) for row in pairs.iterations(session, job_id)] == [([], 1)]
+        assert [(row.hard, row.failures, row.faces) for row in pairs.iterations(session, job_id)] == [([], 1, 2)]
     database.close()

@@ -16,6 +16,7 @@ import pytest
 
 from db.leases import _started
 from tests.workers.service import ROOT, eventually
+from workers.processes import die_with_parent
 from workers.stack import Child
 
 COMMAND = [sys.executable, "-m", "workers.stack"]
@@ -82,6 +83,16 @@ def test_nothing_outlives_a_supervisor_that_is_killed(stack: Stack) -> None:
     pids = stack.description["pids"]
     stack.process.kill()
     eventually(lambda: gone(pids), "every child ends")
+
+
+def test_a_child_ends_by_its_signal_though_the_supervisor_ignores_it() -> None:
+    def prepare() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        die_with_parent(signal.SIGINT)
+
+    with subprocess.Popen(["sleep", "60"], preexec_fn=prepare) as child:
+        child.send_signal(signal.SIGINT)
+        assert child.wait(timeout=20) == -signal.SIGINT
 
 
 def test_a_port_that_was_asked_for_and_is_taken_is_told(tmp_path: Path) -> None:
