@@ -36,9 +36,9 @@ class Caller:
 
 
 class Keyring:
-    """Tells callers by their keys, which are read from the database once in ``KEYS_SECONDS`` and not for every request.
+    """Tells callers by their keys, which are read from the database once in half of ``KEYS_SECONDS`` and not for every request.
 
-    A key that was revoked is refused after that time at the latest. What strangers send is not kept, and makes nobody read more than
+    A key that was revoked is refused after that time at the latest; while the database answers, nobody waits for it. What strangers send is not kept, and makes nobody read more than
     once in ``AGAIN_SECONDS``.
     """
 
@@ -51,6 +51,8 @@ class Keyring:
     async def caller(self, given: str | None) -> Caller | None:
         """The caller by the key that came with a request; None for those who may not come in by what is known."""
         ring = await self._as_of(time.monotonic() - KEYS_SECONDS)
+        if self._read_at < time.monotonic() - KEYS_SECONDS / 2:
+            self._read_soon()
         if given is not None:
             key = ring.check(given)
             return None if key is None else Caller(key.scope, key.id, key.name)
@@ -66,10 +68,15 @@ class Keyring:
     async def _as_of(self, moment: float, pause: float = 0.0) -> Ring:
         """The keys as they were at that moment or later. Of many who ask one reads, ``pause`` after the last reading; it fails for all."""
         while self._read_at < moment:
-            if self._reading is None:
-                self._reading = asyncio.ensure_future(self._read_again(self._read_at + pause))
-            await asyncio.shield(self._reading)
+            await asyncio.shield(self._read_soon(pause))
         return self._ring
+
+    def _read_soon(self, pause: float = 0.0) -> asyncio.Future[None]:
+        """The reading under way, begun if there is none."""
+        if self._reading is None:
+            self._reading = asyncio.ensure_future(self._read_again(self._read_at + pause))
+            self._reading.add_done_callback(lambda reading: reading.cancelled() or reading.exception())  # nobody may be waiting for it
+        return self._reading
 
     async def _read_again(self, not_before: float) -> None:
         try:
