@@ -38,8 +38,8 @@ class Caller:
 class Keyring:
     """Tells callers by their keys, which are read from the database once in half of ``KEYS_SECONDS`` and not for every request.
 
-    A key that was revoked is refused after that time at the latest; while the database answers, nobody waits for it. What strangers send is not kept, and makes nobody read more than
-    once in ``AGAIN_SECONDS``.
+    A key that was revoked is refused after that time at the latest; while the database answers, nobody waits for it. What strangers
+    send is not kept, and makes nobody read more than once in ``AGAIN_SECONDS``.
     """
 
     def __init__(self, database: Database, *, open_without_keys: bool) -> None:
