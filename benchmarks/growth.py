@@ -10,7 +10,7 @@ from benchmarks import catalogue, measure
 from benchmarks.measure import Progress
 from certifier.ellipsoid import inscribed_ellipsoid
 from certifier.errors import CirisError
-from certifier.growth import GrowthOptions
+from certifier.growth_options import GrowthOptions
 from certifier.local import grow
 from certifier.model import Array, Scene
 from certifier.reference import Reference

@@ -2,7 +2,7 @@
 
 Appendix B.4 and Algorithm 1 of C-IRIS. :func:`begin` and :func:`advance` decide what to do next and compute nothing heavy:
 whoever drives them (the service's coordinator, or :mod:`certifier.local`) carries out the :class:`Action` and reports back.
-State, actions and reports are JSON-able, so a job can be resumed from its rows alone.
+Like actions and reports the state is JSON-able, so a job can be resumed from its rows alone.
 
 Contraction, targeted: faces are added where pairs fail (:mod:`certifier.contraction`) until every pair is certified. What was certified
 stays so, since the polytope only shrinks. Tried a few times with another balance between faces and shorter ranges; the largest counts.
@@ -15,260 +15,43 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from certifier.contraction import Failure, contract, measure
 from certifier.ellipsoid import inscribed_ellipsoid
 from certifier.errors import CirisError, RegionError
+from certifier.growth_actions import (
+    Accepted,
+    Certification,
+    Certify,
+    Finish,
+    Propose,
+    Proposed,
+    Report,
+    Step,
+    Stepped,
+    Transition,
+    action_from_document,
+    action_to_document,
+)
+from certifier.growth_options import EFFORT, NEAR, GrowthOptions
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytope import chebyshev_center, drop_redundant
 from certifier.seed_options import Method
 
-EFFORT = (
-    (4, {"contractions": 2, "pushes": 10, "max_rounds": 3}),
-    (6, {"contractions": 2, "pushes": 2, "max_rounds": 0}),
-    (math.inf, {"contractions": 1, "pushes": 0, "max_rounds": 0}),
-)
-"""Defaults, by the most joints that any pair has between its bodies: for seconds, a minute, or the first region, itself a minute."""
 SMALLEST_SCALE = 1e-3
 """The last trial of the uniform contraction, relative to the proposal."""
-NEAR = (1.0, 0.6, 0.3)
-"""Of the contractions, one after the other: from how near on a pair's failure calls for a shorter range and not for a face."""
 MAX_ATTEMPTS = 60
 """Faces added for one pair before the targeted contraction gives up."""
 FAILURES = 2
 """Pairs for which faces are added at once, so that two workers can look for them."""
 FAR, PUSH, SMALLEST_PUSH = 8.0, 1.5, 0.1
-"""Factors by which faces are pushed out from the centre: at first around a given polytope, at first elsewhere; the least growth tried."""
-
-
-@dataclass(frozen=True)
-class GrowthOptions:
-    """What a job asks for.
-
-    Attributes:
-        kind: ``grow`` a region from a seed, or ``certify`` a given polytope as it is.
-        seed: the document of :class:`certifier.seeding.SeedOptions`; for ``certify`` its ``C``, ``d`` and optional ``center``.
-        contraction: ``targeted`` or ``uniform``.
-        contractions: how many targeted contractions of the proposal are tried; each is given up when it is smaller than the best so far.
-            None, of this and the two that follow it, is what pays: see EFFORT.
-        bisection_steps: certifications spent on uniform contraction after the two ends are known.
-        pushes: how often the faces are pushed out after the contractions; each push that fails is followed by a shorter one.
-        max_rounds: rounds of the polytope step (12) after the pushes.
-        tolerance: relative growth of the ellipsoid's volume that is still worth a push or a round.
-        backoff: how many times a stepped polytope that fails to certify is halved towards the last certified one.
-        random_seed: seeds every random choice of the certification.
-    """
-
-    kind: Literal["grow", "certify"] = "grow"
-    seed: dict[str, Any] = field(default_factory=dict)
-    contraction: Literal["targeted", "uniform"] = "targeted"
-    contractions: int | None = None
-    bisection_steps: int = 6
-    pushes: int | None = None
-    max_rounds: int | None = None
-    tolerance: float = 0.02
-    backoff: int = 2
-    random_seed: int = 0
-
-    def to_document(self) -> dict[str, Any]:
-        """The options as JSON-able data."""
-        return asdict(self)
-
-    @classmethod
-    def from_document(cls, document: dict[str, Any]) -> GrowthOptions:
-        """Inverse of :meth:`to_document`.
-
-        Raises:
-            RegionError: an unknown or out-of-range option; the error names it.
-        """
-        known = {f.name for f in fields(cls)}
-        for name in document:
-            if name not in known:
-                raise RegionError(
-                    "unknown_option", f"there is no option {name!r}", field=f"options.{name}", hint=f"options: {', '.join(sorted(known))}"
-                )
-        options = cls(**document)
-        if options.kind not in ("grow", "certify"):
-            raise RegionError("option_value", "kind is 'grow' or 'certify'", field="options.kind")
-        if options.contraction not in ("targeted", "uniform"):
-            raise RegionError("option_value", "contraction is 'targeted' or 'uniform'", field="options.contraction")
-        if options.contractions is not None and not (isinstance(options.contractions, int) and 1 <= options.contractions <= len(NEAR)):
-            raise RegionError("option_value", f"contractions must be an integer from 1 to {len(NEAR)}", field="options.contractions")
-        integers = (("bisection_steps", 60), ("pushes", 1000), ("max_rounds", 1000), ("backoff", 20), ("random_seed", 2**63 - 1))
-        for name, upper in integers:
-            value = getattr(options, name)
-            if name in EFFORT[0][1] and value is None:
-                continue
-            if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= upper:
-                raise RegionError("option_value", f"{name} must be an integer from 0 to {upper}", field=f"options.{name}")
-        if options.contraction == "uniform" and options.seed.get("contain"):
-            raise RegionError("option_value", "only targeted contraction keeps points inside", field="options.contraction")
-        if not (isinstance(options.tolerance, (int, float)) and 0 < options.tolerance < 10):
-            raise RegionError("option_value", "tolerance must be a number between 0 and 10", field="options.tolerance")
-        return options
-
-
-@dataclass(frozen=True)
-class Propose:
-    """Run :func:`certifier.seeding.propose` with these seed options; report Proposed or Failed."""
-
-    seed: dict[str, Any]
-    kind: Literal["propose"] = "propose"
-
-
-@dataclass(frozen=True)
-class Certify:
-    """Certify these pairs on {C s <= d} (joint limits included in the rows); report Certification.
-
-    Attributes:
-        iteration: number of this certification within the job, from 0.
-        label: what it is for: ``given``, ``contract``, ``push`` or ``round``.
-        center: interior point, (n,); None for the Chebyshev centre.
-        pairs: indices into ``scene.pairs`` to certify, most likely failures first.
-        reuse: pair index -> earlier iteration whose proof, on a superset, serves here too.
-        hard: pairs that failed on a larger polytope; nothing less than all faces is tried for them.
-        failures: end after this many, in the order of ``pairs`` (B.3); pairs not reached are reported as absent. None for all pairs.
-    """
-
-    iteration: int
-    label: str
-    C: list[list[float]]
-    d: list[float]
-    center: list[float] | None
-    pairs: list[int]
-    reuse: dict[int, int]
-    hard: list[int]
-    failures: int | None
-    kind: Literal["certify"] = "certify"
-
-
-@dataclass(frozen=True)
-class Step:
-    """Run the polytope step (12) on the last accepted polytope with its proofs; report Stepped or Failed.
-
-    Attributes:
-        contain: (k, n) points that stay inside.
-    """
-
-    iteration: int
-    C: list[list[float]]
-    d: list[float]
-    center: list[float]
-    contain: list[list[float]]
-    kind: Literal["step"] = "step"
-
-
-@dataclass(frozen=True)
-class Finish:
-    """Nothing is left to do; the outcome is about the polytope asked for, the reason is a sentence."""
-
-    outcome: Outcome
-    reason: str
-    kind: Literal["finish"] = "finish"
-
-
-Action = Propose | Certify | Step | Finish
-
-
-def action_to_document(action: Action) -> dict[str, Any]:
-    """An action as JSON-able data (pair indices become strings as JSON keys)."""
-    return asdict(action)
-
-
-def action_from_document(document: dict[str, Any]) -> Action:
-    """Inverse of :func:`action_to_document`, also after a trip through JSON."""
-    kinds: dict[str, type[Action]] = {"propose": Propose, "certify": Certify, "step": Step, "finish": Finish}
-    document = dict(document)
-    if document["kind"] == "certify":
-        document["reuse"] = {int(k): v for k, v in document["reuse"].items()}
-    if document["kind"] == "finish":
-        document["outcome"] = Outcome(document["outcome"])
-    return kinds[document["kind"]](**document)
-
-
-@dataclass(frozen=True)
-class Proposed:
-    """A proposal: faces without the joint limits, the seed and what else the region has to contain, and what the seeding says of itself."""
-
-    C: list[list[float]]
-    d: list[float]
-    center: list[float]
-    contain: list[list[float]]
-    info: dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Certification:
-    """Outcome of each pair that was reached; reused pairs are left out.
-
-    Attributes:
-        weak: pair index -> where it fails, ``points`` (w, n), ``pull`` (n,) and whether ``ranges_alone`` count; pairs of which nothing
-            is known are left out.
-    """
-
-    iteration: int
-    outcomes: dict[int, Outcome]
-    weak: dict[int, dict[str, Any]] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Stepped:
-    """The new polytope, joint limits included, and what the step has to say of itself.
-
-    Attributes:
-        base_C, base_d: the rows it came from, one for one; backing off moves between the two.
-        growth: relative growth of the inscribed ellipsoid's volume.
-    """
-
-    C: list[list[float]]
-    d: list[float]
-    center: list[float]
-    base_C: list[list[float]]
-    base_d: list[float]
-    growth: float
-    info: dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Failed:
-    """The action could not be carried out; ``error`` is a :class:`certifier.errors.CirisError` document."""
-
-    error: dict[str, str | None]
-
-
-Report = Proposed | Certification | Stepped | Failed
-
-
-@dataclass(frozen=True)
-class Accepted:
-    """A polytope all of whose pairs are certified: store it as a region now.
-
-    Attributes:
-        center: a point inside; seed: the one that the region was grown around, None for a given polytope.
-        proofs: pair index -> iteration that holds its proof.
-    """
-
-    iteration: int
-    C: list[list[float]]
-    d: list[float]
-    center: list[float] | None
-    seed: list[float] | None
-    proofs: dict[int, int]
-
-
-@dataclass(frozen=True)
-class Transition:
-    """The state to store, the action to carry out, and a region to store first if there is one."""
-
-    state: dict[str, Any]
-    action: Action
-    accepted: Accepted | None = None
+"""Factors by which faces are pushed out from the centre: those of a given polytope before anything is certified, at first those of a
+certified one; the least growth tried."""
 
 
 def begin(scene: Scene, options: GrowthOptions) -> Transition:
@@ -371,11 +154,35 @@ def _proposed(scene: Scene, state: dict[str, Any], report: Proposed) -> Transiti
 
 def _contract(scene: Scene, state: dict[str, Any]) -> Transition:
     """The next targeted contraction of the proposal, or pushes from the largest when there were enough."""
-    tried = state["contractions"]
-    if tried == _most(scene, state, "contractions"):
+    starts, tried = _starts(scene, state), state["contractions"]
+    if tried == len(starts):
         return _push(scene, state)
+    reach, near = starts[tried]
     rows = Polytope(np.array(state["rows"]["C"]), np.array(state["rows"]["d"]))
-    return _trim(scene, {**state, "contractions": tried + 1, "near": NEAR[tried]}, "contract", rows)
+    polytope = rows if reach == 1.0 else _pushed(scene, rows, np.array(state["seed"]), reach, scene.polytope([], []))
+    return _trim(scene, {**state, "contractions": tried + 1, "near": near, "reach": reach}, "contract", polytope)
+
+
+def _starts(scene: Scene, state: dict[str, Any]) -> list[tuple[float, float]]:
+    """Where targeted contractions start: how far the proposal's faces are pushed out first, and one of NEAR.
+
+    What IRIS cut off collides, but beyond a given polytope nothing is known: the first contraction begins far outside of it.
+    """
+    starts = [(1.0, near) for near in NEAR[: _most(scene, state, "contractions")]]
+    return [(FAR, NEAR[0]), *starts] if _is_given(state) and _most(scene, state, "pushes") else starts
+
+
+def _is_given(state: dict[str, Any]) -> bool:
+    return state["proposal"].get("method") in (Method.BOX, Method.POLYTOPE)
+
+
+def _pushed(scene: Scene, polytope: Polytope, center: Array, reach: float, within: Polytope) -> Polytope:
+    """The faces of a polytope with the joint limits farther from the centre by that factor, within another polytope with them."""
+    limits = 2 * scene.n
+    C, d = polytope.C[:-limits], polytope.d[:-limits]
+    pushed = Polytope(np.concatenate([C, within.C]), np.concatenate([C @ center + reach * (d - C @ center), within.d]))
+    kept = drop_redundant(pushed, fixed=limits)
+    return Polytope(pushed.C[kept], pushed.d[kept])
 
 
 def _is_worth_it(state: dict[str, Any], polytope: Polytope) -> bool:
@@ -425,8 +232,10 @@ def _certified(scene: Scene, state: dict[str, Any], report: Certification) -> Tr
         transition = _bisect(scene, state, action, report, complete)
     elif not complete:
         transition = _cut(scene, state, action, report, failures)
+    elif action.label == "push" or (state.get("reach", 1.0) > 1 and not state["trim"]["attempts"]):
+        transition = _push_on(scene, state)
     else:
-        transition = _push_on(scene, state) if action.label == "push" else _contract(scene, state)
+        transition = _contract(scene, state)
     return Transition(transition.state, transition.action, accepted)
 
 
@@ -452,7 +261,7 @@ def _cut(scene: Scene, state: dict[str, Any], action: Certify, report: Certifica
 def _no_smaller(scene: Scene, state: dict[str, Any], label: str, failures: list[int], outcomes: list[Outcome]) -> Transition:
     if label == "push":
         return _push_less(scene, state)
-    if state["best"] is not None or state["contractions"] < _most(scene, state, "contractions"):
+    if state["best"] is not None or state["contractions"] < len(_starts(scene, state)):
         return _contract(scene, state)
     pair = scene.pairs[failures[0]]
     reason = f"not even a small region around the seed can be certified: {pair.a} and {pair.b} are too close there"
@@ -462,17 +271,13 @@ def _no_smaller(scene: Scene, state: dict[str, Any], label: str, failures: list[
 def _push(scene: Scene, state: dict[str, Any], reach: float | None = None) -> Transition:
     """The next push from the best region, or the alternation when there were enough."""
     pushes = state.get("pushes", 0)
-    # What IRIS cut off collides; around a given polytope nothing is known.
-    given = state["proposal"].get("method") in (Method.BOX, Method.POLYTOPE)
-    reach = reach or (FAR if given and not pushes else PUSH)
+    reach = reach or PUSH
     if pushes >= _most(scene, state, "pushes") or reach - 1 < SMALLEST_PUSH:
         return _step(scene, state)
-    best, limits = state["best"], 2 * scene.n
-    C, d, center = np.array(best["C"])[:-limits], np.array(best["d"])[:-limits], np.array(best["center"])
-    rows = scene.polytope([], []) if given else Polytope(np.array(state["rows"]["C"]), np.array(state["rows"]["d"]))
-    pushed = Polytope(np.concatenate([C, rows.C]), np.concatenate([C @ center + reach * (d - C @ center), rows.d]))
-    kept = drop_redundant(pushed, fixed=limits)
-    return _trim(scene, {**state, "pushes": pushes + 1, "reach": reach}, "push", Polytope(pushed.C[kept], pushed.d[kept]))
+    best = Polytope(np.array(state["best"]["C"]), np.array(state["best"]["d"]))
+    rows = scene.polytope([], []) if _is_given(state) else Polytope(np.array(state["rows"]["C"]), np.array(state["rows"]["d"]))
+    polytope = _pushed(scene, best, np.array(state["best"]["center"]), reach, rows)
+    return _trim(scene, {**state, "pushes": pushes + 1, "reach": reach}, "push", polytope)
 
 
 def _push_on(scene: Scene, state: dict[str, Any]) -> Transition:

@@ -11,21 +11,9 @@ import numpy as np
 
 from certifier.ellipsoid import inscribed_ellipsoid
 from certifier.errors import CirisError
-from certifier.growth import (
-    Accepted,
-    Certification,
-    Certify,
-    Failed,
-    Finish,
-    GrowthOptions,
-    Propose,
-    Proposed,
-    Report,
-    Step,
-    Stepped,
-    advance,
-    begin,
-)
+from certifier.growth import advance, begin
+from certifier.growth_actions import Accepted, Certification, Certify, Failed, Finish, Propose, Proposed, Report, Step, Stepped
+from certifier.growth_options import GrowthOptions
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee, Outcome, combine
 from certifier.pair import Certification as PairCertification

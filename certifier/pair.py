@@ -103,6 +103,9 @@ class Certification:
         self._check = PairCheck(scene, self.ground)
         samples = hit_and_run(faces, self.center, CONE_SAMPLES, seed)
         self._screen = np.concatenate([self.center[None], samples])
+        few = self._screen[:SCREEN_SAMPLES]
+        gauge = ((few - self.center) @ faces.C.T / (faces.d - faces.C @ self.center)).max(axis=1)
+        self._nearest_first = few[np.argsort(gauge)]
         self._kinematics = Kinematics.of(scene)
         self._box, self._samples = box, samples
         self._every = tuple(range(len(kept)))
@@ -139,7 +142,7 @@ class Certification:
     def _certify(self, pair: Pair, max_iterations: int, every_face: bool) -> PairResult:
         volumes = (Volume.of(self.scene.geometry(pair.a)), Volume.of(self.scene.geometry(pair.b)))
         frames = frames_to_try(self._kinematics, volumes)
-        contact = self._contact(volumes, frames[0], self._screen[:SCREEN_SAMPLES])
+        contact = self._contact(volumes, frames[0], self._nearest_first)
         if contact:
             return self._refute(pair, contact, Stage.SCREEN)
         for frame in frames:

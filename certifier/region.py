@@ -9,7 +9,7 @@ import numpy as np
 
 from certifier.archimedean import archimedean
 from certifier.ellipsoid import inscribed_ellipsoid, volume
-from certifier.growth import Accepted
+from certifier.growth_actions import Accepted
 from certifier.model import SCHEMA_VERSION, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytope import chebyshev_center, support

@@ -28,7 +28,7 @@ def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], screen: Scre
     """Grows a region here."""
     loaded = load(scene)
     from certifier import local
-    from certifier.growth import GrowthOptions
+    from certifier.growth_options import GrowthOptions
 
     region = local.grow(loaded, GrowthOptions.from_document({"kind": "grow", "seed": seed, **options}), screen.status)
     screen.clear()

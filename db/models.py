@@ -98,7 +98,7 @@ class JobRow(Base):
     error: Mapped[Document | None]
     """CirisError.to_document() when it failed."""
     options: Mapped[Document]
-    """certifier.growth.GrowthOptions.to_document()"""
+    """certifier.growth_options.GrowthOptions.to_document()"""
     growth: Mapped[Document | None] = mapped_column(deferred=True)
     """The state of certifier.growth after the last transition."""
     action: Mapped[Document | None] = mapped_column(deferred=True)

@@ -9,7 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from certifier.growth import Failed, GrowthOptions, Proposed, Report, Stepped, Transition, advance, begin
+from certifier.growth import advance, begin
+from certifier.growth_actions import Failed, Proposed, Report, Stepped, Transition
+from certifier.growth_options import GrowthOptions
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from db.states import JobKind, JobState, StepKind, StepState

@@ -10,7 +10,7 @@ from functools import lru_cache, partial
 from structlog.contextvars import bound_contextvars
 
 from certifier.errors import CirisError
-from certifier.growth import GrowthOptions
+from certifier.growth_options import GrowthOptions
 from certifier.local import weakness
 from certifier.model import Polytope
 from certifier.pair import Certification

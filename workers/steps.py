@@ -14,7 +14,7 @@ from structlog.contextvars import bound_contextvars
 
 from certifier.child import run_in_child
 from certifier.errors import CirisError
-from certifier.growth import Accepted, Proposed
+from certifier.growth_actions import Accepted, Proposed
 from certifier.local import stepped, versions
 from certifier.model import Polytope, Scene
 from certifier.polytope_step import step as polytope_step

@@ -16,7 +16,17 @@ from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
 from certifier.forecast import PairCost, forecast
-from certifier.growth import Certification, Certify, Finish, Propose, Report, Step, Transition, action_from_document, action_to_document
+from certifier.growth_actions import (
+    Certification,
+    Certify,
+    Finish,
+    Propose,
+    Report,
+    Step,
+    Transition,
+    action_from_document,
+    action_to_document,
+)
 from certifier.outcome import Outcome
 from db import jobs, leases, pairs, steps, work
 from db.models import IterationRow, JobRow

@@ -84,7 +84,7 @@ def create_job(
 
 
 def _options(body: GrowRequest | CertifyRequest, scene: Scene) -> dict[str, Any]:
-    """The document of certifier.growth.GrowthOptions that the request asks for, its numbers checked against the scene."""
+    """The document of certifier.growth_options.GrowthOptions that the request asks for, its numbers checked against the scene."""
     if isinstance(body, GrowRequest):
         return {"kind": "grow", "seed": checks.seed(scene, body.seed).to_document(), **body.options.model_dump()}
     checks.polytope(scene, body.polytope)

@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 
 from api.app import create_app
 from api.schemas.jobs import GrowOptions, Seed
-from certifier.growth import GrowthOptions
+from certifier.growth_options import GrowthOptions
 from certifier.model import Scene
 from certifier.seed_options import SeedOptions
 from db import jobs, pairs

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 
 from certifier.contraction import Failure, contract, measure
 from certifier.ellipsoid import inscribed_ellipsoid
-from certifier.growth import Certification, Certify, Finish, GrowthOptions, Propose, Proposed, action_to_document, advance, begin
+from certifier.growth import advance, begin
+from certifier.growth_actions import Certification, Certify, Finish, Propose, Proposed, action_to_document
+from certifier.growth_options import GrowthOptions
 from certifier.model import WORLD, Polytope
 from certifier.outcome import Outcome
 from tests.certifier.scenes import box, cube, planar_arm

@@ -7,25 +7,24 @@ import numpy as np
 import pytest
 
 from certifier.errors import CirisError, RegionError
-from certifier.growth import (
-    SMALLEST_SCALE,
+from certifier.growth import SMALLEST_SCALE, advance, begin
+from certifier.growth_actions import (
     Certification,
     Certify,
     Failed,
     Finish,
-    GrowthOptions,
     Propose,
     Proposed,
     Step,
     Stepped,
     action_from_document,
     action_to_document,
-    advance,
-    begin,
 )
+from certifier.growth_options import GrowthOptions
 from certifier.local import grow
-from certifier.model import WORLD
+from certifier.model import WORLD, Polytope
 from certifier.outcome import Outcome
+from certifier.polytope import bounds
 from tests.certifier.scenes import box, planar_arm
 
 SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
@@ -157,6 +156,35 @@ def test_the_longer_the_chains_the_less_is_done_unasked(joints, pushes, rounds):
         transition = advance(scene, transition.state, report)
     assert said.count("push") <= pushes
     assert ("push" in said, "step" in said) == (pushes > 0, rounds > 0)
+
+
+GIVEN = replace(PROPOSAL, info={"method": "polytope"})
+
+
+def first_starts(options, verdict, count):
+    """Half-widths in the first joint of the polytopes that a given one's contractions start from, each decided by the verdict."""
+    transition, widths = advance(SCENE, begin(SCENE, options).state, GIVEN), []
+    while len(widths) < count:
+        action = transition.action
+        assert isinstance(action, Certify)
+        if action.label != "contract" or not transition.state["trim"]["attempts"]:
+            widths.append((action.label, round(bounds(Polytope(np.array(action.C), np.array(action.d)))[1][0], 6)))
+        outcomes = {index: verdict(len(widths)) for index in action.pairs}
+        weak = {index: {"points": [[0.9 * action.d[0], 0.0]], "pull": [1.0, 1.0]} for index in action.pairs}
+        transition = advance(SCENE, transition.state, Certification(action.iteration, outcomes, weak))
+    return widths
+
+
+def test_a_given_polytope_is_first_contracted_from_far_outside_where_pushes_are_allowed():
+    options = GrowthOptions(seed={}, contractions=1, pushes=2, max_rounds=0)
+    assert first_starts(options, lambda _: Outcome.CERTIFIED, 1) == [("contract", pytest.approx(SCENE.polytope([], []).d[0], abs=1e-6))]
+    assert first_starts(replace(options, pushes=0), lambda _: Outcome.CERTIFIED, 1) == [("contract", 1.0)]
+
+
+def test_a_given_polytope_is_tried_itself_when_nothing_far_outside_can_be_certified():
+    options = GrowthOptions(seed={}, contractions=1, pushes=2, max_rounds=0)
+    fails_far = lambda start: Outcome.NOT_CERTIFIABLE if start == 1 else Outcome.CERTIFIED  # noqa: E731
+    assert [width for _, width in first_starts(options, fails_far, 2)][1] == 1.0
 
 
 def test_pairs_that_failed_are_hard_until_they_are_certified():

@@ -11,7 +11,7 @@ from certifier.basis import dimension
 from certifier.disproof import DualProof
 from certifier.forecast import forecast
 from certifier.frames import LARGEST
-from certifier.growth import GrowthOptions
+from certifier.growth_options import GrowthOptions
 from certifier.kinematics import Kinematics
 from certifier.local import grow
 from certifier.model import WORLD, Pair

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from certifier.growth import GrowthOptions
+from certifier.growth_options import GrowthOptions
 from certifier.local import grow
 from certifier.model import Polytope
 from certifier.scene import load_scene

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from certifier.growth import Failed, Proposed
+from certifier.growth_actions import Failed, Proposed
 from certifier.outcome import Outcome
 from db.states import JobState, StepKind, StepState
 from tests.scenes import slider

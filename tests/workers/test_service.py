@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from certifier.growth import GrowthOptions
+from certifier.growth_options import GrowthOptions
 from certifier.local import grow
 from certifier.model import Scene
 from certifier.verify.region import verify_region
