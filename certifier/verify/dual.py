@@ -81,7 +81,7 @@ class _Check:
         scene, ground = proof.scene, proof.ground
         self._proof, self._n = proof, scene.n
         ring = fmpq_mpoly_ctx.get([f"u{i}" for i in range(scene.n)], Ordering.lex)
-        kinematics = ExactKinematics(scene, ring, ground.mid, ground.half)
+        kinematics = ExactKinematics.on_box(scene, ring, ground.mid, ground.half)
         volumes = [Volume.of(scene.geometry(name)) for name in (proof.pair.a, proof.pair.b)]
         numerators = [Numerators.between(kinematics, proof.frame, volume.body) for volume in volumes]
         self._sides = [_Side(*parts, self._n) for parts in zip(volumes, numerators, proof.moments, strict=True)]

@@ -7,8 +7,10 @@ tau + s, up to the common factor (1 + tau^2)(1 + s^2), which is the joint's deno
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
+import numpy as np
 from flint import arb, ctx, fmpq, fmpq_mpoly, fmpq_mpoly_ctx
 
 from certifier.model import WORLD, Array, Joint, JointKind, Scene
@@ -34,13 +36,23 @@ def half_tangent(angle: float) -> fmpq:
 
 
 class ExactKinematics:
-    """Numerators of positions as polynomials of the ring Q[u_0 .. u_{n-1}]."""
+    """Numerators of positions as polynomials of the ring Q[u_0 .. u_{n-1}], or as numbers at one configuration."""
 
-    def __init__(self, scene: Scene, ring: fmpq_mpoly_ctx, mid: Array, half: Array) -> None:
-        self._ring = ring
+    def __init__(self, scene: Scene, s: list[Any], constant: Any) -> None:
+        self._constant_of, self._s = constant, s
         self._q_star = scene.q_star
-        self._s = [ring.constant(exact(m)) + exact(h) * u for m, h, u in zip(mid, half, ring.gens(), strict=True)]
         self._above = {joint.child: joint for joint in scene.joints}
+
+    @classmethod
+    def on_box(cls, scene: Scene, ring: fmpq_mpoly_ctx, mid: Array, half: Array) -> ExactKinematics:
+        """Polynomials in u, s = mid + half u."""
+        s = [ring.constant(exact(m)) + exact(h) * u for m, h, u in zip(mid, half, ring.gens(), strict=True)]
+        return cls(scene, s, ring.constant)
+
+    @classmethod
+    def at(cls, scene: Scene, s: list[fmpq]) -> ExactKinematics:
+        """Numbers at the configuration s."""
+        return cls(scene, s, fmpq)
 
     def path(self, frame: str, body: str) -> list[tuple[Joint, bool]]:
         """Joints from the frame's body to the body, each with whether it is crossed upwards."""
@@ -58,7 +70,7 @@ class ExactKinematics:
         return joints
 
     def pose(self, frame: str, body: str) -> Matrix:
-        """(4, 4) polynomials: X_FB times its denominator, the entry [3][3] = prod (1 + tau_i^2)(1 + s_i^2)."""
+        """(4, 4) polynomials or numbers: X_FB times its denominator, the entry [3][3] = prod (1 + tau_i^2)(1 + s_i^2)."""
         # Constant factors are multiplied as numbers.
         fixed = _identity()
         X = self._constant(fixed)
@@ -86,15 +98,12 @@ class ExactKinematics:
         return product
 
     def _constant(self, rows: list[list[fmpq]]) -> Matrix:
-        return [[self._ring.constant(x) for x in row] for row in rows]
+        return [[self._constant_of(x) for x in row] for row in rows]
 
     def _joint(self, joint: Joint, upwards: bool) -> tuple[Numbers, Matrix | None, Numbers]:
         """The joint's fixed frame, its motion, and the other one."""
-        parent, child = _rational(joint.X_PF), _rational(joint.X_BM)
-        if upwards:
-            outer, inner = child, _inverse(parent)
-        else:
-            outer, inner = parent, _inverse(child)
+        first, last = (joint.X_BM, joint.X_PF) if upwards else (joint.X_PF, joint.X_BM)
+        outer, inner = _rational(first.tobytes()), _inverse(last.tobytes())
         if joint.index is None:
             return outer, None, inner
         axis = [exact(-x if upwards else x) for x in joint.axis]
@@ -115,7 +124,7 @@ class ExactKinematics:
         skew = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
         square = [[sum((skew[i][k] * skew[k][j] for k in range(3)), zero) for j in range(3)] for i in range(3)]
         norm, first, second = cosine * cosine + sine * sine, 2 * cosine * sine, 2 * sine * sine
-        none = self._ring.constant(zero)
+        none = self._constant_of(zero)
         rows = [[(norm if i == j else none) + skew[i][j] * first + square[i][j] * second for j in range(3)] + [none] for i in range(3)]
         return [*rows, [none, none, none, norm]]
 
@@ -124,12 +133,16 @@ def _identity() -> Numbers:
     return [[fmpq(int(i == j)) for j in range(4)] for i in range(4)]
 
 
-def _rational(X: Array) -> Numbers:
-    return [[exact(x) for x in row] for row in X]
+@lru_cache(maxsize=1024)
+def _rational(X: bytes) -> Numbers:
+    """The 16 doubles of a rigid transform, not to be changed."""
+    return [[exact(x) for x in row] for row in np.frombuffer(X).reshape(4, 4)]
 
 
-def _inverse(X: Numbers) -> Numbers:
+@lru_cache(maxsize=1024)
+def _inverse(rigid: bytes) -> Numbers:
     """Of a rigid transform: the rotation is transposed."""
+    X = _rational(rigid)
     R = [[X[j][i] for j in range(3)] for i in range(3)]
     p = [-sum((R[i][j] * X[j][3] for j in range(3)), fmpq(0)) for i in range(3)]
     return [[*R[i], p[i]] for i in range(3)] + [[fmpq(0), fmpq(0), fmpq(0), fmpq(1)]]

@@ -100,7 +100,7 @@ class PairCheck:
     def __init__(self, scene: Scene, ground: Ground) -> None:
         self._scene, self._ground = scene, ground
         ring = fmpq_mpoly_ctx.get([f"u{i}" for i in range(scene.n)], Ordering.lex)
-        self._kinematics = ExactKinematics(scene, ring, ground.mid, ground.half)
+        self._kinematics = ExactKinematics.on_box(scene, ring, ground.mid, ground.half)
         self._faces = faces_of(ground)
         self._numerators: dict[tuple[str, str], Numerators] = {}
         self._contained: dict[int, Volume] = {}

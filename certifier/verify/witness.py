@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from flint import Ordering, fmpq, fmpq_mpoly_ctx
+from flint import fmpq
 
 from certifier.disproof import WitnessProof
 from certifier.model import Array, Pair
@@ -48,8 +47,7 @@ def verify_witness(proof: WitnessProof) -> WitnessStatement:
         if not sum((exact(x) * y for x, y in zip(c, point, strict=True)), fmpq(0)) <= exact(d):
             raise ProofError("proof_witness", "the configuration is not in the polytope")
     a, b = scene.geometry(proof.pair.a), scene.geometry(proof.pair.b)
-    kinematics = ExactKinematics(scene, fmpq_mpoly_ctx.get([f"u{i}" for i in range(n)], Ordering.lex), s, np.zeros(n))
-    X = [[entry.coefficient(0) if entry != 0 else fmpq(0) for entry in row] for row in kinematics.pose(a.body, b.body)]
+    X = ExactKinematics.at(scene, point).pose(a.body, b.body)
     p, other = (_mean(g.vertices, w) for g, w in zip((a, b), proof.weights, strict=True))
     q = [sum((X[i][j] * other[j] for j in range(3)), X[i][3]) / X[3][3] for i in range(3)]
     reach = exact(a.radius) + exact(b.radius) + 2 * exact(scene.padding) + exact(TOLERANCE)

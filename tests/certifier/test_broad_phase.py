@@ -111,7 +111,7 @@ def test_every_volume_contains_its_geometries_exactly(seed, count):
     broad_phase = BroadPhase(Kinematics(scene), tried.append)
     for pair in pairs:
         assert broad_phase.find(pair) is None
-    exact = ExactKinematics(scene, fmpq_mpoly_ctx.get(["u0", "u1"], Ordering.lex), np.zeros(2), np.ones(2))
+    exact = ExactKinematics.on_box(scene, fmpq_mpoly_ctx.get(["u0", "u1"], Ordering.lex), np.zeros(2), np.ones(2))
     assert len(tried) <= 2 * count
     for volumes in tried:
         for volume in volumes:

@@ -47,7 +47,7 @@ def test_the_verifiers_polynomials_agree_with_the_numerators(seed):
     rng = np.random.default_rng(seed)
     mid, half = rng.uniform(-0.5, 0.5, scene.n), rng.uniform(0.1, 0.5, scene.n)
     ring = fmpq_mpoly_ctx.get([f"u{i}" for i in range(scene.n)], Ordering.lex)
-    kinematics = ExactKinematics(scene, ring, mid, half)
+    kinematics = ExactKinematics.on_box(scene, ring, mid, half)
     u = rng.uniform(-1, 1, scene.n)
     for frame in scene.bodies:
         for body in scene.bodies:

@@ -21,7 +21,7 @@ from tests.certifier.scenes import planar_arm, random_tree
 
 def exact_kinematics(scene, mid, half):
     ring = fmpq_mpoly_ctx.get([f"u{i}" for i in range(scene.n)], Ordering.lex)
-    return ExactKinematics(scene, ring, mid, half)
+    return ExactKinematics.on_box(scene, ring, mid, half)
 
 
 def fraction(x):

@@ -34,7 +34,7 @@ def scene_of(*geometries) -> Scene:
 
 def contains(volume: Volume, *geometries) -> bool:
     scene = scene_of(*geometries)
-    kinematics = ExactKinematics(scene, fmpq_mpoly_ctx.get(["u0"], Ordering.lex), np.zeros(1), np.ones(1))
+    kinematics = ExactKinematics.on_box(scene, fmpq_mpoly_ctx.get(["u0"], Ordering.lex), np.zeros(1), np.ones(1))
     try:
         check_volume(scene, kinematics, volume)
     except ProofError:
