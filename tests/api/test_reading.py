@@ -1,0 +1,67 @@
+"""Routes that only read: one visit to one of a few threads, with the documentation that FastAPI would give them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+from fastapi import APIRouter, FastAPI, Response
+from fastapi.testclient import TestClient
+from pydantic import BaseModel
+
+from api.reading import READERS, ReadingRoute
+
+
+class Answer(BaseModel):
+    thread: str
+
+
+class Readers:
+    """An application with one route of each kind, and how many read in it at a time."""
+
+    def __init__(self) -> None:
+        self.app, router = FastAPI(), APIRouter(route_class=ReadingRoute)
+        self.most = self._now = 0
+        self._lock = threading.Lock()
+
+        @router.get("/read/{seconds}")
+        def read(seconds: float) -> Answer:
+            with self._lock:
+                self._now += 1
+                self.most = max(self.most, self._now)
+            time.sleep(seconds)
+            with self._lock:
+                self._now -= 1
+            return Answer(thread=threading.current_thread().name)
+
+        @router.get("/raw")
+        def raw() -> Response:
+            return Response("raw", media_type="text/plain")
+
+        @router.post("/write", status_code=201)
+        def write(response: Response) -> Answer:
+            response.headers["Location"] = "/read/0"
+            return Answer(thread=threading.current_thread().name)
+
+        self.app.include_router(router)
+
+
+def test_readers_are_few_however_many_ask() -> None:
+    readers = Readers()
+    with TestClient(readers.app) as client, ThreadPoolExecutor(3 * READERS) as callers:
+        answers = list(callers.map(lambda _: client.get("/read/0.05").json(), range(5 * READERS)))
+    assert readers.most == READERS
+    assert {answer["thread"].rpartition("_")[0] for answer in answers} == {"read"}
+
+
+def test_what_a_route_documents_and_how_others_answer_stays_as_it_is() -> None:
+    readers = Readers()
+    with TestClient(readers.app) as client:
+        assert client.get("/read/not-a-number").status_code == 422
+        assert client.get("/raw").text == "raw"
+        written = client.post("/write")
+    assert (written.status_code, written.headers["location"]) == (201, "/read/0")
+    assert not written.json()["thread"].startswith("read")
+    answer = readers.app.openapi()["paths"]["/read/{seconds}"]["get"]["responses"]["200"]
+    assert answer["content"]["application/json"]["schema"] == {"$ref": "#/components/schemas/Answer"}
