@@ -26,10 +26,11 @@ def upgrade() -> None:
             batch_op.add_column(sa.Column("faces", sa.Integer(), nullable=False, server_default="0"))
         columns = [sa.column(key, sa.Integer() if key == "index" else sa.String()) for key in keys]
         table = sa.table(name, *columns, sa.column("arrays", sa.LargeBinary()), sa.column("faces", sa.Integer()))
-        for *row, arrays in bind.execute(sa.select(*columns, table.c.arrays)).all():
+        for row in bind.execute(sa.select(*columns)).all():
+            where = [table.c[key] == value for key, value in zip(keys, row, strict=True)]
+            arrays = bind.execute(sa.select(table.c.arrays).where(*where)).scalar_one()
             with np.load(io.BytesIO(arrays), allow_pickle=False) as stored:
                 faces = len(stored["d"])
-            where = [table.c[key] == value for key, value in zip(keys, row, strict=True)]
             bind.execute(sa.update(table).where(*where).values(faces=faces))
         with op.batch_alter_table(name, schema=None) as batch_op:
             batch_op.alter_column("faces", server_default=None)
