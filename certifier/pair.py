@@ -35,6 +35,8 @@ from certifier.verify.witness import verify_witness
 from certifier.weakness import pull, weak_points
 
 SCREEN_SAMPLES = 64
+NEAREST_JOINTS = 4
+"""Up to so many joints the contact nearest to the centre is what a refutation tells of."""
 GAP_SAMPLES = 16
 APART = 0.15
 """Least gap at the samples, relative to the way that vertices sweep, for which volumes of several geometries are tried."""
@@ -103,9 +105,10 @@ class Certification:
         self._check = PairCheck(scene, self.ground)
         samples = hit_and_run(faces, self.center, CONE_SAMPLES, seed)
         self._screen = np.concatenate([self.center[None], samples])
-        few = self._screen[:SCREEN_SAMPLES]
-        gauge = ((few - self.center) @ faces.C.T / (faces.d - faces.C @ self.center)).max(axis=1)
-        self._nearest_first = few[np.argsort(gauge)]
+        self._contacts = self._screen[:SCREEN_SAMPLES]
+        if scene.n <= NEAREST_JOINTS:
+            gauge = ((self._contacts - self.center) @ faces.C.T / (faces.d - faces.C @ self.center)).max(axis=1)
+            self._contacts = self._contacts[np.argsort(gauge)]
         self._kinematics = Kinematics.of(scene)
         self._box, self._samples = box, samples
         self._every = tuple(range(len(kept)))
@@ -142,7 +145,7 @@ class Certification:
     def _certify(self, pair: Pair, max_iterations: int, every_face: bool) -> PairResult:
         volumes = (Volume.of(self.scene.geometry(pair.a)), Volume.of(self.scene.geometry(pair.b)))
         frames = frames_to_try(self._kinematics, volumes)
-        contact = self._contact(volumes, frames[0], self._nearest_first)
+        contact = self._contact(volumes, frames[0], self._contacts)
         if contact:
             return self._refute(pair, contact, Stage.SCREEN)
         for frame in frames:
