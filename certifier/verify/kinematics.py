@@ -103,7 +103,7 @@ class ExactKinematics:
     def _joint(self, joint: Joint, upwards: bool) -> tuple[Numbers, Matrix | None, Numbers]:
         """The joint's fixed frame, its motion, and the other one."""
         first, last = (joint.X_BM, joint.X_PF) if upwards else (joint.X_PF, joint.X_BM)
-        outer, inner = _rational(first.tobytes()), _inverse(last.tobytes())
+        outer, inner = _rational(_doubles(first)), _inverse(_doubles(last))
         if joint.index is None:
             return outer, None, inner
         axis = [exact(-x if upwards else x) for x in joint.axis]
@@ -131,6 +131,10 @@ class ExactKinematics:
 
 def _identity() -> Numbers:
     return [[fmpq(int(i == j)) for j in range(4)] for i in range(4)]
+
+
+def _doubles(X: Array) -> bytes:
+    return np.asarray(X, dtype=float).tobytes()
 
 
 @lru_cache(maxsize=1024)
