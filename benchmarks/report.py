@@ -115,8 +115,9 @@ def _growth(document: Document) -> list[str]:
         rows = []
         for row in document["against"]:
             reached = [seconds(row["reached_seconds"]), _ratio(row["time_ratio"])] if row["reached_seconds"] else ["never", ""]
-            rows.append([*line(row), f"{row['volume_ratio']:.3g}", *reached])
-        parts.append(_table([*header, "volume / Drake's", "reached Drake's after", "times as fast"], rows))
+            runs = ", ".join(map(_ratio, row["time_ratios"])) if len(row["time_ratios"]) > 1 else ""
+            rows.append([*line(row), f"{row['volume_ratio']:.3g}", *reached, runs])
+        parts.append(_table([*header, "volume / Drake's", "reached Drake's after", "times as fast", "in each run"], rows))
     return parts
 
 

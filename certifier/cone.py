@@ -20,9 +20,11 @@ import numpy as np
 from scipy.linalg import blas, lapack
 
 from certifier.basis import Basis, subsets
-from certifier.kernels import adjoint, cholesky_inverse, line_search, schur, values
+from certifier.kernels import adjoint, cholesky_inverse, line_search, schur, substitute, values
 from certifier.model import Array
 
+SMALL = 48
+"""Unknowns up to which the call of a triangular solver takes longer than a compiled loop."""
 MAX_NEWTON = 12
 NEWTON_TOLERANCE = 1e-3
 
@@ -119,8 +121,9 @@ class Factor:
     """
 
     def __init__(self, H: Array) -> None:
-        self._upper = []
+        self._lower, self._upper = H, []
         for matrix in H:
+            # Seen from Fortran, the lower triangle is the upper one.
             upper, info = lapack.dpotrf(matrix.T, lower=0, clean=0, overwrite_a=1)
             if info != 0:
                 raise np.linalg.LinAlgError("Schur complement is not positive definite")
@@ -136,6 +139,9 @@ class Factor:
 
     def _triangular(self, right: Array, transposed: int) -> Array:
         solution = right.copy(order="C")
+        if self._lower.shape[1] <= SMALL:
+            substitute(self._lower, solution, bool(transposed))
+            return solution
         for upper, block in zip(self._upper, solution, strict=True):
             # Seen from Fortran, the block is its transpose; it is overwritten in place.
             blas.dtrsm(1.0, upper, block.T, side=1, trans_a=transposed, overwrite_b=1)

@@ -10,7 +10,7 @@ import numpy as np
 
 from certifier.errors import RegionError
 from certifier.model import Array, Polytope
-from certifier.polytope import chebyshev_center
+from certifier.polytope import bounds, chebyshev_center
 from certifier.sampling import CHAINS, hit_and_run
 
 _GAP = 1e-9
@@ -35,8 +35,7 @@ class Ellipsoid:
     @cached_property
     def volume(self) -> float:
         """n-dimensional volume: |det Q| times the unit ball's."""
-        n = len(self.center)
-        return math.pi ** (n / 2) / math.gamma(n / 2 + 1) * abs(float(np.linalg.det(self.shape)))
+        return _unit_ball(len(self.center)) * abs(float(np.linalg.det(self.shape)))
 
 
 def inscribed_ellipsoid(polytope: Polytope) -> Ellipsoid:
@@ -58,6 +57,20 @@ def inscribed_ellipsoid(polytope: Polytope) -> Ellipsoid:
     shape = (axes * np.sqrt(eigenvalues)) @ axes.T
     reach = float(((d - C @ center) / np.linalg.norm(C @ shape, axis=1)).min())
     return Ellipsoid(center, shape * (min(1.0, reach) * _SHRINK))
+
+
+def largest_volume(polytope: Polytope) -> float:
+    """An upper bound of the inscribed ellipsoid's volume in a fraction of its time: that of the one in the bounding box.
+
+    Raises:
+        RegionError: as :func:`certifier.polytope.chebyshev_center`.
+    """
+    lower, upper = bounds(polytope)
+    return _unit_ball(len(lower)) * float(np.prod((upper - lower) / 2))
+
+
+def _unit_ball(n: int) -> float:
+    return math.pi ** (n / 2) / math.gamma(n / 2 + 1)
 
 
 def _largest(A: Array) -> tuple[Array, Array]:

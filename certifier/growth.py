@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from certifier.contraction import Failure, contract, measure
-from certifier.ellipsoid import inscribed_ellipsoid
+from certifier.ellipsoid import inscribed_ellipsoid, largest_volume
 from certifier.errors import CirisError, RegionError
 from certifier.growth_actions import (
     Accepted,
@@ -187,7 +187,10 @@ def _pushed(scene: Scene, polytope: Polytope, center: Array, reach: float, withi
 
 def _is_worth_it(state: dict[str, Any], polytope: Polytope) -> bool:
     """Whether certifying the polytope would be progress."""
-    return state["best"] is None or inscribed_ellipsoid(polytope).volume > state["best"]["volume"] * (1 + state["options"]["tolerance"])
+    if state["best"] is None:
+        return True
+    least = state["best"]["volume"] * (1 + state["options"]["tolerance"])
+    return largest_volume(polytope) > least and inscribed_ellipsoid(polytope).volume > least
 
 
 def _trim(scene: Scene, state: dict[str, Any], label: str, polytope: Polytope, trim: dict[str, Any] | None = None) -> Transition:

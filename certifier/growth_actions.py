@@ -5,7 +5,7 @@ All of it is JSON-able, so a job can be resumed from its rows alone.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 from certifier.outcome import Outcome
@@ -75,7 +75,7 @@ Action = Propose | Certify | Step | Finish
 
 def action_to_document(action: Action) -> dict[str, Any]:
     """An action as JSON-able data (pair indices become strings as JSON keys)."""
-    return asdict(action)
+    return {field.name: getattr(action, field.name) for field in fields(action)}
 
 
 def action_from_document(document: dict[str, Any]) -> Action:

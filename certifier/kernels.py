@@ -43,6 +43,27 @@ def cholesky_inverse(X: Array, inverse: Array) -> bool:
     return True
 
 
+@njit(cache=True)
+def substitute(lower: Array, X: Array, transposed: bool) -> None:
+    """Solves L Y = X, or L' Y = X, for a stack of lower triangles, (R, N, N) and (R, N, p), in place."""
+    R, N, p = X.shape
+    for r in range(R):
+        L, x = lower[r], X[r]
+        for step in range(N):
+            i = N - 1 - step if transposed else step
+            if not transposed:
+                for j in range(i):
+                    for c in range(p):
+                        x[i, c] -= L[i, j] * x[j, c]
+            inverse = 1.0 / L[i, i]
+            for c in range(p):
+                x[i, c] *= inverse
+            if transposed:
+                for j in range(i):
+                    for c in range(p):
+                        x[j, c] -= L[i, j] * x[i, c]
+
+
 @njit(cache=True, fastmath=True)
 def lowest_relative_eigenvalue(inverse: Array, D: Array, tolerance: float) -> float:
     """Least eigenvalue over a stack of L^-1 D L^-T, to a relative tolerance, never above the true one by more.

@@ -99,14 +99,14 @@ class Kinematics:
         Returns:
             (N, 4, 4); the entry [3, 3] is the denominator.
         """
-        X = np.broadcast_to(np.eye(4), (len(s), 4, 4))
+        X = None
         for factor in self.path(frame, body):
-            if factor.index is None:
-                X = X @ factor.terms[0]
-            else:
+            motion = factor.terms[0]
+            if factor.index is not None:
                 si = s[:, factor.index, None, None]
-                X = X @ (factor.terms[0] + si * (factor.terms[1] + si * factor.terms[2]))
-        return X
+                motion = motion + si * (factor.terms[1] + si * factor.terms[2])
+            X = motion if X is None else X @ motion
+        return np.broadcast_to(np.eye(4) if X is None else X, (len(s), 4, 4))
 
     def points(self, frame: str, body: str, vertices: Array, s: Array) -> Array:
         """Positions in F, metres, of vertices (V, 3) of B at the rows of s: (N, V, 3)."""

@@ -31,7 +31,7 @@ from certifier.proof_file import ProofError
 from certifier.sampling import hit_and_run
 from certifier.verify.dual import verify_dual
 from certifier.verify.pair import PairCheck, check_ground
-from certifier.verify.witness import verify_witness
+from certifier.verify.witness import check_witness
 from certifier.weakness import pull, weak_points
 
 SCREEN_SAMPLES = 64
@@ -95,9 +95,9 @@ class Certification:
         middle, _ = chebyshev_center(polytope, tuple(joint.name for joint in scene.moving))
         self.scene = scene
         self.center = middle if center is None else center
-        kept = drop_redundant(polytope)
+        kept = drop_redundant(polytope, inside=middle)
         self._faces = faces = Polytope(polytope.C[kept], polytope.d[kept])
-        lower, upper, Y_lower, Y_upper = bound_multipliers(scene.polytope(faces.C, faces.d))
+        lower, upper, Y_lower, Y_upper = bound_multipliers(scene.polytope(faces.C, faces.d), middle)
         self._whole = None if box is None else PairCheck(scene, Ground.of_box(box.mid, box.half))
         box = Box.around(lower, upper) if box is None else box
         self.ground = Ground(faces.C, faces.d, box.mid, box.half, Y_lower, Y_upper)
@@ -257,7 +257,7 @@ class Certification:
     def _refute(self, pair: Pair, witness: _Witness, stage: Stage) -> PairResult:
         proof = WitnessProof(self.scene, pair, self.ground.C, self.ground.d, witness.s, witness.weights)
         try:
-            verify_witness(proof)
+            check_witness(proof)
         except ProofError as error:
             return PairResult(Outcome.INCONCLUSIVE, stage, detail=f"the contact found does not hold: {error}")
         return PairResult(Outcome.REFUTED, stage, witness_s=witness.s, proof=proof.to_bytes())

@@ -10,6 +10,8 @@ plus a bound on the rounding of the right-hand side itself.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -39,10 +41,13 @@ def _bounds(polytope: Polytope, inside: Array) -> tuple[Array, Array]:
     return -values[n:], values[:n]
 
 
-def bound_multipliers(polytope: Polytope) -> tuple[Array, Array, Array, Array]:
+def bound_multipliers(polytope: Polytope, inside: Array | None = None) -> tuple[Array, Array, Array, Array]:
     """A box around P with the multipliers that prove it in exact arithmetic.
 
     Every axis needs a row on either side that bounds it alone, as the joint limits do; residuals are absorbed there.
+
+    Args:
+        inside: (n,) a point inside, if one is known.
 
     Returns:
         (lo, hi, Y_lo, Y_hi), (n,), (n,), (n, m), (n, m): Y >= 0, row i of Y_hi proves s_i <= hi_i and that of Y_lo
@@ -55,7 +60,7 @@ def bound_multipliers(polytope: Polytope) -> tuple[Array, Array, Array, Array]:
     axes = np.concatenate([np.eye(n), -np.eye(n)])
     limits, rows = _axis_limits(polytope)
     _need_limits(limits)
-    _, Y = _maximise(polytope, axes, chebyshev_center(polytope)[0])
+    _, Y = _maximise(polytope, axes, chebyshev_center(polytope)[0] if inside is None else inside)
     values = _proved_bounds(polytope, axes, Y, -limits[n:], limits[:n])
     at_limit = values >= limits
     Y[at_limit] = 0
@@ -140,7 +145,7 @@ _CLEARLY = 1e-9
 """Relative distance by which a row must be redundant to go, so that whoever proves it again succeeds as well."""
 
 
-def drop_redundant(polytope: Polytope, fixed: int = 0) -> NDArray[np.int64]:
+def drop_redundant(polytope: Polytope, fixed: int = 0, inside: Array | None = None) -> NDArray[np.int64]:
     """Indices, ascending, of rows that suffice to describe P. Never enlarges the set: rows go only when strict dual bounds
     on P's bounding box prove them from the rows that stay, so some weakly redundant rows remain.
 
@@ -150,11 +155,12 @@ def drop_redundant(polytope: Polytope, fixed: int = 0) -> NDArray[np.int64]:
 
     Args:
         fixed: this many rows at the end stay whatever happens (the joint limits, say).
+        inside: (n,) a point well inside, if one is known.
 
     Raises:
         RegionError: as :func:`chebyshev_center`.
     """
-    center = chebyshev_center(polytope)[0]
+    center = chebyshev_center(polytope)[0] if inside is None else inside
     lo, hi = _bounds(polytope, center)
     margin = 1e-6 * (1 + hi - lo)
     lo, hi = lo - margin, hi + margin
@@ -162,7 +168,7 @@ def drop_redundant(polytope: Polytope, fixed: int = 0) -> NDArray[np.int64]:
     rows = np.flatnonzero(~_repeated(polytope) | stays)
     distinct = Polytope(polytope.C[rows], polytope.d[rows])
     needed, idle = stays[rows], np.zeros(len(rows), dtype=bool)
-    rays = np.random.default_rng(0).normal(size=(_RAYS, len(center))) * (hi - lo)
+    rays = _directions(len(center)) * (hi - lo)
     needed |= _left_through(distinct, center, np.concatenate([rays, distinct.C * (hi - lo) ** 2]))
     while not (needed | idle).all():
         tried = np.flatnonzero(~needed & ~idle)
@@ -174,6 +180,12 @@ def drop_redundant(polytope: Polytope, fixed: int = 0) -> NDArray[np.int64]:
         found = _left_through(distinct, center, points[~proved] - center) & ~needed
         needed |= found if found.any() else ~idle
     return rows[needed]
+
+
+@lru_cache(maxsize=16)
+def _directions(n: int) -> Array:
+    """(_RAYS, n), always the same."""
+    return np.random.default_rng(0).normal(size=(_RAYS, n))
 
 
 def _repeated(polytope: Polytope) -> NDArray[np.bool_]:

@@ -18,6 +18,7 @@ positive, |a| <= kappa on the box by
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -86,6 +87,11 @@ class Sides:
         self._constant, self._slopes = constant / self._slack, slopes / self._slack[:, None]
         self._u = box.to_u(samples)
         self._centres: dict[tuple[int, ...], tuple[Cone, Centre]] = {}
+
+    @cached_property
+    def norm_blocks(self) -> list[Block]:
+        """Those that bound |a|, for all pairs where a radius is positive."""
+        return _norm_blocks(len(self.joints), self.u_c[list(self.joints)])
 
     @property
     def scales(self) -> Array:
@@ -164,7 +170,7 @@ def build(sides: Sides, volumes: tuple[Volume, Volume], frame: Frame) -> list[Bl
     a, b = volumes
     radii = [volume.radius + scene.padding for volume in volumes]
     rounded = max(radii) > 0
-    columns = 4 * (j + 1) + (1 + j if rounded else 0) + 1
+    columns = _columns(j, rounded)
     blocks = []
     for volume, chain, radius, sign in ((a, frame.chain_a, radii[0], 1.0), (b, frame.chain_b, radii[1], -1.0)):
         cone, centre = sides.cone(chain)
@@ -184,12 +190,17 @@ def build(sides: Sides, volumes: tuple[Volume, Volume], frame: Frame) -> list[Bl
             B[:, : len(u), 4 * (j + 1)] = -radius * X[:, 3, 3]
         B[:, :, -1] = -centre.w
         blocks.append(Block(cone, B, centre))
-    return blocks + (_norm_blocks(j, sides.u_c[joints], columns) if rounded else [])
+    return blocks + (sides.norm_blocks if rounded else [])
 
 
-def _norm_blocks(n: int, u_c: Array, columns: int) -> list[Block]:
+def _columns(n: int, rounded: bool) -> int:
+    """How many unknowns y has for n joints in play."""
+    return 4 * (n + 1) + (1 + n if rounded else 0) + 1
+
+
+def _norm_blocks(n: int, u_c: Array) -> list[Block]:
     """|a| <= kappa on the box: the LMI as a cone of one Gram matrix sampled at e_i + e_j, and tau >= 0."""
-    size = n + 4
+    size, columns = n + 4, _columns(n, rounded=True)
     rows, cols = np.tril_indices(size)
     points = np.eye(size)[rows] + np.where((rows == cols)[:, None], 0.0, np.eye(size)[cols])
     matrices = np.zeros((columns, size, size))

@@ -15,6 +15,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -84,6 +85,12 @@ class Volume:
         )
 
 
+@lru_cache(maxsize=16)
+def lower_triangle(length: int) -> tuple[np.ndarray, np.ndarray]:
+    """Its rows and columns, row by row."""
+    return np.tril_indices(length)
+
+
 @dataclass(frozen=True)
 class Side:
     """Gram factors of one volume's vertices: factor = mantissa 2^exponent, lower triangles row by row.
@@ -102,7 +109,7 @@ class Side:
     def rounded(cls, chain: tuple[int, ...], factor: Array, kind: str = "int32") -> Side:
         """Rounded factors, (V, f + 1, L, L) lower triangular, of Gram matrices in plain monomials; ``kind`` as in BITS."""
         exponent = np.frexp(np.abs(factor).max(axis=(0, 2, 3)))[1].astype(np.int32) - BITS[kind]
-        rows, columns = np.tril_indices(factor.shape[-1])
+        rows, columns = lower_triangle(factor.shape[-1])
         mantissa = np.rint(np.ldexp(factor[:, :, rows, columns], -exponent[:, None])).astype(kind)
         return cls(chain, mantissa, exponent)
 
@@ -110,7 +117,7 @@ class Side:
     def factors(self) -> Array:
         """The lower triangular factors, (V, f + 1, L, L)."""
         length = 2 ** len(self.chain)
-        rows, columns = np.tril_indices(length)
+        rows, columns = lower_triangle(length)
         L = np.zeros((*self.mantissa.shape[:2], length, length))
         L[:, :, rows, columns] = np.ldexp(self.mantissa.astype(float), self.exponent[:, None])
         return L

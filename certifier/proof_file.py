@@ -18,6 +18,8 @@ from certifier.model import Array, Scene
 
 FORMAT = 2
 MAX_BYTES = 1 << 30
+WORTH_DEFLATING = 1024
+"""Bytes; a compressor takes longer to set up than a smaller member to write."""
 TYPES = ("float64", "int32", "int64")
 LARGEST = 1e100
 """Numbers above it stand for nothing real; sums and products of a few below it do not overflow."""
@@ -45,10 +47,11 @@ def malformed() -> Iterator[None]:
 def pack(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> bytes:
     """The file; the same content gives the same bytes."""
     buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(buffer, "w") as archive:
         members = {"header.json": json.dumps(header, sort_keys=True).encode(), **{f"{name}.npy": npy(a) for name, a in arrays.items()}}
         for name, content in members.items():
-            archive.writestr(zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), content, zipfile.ZIP_DEFLATED)
+            kind = zipfile.ZIP_DEFLATED if len(content) >= WORTH_DEFLATING else zipfile.ZIP_STORED
+            archive.writestr(zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), content, kind)
     return buffer.getvalue()
 
 

@@ -72,15 +72,15 @@ class ExactKinematics:
     def pose(self, frame: str, body: str) -> Matrix:
         """(4, 4) polynomials or numbers: X_FB times its denominator, the entry [3][3] = prod (1 + tau_i^2)(1 + s_i^2)."""
         # Constant factors are multiplied as numbers.
-        fixed = _identity()
-        X = self._constant(fixed)
+        fixed, X = _identity(), None
         for joint, upwards in self.path(frame, body):
             outer, middle, inner = self._joint(joint, upwards)
             fixed = _multiply(fixed, outer)
             if middle is not None:
-                X, fixed = _multiply(X, _multiply(fixed, middle)), _identity()
+                moved = _multiply(fixed, middle)
+                X, fixed = moved if X is None else _multiply(X, moved), _identity()
             fixed = _multiply(fixed, inner)
-        return _multiply(X, fixed)
+        return self._constant(fixed) if X is None else _multiply(X, fixed)
 
     def fixed_pose(self, frame: str, body: str) -> list[list[fmpq]] | None:
         """(4, 4) X_FB of two bodies that are welded together, perhaps through others; None if a joint between them moves."""
@@ -154,8 +154,8 @@ def _inverse(rigid: bytes) -> Numbers:
 
 def _multiply(A: Any, B: Any) -> Any:
     """Of numbers, polynomials, or either and the other."""
-    product = []
+    product, zero = [], 0 * A[0][0] * B[0][0]
     for row in A:
         terms = [(k, x) for k, x in enumerate(row) if x != 0]
-        product.append([sum((x * B[k][j] for k, x in terms if B[k][j] != 0), start=0 * row[0]) for j in range(4)])
+        product.append([sum((x * B[k][j] for k, x in terms if B[k][j] != 0), start=zero) for j in range(4)])
     return product

@@ -44,6 +44,11 @@ def _of_words(words: np.ndarray) -> Array:
 
 def normal(x: Array) -> Array:
     """The same integers in normal limbs; the limbs given are integers below 2^52 in magnitude."""
+    return _trimmed(_carried(x))
+
+
+def _carried(x: Array) -> Array:
+    """Normal limbs, the last ones perhaps without need."""
     # Three limbs more take up what reaches beyond the last one.
     limbs = np.concatenate([x, np.zeros((3, *x.shape[1:]))])
     carry = np.empty(x.shape[1:])
@@ -53,7 +58,7 @@ def normal(x: Array) -> Array:
         high += carry
         carry *= BASE
         low -= carry
-    return _trimmed(limbs)
+    return limbs
 
 
 def _trimmed(x: Array) -> Array:
@@ -98,10 +103,13 @@ def integers(x: Array) -> list[list[int]]:
 
 def absolute_sums(x: Array) -> list[int]:
     """Sums of |X| over the last axis, for X of shape (r, c) in limbs (w, r, c) below 2^52: r integers."""
-    limbs = normal(x)
+    limbs = _carried(x)
     sums = np.where(limbs[-1] < 0, -limbs, limbs).sum(axis=-1)
     return [_integer(row) for row in sums.T]
 
 
 def _integer(limbs: Array) -> int:
-    return sum(int(limb) << BITS * i for i, limb in enumerate(limbs))
+    value = 0
+    for limb in limbs[::-1].astype(np.int64).tolist():
+        value = (value << BITS) + limb
+    return value

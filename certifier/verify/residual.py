@@ -21,7 +21,7 @@ import numpy as np
 from flint import fmpq
 
 from certifier.model import Array
-from certifier.proof import Side, Volume
+from certifier.proof import Side, Volume, lower_triangle
 from certifier.proof_file import ProofError
 from certifier.verify import limbs
 from certifier.verify.kinematics import ExactKinematics, exact
@@ -126,7 +126,7 @@ def _squares(side: Side) -> Array:
     """|L_j' rho|^2 in units of 4^exponent_j, in normal limbs of the (f + 1, V * 3^k) integers."""
     length, (vertices, faces) = 2 ** len(side.chain), side.mantissa.shape[:2]
     mantissa = limbs.of_array(side.mantissa)
-    rows, columns = np.tril_indices(length)
+    rows, columns = lower_triangle(length)
     factor = np.zeros((len(mantissa), vertices * faces, length, length))
     factor[:, :, rows, columns] = mantissa.reshape(len(mantissa), vertices * faces, -1)
     gather = _gather(len(side.chain))
@@ -135,6 +135,12 @@ def _squares(side: Side) -> Array:
         squares[p + q] += (factor[p] @ np.swapaxes(factor[q], 1, 2)).reshape(vertices * faces, -1) @ gather
     squares = limbs.normal(squares).reshape(-1, vertices, faces, gather.shape[1])
     return np.swapaxes(squares, 1, 2).reshape(len(squares), faces, -1)
+
+
+@lru_cache(maxsize=MAX_CHAIN + 1)
+def _places(k: int) -> np.ndarray:
+    """(3^k,) where the monomial of degrees 0 to 2 stands among those of degrees 0 to 3."""
+    return np.array([sum(d * 4**i for i, d in enumerate(reversed(digits))) for digits in itertools.product(range(3), repeat=k)], dtype=int)
 
 
 @lru_cache(maxsize=MAX_CHAIN + 1)
@@ -147,8 +153,7 @@ def _gather(k: int) -> Array:
 
 def _coefficient_sums(missed: Array, chain: tuple[int, ...]) -> list[int]:
     """Sums of the absolute values of the coefficients of sum_e u_e (c_e' m), for c in limbs (w, n + 1, V, 3^k): V integers."""
-    k, width = len(chain), missed.shape[0]
-    place = np.array([sum(d * 4**i for i, d in enumerate(reversed(digits))) for digits in itertools.product(range(3), repeat=k)], dtype=int)
+    k, width, place = len(chain), missed.shape[0], _places(len(chain))
     inside = np.zeros((width, missed.shape[2], 4**k))
     inside[:, :, place] += missed[:, 0]
     for position, joint in enumerate(chain):

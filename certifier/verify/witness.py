@@ -34,8 +34,17 @@ def verify_witness(proof: WitnessProof) -> WitnessStatement:
     Raises:
         ProofError: it does not hold.
     """
+    check_scene(proof.scene)
+    return check_witness(proof)
+
+
+def check_witness(proof: WitnessProof) -> WitnessStatement:
+    """Check a refutation in a scene that :func:`check_scene` has accepted.
+
+    Raises:
+        ProofError: it does not hold.
+    """
     scene, s = proof.scene, proof.s
-    check_scene(scene)
     n, m = scene.n, proof.d.size
     if proof.C.shape != (m, n) or proof.d.shape != (m,) or s.shape != (n,):
         raise ProofError("proof_malformed", "the arrays of the witness do not fit the scene")
