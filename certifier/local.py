@@ -12,16 +12,16 @@ import numpy as np
 from certifier.ellipsoid import inscribed_ellipsoid
 from certifier.errors import CirisError
 from certifier.growth import advance, begin
-from certifier.growth_actions import Accepted, Certification, Certify, Failed, Finish, Propose, Proposed, Report, Step, Stepped
+from certifier.growth_actions import Accepted, Certification, Certify, Failed, Finish, Propose, Report, Step
 from certifier.growth_options import GrowthOptions
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee, Outcome, combine
 from certifier.pair import Certification as PairCertification
 from certifier.pair import PairResult
-from certifier.polytope_step import Step as PolytopeStep
 from certifier.polytope_step import step
-from certifier.region import Region, certified_region
-from certifier.seeding import SeedOptions, propose
+from certifier.region import Region, certified_region, versions
+from certifier.reports import stepped, weakness
+from certifier.seeding import proposed
 
 Progress = Callable[[str], None]
 
@@ -62,28 +62,11 @@ class _Run:
             return self.certify(action)
         if isinstance(action, Propose):
             self.progress("seeding")
-            proposal = propose(self.scene, SeedOptions.from_document(action.seed))
-            return Proposed(proposal.C.tolist(), proposal.d.tolist(), proposal.center.tolist(), proposal.contain.tolist(), proposal.info)
+            return proposed(self.scene, action.seed)
         assert self.accepted is not None, "a step follows an accepted region"
         self.progress("polytope step")
         polytope, witnesses = Polytope(np.array(action.C), np.array(action.d)), np.array(action.contain)
-        found = step(self.scene, polytope, self.proofs(self.accepted), witnesses=witnesses)
-        return stepped(found)
-
-
-def weakness(result: PairResult) -> dict[str, Any] | None:
-    """Where a pair failed, for the report of its certification; None when nothing is known."""
-    if result.witness_s is not None:
-        return {"points": [result.witness_s.tolist()], "pull": [0.0] * len(result.witness_s)}
-    if result.weak_points is None or result.pull is None:
-        return None
-    return {"points": result.weak_points.tolist(), "pull": result.pull.tolist(), "ranges_alone": result.ranges_alone}
-
-
-def stepped(found: PolytopeStep) -> Stepped:
-    """The report of a polytope step."""
-    C, d, center, base_C, base_d = (a.tolist() for a in (found.C, found.d, found.center, found.base_C, found.base_d))
-    return Stepped(C, d, center, base_C, base_d, found.growth, found.info)
+        return stepped(step(self.scene, polytope, self.proofs(self.accepted), witnesses=witnesses))
 
 
 def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: None) -> Region:
@@ -163,16 +146,3 @@ def pair_document(scene: Scene, index: int, result: PairResult) -> dict[str, Any
         "witness_q": None if result.witness_s is None else scene.to_q(result.witness_s).tolist(),
         "detail": result.detail,
     }
-
-
-def versions(scene: Scene) -> dict[str, Any]:
-    """Versions that a region's provenance names."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    def of(package: str) -> str | None:
-        try:
-            return version(package)
-        except PackageNotFoundError:
-            return None
-
-    return {"ciris": of("ciris"), "drake": scene.provenance.get("drake") or of("drake"), "python-flint": of("python-flint")}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
@@ -81,6 +82,18 @@ def certified_region(scene: Scene, accepted: Accepted, proofs: dict[int, bytes],
         "provenance": provenance,
     }
     return Region(manifest, data, statement)
+
+
+def versions(scene: Scene) -> dict[str, Any]:
+    """Versions that a region's provenance names."""
+
+    def of(package: str) -> str | None:
+        try:
+            return version(package)
+        except PackageNotFoundError:
+            return None
+
+    return {"ciris": of("ciris"), "drake": scene.provenance.get("drake") or of("drake"), "python-flint": of("python-flint")}
 
 
 def _implied(polytope: Polytope, proofs: tuple[PairProof, ...]) -> Implied:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from pydrake.geometry import QueryObject
 
 from certifier.drake_model import build_diagram, geometry_name
 from certifier.errors import RegionError
+from certifier.growth_actions import Proposed
 from certifier.iris import iris
 from certifier.model import Array, Scene
 from certifier.outcome import Guarantee
@@ -125,6 +126,17 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
     guarantee = said.pop("guarantee", Guarantee.NONE)
     info = {"method": method.value, "guarantee": guarantee.value, "faces": len(d), "seconds": time.perf_counter() - start, **said}
     return Proposal(C, d, center, contain, guarantee, info)
+
+
+def proposed(scene: Scene, seed: dict[str, Any]) -> Proposed:
+    """:func:`propose` for the document of its options, as certifier.growth is told of it."""
+    found = propose(scene, SeedOptions.from_document(seed))
+    return Proposed(found.C.tolist(), found.d.tolist(), found.center.tolist(), found.contain.tolist(), found.info)
+
+
+def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:
+    """The same in a child process: documents in, the report out."""
+    return asdict(proposed(Scene.from_document(payload["scene"]), payload["seed"]))
 
 
 def _given(scene: Scene, options: SeedOptions) -> tuple[Array, Array, Array]:

@@ -80,14 +80,14 @@ def _started(pid: int) -> str | None:
     return "alive"
 
 
-def take(session: Session, model: type[Row], rows: Sequence[Row], *, seconds: float) -> str:
+def take(session: Session, model: type[PairRow] | type[StepRow], ids: Sequence[int], *, seconds: float) -> str:
     """Claims open rows (the caller holds their job's lock) and counts the attempt. Returns the lease's token."""
     token = str(uuid4())
     transition(
         session,
         model,
         RUNNING,
-        model.id.in_([row.id for row in rows]),
+        model.id.in_(ids),
         attempts=model.attempts + 1,
         worker=this_worker(),
         parent=_name(os.getppid()),

@@ -6,9 +6,8 @@ that order, not the first in time: what a job comes to depends neither on how ma
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from db.states import PAIR, IterationState, PairState, transition, unfinished
 from db.types import utcnow
 
 UNFINISHED = unfinished(PAIR)
+FAILED = frozenset(PairState) - UNFINISHED - {PairState.CERTIFIED, PairState.SKIPPED}
 
 
 @dataclass(frozen=True)
@@ -130,20 +130,16 @@ def add_iteration(
     events.emit(session, job, "iteration", {"index": index, "label": label, "state": "running", "pairs": len(pairs), "reused": len(reuse)})
 
 
-def batches(pairs: Sequence[tuple[int, float]], seconds: float) -> list[list[int]]:
-    """Groups (pair index, forecast in seconds), in their order, into pieces of work of at most ``seconds`` or one pair each.
-
-    Taking the first group away leaves the other groups as they are.
-    """
-    groups: list[list[int]] = []
-    filled = inf
+def batch(pairs: Iterable[tuple[int, float]], seconds: float) -> list[int]:
+    """The first of (pair index, forecast in seconds), in their order, that come to at most ``seconds``, or the first alone."""
+    chosen: list[int] = []
+    filled = 0.0
     for index, forecast in pairs:
-        if filled + forecast > seconds:
-            groups.append([])
-            filled = 0.0
-        groups[-1].append(index)
         filled += forecast
-    return groups
+        if chosen and filled > seconds:
+            break
+        chosen.append(index)
+    return chosen
 
 
 def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds: float) -> Claim | None:
@@ -151,15 +147,17 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
 
     None when no pair is open. The caller holds the job's lock.
     """
-    rows = session.scalars(select(PairRow).where(PairRow.job_id == job.id, PairRow.state == PairState.OPEN).order_by(PairRow.id)).all()
+    columns = (PairRow.id, PairRow.iteration, PairRow.pair_index, PairRow.forecast_seconds, PairRow.attempts, PairRow.deaths)
+    is_open = (PairRow.job_id == job.id, PairRow.state == PairState.OPEN)
+    rows = session.execute(select(*columns).where(*is_open).order_by(PairRow.id)).all()
     if not rows:
         return None
     fresh = {row.pair_index: row for row in rows if row.deaths == 0}
-    groups = batches([(index, row.forecast_seconds) for index, row in fresh.items()], batch_seconds)
-    chosen = [fresh[index] for index in groups[0]] if groups else rows[:1]
+    first = batch(((index, row.forecast_seconds) for index, row in fresh.items()), batch_seconds)
+    chosen = [fresh[index] for index in first] or rows[:1]
     pairs = tuple(Claimed(row.pair_index, row.attempts + 1, row.deaths) for row in chosen)
     jobs.charge(session, job, sum(row.forecast_seconds for row in chosen))
-    token = leases.take(session, PairRow, chosen, seconds=lease_seconds)
+    token = leases.take(session, PairRow, [row.id for row in chosen], seconds=lease_seconds)
     return Claim(token, job.id, job.scene_id, chosen[0].iteration, pairs)
 
 
@@ -169,30 +167,40 @@ def save(session: Session, claim: Claim, results: Sequence[Result]) -> Saved:
     Enough failures skip the pairs after them; whoever holds one of those stops (leases.kept).
     """
     job = jobs.lock(session, claim.job_id)
-    where = (PairRow.job_id == claim.job_id, PairRow.iteration == claim.iteration, leases.held(PairRow, claim.token))
-    held = {row.pair_index: row for row in session.scalars(select(PairRow).where(*where))}
+    columns = (PairRow.id, PairRow.pair_index, PairRow.state, PairRow.lease_token)
+    mine = (PairRow.job_id == claim.job_id, PairRow.iteration == claim.iteration)
+    rows = session.execute(select(*columns).where(*mine).order_by(PairRow.id)).all()
+    held = {row.pair_index: row.id for row in rows if row.state == PairState.RUNNING and row.lease_token == claim.token}
     saved = [result for result in results if result.index in held]
     if not saved:
         return Saved(held=False, finished=False)
     digests = proofs.put(session, [result.proof for result in saved if result.proof is not None])
-    for state in {result.state for result in saved}:
-        ids = [held[result.index].id for result in saved if result.state == state]
-        transition(session, PairRow, state, PairRow.id.in_(ids), lease_until=None)
     for result in saved:
-        row = held[result.index]
-        row.stage, row.margin, row.seconds, row.detail = result.stage, result.margin, result.seconds, result.detail
-        row.witness_s, row.weak_points = result.witness_s, result.weak_points
-        row.proof_digest = None if result.proof is None else digests[result.proof]
+        transition(
+            session,
+            PairRow,
+            result.state,
+            PairRow.id == held[result.index],
+            lease_until=None,
+            stage=result.stage,
+            margin=result.margin,
+            seconds=result.seconds,
+            detail=result.detail,
+            witness_s=result.witness_s,
+            weak_points=result.weak_points,
+            proof_digest=None if result.proof is None else digests[result.proof],
+        )
     job.error = next((result.error for result in saved if result.error is not None), job.error)
     events.emit(session, job, "pairs", {"iteration": claim.iteration, "pairs": [_public(result) for result in saved]})
     label, enough = session.execute(select(IterationRow.label, IterationRow.failures).where(*_iteration(job.id, claim.iteration))).one()
-    if enough is not None and any(result.state != PairState.CERTIFIED for result in saved):
-        last = session.scalar(_failed(job.id, claim.iteration).order_by(PairRow.id).offset(enough - 1).limit(1))
-        if last is not None:
-            skip(session, claim.job_id, PairRow.id > last)
-    finished = _finish_iteration(session, job, claim.iteration, label)
-    still_held = session.scalar(select(PairRow.id).where(leases.held(PairRow, claim.token)).limit(1)) is not None
-    return Saved(still_held, finished)
+    states = {row.id: row.state for row in rows} | {held[result.index]: result.state.value for result in saved}
+    failed = [pair for pair, state in states.items() if state in FAILED]
+    if enough is not None and len(failed) >= enough:
+        late = [pair for pair, state in states.items() if pair > failed[enough - 1] and state in UNFINISHED]
+        skip(session, claim.job_id, PairRow.id.in_(late))
+        states |= dict.fromkeys(late, PairState.SKIPPED.value)
+    finished = not UNFINISHED.intersection(states.values()) and _finish_iteration(session, job, claim.iteration, label, states.values())
+    return Saved(any(states[pair] == PairState.RUNNING for pair in held.values()), finished)
 
 
 def skip(session: Session, job_id: str, *which: ColumnElement[bool]) -> None:
@@ -200,12 +208,9 @@ def skip(session: Session, job_id: str, *which: ColumnElement[bool]) -> None:
     transition(session, PairRow, PairState.SKIPPED, PairRow.job_id == job_id, PairRow.state.in_(UNFINISHED), *which)
 
 
-def _finish_iteration(session: Session, job: JobRow, index: int, label: str) -> bool:
-    """Settles the iteration if no pair of it is unfinished; True for the one call that does."""
-    states = set(session.scalars(select(PairRow.state).distinct().where(PairRow.job_id == job.id, PairRow.iteration == index)))
-    if states & UNFINISHED:
-        return False
-    state = IterationState.CERTIFIED if states <= {PairState.CERTIFIED} else IterationState.FAILED
+def _finish_iteration(session: Session, job: JobRow, index: int, label: str, states: Collection[str]) -> bool:
+    """Settles an iteration whose pairs are all in these states; True for the one call that does."""
+    state = IterationState.CERTIFIED if set(states) <= {PairState.CERTIFIED} else IterationState.FAILED
     if not transition(session, IterationRow, state, *_iteration(job.id, index), finished_at=utcnow()):
         return False
     events.emit(session, job, "iteration", {"index": index, "label": label, "state": state})
@@ -256,12 +261,6 @@ def proving(session: Session, job_id: str, iteration_of: Mapping[int, int]) -> d
 
 def _iteration(job_id: str, index: int) -> tuple[ColumnElement[bool], ColumnElement[bool]]:
     return IterationRow.job_id == job_id, IterationRow.index == index
-
-
-def _failed(job_id: str, iteration: int) -> Select[int]:
-    """Identities of the pairs that are settled and not certified."""
-    settled = PairRow.state.not_in([*UNFINISHED, PairState.CERTIFIED, PairState.SKIPPED])
-    return select(PairRow.id).where(PairRow.job_id == job_id, PairRow.iteration == iteration, settled)
 
 
 def _pairs(job_id: str, iteration: int) -> Select[PairRow]:

@@ -48,7 +48,7 @@ def claim(session: Session, job: JobRow, kinds: Collection[StepKind], *, lease_s
     if step is None:
         return None
     attempt, deaths = step.attempts + 1, step.deaths
-    token = leases.take(session, StepRow, [step], seconds=lease_seconds)
+    token = leases.take(session, StepRow, [step.id], seconds=lease_seconds)
     return Claim(token, step.id, job.id, job.scene_id, StepKind(step.kind), step.input, attempt, deaths)
 
 

@@ -51,12 +51,6 @@ def served_by_now(session: Session) -> float:
     return waiting or 0.0
 
 
-def open_pieces(session: Session) -> int:
-    """How many messages are enough for all that is open and due."""
-    conditions = (PairRow.state == PairState.OPEN, steps.is_due(StepRow, utcnow()))
-    return sum(session.scalar(select(func.count()).where(condition)) or 0 for condition in conditions)
-
-
 _NOW = bindparam("now", type_=Utc())
 
 

@@ -11,16 +11,15 @@ from structlog.contextvars import bound_contextvars
 
 from certifier.errors import CirisError
 from certifier.growth_options import GrowthOptions
-from certifier.local import weakness
 from certifier.model import Polytope
 from certifier.pair import Certification
+from certifier.reports import weakness
 from db import jobs, leases, pairs
 from db.models import IterationRow, PairRow
 from db.session import database
 from db.settings import settings
 from db.states import JobState, PairState
 from db.types import Arrays
-from workers.app import send_coordinate
 from workers.scenes import load_scene
 from workers.transaction import persistently
 
@@ -31,17 +30,14 @@ SAVE_SECONDS = 0.5
 """Results are saved together until this much time has gone into them."""
 
 
-def certify_pairs(claim: pairs.Claim) -> None:
-    """Certifies and saves the claimed pairs, for as long as any is held."""
+def certify_pairs(claim: pairs.Claim) -> bool:
+    """Certifies and saves the claimed pairs, for as long as any is held; whether that finished the iteration."""
     bound = bound_contextvars(job=claim.job_id, iteration=claim.iteration)
     with bound, leases.kept(database(), PairRow, claim.token, settings().lease_seconds, [JobState.RUNNING]):
-        finished = _certify_and_save(claim)
-    if finished:
-        send_coordinate(claim.job_id)
+        return _certify_and_save(claim)
 
 
 def _certify_and_save(claim: pairs.Claim) -> bool:
-    """Whether that finished the iteration."""
     results: list[pairs.Result] = []
     since = time.monotonic()
     for place, pair in enumerate(claim.pairs, start=1):

@@ -1,34 +1,49 @@
-"""One piece of work: whatever is next for anybody, claimed and done."""
+"""One piece of work: whatever is next for anybody, claimed and done.
+
+Whoever claims a piece and leaves more sends a message for the next solver before it begins. So there is always a message as long as
+something is open, and hardly any that comes for nothing, however early an iteration ends.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from db import pairs, steps
 from db import work as queue
 from db.session import database
 from db.settings import settings
+from workers.app import send_work
 from workers.pairs import certify_pairs
 from workers.steps import carry_out
 
 
-def work() -> bool:
-    """Does the next piece of work; False when there is none. Harmless however often it is called."""
-    claim = _claim()
+@dataclass(frozen=True)
+class Piece:
+    """What was done, and whether the job waits for nothing more before its next decision."""
+
+    job_id: str
+    settles: bool
+
+
+def work() -> Piece | None:
+    """Does the next piece of work; None when there is none. Harmless however often it is called."""
+    claim, more = _claim()
     if claim is None:
-        return False
-    if isinstance(claim, steps.Claim):
-        carry_out(claim)
-    else:
-        certify_pairs(claim)
-    return True
+        return None
+    if more:
+        send_work()
+    return Piece(claim.job_id, carry_out(claim) if isinstance(claim, steps.Claim) else certify_pairs(claim))
 
 
-def _claim() -> pairs.Claim | steps.Claim | None:
-    claim, limits = None, settings()
+def _claim() -> tuple[pairs.Claim | steps.Claim | None, bool]:
+    """The next piece, and whether something is left for others."""
+    claim, more, limits = None, False, settings()
     while claim is None:
         with database().read() as session:
             job_id = queue.next_job(session)
         if job_id is None:
-            return None
+            break
         with database().write() as session:
             claim = queue.claim(session, job_id, lease_seconds=limits.lease_seconds, batch_seconds=limits.batch_seconds)
-    return claim
+            more = queue.next_job(session) is not None
+    return claim, more

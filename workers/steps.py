@@ -14,19 +14,18 @@ from structlog.contextvars import bound_contextvars
 
 from certifier.child import run_in_child
 from certifier.errors import CirisError
-from certifier.growth_actions import Accepted, Proposed
-from certifier.local import stepped, versions
+from certifier.growth_actions import Accepted
 from certifier.model import Polytope, Scene
 from certifier.polytope_step import step as polytope_step
-from certifier.region import certified_region
-from certifier.seeding import SeedOptions, propose
+from certifier.region import certified_region, versions
+from certifier.reports import stepped
 from db import jobs, leases, pairs, proofs, regions, steps
 from db.models import JobRow, StepRow
 from db.session import database
 from db.settings import settings
 from db.states import IterationState, JobState, StepKind, StepState
 from db.types import utcnow
-from workers.app import send_coordinate, send_work
+from workers.app import send_work
 from workers.pairs import LOST
 from workers.scenes import load_scene
 from workers.transaction import persistently
@@ -42,8 +41,8 @@ class Done:
     save: Callable[[Session, JobRow], None] = lambda session, job: None
 
 
-def carry_out(claim: steps.Claim) -> None:
-    """Does a claimed step and saves what came of it."""
+def carry_out(claim: steps.Claim) -> bool:
+    """Does a claimed step and saves what came of it; False when it was not held any more."""
     wanted = [JobState.RUNNING, JobState.CANCELLING] if claim.kind == StepKind.ACCEPT else [JobState.RUNNING]
     start = time.perf_counter()
     bound = bound_contextvars(job=claim.job_id, step=claim.kind.value)
@@ -57,10 +56,9 @@ def carry_out(claim: steps.Claim) -> None:
             problem = CirisError("internal_error", f"{claim.kind}: {type(error).__name__}: {error}")
             state, done = StepState.FAILED, Done(problem.to_document())
         saved = persistently(lambda: _save(claim, state, done, time.perf_counter() - start))
-    if saved:
-        if claim.kind == StepKind.ACCEPT and state == StepState.FAILED:
-            send_work()  # a region certified earlier may be had instead
-        send_coordinate(claim.job_id)
+    if saved and claim.kind == StepKind.ACCEPT and state == StepState.FAILED:
+        send_work()  # a region certified earlier may be had instead
+    return saved
 
 
 def _save(claim: steps.Claim, state: StepState, done: Done, seconds: float) -> bool:
@@ -90,13 +88,7 @@ def _propose(scene: Scene, claim: steps.Claim) -> Done:
     """Seeds in a process of its own: Drake may abort the process, hang, or want too much memory, and that fails the step, nothing else."""
     limits, payload = settings(), {"scene": scene.to_document(), "seed": claim.input["seed"]}
     timeout, memory = limits.time_limit_seconds, limits.child_memory_bytes
-    return Done(run_in_child("workers.steps:propose_in_child", payload, timeout_s=timeout, memory_bytes=memory))
-
-
-def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:
-    """The seeding, as its child process runs it: documents in, the report out."""
-    found = propose(Scene.from_document(payload["scene"]), SeedOptions.from_document(payload["seed"]))
-    return asdict(Proposed(found.C.tolist(), found.d.tolist(), found.center.tolist(), found.contain.tolist(), found.info))
+    return Done(run_in_child("certifier.seeding:propose_in_child", payload, timeout_s=timeout, memory_bytes=memory))
 
 
 def _step(scene: Scene, claim: steps.Claim) -> Done:

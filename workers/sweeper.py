@@ -9,7 +9,6 @@ import logging
 import threading
 from collections.abc import Sequence
 from datetime import datetime, timedelta
-from functools import partial
 from typing import Any
 
 from kombu.exceptions import OperationalError
@@ -23,9 +22,6 @@ from workers.app import SOLVE, send_coordinate, send_work, waiting
 from workers.transaction import writing
 
 log = logging.getLogger(__name__)
-
-MOST_MESSAGES = 1000
-"""How many messages to the solvers one round sends at most; the next round sees what is left."""
 
 
 def run(stop: threading.Event) -> None:
@@ -64,11 +60,11 @@ def sweep(*, by_time: bool = True) -> None:
     release_lost(by_time=by_time)
     with database().read() as session:
         due = jobs.awaiting_coordination(session, utcnow())
-        pieces = work.open_pieces(session)
+        is_open = work.next_job(session) is not None
     for job_id in due:
         send_coordinate(job_id)
-    if pieces and waiting(SOLVE) == 0:
-        send_work(min(pieces, MOST_MESSAGES))
+    if is_open and waiting(SOLVE) == 0:
+        send_work()
 
 
 def release_lost(*, by_time: bool) -> None:
@@ -85,7 +81,7 @@ def _release_lost(model: type[leases.Row], by_time: bool) -> None:
             job = jobs.lock(session, lease.job_id)
             if rows := leases.release(session, model, lease):
                 events.emit(session, job, "lost", {"worker": lease.worker, "reason": lease.reason, **_what(rows)})
-                afterwards.append(partial(send_work, len(rows)))
+                afterwards.append(send_work)
 
 
 def _what(rows: Sequence[PairRow] | Sequence[StepRow]) -> dict[str, Any]:

@@ -23,9 +23,12 @@ def register(app: Celery, queue: str) -> None:
 
     from workers.solver import work
     from workers.sweeper import release_lost
+    from workers.turns import coordinate
 
     @app.task(name=WORK, bind=True, Request=Acknowledged)
     def _work(self: Task) -> None:
         if self.request.delivery_info.get("redelivered"):
             release_lost(by_time=False)  # whoever had this message has died
-        work()
+        piece = work()
+        if piece is not None and piece.settles:
+            coordinate(piece.job_id)

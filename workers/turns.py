@@ -7,6 +7,7 @@ saved only onto the turn that it started from, and the others find nothing to do
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import asdict, dataclass
 from datetime import datetime, timedelta
 from functools import lru_cache, partial
@@ -176,8 +177,9 @@ def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: A
         hard=action.hard,
         failures=action.failures,
     )
-    pieces = pairs.batches([(pair.index, pair.forecast_seconds) for pair in new], settings().batch_seconds)
-    afterwards.append(partial(send_work, len(pieces)))
+    # Each solver that finds something wakes the next; where there is much, so many begin at once.
+    pieces = math.ceil(sum(pair.forecast_seconds for pair in new) / settings().batch_seconds)
+    afterwards.append(partial(send_work, min(max(pieces, 1), settings().solve_processes)))
 
 
 def _give_up(turn: Turn, error: CirisError) -> bool:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from itertools import chain
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from certifier.errors import CirisError
-from db import jobs, pairs, work
+from db import jobs, work
 from db.models import ApiKeyRow, JobRow
-from db.pairs import batches
+from db.pairs import batch
 from db.session import Database
 from db.settings import settings
 from db.states import JobState
@@ -22,25 +21,15 @@ forecasts = st.lists(st.floats(0, 2), max_size=60)
 
 
 @given(forecasts)
-def test_batches_keep_the_order_and_none_is_overfull(seconds: list[float]) -> None:
-    groups = batches(list(enumerate(seconds)), 0.5)
-    assert list(chain.from_iterable(groups)) == list(range(len(seconds)))
-    assert all(len(group) == 1 or sum(seconds[i] for i in group) <= 0.5 + 1e-9 for group in groups)
-
-
-@given(forecasts)
-def test_taking_a_batch_leaves_the_others_as_they_were(seconds: list[float]) -> None:
-    """So there are as many messages as batches, though batches are formed when they are claimed."""
-    left = list(enumerate(seconds))
-    groups = batches(left, 0.5)
-    for group in groups:
-        assert batches(left, 0.5)[0] == group
-        left = [pair for pair in left if pair[0] not in group]
-    assert not left
+def test_a_batch_is_full_and_not_overfull(seconds: list[float]) -> None:
+    chosen = batch(enumerate(seconds), 0.5)
+    assert chosen == list(range(len(chosen)))
+    assert len(chosen) <= 1 or sum(seconds[i] for i in chosen) <= 0.5
+    assert len(chosen) == len(seconds) or sum(seconds[: len(chosen) + 1]) > 0.5
 
 
 def test_small_pairs_fill_a_batch() -> None:
-    assert batches([(i, 0.1) for i in range(7)], 0.5) == [[0, 1, 2, 3, 4], [5, 6]]
+    assert batch(enumerate([0.1] * 7), 0.5) == [0, 1, 2, 3, 4]
 
 
 def run(db: Database, pieces: int) -> list[str]:
@@ -98,15 +87,13 @@ def test_a_job_that_comes_late_neither_waits_nor_overtakes(db: Database) -> None
 def test_there_is_nothing_to_do_for_jobs_that_do_not_run(db: Database) -> None:
     job_id = a_job_of(db)
     with db.read() as session:
-        assert work.open_pieces(session) == 60
+        assert work.next_job(session) == job_id
     with db.write() as session:
         jobs.cancel(session, job_id)
     with db.read() as session:
         assert work.next_job(session) is None
     with db.write() as session:
         assert work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5) is None
-        pairs.skip(session, job_id)
-        assert work.open_pieces(session) == 0
 
 
 def test_a_key_has_a_quota_of_unfinished_jobs(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,7 +25,7 @@ from tests.workers.service import environment, events_of, job_of, pairs_of, subm
 from workers import admission, sweeper, transaction
 from workers.app import CONTROL, SOLVE, send_coordinate, waiting
 from workers.scenes import load_scene
-from workers.solver import work
+from workers.solver import Piece, work
 from workers.turns import coordinate
 
 ELSEWHERE = "elsewhere:1:1"
@@ -63,17 +63,15 @@ def test_a_job_begins_once_however_often_it_is_coordinated(job_id: str) -> None:
     assert (waiting(SOLVE), job_of(job_id).turn) == (1, 1)
 
 
-def work_all() -> None:
-    """Does what is to be done until nothing is."""
-    while work():
-        pass
+def work_all() -> list[Piece]:
+    """Does what is to be done until nothing is, and coordinates nothing."""
+    return list(iter(work, None))
 
 
 def test_work_is_done_once(job_id: str) -> None:
-    work_all()
-    assert not work()
+    with environment(CIRIS_BATCH_SECONDS="1e-9"):
+        assert work_all() == [Piece(job_id, False), Piece(job_id, False), Piece(job_id, True)]
     assert [(row.state, row.attempts) for row in pairs_of(job_id)] == [("certified", 1)] * 3
-    assert waiting(CONTROL) == 2  # one asks for the beginning, one for what follows
 
 
 def test_a_cancelled_job_ends_with_its_open_pairs_skipped(job_id: str) -> None:
@@ -193,12 +191,21 @@ def test_a_certified_polytope_becomes_a_region_even_after_a_cancel(job_id: str) 
         assert regions.get(session, job.region_id or "").guarantee == "exact"
 
 
+def test_a_solver_that_leaves_work_sends_for_another(job_id: str, queue: Queue) -> None:
+    queue.flush()
+    with environment(CIRIS_BATCH_SECONDS="1e-9"):
+        for left in (1, 1, 0):
+            queue.flush()
+            assert work()
+            assert waiting(SOLVE) == left
+
+
 def test_the_sweeper_sends_lost_messages_again(job_id: str, queue: Queue) -> None:
     queue.flush()
     sweeper.sweep()
-    assert waiting(SOLVE) == 3
+    assert waiting(SOLVE) == 1
     sweeper.sweep()
-    assert waiting(SOLVE) == 3
+    assert waiting(SOLVE) == 1
     work_all()
     queue.flush()
     sweeper.sweep()
