@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from certifier.arrow import Method, Term
+from certifier.basis import dimension
 from certifier.certificates import Certificates, face_multipliers, holds_on
 from certifier.ellipsoid import Ellipsoid, inscribed_ellipsoid
 from certifier.errors import RegionError
@@ -49,6 +50,8 @@ WEIGHT = 512.0
 """Of the objective against the barriers: large enough to come close to the optimum, small enough to stay off the boundary."""
 TOLERANCE = 0.005
 """Of the objective, per face."""
+MOST_TERMS = 4096
+"""Of a rational's polynomial, all joints of the scene in play: above, its Schur complement alone has 128 MiB, and a step takes hours."""
 
 Progress = Callable[[str], None]
 
@@ -104,7 +107,7 @@ def step(
         progress: called many times with a sentence; an exception it raises ends the step.
 
     Raises:
-        RegionError: ``witness_outside``; ``step_failed``, and the current region stands.
+        RegionError: ``witness_outside``; ``step_too_large``, naming the pair; ``step_failed``, and the current region stands.
     """
     points = np.zeros((0, scene.n)) if witnesses is None else witnesses
     if not polytope.contains(points).all():
@@ -204,8 +207,17 @@ def _coupled(
         if data not in needed:
             Y = face_multipliers(proof, current, box)
             if Y.any():
+                _check_size(scene, index, proof)
                 needed[data] = proof, Y
     return list(needed.values())
+
+
+def _check_size(scene: Scene, index: int, proof: PairProof) -> None:
+    terms = max(dimension(k, k, scene.n - k) for k in (len(side.chain) for side in proof.sides))
+    if terms > MOST_TERMS:
+        pair, most = scene.pairs[index], f"more than {MOST_TERMS}"
+        problem = f"with all {scene.n} joints in play the polynomials of {pair.a} and {pair.b} have {terms} terms, {most}"
+        raise RegionError("step_too_large", problem, hint="push the faces out instead of stepping (pushes)")
 
 
 def _within(box: Box, C: Array, d: Array) -> Polytope:

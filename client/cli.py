@@ -135,7 +135,8 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         help="joint positions to contain as well; may be given several times",
     )
-    grow.add_argument("--method", help="how the first polytope is found; default: the service's")
+    methods = "iris_np2 (default up to 8 joints) and iris_zo: Drake's IRIS; limits (default beyond): the joint limits; box: around the seed"
+    grow.add_argument("--method", help=f"where the first polytope, which is then cut until it is certified, comes from. {methods}")
     grow.add_argument("--pushes", type=int, help="how often faces are pushed out again; default: the more, the smaller the arm")
     grow.add_argument("--rounds", type=int, help="rounds of the polytope step; default: a few for small arms, none for large ones")
     grow.add_argument("--random-seed", type=int, help="seeds every random choice; default 0")

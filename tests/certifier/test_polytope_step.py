@@ -127,6 +127,15 @@ def test_a_certificate_that_is_not_feasible_on_the_trust_box_is_refused(monkeypa
     assert refusal.value.code == "step_failed"
 
 
+def test_a_pair_whose_polynomials_would_be_too_large_is_refused_by_name(monkeypatch):
+    scene, region = SCENES["revolute"], crosscut(SCENES["revolute"], 0.15)
+    monkeypatch.setattr(polytope_step, "MOST_TERMS", 4)
+    with pytest.raises(RegionError) as refusal:
+        step(scene, region, certified(scene, region))
+    assert refusal.value.code == "step_too_large"
+    assert "arm/link2/bar and world/obstacle" in refusal.value.message
+
+
 def test_from_where_hardly_any_margin_is_left_it_steps_back_first():
     scene = SCENES["ball"]
     holds, fails = 0.05, 1.0
