@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import socket
 import sys
 
 import uvicorn
@@ -17,6 +18,8 @@ SHUTDOWN_SECONDS = 2
 """How long open streams may hold up the end."""
 KEEP_ALIVE_SECONDS = 75
 """Longer than clients keep idle connections: whoever closes first must not be the one who answers."""
+BACKLOG = 2048
+NOT_STARTED = 3
 GARBAGE = 20_000, 10, 100
 """After how many objects, and passes, the collector looks at the young, the middle and the old ones."""
 
@@ -29,7 +32,7 @@ def main() -> None:
     except CirisError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)
-    uvicorn.run(
+    config = uvicorn.Config(
         _frozen_app,
         factory=True,
         host=settings().host,
@@ -39,6 +42,16 @@ def main() -> None:
         log_config=None,
         access_log=False,
     )
+    server = uvicorn.Server(config)
+    server.run(sockets=None if settings().requests_file is None else [_shared_socket(config.host, config.port)])
+    if not server.started:
+        sys.exit(NOT_STARTED)
+
+
+def _shared_socket(host: str, port: int) -> socket.socket:
+    """Listens beside the other API processes of this service; the kernel deals out the connections."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    return socket.create_server((host, port), family=family, reuse_port=True, backlog=BACKLOG)
 
 
 def _frozen_app() -> FastAPI:

@@ -44,7 +44,7 @@ def create_app(db: Database | None = None) -> FastAPI:
         lifespan=_few_threads,
     )
     app.state.database = db or database()
-    app.state.requests = Requests()
+    app.state.requests = Requests(settings().requests_file)
     app.state.children = ChildLimiter()
     app.state.announcer = Announcer()
     app.add_middleware(

@@ -1,30 +1,68 @@
-"""Prometheus' text format (version 0.0.4): what the database holds, what waits in the queue, what this process has answered."""
+"""Prometheus' text format (version 0.0.4): what the database holds, what waits in the queue, what was answered."""
 
 from __future__ import annotations
 
+import mmap
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from pathlib import Path
 
 from db.statistics import Statistics
 
-METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+OTHER = "other"
+METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", OTHER)
+STATUSES = range(100, 600)
+_BYTES = 16 * len(METHODS) * len(STATUSES)
 MEDIA_TYPE = "text/plain; version=0.0.4"
 
 Samples = Mapping[tuple[tuple[str, str], ...], float]
 
 
-@dataclass
 class Requests:
-    """Requests that this process has answered, by method and status, and the seconds that they took together."""
+    """Requests answered, by method and status, and the seconds that they took together: by this process and by those that share its port.
 
-    count: dict[tuple[str, int], int] = field(default_factory=dict)
-    seconds: dict[tuple[str, int], float] = field(default_factory=dict)
+    Each of them counts in a file of its own, which all map into their memory, and goes on where it was when it is started again.
+
+    Args:
+        file: this process's; the other files of its directory are those of the others. None for a process that shares with nobody.
+    """
+
+    def __init__(self, file: Path | None = None) -> None:
+        self._file, self._cells = file, memoryview(_mapped(file)).cast("d")
 
     def note(self, method: str, status: int, seconds: float) -> None:
         """Counts one; methods that nobody uses count as one, however many a client thinks up."""
-        key = (method if method in METHODS else "other", status)
-        self.count[key] = self.count.get(key, 0) + 1
-        self.seconds[key] = self.seconds.get(key, 0.0) + seconds
+        cell = _cell(method, status)
+        self._cells[cell] += 1
+        self._cells[cell + 1] += seconds
+
+    def totals(self) -> dict[tuple[str, int], tuple[int, float]]:
+        """(method, status) -> how many, and their seconds."""
+        every = [self._cells]
+        if self._file is not None:
+            others = [path.read_bytes() for path in self._file.parent.iterdir() if path != self._file]
+            every += [memoryview(content).cast("d") for content in others if len(content) == _BYTES]
+        found = {}
+        for method in METHODS:
+            for status in STATUSES:
+                cell = _cell(method, status)
+                if count := sum(cells[cell] for cells in every):
+                    found[method, status] = int(count), sum(cells[cell + 1] for cells in every)
+        return found
+
+
+def _cell(method: str, status: int) -> int:
+    row = METHODS.index(method) if method in METHODS else METHODS.index(OTHER)
+    return 2 * (row * len(STATUSES) + STATUSES.index(status))
+
+
+def _mapped(file: Path | None) -> mmap.mmap:
+    if file is None:
+        return mmap.mmap(-1, _BYTES)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("ab") as stream:
+        stream.truncate(_BYTES)
+    with file.open("r+b") as stream:
+        return mmap.mmap(stream.fileno(), _BYTES)
 
 
 def render(statistics: Statistics, waiting: Mapping[str, int], requests: Requests) -> str:
@@ -33,6 +71,7 @@ def render(statistics: Statistics, waiting: Mapping[str, int], requests: Request
     Args:
         waiting: messages in each queue; empty when Redis cannot be reached.
     """
+    answered = requests.totals()
     families = [
         _family("ciris_jobs", "gauge", "Jobs by state.", _by("state", statistics.jobs)),
         _family("ciris_pairs", "gauge", "Pairs by state; the settled ones by outcome.", _by("state", statistics.pairs)),
@@ -41,8 +80,13 @@ def render(statistics: Statistics, waiting: Mapping[str, int], requests: Request
         _family("ciris_webhooks", "gauge", "Webhooks by state.", _by("state", statistics.webhooks)),
         _family("ciris_regions", "gauge", "Certified regions.", {(): statistics.regions}),
         _family("ciris_queue_messages", "gauge", "Messages that wait, by queue.", _by("queue", waiting)),
-        _family("ciris_http_requests_total", "counter", "Requests answered by this process.", _requests(requests.count)),
-        _family("ciris_http_request_seconds_total", "counter", "Time that they took.", _requests(requests.seconds)),
+        _family("ciris_http_requests_total", "counter", "Requests answered.", _requests(answered, 0)),
+        _family(
+            "ciris_http_request_seconds_total",
+            "counter",
+            "Time that they took.",
+            _requests(answered, 1),
+        ),
     ]
     return "".join(families)
 
@@ -51,8 +95,8 @@ def _by(label: str, values: Mapping[str, float]) -> Samples:
     return {((label, name),): value for name, value in values.items()}
 
 
-def _requests(values: Mapping[tuple[str, int], float]) -> Samples:
-    return {(("method", method), ("status", str(status))): value for (method, status), value in values.items()}
+def _requests(answered: Mapping[tuple[str, int], tuple[float, float]], part: int) -> Samples:
+    return {(("method", method), ("status", str(status))): values[part] for (method, status), values in answered.items()}
 
 
 def _family(name: str, kind: str, text: str, samples: Samples) -> str:

@@ -44,6 +44,10 @@ class Settings(BaseSettings):
     """Port the API binds to; the embedded stack takes a free one when it is taken and was not asked for."""
     requests_per_second: float = Field(default=100.0, gt=0)
     """How many requests one key (or one address without a key) may make for long; for a short while, twice as many."""
+    api_processes: int = Field(default_factory=lambda: min(2, _cores()), ge=1)
+    """Processes of the API in the embedded stack, all on one port."""
+    requests_file: Path | None = None
+    """For one of several API processes on one port: where it counts its requests, in a directory with the others' files."""
     solve_processes: int = Field(default_factory=_cores, ge=1)
     """Processes that solve pairs, one thread each."""
 

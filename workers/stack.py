@@ -21,7 +21,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from types import FrameType
@@ -51,12 +51,14 @@ class Child:
 
     Attributes:
         background: it computes; on a busy machine the others answer first.
+        own: variables of its environment alone.
     """
 
     name: str
     command: list[str]
     stop_signal: int
     background: bool = False
+    own: dict[str, str] = field(default_factory=dict)
     process: subprocess.Popen[bytes] | None = None
     started: float = 0.0
     backoff: float = 0.0
@@ -68,7 +70,7 @@ class Child:
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,
-                env=environment,
+                env={**environment, **self.own},
                 start_new_session=True,
                 preexec_fn=self._prepare,
             )
@@ -146,8 +148,10 @@ def _children(settings: Settings, data: Path, queue_socket: Path) -> list[Child]
     children = [
         Child("control", [sys.executable, "-m", "workers", "control"], signal.SIGQUIT),
         Child("solve", [sys.executable, "-m", "workers", "solve"], signal.SIGQUIT, background=True),
-        Child("api", [sys.executable, "-m", "api"], signal.SIGTERM),
     ]
+    for name in ["api", *(f"api-{i}" for i in range(2, settings.api_processes + 1))]:
+        counts = {"CIRIS_REQUESTS_FILE": str(data / "requests" / name)}
+        children.append(Child(name, [sys.executable, "-m", "api"], signal.SIGTERM, own=counts))
     if not settings.redis_url:
         children.insert(0, Child(QUEUE, queue_server_command(data / "queue", queue_socket), signal.SIGTERM))
     return children

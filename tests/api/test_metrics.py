@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 from fastapi.testclient import TestClient
 
@@ -57,6 +58,20 @@ def test_both_databases_count_alike(db: Database) -> None:
         statistics = collect(session)
     assert set(statistics.jobs.values()) == {0}
     assert samples(render(statistics, {}, Requests()))['ciris_step_seconds{kind="accept"}'] == 0
+
+
+def test_processes_on_one_port_count_together_and_go_on_when_they_are_started_again(tmp_path: Path) -> None:
+    first, second = (Requests(tmp_path / "requests" / name) for name in ("api", "api-2"))
+    first.note("GET", 200, 0.5)
+    for _ in range(2):
+        second.note("GET", 200, 0.25)
+    second.note("POST", 503, 0.1)
+    everything = {("GET", 200): (3, 1.0), ("POST", 503): (1, 0.1)}
+    assert first.totals() == second.totals() == everything
+    again = Requests(tmp_path / "requests" / "api")
+    again.note("GET", 200, 1.0)
+    assert second.totals() == everything | {("GET", 200): (4, 2.0)}
+    assert Requests().totals() == {}
 
 
 def test_invented_methods_make_no_new_series(client: TestClient, scene: Scene) -> None:

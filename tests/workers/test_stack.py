@@ -27,7 +27,7 @@ class Stack:
 
     def __init__(self, data: Path) -> None:
         self.data = data
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")}
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")} | {"CIRIS_API_PROCESSES": "2"}
         self.process = subprocess.Popen([*COMMAND, "--data", str(data)], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
         assert self.process.stdout.readline() == f"ciris is up at {self.description['url']}\n"
@@ -66,7 +66,7 @@ def test_what_dies_is_started_again_and_a_stop_leaves_nothing(stack: Stack) -> N
     assert second.stderr.splitlines()[-1].startswith("error: a stack with the data directory")
 
     before = stack.description["pids"]
-    assert set(before) == {"queue", "control", "solve", "api"}
+    assert set(before) == {"queue", "control", "solve", "api", "api-2"}
     os.kill(before["queue"], signal.SIGKILL)
     os.kill(before["api"], signal.SIGKILL)
     eventually(lambda: not set(stack.description["pids"].values()) & {before["queue"], before["api"]}, "both are started again")
@@ -77,6 +77,22 @@ def test_what_dies_is_started_again_and_a_stop_leaves_nothing(stack: Stack) -> N
     assert stack.process.wait(30) == 0
     assert gone(after)
     assert not (stack.data / "stack.json").exists()
+
+
+def test_the_processes_of_the_api_share_the_port_and_count_together(stack: Stack) -> None:
+    def ask(path: str) -> str:
+        with urllib.request.urlopen(f"{stack.description['url']}{path}", timeout=10) as answer:
+            return str(answer.read().decode())
+
+    def answered(name: str) -> float:
+        file = stack.data / "requests" / name
+        return sum(memoryview(file.read_bytes()).cast("d")[::2]) if file.exists() else 0.0
+
+    def told() -> float:
+        return sum(float(line.split()[1]) for line in ask("/metrics").splitlines() if line.startswith("ciris_http_requests_total{"))
+
+    eventually(lambda: ask("/healthz") and answered("api") and answered("api-2"), "both have answered")
+    eventually(lambda: answered("api") + answered("api-2") - told() in (0, -1), "one tells of both")
 
 
 def test_nothing_outlives_a_supervisor_that_is_killed(stack: Stack) -> None:
