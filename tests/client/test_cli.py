@@ -150,7 +150,7 @@ def test_a_proof_that_holds_says_what_it_proves(ciris: Ciris, certified: Region,
 
 def test_a_proof_that_does_not_hold_is_a_negative_answer(ciris: Ciris, certified: Region, tmp_path: Path) -> None:
     damaged = bytearray(certified.proof)
-    damaged[len(damaged) // 2] ^= 1
+    damaged[certified.proof.index(b"NUMPY")] ^= 1
     (tmp_path / "bad.proof").write_bytes(damaged)
     done = ciris("verify", "bad.proof", "--json")
     assert (done.status, done.json["holds"]) == (1, False)
