@@ -59,7 +59,7 @@ def inscribed_ellipsoid(polytope: Polytope) -> Ellipsoid:
     return Ellipsoid(center, shape * (min(1.0, reach) * _SHRINK))
 
 
-def largest_volume(polytope: Polytope) -> float:
+def volume_bound(polytope: Polytope) -> float:
     """An upper bound of the inscribed ellipsoid's volume in a fraction of its time: that of the one in the bounding box.
 
     Raises:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from certifier.contraction import Failure, contract, measure
-from certifier.ellipsoid import inscribed_ellipsoid, largest_volume
+from certifier.ellipsoid import inscribed_ellipsoid, volume_bound
 from certifier.errors import CirisError, RegionError
 from certifier.growth_actions import (
     Accepted,
@@ -190,7 +190,7 @@ def _is_worth_it(state: dict[str, Any], polytope: Polytope) -> bool:
     if state["best"] is None:
         return True
     least = state["best"]["volume"] * (1 + state["options"]["tolerance"])
-    return largest_volume(polytope) > least and inscribed_ellipsoid(polytope).volume > least
+    return volume_bound(polytope) > least and inscribed_ellipsoid(polytope).volume > least
 
 
 def _trim(scene: Scene, state: dict[str, Any], label: str, polytope: Polytope, trim: dict[str, Any] | None = None) -> Transition:

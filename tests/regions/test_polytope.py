@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydrake.geometry.optimization import HPolyhedron
 from scipy.optimize import linprog
 
-from certifier.ellipsoid import inscribed_ellipsoid, volume
+from certifier.ellipsoid import inscribed_ellipsoid, volume, volume_bound
 from certifier.errors import RegionError
 from certifier.model import Polytope
 from certifier.polytope import (
@@ -234,6 +234,12 @@ def test_inscribed_ellipsoid_is_inside_and_as_large_as_a_ball(case):
     n, (_, radius) = len(E.center), chebyshev_center(polytope)
     ball = math.pi ** (n / 2) / math.gamma(n / 2 + 1) * radius**n
     assert E.volume >= ball * (1 - 1e-4)
+    assert E.volume <= volume_bound(polytope)
+
+
+def test_the_bound_of_the_ellipsoids_volume_is_reached_in_a_box():
+    box = Polytope(np.concatenate([np.eye(3), -np.eye(3)]), np.array([0.1, 2.0, 3.0, 0.3, 1.0, 0.0]))
+    assert volume_bound(box) == pytest.approx(inscribed_ellipsoid(box).volume, rel=1e-6)
 
 
 @settings(max_examples=25, deadline=None)
