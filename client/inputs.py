@@ -48,10 +48,12 @@ def seed_of(scene: str, q: str | None) -> list[float]:
     """The seed configuration: ``q``, or the ``q`` of the seed.yaml beside the scene file.
 
     Raises:
-        CirisError: seed_missing, or what is wrong with it.
+        CirisError: scene_not_found for a scene file that is not there; seed_missing, or what is wrong with it.
     """
     if q is not None:
         return configuration(q)
+    if is_scene_file(scene) and not Path(scene).is_file():
+        raise CirisError("scene_not_found", f"there is no scene file {scene}", field="SCENE")
     path = Path(scene).parent / SEED_FILE
     if not is_scene_file(scene) or not path.is_file():
         raise CirisError("seed_missing", "no seed was given", field="--q", hint=f"or put a {SEED_FILE} with q beside the scene file")

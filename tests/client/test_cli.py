@@ -77,6 +77,7 @@ def files(tmp_path: Path) -> Path:
         (("certify", PLANAR, "--polytope", "empty.npz"), "no point satisfies"),
         (("certify", "planar-2dof", "--polytope", "small.npz"), "is not a scene file"),
         (("grow", "nowhere.yaml", "--q", "0,0"), "nowhere.yaml"),
+        (("grow", "nowhere.yaml"), "there is no scene file nowhere.yaml"),
         (("grow", "broken.yaml", "--q", "0,0"), "broken.yaml, line 1"),
         (("grow", "broken.yaml"), "--q: no seed was given"),
         (("grow", PLANAR, "--q", "0,nan"), "--q[1]: 'nan' is not a finite number"),
