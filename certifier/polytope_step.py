@@ -192,7 +192,10 @@ def _coupled(
     """The proofs that do not hold on all of the box, with the faces they need; (11) is tried with those of the box first."""
     trusted: Certification | None = None
     needed: dict[bytes, tuple[PairProof, Array]] = {}
-    for count, (index, data) in enumerate(proofs.items()):
+    affordable = {index: _terms(scene, PairProof.from_bytes(data, scene)) <= MOST_TERMS for index, data in proofs.items()}
+    # What may have to be refused comes first; the others keep their order, on which the last digits of the step's sums depend.
+    for count, index in enumerate(sorted(proofs, key=affordable.__getitem__)):
+        data = proofs[index]
         proof = PairProof.from_bytes(data, scene)
         m = len(proof.ground.d)
         if not (holds_on(proof, box, proof.faces) or holds_on(proof, box, range(m, m + 2 * scene.n))):
@@ -212,8 +215,13 @@ def _coupled(
     return list(needed.values())
 
 
+def _terms(scene: Scene, proof: PairProof) -> int:
+    """Of the larger side's polynomials, with all joints of the scene in play."""
+    return max(dimension(k, k, scene.n - k) for k in (len(side.chain) for side in proof.sides))
+
+
 def _check_size(scene: Scene, index: int, proof: PairProof) -> None:
-    terms = max(dimension(k, k, scene.n - k) for k in (len(side.chain) for side in proof.sides))
+    terms = _terms(scene, proof)
     if terms > MOST_TERMS:
         pair, most = scene.pairs[index], f"more than {MOST_TERMS}"
         problem = f"with all {scene.n} joints in play the polynomials of {pair.a} and {pair.b} have {terms} terms, {most}"
