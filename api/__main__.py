@@ -19,7 +19,9 @@ SHUTDOWN_SECONDS = 2
 KEEP_ALIVE_SECONDS = 75
 """Longer than clients keep idle connections: whoever closes first must not be the one who answers."""
 BACKLOG = 2048
+"""Connections that may wait to be taken, as many as uvicorn has by itself."""
 NOT_STARTED = 3
+"""The exit status that ``uvicorn.run`` has then."""
 GARBAGE = 20_000, 10, 100
 """After how many objects, and passes, the collector looks at the young, the middle and the old ones."""
 

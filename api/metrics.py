@@ -81,12 +81,7 @@ def render(statistics: Statistics, waiting: Mapping[str, int], requests: Request
         _family("ciris_regions", "gauge", "Certified regions.", {(): statistics.regions}),
         _family("ciris_queue_messages", "gauge", "Messages that wait, by queue.", _by("queue", waiting)),
         _family("ciris_http_requests_total", "counter", "Requests answered.", _requests(answered, 0)),
-        _family(
-            "ciris_http_request_seconds_total",
-            "counter",
-            "Time that they took.",
-            _requests(answered, 1),
-        ),
+        _family("ciris_http_request_seconds_total", "counter", "Time that they took.", _requests(answered, 1)),
     ]
     return "".join(families)
 

@@ -75,7 +75,7 @@ Action = Propose | Certify | Step | Finish
 
 def action_to_document(action: Action) -> dict[str, Any]:
     """An action as JSON-able data (pair indices become strings as JSON keys)."""
-    return {field.name: getattr(action, field.name) for field in fields(action)}
+    return {part.name: getattr(action, part.name) for part in fields(action)}
 
 
 def action_from_document(document: dict[str, Any]) -> Action:

@@ -21,6 +21,8 @@ from db.states import PAIR, IterationState, PairState, transition, unfinished
 from db.types import utcnow
 
 UNFINISHED = unfinished(PAIR)
+STORED = ("stage", "margin", "seconds", "detail", "witness_s", "weak_points")
+"""Fields of a result that are columns of its row."""
 FAILED = frozenset(PairState) - UNFINISHED - {PairState.CERTIFIED, PairState.SKIPPED}
 
 
@@ -176,20 +178,9 @@ def save(session: Session, claim: Claim, results: Sequence[Result]) -> Saved:
         return Saved(held=False, finished=False)
     digests = proofs.put(session, [result.proof for result in saved if result.proof is not None])
     for result in saved:
-        transition(
-            session,
-            PairRow,
-            result.state,
-            PairRow.id == held[result.index],
-            lease_until=None,
-            stage=result.stage,
-            margin=result.margin,
-            seconds=result.seconds,
-            detail=result.detail,
-            witness_s=result.witness_s,
-            weak_points=result.weak_points,
-            proof_digest=None if result.proof is None else digests[result.proof],
-        )
+        values = {name: getattr(result, name) for name in STORED}
+        values["proof_digest"] = None if result.proof is None else digests[result.proof]
+        transition(session, PairRow, result.state, PairRow.id == held[result.index], lease_until=None, **values)
     job.error = next((result.error for result in saved if result.error is not None), job.error)
     events.emit(session, job, "pairs", {"iteration": claim.iteration, "pairs": [_public(result) for result in saved]})
     label, enough = session.execute(select(IterationRow.label, IterationRow.failures).where(*_iteration(job.id, claim.iteration))).one()

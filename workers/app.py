@@ -70,7 +70,7 @@ def send_coordinate(job_id: str) -> bool:
 
 
 def send_work(count: int = 1) -> bool:
-    """Tells the solvers of so many pieces of work; False as for :func:`send_coordinate`."""
+    """Wakes so many solvers, each of whom wakes another while something is left; False as for :func:`send_coordinate`."""
     return _send(WORK, [[]] * count)
 
 

@@ -38,6 +38,7 @@ def certify_pairs(claim: pairs.Claim) -> bool:
 
 
 def _certify_and_save(claim: pairs.Claim) -> bool:
+    """Whether that finished the iteration."""
     results: list[pairs.Result] = []
     since = time.monotonic()
     for place, pair in enumerate(claim.pairs, start=1):

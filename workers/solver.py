@@ -32,7 +32,8 @@ def work() -> Piece | None:
         return None
     if more:
         send_work()
-    return Piece(claim.job_id, carry_out(claim) if isinstance(claim, steps.Claim) else certify_pairs(claim))
+    settles = carry_out(claim) if isinstance(claim, steps.Claim) else certify_pairs(claim)
+    return Piece(claim.job_id, settles)
 
 
 def _claim() -> tuple[pairs.Claim | steps.Claim | None, bool]:

@@ -38,8 +38,8 @@ def half_tangent(angle: float) -> fmpq:
 class ExactKinematics:
     """Numerators of positions as polynomials of the ring Q[u_0 .. u_{n-1}], or as numbers at one configuration."""
 
-    def __init__(self, scene: Scene, s: list[Any], constant: Any) -> None:
-        self._constant_of, self._s = constant, s
+    def __init__(self, scene: Scene, s: list[Any], embed: Any) -> None:
+        self._embed, self._s = embed, s
         self._q_star = scene.q_star
         self._above = {joint.child: joint for joint in scene.joints}
 
@@ -80,7 +80,7 @@ class ExactKinematics:
                 moved = _multiply(fixed, middle)
                 X, fixed = moved if X is None else _multiply(X, moved), _identity()
             fixed = _multiply(fixed, inner)
-        return self._constant(fixed) if X is None else _multiply(X, fixed)
+        return self._embedded(fixed) if X is None else _multiply(X, fixed)
 
     def fixed_pose(self, frame: str, body: str) -> list[list[fmpq]] | None:
         """(4, 4) X_FB of two bodies that are welded together, perhaps through others; None if a joint between them moves."""
@@ -97,8 +97,8 @@ class ExactKinematics:
             product *= 1 + tau * tau
         return product
 
-    def _constant(self, rows: list[list[fmpq]]) -> Matrix:
-        return [[self._constant_of(x) for x in row] for row in rows]
+    def _embedded(self, rows: list[list[fmpq]]) -> Matrix:
+        return [[self._embed(x) for x in row] for row in rows]
 
     def _joint(self, joint: Joint, upwards: bool) -> tuple[Numbers, Matrix | None, Numbers]:
         """The joint's fixed frame, its motion, and the other one."""
@@ -109,7 +109,7 @@ class ExactKinematics:
         axis = [exact(-x if upwards else x) for x in joint.axis]
         s, q = self._s[joint.index], float(self._q_star[joint.index])
         if joint.kind is JointKind.PRISMATIC:
-            middle = self._constant(_identity())
+            middle = self._embedded(_identity())
             for i in range(3):
                 middle[i][3] = axis[i] * (s + exact(q))
         else:
@@ -124,7 +124,7 @@ class ExactKinematics:
         skew = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
         square = [[sum((skew[i][k] * skew[k][j] for k in range(3)), zero) for j in range(3)] for i in range(3)]
         norm, first, second = cosine * cosine + sine * sine, 2 * cosine * sine, 2 * sine * sine
-        none = self._constant_of(zero)
+        none = self._embed(zero)
         rows = [[(norm if i == j else none) + skew[i][j] * first + square[i][j] * second for j in range(3)] + [none] for i in range(3)]
         return [*rows, [none, none, none, norm]]
 

@@ -119,21 +119,20 @@ def test_proofs_that_hold_on_the_trust_box_hold_on_the_moved_polytope():
         assert (proof.ground.C @ corner <= proof.ground.d).all()
 
 
-def test_a_certificate_that_is_not_feasible_on_the_trust_box_is_refused(monkeypatch):
+@pytest.mark.parametrize(
+    ("constant", "value", "code", "words"),
+    [
+        pytest.param("MARGIN_SHARE", 50.0, "step_failed", "not strictly feasible", id="no certificate is feasible on the trust box"),
+        pytest.param("MOST_TERMS", 4, "step_too_large", "arm/link2/bar and world/obstacle", id="a pair is too large, and named"),
+    ],
+)
+def test_what_cannot_be_stepped_is_refused(monkeypatch, constant, value, code, words):
     scene, region = SCENES["revolute"], crosscut(SCENES["revolute"], 0.15)
-    monkeypatch.setattr(polytope_step, "MARGIN_SHARE", 50.0)
+    monkeypatch.setattr(polytope_step, constant, value)
     with pytest.raises(RegionError) as refusal:
         step(scene, region, certified(scene, region))
-    assert refusal.value.code == "step_failed"
-
-
-def test_a_pair_whose_polynomials_would_be_too_large_is_refused_by_name(monkeypatch):
-    scene, region = SCENES["revolute"], crosscut(SCENES["revolute"], 0.15)
-    monkeypatch.setattr(polytope_step, "MOST_TERMS", 4)
-    with pytest.raises(RegionError) as refusal:
-        step(scene, region, certified(scene, region))
-    assert refusal.value.code == "step_too_large"
-    assert "arm/link2/bar and world/obstacle" in refusal.value.message
+    assert refusal.value.code == code
+    assert words in refusal.value.message
 
 
 def test_from_where_hardly_any_margin_is_left_it_steps_back_first():
