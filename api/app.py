@@ -18,6 +18,7 @@ from api.children import AT_ONCE, ChildLimiter
 from api.metrics import Requests
 from api.reading import READERS
 from api.routers import events, jobs, planning, regions, scenes, service
+from certifier.scene.bundle import expect_bundles
 from db.session import CONNECTIONS, Database, database
 from db.settings import LOOPBACK_NAMES, settings
 
@@ -41,7 +42,7 @@ def create_app(db: Database | None = None) -> FastAPI:
         redoc_url=None,
         generate_unique_id_function=_operation_id,
         separate_input_output_schemas=False,
-        lifespan=_few_threads,
+        lifespan=_lifespan,
     )
     app.state.database = db or database()
     app.state.requests = Requests(settings().requests_file)
@@ -65,9 +66,12 @@ def create_app(db: Database | None = None) -> FastAPI:
 
 
 @asynccontextmanager
-async def _few_threads(_app: FastAPI) -> AsyncIterator[None]:
-    """Requests are answered by a few threads, each with its connection to the database: more would only wait for each other."""
+async def _lifespan(_app: FastAPI) -> AsyncIterator[None]:
+    """Requests are answered by a few threads, each with its connection to the database: more would only wait for each other.
+
+    The first upload is to be as quick as the others."""
     to_thread.current_default_thread_limiter().total_tokens = THREADS
+    expect_bundles()
     yield
 
 

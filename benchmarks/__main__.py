@@ -8,7 +8,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from typing import Any
 
-from benchmarks import agreement, catalogue, compare, growth, report, scaling, survey
+from benchmarks import agreement, catalogue, compare, growth, report, scaling, service, survey
 from certifier.errors import CirisError
 from client.output import Screen, print_json
 
@@ -50,6 +50,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "growth": lambda args, screen: growth.growth(args.scenes, args.against is not None, screen.line),
     "agreement": lambda args, screen: agreement.campaign(agreement.questions(), screen.line),
     "scaling": lambda args, screen: scaling.curves(args.against is not None, screen.line),
+    "service": lambda args, screen: service.beside_local(args.example, args.processes, args.turns, screen.line),
     "survey": lambda args, screen: survey.survey(args.scenes, args.most, screen.line),
 }
 
@@ -77,6 +78,10 @@ def _parser() -> ArgumentParser:
     surveyed = kinds.add_parser("survey", parents=[json], help="every pair of every scene on every region")
     surveyed.add_argument("scenes", nargs="*", metavar="SCENE", default=list(catalogue.SCENES), help="default: all")
     surveyed.add_argument("--most", type=float, default=5.0, metavar="SECONDS", help="leave pairs with a longer forecast out; default 5")
+    served = kinds.add_parser("service", parents=[json], help="the service beside --local")
+    served.add_argument("example", nargs="?", default="iiwa_shelf", metavar="EXAMPLE", help="default iiwa_shelf")
+    served.add_argument("--processes", type=int, default=1, metavar="N", help="solving processes of the service; default 1")
+    served.add_argument("--turns", type=int, default=5, metavar="N", help="how often each; default 5")
     kinds.add_parser("docs", help="write the tables of docs/benchmarks.md from docs/benchmarks/*.json")
     return parser
 

@@ -151,6 +151,31 @@ def _scaling(document: Document) -> list[str]:
     return [_table(["curve", "number", "pairs", "outcomes", "setup", "certify", "verify again", "Drake"], rows)]
 
 
+def _service(document: Document) -> list[str]:
+    names = {"seconds": "the command", "job_seconds": "the growth", "processor_seconds": "processor time"}
+    rows = [[str(r["turn"]), r["way"], *(f"{r[name]:.1f}" for name in names), f"{r['stolen_seconds']:.1f}"] for r in document["rows"]]
+    found = document["overhead"]
+    sums = [
+        [
+            name,
+            *(f"{median:.1f}" for median in found[key]["medians"].values()),
+            _percent(found[key]["of_medians"]),
+            *[", ".join(map(_percent, found[key]["each"]))],
+        ]
+        for key, name in names.items()
+    ]
+    many = "one solving process" if document["processes"] == 1 else f"{document['processes']} solving processes"
+    return [
+        f"{document['scene']}, {many}.",
+        _table(["turn", "way", *names.values(), "stolen by the host"], rows),
+        _table(["seconds of", "service, median", "--local, median", "more", "in each turn"], sums),
+    ]
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:+.1f} %"
+
+
 def _survey(document: Document) -> list[str]:
     rows = [
         [row["scene"], row["region"], _counts(row["outcomes"]), str(row["left_out"]), seconds(row["seconds"])] for row in document["counts"]
@@ -178,5 +203,6 @@ _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "growth": _growth,
     "agreement": _agreement,
     "scaling": _scaling,
+    "service": _service,
     "survey": _survey,
 }

@@ -14,9 +14,9 @@ from certifier.drake_model import build_diagram, geometry_name
 from certifier.errors import RegionError
 from certifier.growth_actions import Proposed
 from certifier.iris import iris
-from certifier.model import Array, Scene
+from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee
-from certifier.polytope import chebyshev_center
+from certifier.polytope import chebyshev_center, drop_redundant
 from certifier.seed_options import MOST_IRIS_JOINTS, Method, SeedOptions
 
 __all__ = ["Method", "Proposal", "SeedOptions", "check_seed", "propose"]
@@ -132,6 +132,12 @@ def proposed(scene: Scene, seed: dict[str, Any]) -> Proposed:
     """:func:`propose` for the document of its options, as certifier.growth is told of it."""
     found = propose(scene, SeedOptions.from_document(seed))
     return Proposed(found.C.tolist(), found.d.tolist(), found.center.tolist(), found.contain.tolist(), found.info)
+
+
+def warm_up() -> None:
+    """Loads the compiled functions that a proposal needs."""
+    eye = np.eye(2)
+    drop_redundant(Polytope(np.concatenate([eye, -eye]), np.ones(4)))
 
 
 def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:

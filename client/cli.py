@@ -179,7 +179,7 @@ def _parser() -> argparse.ArgumentParser:
     contains.set_defaults(run="client.commands:contains")
 
     bench = verbs.add_parser("bench", help="measure, side by side with Drake: ciris bench BENCHMARK --help")
-    kinds = ["pairs", "scene", "growth", "agreement", "scaling", "survey", "docs"]
+    kinds = ["pairs", "scene", "growth", "agreement", "scaling", "service", "survey", "docs"]
     bench.add_argument("benchmark", choices=kinds)
     bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...")
     bench.set_defaults(run="client.bench:bench")

@@ -55,6 +55,7 @@ def configure(process: str) -> None:
     handler.setFormatter(formatter)
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
     logging.captureWarnings(True)
+    logging.getLogger("alembic").setLevel(logging.WARNING)  # it tells of every migration
 
 
 def _render(_logger: object, _method: str, event: EventDict) -> str:

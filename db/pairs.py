@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sqlalchemy import ColumnElement, Select, insert, select
+from sqlalchemy import ColumnElement, Select, func, insert, select
 from sqlalchemy.orm import Session, defer
 
 from db import events, jobs, leases, proofs
@@ -236,6 +236,13 @@ def iterations(session: Session, job_id: str) -> Sequence[IterationRow]:
     """The job's iterations, in order, without their arrays."""
     query = select(IterationRow).where(IterationRow.job_id == job_id).order_by(IterationRow.index)
     return session.scalars(query.options(defer(IterationRow.arrays, raiseload=True))).all()
+
+
+def expected_seconds(session: Session, job_id: str, iteration: int) -> dict[int, float]:
+    """Pair index -> what the pair took in that iteration or, where it was not settled, was expected to; empty without that iteration."""
+    seconds = func.coalesce(PairRow.seconds, PairRow.forecast_seconds)
+    mine = (PairRow.job_id == job_id, PairRow.iteration == iteration)
+    return {row.pair_index: row.seconds for row in session.execute(select(PairRow.pair_index, seconds.label("seconds")).where(*mine))}
 
 
 def proving(session: Session, job_id: str, iteration_of: Mapping[int, int]) -> dict[int, PairRow]:

@@ -22,10 +22,11 @@ def main() -> None:
 
     from celery.signals import setup_logging, worker_process_init, worker_ready
 
+    from certifier.child import prepare
     from db import logs
     from db.session import database
     from db.settings import settings
-    from workers.app import CONTROL, celery_app
+    from workers.app import CONTROL, SOLVE, celery_app
     from workers.heartbeat import Heartbeat
     from workers.processes import die_with_parent
     from workers.tasks import register
@@ -44,6 +45,10 @@ def main() -> None:
     def after_fork(**_: Any) -> None:
         die_with_parent()
         database.cache_clear()
+        if queue == SOLVE:
+            from workers.steps import SEEDING
+
+            prepare(SEEDING)
 
     @worker_ready.connect(weak=False)
     def sweep(**_: Any) -> None:

@@ -123,8 +123,7 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
     """
     data = settings.data_dir.expanduser().absolute()
     (data / "logs").mkdir(parents=True, exist_ok=True)
-    with _only_one(data), _stop_signals() as stopping, _socket_directory(data) as sockets:
-        bound = _choose_port(settings, port)
+    with _only_one(data), _stop_signals() as stopping, _socket_directory(data) as sockets, _reserved_port(settings, port) as bound:
         url = f"http://{settings.host}:{bound}"
         children = _children(settings, data, sockets / SOCKET)
         environment = _environment(settings, data, sockets / SOCKET, bound)
@@ -207,14 +206,22 @@ def _wait_until_healthy(url: str, stopping: Callable[[], bool], data: Path) -> b
     return False
 
 
-def _choose_port(settings: Settings, asked: int | None) -> int:
-    for port in (asked,) if asked is not None else (settings.port, 0):
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+@contextmanager
+def _reserved_port(settings: Settings, asked: int | None) -> Iterator[int]:
+    """A port that no other program gets while the block runs: bound here without listening, and open to our API processes."""
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    with socket.socket(family) as holder:
+        holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # the last stack's connections may linger
+        for port in (asked,) if asked is not None else (settings.port, 0):
             with suppress(OSError):
-                probe.bind((settings.host, port))
-                return int(probe.getsockname()[1])
-    raise CirisError("port_taken", f"port {asked} of {settings.host} cannot be bound", field="port", hint="choose another, or none")
+                holder.bind((settings.host, port))
+                break
+        else:
+            problem = f"{'no port' if asked is None else f'port {asked}'} of {settings.host} can be bound"
+            raise CirisError("port_taken", problem, field="port", hint="choose another, or none; CIRIS_HOST is where it is looked for")
+        holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 0)
+        holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        yield int(holder.getsockname()[1])
 
 
 @contextmanager

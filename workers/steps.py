@@ -32,6 +32,8 @@ from workers.transaction import persistently
 
 log = logging.getLogger(__name__)
 
+SEEDING = "certifier.seeding:propose_in_child"
+
 
 @dataclass(frozen=True)
 class Done:
@@ -88,7 +90,7 @@ def _propose(scene: Scene, claim: steps.Claim) -> Done:
     """Seeds in a process of its own: Drake may abort the process, hang, or want too much memory, and that fails the step, nothing else."""
     limits, payload = settings(), {"scene": scene.to_document(), "seed": claim.input["seed"]}
     timeout, memory = limits.time_limit_seconds, limits.child_memory_bytes
-    return Done(run_in_child("certifier.seeding:propose_in_child", payload, timeout_s=timeout, memory_bytes=memory))
+    return Done(run_in_child(SEEDING, payload, timeout_s=timeout, memory_bytes=memory))
 
 
 def _step(scene: Scene, claim: steps.Claim) -> Done:

@@ -163,7 +163,9 @@ def _advance(job: JobRow, action: Propose | Certify | Step | Finish) -> None:
 
 def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: Afterwards) -> None:
     costs = _forecast(job.scene_id)
-    new = [pairs.NewPair(i, costs[i].a, costs[i].b, costs[i].seconds) for i in action.pairs]
+    # A pair takes about as long as the last time, which the forecast by its size alone may be far from.
+    expected = pairs.expected_seconds(session, job.id, action.iteration - 1)
+    new = [pairs.NewPair(i, costs[i].a, costs[i].b, expected.get(i, costs[i].seconds)) for i in action.pairs]
     pairs.add_iteration(
         session,
         job,

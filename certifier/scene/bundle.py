@@ -13,6 +13,7 @@ import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from certifier.child import prepare
 from certifier.errors import CirisError, SceneError
 from certifier.model import Scene
 from certifier.scene.file import read_scene_file
@@ -21,6 +22,7 @@ from certifier.scene.references import references, resolve
 
 INDEX = "bundle.json"
 """Where the bundle says which file is the scene file."""
+_READER = "certifier.scene.unpack:parse_bundle"
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -63,6 +65,11 @@ def pack_bundle(path: str | Path) -> bytes:
     return data.getvalue()
 
 
+def expect_bundles() -> None:
+    """Begins to load what :func:`load_bundle` needs, without waiting."""
+    prepare(_READER)
+
+
 def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
     """The scene in a bundle from a stranger: unpacked within limits, checked and parsed, all of it in a child process.
 
@@ -79,7 +86,7 @@ def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
         root.mkdir()
         payload = {"archive": str(archive), "root": str(root), "limits": asdict(limits)}
         try:
-            return read_in_child("certifier.scene.unpack:parse_bundle", payload, "the bundle", None, limits.timeout_s, limits.memory_bytes)
+            return read_in_child(_READER, payload, "the bundle", None, limits.timeout_s, limits.memory_bytes)
         except CirisError as error:
             error.message = error.message.replace(f"{root}/", "")
             raise

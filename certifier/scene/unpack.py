@@ -11,6 +11,7 @@ from typing import Any
 from certifier.errors import SceneError
 from certifier.scene.bundle import INDEX, BundleLimits, starts
 from certifier.scene.file import read_scene_file
+from certifier.scene.parse import parse
 from certifier.scene.references import references, resolve
 
 _DEPTH = 32
@@ -18,7 +19,7 @@ _CHUNK = 2**20
 
 
 def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
-    """The document of the Scene. Drake is loaded once the files have passed.
+    """The document of the Scene. Drake sees the files once they have passed.
 
     Raises:
         SceneError: as :func:`certifier.scene.bundle.load_bundle`.
@@ -27,8 +28,6 @@ def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
     scene = root / unpack(Path(payload["archive"]), root, BundleLimits(**payload["limits"]))
     check_bundle(root, scene)
     os.chdir(scene.parent)  # where SDFormat looks for included files
-    from certifier.scene.parse import parse
-
     return parse({"path": str(scene)})
 
 

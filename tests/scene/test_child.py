@@ -1,16 +1,18 @@
-"""The killable child: results, errors, deaths, limits."""
+"""The killable child: results, errors, deaths, limits; and the nursery that it comes from."""
 
 import os
 import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from certifier.child import run_in_child
+from certifier import child
+from certifier.child import prepare, run_in_child
 from certifier.errors import CirisError, RegionError
 
 GIB = 2**30
@@ -41,6 +43,26 @@ def sleep(payload):
 
 def broken(payload):
     raise ValueError("a bug")
+
+calls = 0
+
+def count(payload):
+    global calls
+    calls += 1
+    return {"calls": calls, "nursery": os.getppid()}
+
+def meet(payload):
+    # ends once two of these are here
+    with open(os.path.join(payload["directory"], f"here-{os.getpid()}"), "w"):
+        pass
+    while sum(name.startswith("here-") for name in os.listdir(payload["directory"])) < 2:
+        time.sleep(0.01)
+    return {"pid": os.getpid()}
+
+def fill(payload):
+    with open(payload["file"], "wb") as file:
+        for _ in range(2**10):
+            file.write(bytes(2**20))
 """
 
 
@@ -113,11 +135,90 @@ run_in_child("child_functions:sleep", {{"file": {str(pid_file)!r}}}, timeout_s=6
     parent = subprocess.Popen([sys.executable, "-c", script], env={**os.environ, "PYTHONPATH": os.pathsep.join([root, str(tmp_path)])})
     try:
         wait_for(lambda: pid_file.exists() and pid_file.read_text())
+        called = int(pid_file.read_text())
+        nursery = int(Path(f"/proc/{called}/stat").read_text().rsplit(")", 1)[1].split()[1])
     finally:
         parent.send_signal(signal.SIGKILL)
         parent.wait()
-    child = int(pid_file.read_text())
-    wait_for(lambda: not alive(child))
+    wait_for(lambda: not alive(called) and not alive(nursery))
+
+
+def test_the_module_stays_loaded_for_the_next_call_and_keeps_nothing_of_it(call):
+    first, second = call("count"), call("count")
+    assert first["nursery"] == second["nursery"]
+    assert first["calls"] == second["calls"] == 1
+
+
+def test_a_call_that_dies_costs_the_next_one_nothing(call):
+    nursery = call("count")["nursery"]
+    with pytest.raises(CirisError):
+        call("abort")
+    assert call("count")["nursery"] == nursery
+
+
+def test_a_nursery_that_died_or_was_killed_with_its_call_is_replaced(call, tmp_path):
+    nursery = call("count")["nursery"]
+    os.kill(nursery, signal.SIGKILL)
+    wait_for(lambda: not alive(nursery))
+    other = call("count")["nursery"]
+    assert other != nursery
+    with pytest.raises(CirisError, match="more than"):
+        call("sleep", {"file": str(tmp_path / "pid")}, timeout_s=1.0)
+    assert not alive(other)
+    assert call("count")["nursery"] != other
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the parent-death signal is Linux's")
+def test_a_call_ends_with_its_nursery(call, tmp_path):
+    with ThreadPoolExecutor(1) as pool:
+        calling = pool.submit(call, "sleep", {"file": str(tmp_path / "pid")})
+        wait_for(lambda: (tmp_path / "pid").exists() and (tmp_path / "pid").read_text())
+        called = int((tmp_path / "pid").read_text())
+        os.kill(int(Path(f"/proc/{called}/stat").read_text().rsplit(")", 1)[1].split()[1]), signal.SIGKILL)
+        with pytest.raises(CirisError, match="SIGKILL"):
+            calling.result(20)
+    wait_for(lambda: not alive(called))
+
+
+def test_a_death_says_nothing_of_calls_before(call):
+    with pytest.raises(CirisError, match="about to abort"):
+        call("abort")
+    with pytest.raises(CirisError, match="a bug") as caught:
+        call("broken")
+    assert "about to abort" not in caught.value.message
+
+
+def test_calls_at_once_do_not_wait_for_each_other(call):
+    with ThreadPoolExecutor(2) as pool:
+        answers = list(pool.map(lambda _: call("meet", {"directory": os.environ["PYTHONPATH"]}), range(2)))
+    assert answers[0]["pid"] != answers[1]["pid"]
+
+
+def test_what_was_prepared_answers_the_first_call(call):
+    prepare("child_functions:count")
+    (nursery,) = [waiting.process.pid for module, waiting in child._idle.items() if module == "child_functions"]
+    prepare("child_functions:count")
+    assert call("count")["nursery"] == nursery
+
+
+def test_a_fork_of_this_process_has_nurseries_of_its_own(call):
+    nursery = call("count")["nursery"]
+    reading, writing = os.pipe()
+    forked = os.fork()
+    if forked == 0:
+        os.write(writing, str(call("count")["nursery"]).encode())
+        os._exit(0)
+    os.waitpid(forked, 0)
+    assert int(os.read(reading, 100)) != nursery
+    assert call("count")["nursery"] == nursery
+    os.close(reading)
+    os.close(writing)
+
+
+def test_a_file_cannot_grow_without_limit(call, tmp_path):
+    with pytest.raises(CirisError, match="File too large"):
+        call("fill", {"file": str(tmp_path / "filled")})
+    assert (tmp_path / "filled").stat().st_size <= 2**28
 
 
 def alive(pid):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import urllib.request
@@ -15,9 +16,10 @@ from typing import Any
 import pytest
 
 from db.leases import _started
+from db.settings import Settings
 from tests.workers.service import ROOT, eventually
 from workers.processes import die_with_parent
-from workers.stack import Child
+from workers.stack import Child, _reserved_port
 
 COMMAND = [sys.executable, "-m", "workers.stack"]
 
@@ -112,15 +114,28 @@ def test_a_child_ends_by_its_signal_though_the_supervisor_ignores_it() -> None:
 
 
 def test_a_port_that_was_asked_for_and_is_taken_is_told(tmp_path: Path) -> None:
-    import socket
-
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = str(taken.getsockname()[1])
         failed = subprocess.run([*COMMAND, "--data", str(tmp_path), "--port", port], cwd=ROOT, capture_output=True, text=True, check=False)
     assert failed.returncode == 2
-    assert failed.stderr.startswith(f"error: port: port {port} of 127.0.0.1 cannot be bound")
+    assert failed.stderr.startswith(f"error: port: port {port} of 127.0.0.1 can be bound")
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
+def test_the_port_stays_ours_while_nobody_listens(tmp_path: Path, host: str) -> None:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with _reserved_port(Settings(data_dir=tmp_path, host=host), 0) as port:
+        with socket.socket(family) as other:
+            other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            with pytest.raises(OSError, match="in use"):
+                other.bind((host, port))
+        with socket.create_server((host, port), family=family, reuse_port=True):
+            socket.create_connection((host, port), timeout=5).close()
+    with socket.socket(family) as other:
+        other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        other.bind((host, port))
 
 
 def test_a_child_that_keeps_dying_is_waited_for_longer_each_time(tmp_path: Path) -> None:

@@ -1,0 +1,131 @@
+"""What the service costs: ``ciris grow`` beside ``ciris grow --local``, the same example in turn, by the clock and in processor time."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks import catalogue, measure
+from benchmarks.measure import Progress
+from certifier.errors import CirisError
+
+CIRIS = [sys.executable, "-m", "client.cli"]
+SERVICE, LOCAL = "service", "--local"
+START_SECONDS = 60.0
+
+
+@dataclass(frozen=True)
+class _Service:
+    pid: int
+    url: str
+
+
+def beside_local(name: str, processes: int, turns: int, progress: Progress) -> dict[str, Any]:
+    """Grow the example's region in both ways, so often, each time the other way first; the document of ``ciris bench service``.
+
+    Raises:
+        CirisError: the service does not start, a command fails, or the two come to different regions.
+    """
+    rows: list[dict[str, Any]] = []
+    with tempfile.TemporaryDirectory() as directory, _running(Path(directory), processes) as service:
+        for turn in range(turns):
+            for way in (SERVICE, LOCAL) if turn % 2 == 0 else (LOCAL, SERVICE):
+                rows.append({"turn": turn, "way": way, **_grown(name, way, service, Path(directory))})
+                progress(_line(rows[-1]))
+    if len({row["ellipsoid"] for row in rows}) > 1:
+        raise CirisError("regions_differ", f"the runs came to different regions of {name}")
+    return {
+        "benchmark": "service",
+        "machine": measure.machine(),
+        "scene": name,
+        "processes": processes,
+        "rows": rows,
+        "overhead": {what: _overhead(rows, what) for what in ("seconds", "job_seconds", "processor_seconds")},
+    }
+
+
+def _overhead(rows: list[dict[str, Any]], what: str) -> dict[str, Any]:
+    """How much more the service takes: that of the medians, and of every turn."""
+    by_way = {way: [row[what] for row in sorted(rows, key=lambda row: row["turn"]) if row["way"] == way] for way in (SERVICE, LOCAL)}
+    medians = {way: statistics.median(values) for way, values in by_way.items()}
+    each = [service / local - 1 for service, local in zip(by_way[SERVICE], by_way[LOCAL], strict=True)]
+    return {"medians": medians, "of_medians": medians[SERVICE] / medians[LOCAL] - 1, "each": each}
+
+
+def _grown(name: str, way: str, service: _Service, directory: Path) -> dict[str, Any]:
+    """One command: its seconds, those of the growth alone, and the processor time of it and of the service meanwhile."""
+    command = [*CIRIS, "grow", str(catalogue.ROOT / "examples" / name / "scene.yaml"), "--json", "--out", str(directory / "proof")]
+    command += [LOCAL] if way == LOCAL else ["--url", service.url]
+    before, start, busy = _stolen(), time.perf_counter(), _processor_seconds(service.pid)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        output, said = process.stdout.read(), process.stderr.read()  # what is said on the way fits into a pipe
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
+        raise CirisError("command_failed", f"{' '.join(command)} ended with {process.returncode}: {said.strip()[-300:]}")
+    seconds, document = time.perf_counter() - start, json.loads(output)
+    return {
+        "seconds": seconds,
+        "job_seconds": document["seconds"],
+        "processor_seconds": usage.ru_utime + usage.ru_stime + _processor_seconds(service.pid) - busy,
+        "stolen_seconds": _stolen() - before,
+        "ellipsoid": document["volume"]["ellipsoid"],
+    }
+
+
+@contextmanager
+def _running(directory: Path, processes: int) -> Iterator[_Service]:
+    """A service of its own, with a database of its own."""
+    own = {"CIRIS_SOLVE_PROCESSES": str(processes)}
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")} | own
+    command = [*CIRIS, "up", "--data", str(directory / "data"), "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stdout is not None
+        try:
+            said = process.stdout.readline()
+            if "http" not in said:
+                raise CirisError("service_failed", "the service did not start", hint="try `ciris up`")
+            yield _Service(process.pid, said.split()[-1])
+        finally:
+            process.send_signal(signal.SIGINT)
+
+
+def _processor_seconds(root: int) -> float:
+    """What a process, all that came of it, and those of them that were waited for have computed so far (Linux)."""
+    fields = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields[int(stat.parent.name)] = stat.read_text().rpartition(")")[2].split()
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+    family, grew = {root}, True
+    while grew:
+        found = {pid for pid, values in fields.items() if int(values[1]) in family} - family
+        family, grew = family | found, bool(found)
+    ticks = sum(int(value) for pid in family & fields.keys() for value in fields[pid][11:15])
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
+def _stolen() -> float:
+    """Seconds that the host gave this machine's cores to others."""
+    return int(Path("/proc/stat").read_text().split(maxsplit=9)[8]) / os.sysconf("SC_CLK_TCK")
+
+
+def _line(row: dict[str, Any]) -> str:
+    return (
+        f"{row['turn']} {row['way']}: {row['seconds']:.1f} s, {row['job_seconds']:.1f} of them growing, "
+        f"{row['processor_seconds']:.1f} s of processor time, {row['stolen_seconds']:.1f} s stolen"
+    )
