@@ -121,7 +121,7 @@ def test_time_is_limited(call, tmp_path):
         call("sleep", {"file": str(tmp_path / "pid")}, timeout_s=1.5)
     assert caught.value.code == "child_timeout"
     assert time.monotonic() - started < 10
-    assert not alive(int((tmp_path / "pid").read_text()))
+    wait_for(lambda: not alive(int((tmp_path / "pid").read_text())))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the parent-death signal is Linux's")
