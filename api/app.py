@@ -67,9 +67,7 @@ def create_app(db: Database | None = None) -> FastAPI:
 
 @asynccontextmanager
 async def _lifespan(_app: FastAPI) -> AsyncIterator[None]:
-    """Requests are answered by a few threads, each with its connection to the database: more would only wait for each other.
-
-    The first upload is to be as quick as the others."""
+    """Requests are answered by a few threads, each with its connection to the database: more would only wait for each other."""
     to_thread.current_default_thread_limiter().total_tokens = THREADS
     expect_bundles()
     yield

@@ -49,6 +49,17 @@ def claim_and_certify(url: str, job_id: str, out: multiprocessing.Queue) -> None
     db.close()
 
 
+def test_a_pair_is_expected_to_take_what_it_took_or_else_what_was_forecast(db: Database) -> None:
+    with db.write() as session:
+        job_id = a_running_job(session, 3).id
+    held = claim(db, job_id)
+    assert held is not None
+    save(db, held, [certified(0)])
+    with db.read() as session:
+        assert pairs.expected_seconds(session, job_id, 0) == {0: 0.1, 1: 1.0, 2: 1.0}
+        assert pairs.expected_seconds(session, job_id, 1) == {}
+
+
 def test_processes_that_race_for_pairs_never_share_one(db: Database, database_url: str) -> None:
     with db.write() as session:
         job_id = a_running_job(session, 40).id

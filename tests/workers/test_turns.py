@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import timedelta
 from typing import Any
 
+import numpy as np
 import pytest
 from sqlalchemy import update
 from sqlalchemy.exc import OperationalError
@@ -72,6 +74,19 @@ def test_work_is_done_once(job_id: str) -> None:
     with environment(CIRIS_BATCH_SECONDS="1e-9"):
         assert work_all() == [Piece(job_id, False), Piece(job_id, False), Piece(job_id, True)]
     assert [(row.state, row.attempts) for row in pairs_of(job_id)] == [("certified", 1)] * 3
+
+
+def test_a_pair_that_failed_is_expected_to_take_as_long_the_next_time() -> None:
+    free = slider()
+    cart, post = free.geometries
+    job_id = submit(replace(free, geometries=(cart, replace(post, vertices=np.array([[0.6, 0.0, 0.0]])))), grow_box([0.0], 0.9))
+    for _ in range(2):
+        coordinate(job_id)
+        work_all()
+    coordinate(job_id)
+    first, second = pairs_of(job_id)
+    assert (first.iteration, first.state, second.iteration) == (0, "refuted", 1)
+    assert second.forecast_seconds == first.seconds
 
 
 def test_a_cancelled_job_ends_with_its_open_pairs_skipped(job_id: str) -> None:
