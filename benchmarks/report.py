@@ -152,23 +152,23 @@ def _scaling(document: Document) -> list[str]:
 
 
 def _service(document: Document) -> list[str]:
-    names = {"seconds": "the command", "job_seconds": "the growth", "processor_seconds": "processor time"}
-    rows = [[str(r["turn"]), r["way"], *(f"{r[name]:.1f}" for name in names), f"{r['stolen_seconds']:.1f}"] for r in document["rows"]]
-    found = document["overhead"]
+    parts = {"seeding_seconds": "seeding", "pair_seconds": "pairs", "besides_seconds": "besides"}
+    columns = {"seconds": "the command", **parts, "processor_seconds": "processor time", "stolen_seconds": "stolen by the host"}
+    rows = [[str(row["turn"]), row["way"], *(f"{row[key]:.1f}" for key in columns)] for row in document["rows"]]
     sums = [
         [
-            name,
-            *(f"{median:.1f}" for median in found[key]["medians"].values()),
-            _percent(found[key]["of_medians"]),
-            *[", ".join(map(_percent, found[key]["each"]))],
+            columns[key],
+            *(f"{median:.1f}" for median in more["medians"].values()),
+            _percent(more["share"]),
+            ", ".join(map(_percent, more["each"])),
         ]
-        for key, name in names.items()
+        for key, more in document["more"].items()
     ]
     many = "one solving process" if document["processes"] == 1 else f"{document['processes']} solving processes"
     return [
-        f"{document['scene']}, {many}.",
-        _table(["turn", "way", *names.values(), "stolen by the host"], rows),
-        _table(["seconds of", "service, median", "--local, median", "more", "in each turn"], sums),
+        f"{document['scene']}, {many}, seconds.",
+        _table(["turn", "way", *columns.values()], rows),
+        _table(["", "service, median", "--local, median", "more, of --local's command", "in each turn"], sums),
     ]
 
 

@@ -34,6 +34,8 @@ class _Service:
 def beside_local(name: str, processes: int, turns: int, progress: Progress) -> dict[str, Any]:
     """Grow the example's region in both ways, so often, each time the other way first; the document of ``ciris bench service``.
 
+    Seeding and pairs are the same computations in both, and on a machine that others share they vary by more than all the rest is.
+
     Raises:
         CirisError: the service does not start, a command fails, or the two come to different regions.
     """
@@ -42,29 +44,29 @@ def beside_local(name: str, processes: int, turns: int, progress: Progress) -> d
         for turn in range(turns):
             for way in (SERVICE, LOCAL) if turn % 2 == 0 else (LOCAL, SERVICE):
                 rows.append({"turn": turn, "way": way, **_grown(name, way, service, Path(directory))})
+                if rows[-1]["ellipsoid"] != rows[0]["ellipsoid"]:
+                    raise CirisError("regions_differ", f"the runs came to different regions of {name}")
                 progress(_line(rows[-1]))
-    if len({row["ellipsoid"] for row in rows}) > 1:
-        raise CirisError("regions_differ", f"the runs came to different regions of {name}")
     return {
         "benchmark": "service",
         "machine": measure.machine(),
         "scene": name,
         "processes": processes,
         "rows": rows,
-        "overhead": {what: _overhead(rows, what) for what in ("seconds", "job_seconds", "processor_seconds")},
+        "more": {what: _more(rows, what) for what in ("seconds", "besides_seconds", "processor_seconds")},
     }
 
 
-def _overhead(rows: list[dict[str, Any]], what: str) -> dict[str, Any]:
-    """How much more the service takes: that of the medians, and of every turn."""
-    by_way = {way: [row[what] for row in sorted(rows, key=lambda row: row["turn"]) if row["way"] == way] for way in (SERVICE, LOCAL)}
-    medians = {way: statistics.median(values) for way, values in by_way.items()}
-    each = [service / local - 1 for service, local in zip(by_way[SERVICE], by_way[LOCAL], strict=True)]
-    return {"medians": medians, "of_medians": medians[SERVICE] / medians[LOCAL] - 1, "each": each}
+def _more(rows: list[dict[str, Any]], what: str) -> dict[str, Any]:
+    """The medians, and how much more the service takes, in every turn, as a share of the seconds of the ``--local`` command then."""
+    by_way = {way: [row for row in sorted(rows, key=lambda row: row["turn"]) if row["way"] == way] for way in (SERVICE, LOCAL)}
+    shares = [(mine[what] - other[what]) / other["seconds"] for mine, other in zip(by_way[SERVICE], by_way[LOCAL], strict=True)]
+    medians = {way: statistics.median(row[what] for row in found) for way, found in by_way.items()}
+    return {"medians": medians, "share": statistics.median(shares), "each": shares}
 
 
 def _grown(name: str, way: str, service: _Service, directory: Path) -> dict[str, Any]:
-    """One command: its seconds, those of the growth alone, and the processor time of it and of the service meanwhile."""
+    """One command: its seconds, what it spent besides seeding and pairs, and the processor time of it and of the service meanwhile."""
     command = [*CIRIS, "grow", str(catalogue.ROOT / "examples" / name / "scene.yaml"), "--json", "--out", str(directory / "proof")]
     command += [LOCAL] if way == LOCAL else ["--url", service.url]
     before, start, busy = _stolen(), time.perf_counter(), _processor_seconds(service.pid)
@@ -77,9 +79,12 @@ def _grown(name: str, way: str, service: _Service, directory: Path) -> dict[str,
     if process.returncode != 0:
         raise CirisError("command_failed", f"{' '.join(command)} ended with {process.returncode}: {said.strip()[-300:]}")
     seconds, document = time.perf_counter() - start, json.loads(output)
+    parts = document["provenance"]
     return {
         "seconds": seconds,
-        "job_seconds": document["seconds"],
+        "seeding_seconds": parts["seeding_seconds"],
+        "pair_seconds": parts["pair_seconds"],
+        "besides_seconds": seconds - parts["seeding_seconds"] - parts["pair_seconds"],
         "processor_seconds": usage.ru_utime + usage.ru_stime + _processor_seconds(service.pid) - busy,
         "stolen_seconds": _stolen() - before,
         "ellipsoid": document["volume"]["ellipsoid"],
@@ -126,6 +131,6 @@ def _stolen() -> float:
 
 def _line(row: dict[str, Any]) -> str:
     return (
-        f"{row['turn']} {row['way']}: {row['seconds']:.1f} s, {row['job_seconds']:.1f} of them growing, "
+        f"{row['turn']} {row['way']}: {row['seconds']:.1f} s, {row['besides_seconds']:.1f} of them besides seeding and pairs, "
         f"{row['processor_seconds']:.1f} s of processor time, {row['stolen_seconds']:.1f} s stolen"
     )

@@ -28,12 +28,13 @@ Progress = Callable[[str], None]
 
 @dataclass
 class _Run:
-    """Results of a job so far: iteration -> pair index -> result, and the last accepted region's data."""
+    """Results of a job so far: iteration -> pair index -> result, the seconds of the seeding, and the last accepted region's data."""
 
     scene: Scene
     seed: int
     progress: Progress
     results: dict[int, dict[int, PairResult]] = field(default_factory=dict)
+    seeding_seconds: float = 0.0
     accepted: Accepted | None = None
 
     def certify(self, action: Certify) -> Certification:
@@ -62,7 +63,9 @@ class _Run:
             return self.certify(action)
         if isinstance(action, Propose):
             self.progress("seeding")
-            return proposed(self.scene, action.seed)
+            found = proposed(self.scene, action.seed)
+            self.seeding_seconds = found.info["seconds"]
+            return found
         assert self.accepted is not None, "a step follows an accepted region"
         self.progress("polytope step")
         polytope, witnesses = Polytope(np.array(action.C), np.array(action.d)), np.array(action.contain)
@@ -100,6 +103,8 @@ def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: No
         "versions": versions(scene),
         "reason": transition.action.reason,
         "growth_curve": curve,
+        "seeding_seconds": run.seeding_seconds,
+        "pair_seconds": sum(result.seconds for found in run.results.values() for result in found.values()),
         "seconds": time.perf_counter() - start,
     }
     accepted = run.accepted

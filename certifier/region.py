@@ -38,7 +38,7 @@ def certified_region(scene: Scene, accepted: Accepted, proofs: dict[int, bytes],
 
     Args:
         proofs: pair index -> proof file, for every pair of the scene; one that covers several pairs stands at each of them.
-        provenance: options, seeds, versions, seconds, growth curve.
+        provenance: options, versions, growth curve, and seconds: altogether, of the seeding, of all pairs.
 
     Raises:
         ProofError: the proof does not hold; nothing may be served as certified then.

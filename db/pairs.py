@@ -238,11 +238,16 @@ def iterations(session: Session, job_id: str) -> Sequence[IterationRow]:
     return session.scalars(query.options(defer(IterationRow.arrays, raiseload=True))).all()
 
 
+def seconds(session: Session, job_id: str) -> float:
+    """What the job's pairs took, together."""
+    return session.scalar(select(func.sum(PairRow.seconds)).where(PairRow.job_id == job_id)) or 0.0
+
+
 def expected_seconds(session: Session, job_id: str, iteration: int) -> dict[int, float]:
     """Pair index -> what the pair took in that iteration or, where it was not settled, was expected to; empty without that iteration."""
-    seconds = func.coalesce(PairRow.seconds, PairRow.forecast_seconds)
+    expected = func.coalesce(PairRow.seconds, PairRow.forecast_seconds)
     mine = (PairRow.job_id == job_id, PairRow.iteration == iteration)
-    return {row.pair_index: row.seconds for row in session.execute(select(PairRow.pair_index, seconds.label("seconds")).where(*mine))}
+    return dict(session.execute(select(PairRow.pair_index, expected).where(*mine)).tuples().all())
 
 
 def proving(session: Session, job_id: str, iteration_of: Mapping[int, int]) -> dict[int, PairRow]:

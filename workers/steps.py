@@ -133,6 +133,7 @@ def _proofs(session: Session, job_id: str, iteration_of: Mapping[str, int]) -> d
 def _provenance(session: Session, scene: Scene, job: JobRow) -> dict[str, Any]:
     started = job.started_at or job.created_at
     certified = [row for row in pairs.iterations(session, job.id) if row.state == IterationState.CERTIFIED]
+    seeded = [step.report for step in steps.of_job(session, job.id) if step.kind == StepKind.PROPOSE and step.report is not None]
     return {
         "job": job.id,
         "options": job.options,
@@ -140,5 +141,7 @@ def _provenance(session: Session, scene: Scene, job: JobRow) -> dict[str, Any]:
         "growth_curve": [
             {"iteration": row.index, "seconds": ((row.finished_at or started) - started).total_seconds()} for row in certified
         ],
+        "seeding_seconds": sum(report["info"]["seconds"] for report in seeded),
+        "pair_seconds": pairs.seconds(session, job.id),
         "seconds": (utcnow() - started).total_seconds(),
     }

@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
 import pytest
 
-from benchmarks import agreement, catalogue, compare, growth, report, survey
+from benchmarks import agreement, catalogue, compare, growth, report, service, survey
 from benchmarks.compare import Verdict, verdict
 from certifier.closest import closest
+from certifier.errors import CirisError
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD
 from certifier.outcome import Outcome
@@ -58,6 +60,26 @@ def test_a_region_that_cannot_be_grown_is_a_row_that_says_why(monkeypatch: pytes
     (row,) = growth.growth(["planar_2dof"], against=False, progress=lambda _: None)["ways"]
     assert row["ellipsoid"] == 0
     assert "is at 9," in row["ended"]
+
+
+def test_the_service_is_measured_beside_local() -> None:
+    document = bench("service", "planar_2dof", "--turns", "1")
+    served, local = document["rows"]
+    assert (served["way"], local["way"]) == ("service", "--local")
+    for row in document["rows"]:
+        assert min(row["seeding_seconds"], row["pair_seconds"], row["besides_seconds"], row["processor_seconds"]) > 0
+    more = (served["besides_seconds"] - local["besides_seconds"]) / local["seconds"]
+    assert document["more"]["besides_seconds"]["each"] == [pytest.approx(more)]
+    assert "planar_2dof, one solving process" in report.text(document)
+
+
+def test_runs_that_come_to_different_regions_are_no_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
+    volumes = iter([0.5, 0.6])
+    monkeypatch.setattr(service, "_running", lambda *_: nullcontext())
+    monkeypatch.setattr(service, "_line", str)
+    monkeypatch.setattr(service, "_grown", lambda *_: {"seconds": 1.0, "ellipsoid": next(volumes)})
+    with pytest.raises(CirisError, match="different regions"):
+        service.beside_local("planar_2dof", processes=1, turns=1, progress=lambda _: None)
 
 
 @pytest.mark.parametrize(

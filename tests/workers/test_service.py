@@ -36,6 +36,8 @@ def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(plana
     assert np.all(region.arrays["C"] @ planar.to_s(SEED) <= region.arrays["d"])
     assert region.manifest["guarantee"] == region.guarantee == "exact"
     assert region.ellipsoid_volume == max(volumes)
+    assert 0 < region.manifest["provenance"]["pair_seconds"] < 1.001 * sum(row.seconds or 0 for row in pairs_of(job.id))
+    assert 0 < alone["provenance"]["seeding_seconds"] + alone["provenance"]["pair_seconds"] < alone["provenance"]["seconds"]
     events = events_of(job.id)
     assert [event.seq for event in events] == list(range(1, len(events) + 1))
     assert (events[0].data["state"], events[-1].data["state"]) == ("queued", "succeeded")
