@@ -22,7 +22,6 @@ from certifier.errors import CirisError
 
 CIRIS = [sys.executable, "-m", "client.cli"]
 SERVICE, LOCAL = "service", "--local"
-START_SECONDS = 60.0
 
 
 @dataclass(frozen=True)
