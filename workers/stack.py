@@ -213,7 +213,7 @@ def _reserved_port(settings: Settings, asked: int | None) -> Iterator[int]:
     with socket.socket(family) as holder:
         holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # the last stack's connections may linger
         for port in (asked,) if asked is not None else (settings.port, 0):
-            with suppress(OSError):
+            with suppress(OSError, OverflowError):
                 holder.bind((settings.host, port))
                 break
         else:

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from certifier.errors import CirisError
 from db.leases import _started
 from db.settings import Settings
 from tests.workers.service import ROOT, eventually
@@ -121,6 +122,12 @@ def test_a_port_that_was_asked_for_and_is_taken_is_told(tmp_path: Path) -> None:
         failed = subprocess.run([*COMMAND, "--data", str(tmp_path), "--port", port], cwd=ROOT, capture_output=True, text=True, check=False)
     assert failed.returncode == 2
     assert failed.stderr.startswith(f"error: port: port {port} of 127.0.0.1 can be bound")
+
+
+@pytest.mark.parametrize(("host", "port"), [("127.0.0.1", 65536), ("127.0.0.1", -1), ("192.0.2.1", None)])
+def test_a_port_or_address_that_there_is_not_is_told(tmp_path: Path, host: str, port: int | None) -> None:
+    with pytest.raises(CirisError, match="can be bound"), _reserved_port(Settings(data_dir=tmp_path, host=host), port):
+        pass
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
