@@ -217,7 +217,8 @@ def _reserved_port(settings: Settings, asked: int | None) -> Iterator[int]:
                 holder.bind((settings.host, port))
                 break
         else:
-            problem = f"{'no port' if asked is None else f'port {asked}'} of {settings.host} can be bound"
+            host = settings.host
+            problem = f"no port of {host} can be bound" if asked is None else f"port {asked} of {host} cannot be bound"
             raise CirisError("port_taken", problem, field="port", hint="choose another, or none; CIRIS_HOST is where it is looked for")
         holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 0)
         holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)

@@ -121,12 +121,19 @@ def test_a_port_that_was_asked_for_and_is_taken_is_told(tmp_path: Path) -> None:
         port = str(taken.getsockname()[1])
         failed = subprocess.run([*COMMAND, "--data", str(tmp_path), "--port", port], cwd=ROOT, capture_output=True, text=True, check=False)
     assert failed.returncode == 2
-    assert failed.stderr.startswith(f"error: port: port {port} of 127.0.0.1 can be bound")
+    assert failed.stderr.startswith(f"error: port: port {port} of 127.0.0.1 cannot be bound")
 
 
-@pytest.mark.parametrize(("host", "port"), [("127.0.0.1", 65536), ("127.0.0.1", -1), ("192.0.2.1", None)])
-def test_a_port_or_address_that_there_is_not_is_told(tmp_path: Path, host: str, port: int | None) -> None:
-    with pytest.raises(CirisError, match="can be bound"), _reserved_port(Settings(data_dir=tmp_path, host=host), port):
+@pytest.mark.parametrize(
+    ("host", "port", "problem"),
+    [
+        ("127.0.0.1", 65536, "port 65536 of 127.0.0.1 cannot be bound"),
+        ("127.0.0.1", -1, "port -1 of 127.0.0.1 cannot be bound"),
+        ("192.0.2.1", None, "no port of 192.0.2.1 can be bound"),
+    ],
+)
+def test_a_port_or_address_that_there_is_not_is_told(tmp_path: Path, host: str, port: int | None, problem: str) -> None:
+    with pytest.raises(CirisError, match=problem), _reserved_port(Settings(data_dir=tmp_path, host=host), port):
         pass
 
 
