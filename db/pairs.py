@@ -245,9 +245,9 @@ def seconds(session: Session, job_id: str) -> float:
 
 def expected_seconds(session: Session, job_id: str, iteration: int) -> dict[int, float]:
     """Pair index -> what the pair took in that iteration or, where it was not settled, was expected to; empty without that iteration."""
-    expected = func.coalesce(PairRow.seconds, PairRow.forecast_seconds)
+    expected = func.coalesce(PairRow.seconds, PairRow.forecast_seconds).label("expected")
     mine = (PairRow.job_id == job_id, PairRow.iteration == iteration)
-    return dict(session.execute(select(PairRow.pair_index, expected).where(*mine)).tuples().all())
+    return {row.pair_index: row.expected for row in session.execute(select(PairRow.pair_index, expected).where(*mine))}
 
 
 def proving(session: Session, job_id: str, iteration_of: Mapping[int, int]) -> dict[int, PairRow]:
