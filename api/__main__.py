@@ -45,15 +45,15 @@ def main() -> None:
         access_log=False,
     )
     server = uvicorn.Server(config)
-    server.run(sockets=None if settings().requests_file is None else [_shared_socket(config.host, config.port)])
+    server.run(sockets=None if settings().requests_file is None else [_shared_socket()])
     if not server.started:
         sys.exit(NOT_STARTED)
 
 
-def _shared_socket(host: str, port: int) -> socket.socket:
+def _shared_socket() -> socket.socket:
     """Listens beside the other API processes of this service; the kernel deals out the connections."""
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    return socket.create_server((host, port), family=family, reuse_port=True, backlog=BACKLOG)
+    address = settings().host, settings().port
+    return socket.create_server(address, family=settings().family, reuse_port=True, backlog=BACKLOG)
 
 
 def _frozen_app() -> FastAPI:

@@ -53,13 +53,10 @@ def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes:
         nursery = _Nursery(module)
     try:
         status, answer = nursery.ask(request, timeout_s)
-    except BaseException as error:
-        nursery.kill()
-        if isinstance(error, TimeoutError):
-            raise CirisError("child_timeout", f"it took more than {timeout_s:g} s and was stopped{nursery.tail()}") from None
-        if isinstance(error, (EOFError, ConnectionError)):
-            raise _death(nursery.process.returncode, nursery.tail(), memory_bytes) from None
-        raise
+    except TimeoutError:
+        raise CirisError("child_timeout", f"it took more than {timeout_s:g} s and was stopped{nursery.tail()}") from None
+    except (EOFError, ConnectionError):
+        raise _death(nursery.process.returncode, nursery.tail(), memory_bytes) from None
     tail = nursery.tail()
     if _idle.setdefault(module, nursery) is not nursery:
         nursery.kill()
@@ -95,7 +92,7 @@ class _Nursery:
             )
 
     def ask(self, request: bytes, timeout_s: float) -> tuple[int, bytes]:
-        """How the child ended, and its answer.
+        """How the child ended, and its answer. Whatever is raised, the nursery is killed before.
 
         Raises:
             TimeoutError: the child has not ended in time.
@@ -103,10 +100,14 @@ class _Nursery:
         """
         self._log.seek(0)
         self._log.truncate()
-        self._connection.send_bytes(request)
-        if not self._connection.poll(timeout_s):
-            raise TimeoutError
-        reply = self._connection.recv_bytes()
+        try:
+            self._connection.send_bytes(request)
+            if not self._connection.poll(timeout_s):
+                raise TimeoutError
+            reply = self._connection.recv_bytes()
+        except BaseException:
+            self.kill()
+            raise
         return STATUS.unpack_from(reply)[0], reply[STATUS.size :]
 
     def kill(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from functools import cache
 from pathlib import Path
 
@@ -73,6 +74,11 @@ class Settings(BaseSettings):
     """A job with a pair that would need more memory is refused. Default: this machine's memory, divided by its cores."""
     max_jobs_per_key: int = Field(default=1000, ge=1)
     """How many jobs of one API key may be unfinished (of all callers together where the service asks for no key)."""
+
+    @property
+    def family(self) -> socket.AddressFamily:
+        """That of the API's address."""
+        return socket.AF_INET6 if ":" in self.host else socket.AF_INET
 
     @property
     def loopback(self) -> bool:

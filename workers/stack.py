@@ -124,7 +124,8 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
     data = settings.data_dir.expanduser().absolute()
     (data / "logs").mkdir(parents=True, exist_ok=True)
     with _only_one(data), _stop_signals() as stopping, _socket_directory(data) as sockets, _reserved_port(settings, port) as bound:
-        url = f"http://{settings.host}:{bound}"
+        host = f"[{settings.host}]" if settings.family == socket.AF_INET6 else settings.host
+        url = f"http://{host}:{bound}"
         children = _children(settings, data, sockets / SOCKET)
         environment = _environment(settings, data, sockets / SOCKET, bound)
         migrate.upgrade(settings.database)
@@ -209,8 +210,7 @@ def _wait_until_healthy(url: str, stopping: Callable[[], bool], data: Path) -> b
 @contextmanager
 def _reserved_port(settings: Settings, asked: int | None) -> Iterator[int]:
     """A port that no other program gets while the block runs: bound here without listening, and open to our API processes."""
-    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
-    with socket.socket(family) as holder:
+    with socket.socket(settings.family) as holder:
         holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # the last stack's connections may linger
         for port in (asked,) if asked is not None else (settings.port, 0):
             with suppress(OSError, OverflowError):

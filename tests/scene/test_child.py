@@ -38,7 +38,7 @@ def hog(payload):
 
 def sleep(payload):
     with open(payload["file"], "w") as f:
-        f.write(str(os.getpid()))
+        f.write(f"{os.getpid()} {os.getppid()}")
     time.sleep(60)
 
 def broken(payload):
@@ -121,26 +121,25 @@ def test_time_is_limited(call, tmp_path):
         call("sleep", {"file": str(tmp_path / "pid")}, timeout_s=1.5)
     assert caught.value.code == "child_timeout"
     assert time.monotonic() - started < 10
-    wait_for(lambda: not alive(int((tmp_path / "pid").read_text())))
+    wait_for(lambda: not alive(int((tmp_path / "pid").read_text().split()[0])))
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="the parent-death signal is Linux's")
-def test_the_child_dies_with_its_parent(call, tmp_path):
-    pid_file = tmp_path / "pid"
+@pytest.mark.parametrize("victim", ["caller", "nursery"])
+def test_a_call_ends_with_its_caller_and_with_its_nursery(call, tmp_path, victim):
+    pids = tmp_path / "pid"
     script = f"""
 from certifier.child import run_in_child
-run_in_child("child_functions:sleep", {{"file": {str(pid_file)!r}}}, timeout_s=60, memory_bytes=2 << 30)
+run_in_child("child_functions:sleep", {{"file": {str(pids)!r}}}, timeout_s=60, memory_bytes=2 << 30)
 """
     root = str(Path(__file__).parents[2])
-    parent = subprocess.Popen([sys.executable, "-c", script], env={**os.environ, "PYTHONPATH": os.pathsep.join([root, str(tmp_path)])})
-    try:
-        wait_for(lambda: pid_file.exists() and pid_file.read_text())
-        called = int(pid_file.read_text())
-        nursery = int(Path(f"/proc/{called}/stat").read_text().rsplit(")", 1)[1].split()[1])
-    finally:
-        parent.send_signal(signal.SIGKILL)
-        parent.wait()
-    wait_for(lambda: not alive(called) and not alive(nursery))
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([root, str(tmp_path)])}
+    with subprocess.Popen([sys.executable, "-c", script], env=environment, stderr=subprocess.PIPE, text=True) as caller:
+        wait_for(lambda: pids.exists() and len(pids.read_text().split()) == 2)
+        called, nursery = map(int, pids.read_text().split())
+        os.kill(caller.pid if victim == "caller" else nursery, signal.SIGKILL)
+        wait_for(lambda: not alive(called) and not alive(nursery))
+        said = caller.communicate(timeout=20)[1]
+    assert ("the process died (signal SIGKILL)" in said) == (victim == "nursery")
 
 
 def test_the_module_stays_loaded_for_the_next_call_and_keeps_nothing_of_it(call):
@@ -166,18 +165,6 @@ def test_a_nursery_that_died_or_was_killed_with_its_call_is_replaced(call, tmp_p
         call("sleep", {"file": str(tmp_path / "pid")}, timeout_s=1.0)
     assert not alive(other)
     assert call("count")["nursery"] != other
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="the parent-death signal is Linux's")
-def test_a_call_ends_with_its_nursery(call, tmp_path):
-    with ThreadPoolExecutor(1) as pool:
-        calling = pool.submit(call, "sleep", {"file": str(tmp_path / "pid")})
-        wait_for(lambda: (tmp_path / "pid").exists() and (tmp_path / "pid").read_text())
-        called = int((tmp_path / "pid").read_text())
-        os.kill(int(Path(f"/proc/{called}/stat").read_text().rsplit(")", 1)[1].split()[1]), signal.SIGKILL)
-        with pytest.raises(CirisError, match="SIGKILL"):
-            calling.result(20)
-    wait_for(lambda: not alive(called))
 
 
 def test_a_death_says_nothing_of_calls_before(call):

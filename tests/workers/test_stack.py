@@ -28,9 +28,12 @@ COMMAND = [sys.executable, "-m", "workers.stack"]
 class Stack:
     """A running stack and what its stack.json says."""
 
-    def __init__(self, data: Path) -> None:
+    def __init__(self, data: Path, **own: str) -> None:
         self.data = data
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")} | {"CIRIS_API_PROCESSES": "2"}
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")} | {
+            "CIRIS_API_PROCESSES": "2",
+            **own,
+        }
         self.process = subprocess.Popen([*COMMAND, "--data", str(data)], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
         assert self.process.stdout.readline() == f"ciris is up at {self.description['url']}\n"
@@ -46,6 +49,12 @@ class Stack:
         except OSError:
             return False
 
+    def close(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+
 
 @pytest.fixture
 def stack(tmp_path: Path) -> Iterator[Stack]:
@@ -53,10 +62,7 @@ def stack(tmp_path: Path) -> Iterator[Stack]:
     try:
         yield running
     finally:
-        running.process.kill()
-        running.process.wait()
-        assert running.process.stdout is not None
-        running.process.stdout.close()
+        running.close()
 
 
 def gone(pids: dict[str, int]) -> bool:
@@ -80,6 +86,15 @@ def test_what_dies_is_started_again_and_a_stop_leaves_nothing(stack: Stack) -> N
     assert stack.process.wait(30) == 0
     assert gone(after)
     assert not (stack.data / "stack.json").exists()
+
+
+def test_an_address_of_ipv6_is_served(tmp_path: Path) -> None:
+    stack = Stack(tmp_path / "data", CIRIS_HOST="::1")
+    try:
+        assert stack.description["url"].startswith("http://[::1]:")
+        eventually(stack.ready, "the service is ready")
+    finally:
+        stack.close()
 
 
 def test_the_processes_of_the_api_share_the_port_and_count_together(stack: Stack) -> None:
