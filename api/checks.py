@@ -10,7 +10,7 @@ import numpy as np
 from api.schemas.jobs import PolytopeBody, Seed, WebhookRequest
 from certifier.errors import CirisError, RegionError
 from certifier.model import Array, Scene
-from certifier.seed_options import SeedOptions
+from certifier.seeding.options import SeedOptions
 from db.settings import settings
 from workers.addresses import is_public
 

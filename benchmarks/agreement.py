@@ -18,11 +18,12 @@ from benchmarks.arms import random_arm, random_faces
 from benchmarks.catalogue import Region
 from benchmarks.compare import Verdict, same_program, verdict
 from benchmarks.measure import Progress
-from certifier.forecast import forecast
+from certifier.jobs.reference import Reference
 from certifier.model import Pair, Scene
 from certifier.outcome import Outcome
-from certifier.pair import PairResult, certify_pair
-from certifier.reference import Reference
+from certifier.pair.certification import certify_pair
+from certifier.pair.forecast import forecast
+from certifier.pair.result import PairResult
 
 BOXES, ROUND = 60, 40
 """Random arms with boxes alone, and with balls and capsules among them."""

@@ -11,10 +11,10 @@ from benchmarks import catalogue, measure
 from benchmarks.catalogue import Instance, Region
 from benchmarks.measure import Ours, Progress
 from certifier.errors import CirisError
-from certifier.forecast import PairCost, forecast
+from certifier.jobs.reference import ReferenceResult
 from certifier.model import Pair, Scene
 from certifier.outcome import Outcome
-from certifier.reference import ReferenceResult
+from certifier.pair.forecast import PairCost, forecast
 
 
 class Verdict(StrEnum):
@@ -120,7 +120,7 @@ def _row(scene: Scene, cost: PairCost, ours: Ours, theirs: ReferenceResult | Non
         "vertices": cost.rationals,
         "ciris": {
             "outcome": result.outcome.value,
-            "stage": result.stage.value,
+            "stage": result.stage,
             "detail": result.detail,
             "margin": result.margin,
             "covers": ours.covers,

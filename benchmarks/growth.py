@@ -9,12 +9,12 @@ from typing import Any
 
 from benchmarks import catalogue, measure
 from benchmarks.measure import Progress
-from certifier.ellipsoid import inscribed_ellipsoid
 from certifier.errors import CirisError
-from certifier.growth_options import GrowthOptions
-from certifier.local import grow
+from certifier.growth.options import GrowthOptions
+from certifier.jobs.local import grow
+from certifier.jobs.reference import Reference
 from certifier.model import Array, Scene
-from certifier.reference import Reference
+from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.verify.region import verify_region
 
 WAYS: dict[str, dict[str, Any]] = {

@@ -15,12 +15,13 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from benchmarks.catalogue import Region
-from certifier.disproof import DualProof, WitnessProof
+from certifier.jobs.reference import Reference, ReferenceResult
 from certifier.model import Scene
 from certifier.outcome import Outcome
-from certifier.pair import Certification, PairResult
-from certifier.proof import PairProof
-from certifier.reference import Reference, ReferenceResult
+from certifier.pair.certification import Certification
+from certifier.pair.result import PairResult
+from certifier.proof.negative import DualProof, WitnessProof
+from certifier.proof.pair import PairProof
 from certifier.verify.dual import verify_dual
 from certifier.verify.pair import PairCheck
 from certifier.verify.witness import verify_witness

@@ -14,9 +14,9 @@ from benchmarks.arms import box, serial_arm
 from benchmarks.catalogue import Region, cube, tangent
 from benchmarks.measure import Progress
 from benchmarks.svg import Panel, draw
-from certifier.closest import closest
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Array, Geometry, Pair, Scene
+from certifier.pair.closest import closest
 
 OBSTACLES = (10, 30, 100, 300, 1000)
 JOINTS = range(2, 8)

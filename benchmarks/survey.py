@@ -14,11 +14,12 @@ from scipy.optimize import nnls
 from benchmarks import catalogue, measure
 from benchmarks.catalogue import Region
 from benchmarks.measure import Progress
-from certifier.forecast import SECONDS, forecast, terms
 from certifier.model import Pair, Scene
 from certifier.outcome import Outcome, Stage
-from certifier.pair import Certification, PairResult
-from certifier.proof import PairProof
+from certifier.pair.certification import Certification
+from certifier.pair.forecast import SECONDS, forecast, terms
+from certifier.pair.result import PairResult
+from certifier.proof.pair import PairProof
 
 DECIDED = (Outcome.CERTIFIED, Outcome.REFUTED, Outcome.NOT_CERTIFIABLE)
 

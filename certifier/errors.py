@@ -34,3 +34,7 @@ class SceneError(CirisError):
 
 class RegionError(CirisError):
     """The polytope or the seed cannot be used: empty, unbounded, in collision, outside the limits, wrong length."""
+
+
+class ProofError(CirisError):
+    """The proof does not hold, or the file is not one."""

@@ -304,3 +304,62 @@ class Polytope:
     def contains(self, s: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
         """Which of the points s, (..., n), satisfy C s <= d + tolerance."""
         return np.all(np.asarray(s) @ self.C.T <= self.d + tolerance, axis=-1)
+
+
+@dataclass(frozen=True)
+class Box:
+    """Coordinates u = (s - mid)/half of a box that contains the polytope; (n,) each."""
+
+    mid: Array
+    half: Array
+
+    @classmethod
+    def around(cls, lower: Array, upper: Array) -> Box:
+        """The box of these bounds, rounded outwards to numbers with few bits."""
+        mid = (lower + upper) / 2
+        return cls(mid, np.nextafter(np.maximum(upper - mid, mid - lower) * (1 + 1e-12), np.inf))
+
+    @property
+    def lower(self) -> Array:
+        """The least doubles inside."""
+        return np.nextafter(self.mid - self.half, np.inf)
+
+    @property
+    def upper(self) -> Array:
+        """The largest doubles inside."""
+        return np.nextafter(self.mid + self.half, -np.inf)
+
+    def to_u(self, s: Array) -> Array:
+        return (s - self.mid) / self.half
+
+
+@dataclass(frozen=True)
+class Volume:
+    """A convex body conv(vertices) + ball(radius), fixed to a link, that contains every geometry it names and stands for all of them.
+
+    Attributes:
+        geometries: names.
+        body: whose frame the vertices are in; the geometries' own bodies are welded to it, or it is theirs.
+        vertices: (V, 3) metres.
+        radius: metres; the scene's padding comes on top.
+    """
+
+    geometries: tuple[str, ...]
+    body: str
+    vertices: Array
+    radius: float
+
+    @classmethod
+    def of(cls, geometry: Geometry) -> Volume:
+        """The geometry itself."""
+        return cls((geometry.name,), geometry.body, geometry.vertices, geometry.radius)
+
+    def is_geometry_of(self, scene: Scene) -> bool:
+        """Whether it is exactly the one geometry that it names."""
+        geometry = scene.geometry(self.geometries[0])
+        return (
+            len(self.geometries) == 1
+            and self.body == geometry.body
+            and self.radius == geometry.radius
+            and np.array_equal(self.vertices, geometry.vertices)
+        )

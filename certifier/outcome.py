@@ -21,9 +21,7 @@ class Outcome(StrEnum):
 class Stage(StrEnum):
     """Which part of the certifier settled a pair."""
 
-    LIMITS = "limits"
     SCREEN = "screen"
-    BROAD_PHASE = "broad_phase"
     SOS = "sos"
 
 

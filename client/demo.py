@@ -66,7 +66,7 @@ def _demonstrate(url: str) -> bool:
 
 
 def _verified(proof: bytes) -> bool:
-    from certifier.proof_file import ProofError
+    from certifier.errors import ProofError
     from certifier.verify.region import verify_region
 
     try:

@@ -27,8 +27,8 @@ def load(scene: str) -> Scene:
 def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], screen: Screen) -> Grown:
     """Grows a region here."""
     loaded = load(scene)
-    from certifier import local
-    from certifier.growth_options import GrowthOptions
+    from certifier.growth.options import GrowthOptions
+    from certifier.jobs import local
 
     region = local.grow(loaded, GrowthOptions.from_document({"kind": "grow", "seed": seed, **options}), screen.status)
     screen.clear()
@@ -41,11 +41,11 @@ def certify(scene: str, polytope: PolytopeFile, screen: Screen, watch: bool, dra
     loaded = load(scene)
     progress = screen.line if watch else screen.status
     if drake is None:
-        from certifier import local
+        from certifier.jobs import local
 
         document = local.certify(loaded, polytope.C, polytope.d, polytope.center, progress)
     else:
-        from certifier import reference
+        from certifier.jobs import reference
 
         document = reference.certify(loaded, polytope.C, polytope.d, drake, progress)
     screen.clear()

@@ -98,9 +98,9 @@ class JobRow(Base):
     error: Mapped[Document | None]
     """CirisError.to_document() when it failed."""
     options: Mapped[Document]
-    """certifier.growth_options.GrowthOptions.to_document()"""
+    """certifier.growth.options.GrowthOptions.to_document()"""
     growth: Mapped[Document | None] = mapped_column(deferred=True)
-    """The state of certifier.growth after the last transition."""
+    """The state of certifier.growth.machine after the last transition."""
     action: Mapped[Document | None] = mapped_column(deferred=True)
     """The action that this state waits for."""
     idempotency_key: Mapped[str | None] = mapped_column(String(255), unique=True)

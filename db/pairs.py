@@ -58,7 +58,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Result:
-    """What came of one pair; the fields are those of certifier.pair.PairResult, and the CirisError document of an ``error``."""
+    """What came of one pair; the fields are those of certifier.pair.result.PairResult, and the CirisError document of an ``error``."""
 
     index: int
     state: PairState

@@ -22,7 +22,7 @@ def main() -> None:
 
     from celery.signals import setup_logging, worker_process_init, worker_ready
 
-    from certifier.child import prepare
+    from certifier.isolation.child import prepare
     from db import logs
     from db.session import database
     from db.settings import settings

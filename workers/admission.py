@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from certifier.errors import CirisError
-from certifier.forecast import PairCost
+from certifier.pair.forecast import PairCost
 from db.settings import Settings
 
 

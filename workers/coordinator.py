@@ -1,6 +1,6 @@
 """What happens next in a job, as pure functions: from what the database holds to what it shall hold.
 
-:mod:`certifier.growth` decides about the mathematics (which polytope is certified next); this module turns its actions into rows
+:mod:`certifier.growth.machine` decides about the mathematics (which polytope is certified next); this module turns its actions into rows
 and the rows' outcomes into its reports, and says how a job ends. Nothing here reads or writes anything.
 """
 
@@ -9,11 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from certifier.growth import advance, begin
-from certifier.growth_actions import Failed, Proposed, Report, Stepped, Transition
-from certifier.growth_options import GrowthOptions
+from certifier.growth.actions import Failed, Report, Stepped, Transition
+from certifier.growth.machine import advance, begin
+from certifier.growth.options import GrowthOptions
 from certifier.model import Scene
 from certifier.outcome import Outcome
+from certifier.seeding.proposal import Proposal
 from db.states import JobKind, JobState, StepKind, StepState
 
 
@@ -31,7 +32,7 @@ def step_report(kind: StepKind, state: StepState, report: dict[str, Any]) -> Rep
     """The report of a seeding or a polytope step from its row."""
     if state == StepState.FAILED:
         return Failed(report)
-    return Proposed(**report) if kind == StepKind.PROPOSE else Stepped(**report)
+    return Proposal.from_document(report) if kind == StepKind.PROPOSE else Stepped(**report)
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from functools import lru_cache, partial
 from structlog.contextvars import bound_contextvars
 
 from certifier.errors import CirisError
-from certifier.growth_options import GrowthOptions
+from certifier.growth.options import GrowthOptions
+from certifier.jobs.reports import weakness
 from certifier.model import Polytope
-from certifier.pair import Certification
-from certifier.reports import weakness
+from certifier.pair.certification import Certification
 from db import jobs, leases, pairs
 from db.models import IterationRow, PairRow
 from db.session import database
@@ -69,7 +69,7 @@ def _certify(claim: pairs.Claim, pair: pairs.Claimed) -> pairs.Result:
     return pairs.Result(
         index=pair.index,
         state=PairState(found.outcome.value),
-        stage=found.stage.value,
+        stage=found.stage,
         margin=found.margin,
         seconds=found.seconds,
         detail=found.detail,

@@ -12,13 +12,13 @@ import numpy as np
 from sqlalchemy.orm import Session
 from structlog.contextvars import bound_contextvars
 
-from certifier.child import run_in_child
 from certifier.errors import CirisError
-from certifier.growth_actions import Accepted
+from certifier.growth.actions import Accepted
+from certifier.isolation.child import run_in_child
+from certifier.jobs.region import certified_region, versions
+from certifier.jobs.reports import stepped
 from certifier.model import Polytope, Scene
-from certifier.polytope_step import step as polytope_step
-from certifier.region import certified_region, versions
-from certifier.reports import stepped
+from certifier.step.step import step as polytope_step
 from db import jobs, leases, pairs, proofs, regions, steps
 from db.models import JobRow, StepRow
 from db.session import database
@@ -32,7 +32,7 @@ from workers.transaction import persistently
 
 log = logging.getLogger(__name__)
 
-SEEDING = "certifier.seeding:propose_in_child"
+SEEDING = "certifier.seeding.propose:propose_in_child"
 
 
 @dataclass(frozen=True)

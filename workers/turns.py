@@ -16,8 +16,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from certifier.forecast import PairCost, forecast
-from certifier.growth_actions import (
+from certifier.growth.actions import (
     Certification,
     Certify,
     Finish,
@@ -29,6 +28,7 @@ from certifier.growth_actions import (
     action_to_document,
 )
 from certifier.outcome import Outcome
+from certifier.pair.forecast import PairCost, forecast
 from db import jobs, leases, pairs, steps, work
 from db.models import IterationRow, JobRow
 from db.session import database

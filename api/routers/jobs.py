@@ -36,7 +36,7 @@ from api.schemas.scenes import PairInfo
 from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Stage
-from certifier.proof_file import with_scene
+from certifier.proof.container import with_scene
 from db import jobs, pairs, proofs, regions, scenes, webhooks
 from db.models import IterationRow, PairRow
 from db.states import IterationState, JobKind, JobState, PairState
@@ -84,7 +84,7 @@ def create_job(
 
 
 def _options(body: GrowRequest | CertifyRequest, scene: Scene) -> dict[str, Any]:
-    """The document of certifier.growth_options.GrowthOptions that the request asks for, its numbers checked against the scene."""
+    """The document of certifier.growth.options.GrowthOptions that the request asks for, its numbers checked against the scene."""
     if isinstance(body, GrowRequest):
         return {"kind": "grow", "seed": checks.seed(scene, body.seed).to_document(), **body.options.model_dump()}
     checks.polytope(scene, body.polytope)

@@ -15,7 +15,7 @@ from api.children import Children
 from api.reading import ReadingRoute
 from api.schemas.common import Cursor
 from api.schemas.regions import RegionDetail, RegionPage, RegionSummary, Verification
-from certifier.child import run_in_child
+from certifier.isolation.child import run_in_child
 from db import jobs, proofs, regions, scenes
 from db.session import Database
 from db.settings import settings

@@ -13,7 +13,7 @@ from api.reading import ReadingRoute
 from api.scene_cache import scene_of
 from api.schemas.common import Cursor
 from api.schemas.scenes import IgnoredPair, LintReport, PairForecast, SceneDetail, ScenePage, ScenePairs, SceneSummary, Substitution
-from certifier.forecast import forecast
+from certifier.pair.forecast import forecast
 from certifier.scene.bundle import load_bundle
 from db import scenes
 from db.models import SceneRow

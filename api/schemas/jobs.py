@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector
 from api.schemas.scenes import PairInfo
 from certifier.outcome import Outcome, Stage
-from certifier.seed_options import Method
+from certifier.seeding.options import Method
 from db.models import EventRow, JobRow, WebhookRow
 from db.states import IterationState, JobKind, JobState, PairState, WebhookState
 

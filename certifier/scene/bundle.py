@@ -13,8 +13,8 @@ import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from certifier.child import prepare
 from certifier.errors import CirisError, SceneError
+from certifier.isolation.child import prepare
 from certifier.model import Scene
 from certifier.scene.file import read_scene_file
 from certifier.scene.load import read_in_child

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from certifier.drake_model import build_diagram, geometry_name
 from certifier.model import Geometry, Pair, Scene
+from certifier.scene.drake_model import build_diagram, geometry_name
 from certifier.scene.tree import Tree
 
 _SAMPLES = 40

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from certifier.child import run_in_child
 from certifier.errors import CirisError, SceneError
+from certifier.isolation.child import run_in_child
 from certifier.model import Scene
 
 

@@ -13,32 +13,12 @@ Every bound, and the affine remainder in brackets, is a nonnegative combination 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from certifier.model import Array
+from certifier.proof.region import Archimedean
 from certifier.verify.box import check_box, upper_bound
 from certifier.verify.kinematics import exact
-
-
-@dataclass(frozen=True)
-class Archimedean:
-    """Numbers that show P to be Archimedean.
-
-    Attributes:
-        N: |s|^2 <= N on P.
-        lower, upper: (n,) l and u, the box.
-        Y_lower, Y_upper: (n, m) multipliers of the faces that prove the box.
-        y: (m,) multipliers that prove the remainder.
-    """
-
-    N: float
-    lower: Array
-    upper: Array
-    Y_lower: Array
-    Y_upper: Array
-    y: Array
 
 
 def check_archimedean(C: Array, d: Array, proof: Archimedean) -> bool:

@@ -8,7 +8,7 @@ Let x_v be functionals whose localising matrices Lambda_j(x_v) = x_v(g_j rho rho
 
 Where no radius is involved and R = 0, it follows that t <= 0. Where one is, the rows R_a of R that belong to a need not vanish: with
 Y = [[Yaa, -R_a/2], [-R_a'/2, Ybb]] psd, Ybb_ii <= Ybb_00 and tr Yaa + Ybb_00 <= sum_v r_v x_v(den), the matrix inequality by which
-kappa bounds |a| (certifier.program) gives <Z_a, R_a> <= kappa sum_v r_v x_v(den).
+kappa bounds |a| (certifier.pair.program) gives <Z_a, R_a> <= kappa sum_v r_v x_v(den).
 
 R never vanishes in floating point. The proof names as many moments as R has entries to vanish; changing them by c, G c = -R, makes R
 zero, and |c| is bounded by ball arithmetic. Every matrix is then shown to be positive definite whatever such a change does: it is reduced
@@ -25,10 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 from flint import Ordering, arb, arb_mat, ctx, fmpq, fmpq_mpoly_ctx
 
-from certifier.disproof import DualProof
-from certifier.model import Array, Pair
-from certifier.proof import Volume
-from certifier.proof_file import ProofError
+from certifier.errors import ProofError
+from certifier.model import Array, Pair, Volume
+from certifier.proof.negative import DualProof
 from certifier.verify import limbs
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.moments import localised, table

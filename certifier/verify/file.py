@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from certifier.disproof import DualProof, WitnessProof
+from certifier.errors import ProofError
 from certifier.model import Scene
 from certifier.outcome import Guarantee
-from certifier.proof import PairProof, RegionProof
-from certifier.proof_file import ProofError, header_of, malformed
+from certifier.proof.container import header_of, malformed
+from certifier.proof.negative import DualProof, WitnessProof
+from certifier.proof.pair import PairProof
+from certifier.proof.region import RegionProof
 from certifier.verify.dual import verify_dual
 from certifier.verify.pair import verify_pair
 from certifier.verify.region import verify_region
@@ -74,7 +76,7 @@ def answer(data: bytes) -> dict[str, Any]:
 
 
 def answer_about_region(payload: dict[str, Any]) -> dict[str, Any]:
-    """The answer about a stored proof, as a child process gives it (certifier.child): it has to be of that very region.
+    """The answer about a stored proof, as a child process gives it (certifier.isolation.child): it has to be of that very region.
 
     Args:
         payload: ``proof`` in base 64; ``scene_hash``, ``C`` and ``d`` of the region.

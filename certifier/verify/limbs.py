@@ -16,8 +16,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from certifier.errors import ProofError
 from certifier.model import Array
-from certifier.proof_file import ProofError
 
 BITS = 16
 BASE = float(1 << BITS)

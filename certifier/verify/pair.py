@@ -1,4 +1,4 @@
-"""Exact check of one pair's proof (certifier.proof): what it states is true of the scene's numbers, or ProofError says why not.
+"""Exact check of one pair's proof (certifier.proof.pair): what it states is true of the scene's numbers, or ProofError says why not.
 
 With every vertex's residual e_v on the box bounded (certifier.verify.residual), and den >= sigma,
 
@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from flint import Ordering, arb, fmpq, fmpq_mpoly_ctx
 
-from certifier.model import Pair, Scene
-from certifier.proof import Ground, PairProof, Volume
-from certifier.proof_file import ProofError
+from certifier.errors import ProofError
+from certifier.model import Pair, Scene, Volume
+from certifier.proof.pair import Ground, PairProof
 from certifier.verify.box import check_box
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.residual import Numerators, largest_residual

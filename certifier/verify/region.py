@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from certifier.errors import ProofError
 from certifier.model import Pair, Scene
-from certifier.proof import Ground, RegionProof
-from certifier.proof_file import ProofError
+from certifier.proof.pair import Ground
+from certifier.proof.region import RegionProof
 from certifier.verify.archimedean import check_archimedean
 from certifier.verify.box import holds
 from certifier.verify.kinematics import exact

@@ -20,9 +20,9 @@ from functools import lru_cache
 import numpy as np
 from flint import fmpq
 
-from certifier.model import Array
-from certifier.proof import Side, Volume, lower_triangle
-from certifier.proof_file import ProofError
+from certifier.errors import ProofError
+from certifier.model import Array, Volume
+from certifier.proof.pair import Side, lower_triangle
 from certifier.verify import limbs
 from certifier.verify.kinematics import ExactKinematics, exact
 

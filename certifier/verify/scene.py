@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from certifier.errors import ProofError
 from certifier.model import WORLD, Joint, JointKind, Scene
-from certifier.proof_file import LARGEST, ProofError, malformed
+from certifier.proof.container import LARGEST, malformed
 
 RIGID = 1e-9
 """How far the numbers of a rotation or of an axis may be from orthonormal; those of a parsed model are so to about 1e-16."""

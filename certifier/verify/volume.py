@@ -15,9 +15,8 @@ from collections.abc import Sequence
 
 from flint import fmpq
 
-from certifier.model import Array, Geometry, Scene
-from certifier.proof import Volume
-from certifier.proof_file import ProofError
+from certifier.errors import ProofError
+from certifier.model import Array, Geometry, Scene, Volume
 from certifier.verify.kinematics import ExactKinematics, exact
 
 Point = tuple[fmpq, ...]

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from flint import fmpq
 
-from certifier.disproof import WitnessProof
+from certifier.errors import ProofError
 from certifier.model import Array, Pair
-from certifier.proof_file import ProofError
+from certifier.proof.negative import WitnessProof
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.scene import check_scene
 

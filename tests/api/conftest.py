@@ -13,9 +13,9 @@ import uvicorn
 from fastapi.testclient import TestClient
 
 from api.app import create_app
+from certifier.jobs.region import Region, certified_region
 from certifier.model import Scene
-from certifier.pair import Certification
-from certifier.region import Region, certified_region
+from certifier.pair.certification import Certification
 from db import jobs, pairs, regions, scenes
 from db.session import Database
 from db.settings import settings

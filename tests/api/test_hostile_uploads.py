@@ -20,7 +20,7 @@ from certifier.errors import SceneError
 from certifier.scene.bundle import BundleLimits, pack_bundle
 from certifier.scene.unpack import unpack
 from tests.api.conftest import PROBLEM
-from tests.scene.workshop import ARM, BOX, LIMIT, ROOM, SCENE
+from tests.certifier.scene.workshop import ARM, BOX, LIMIT, ROOM, SCENE
 
 HONEST = {
     "bundle.json": '{"scene": "scene.yaml"}',

@@ -9,9 +9,9 @@ from fastapi.testclient import TestClient
 
 from api.app import create_app
 from api.schemas.jobs import GrowOptions, Seed
-from certifier.growth_options import GrowthOptions
+from certifier.growth.options import GrowthOptions
 from certifier.model import Scene
-from certifier.seed_options import SeedOptions
+from certifier.seeding.options import SeedOptions
 from db import jobs, pairs
 from db.session import Database
 from tests.api.conftest import BASE_URL, PROBLEM

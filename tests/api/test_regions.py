@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from certifier.jobs.region import Region, certified_region
 from certifier.model import Scene
-from certifier.pair import Certification
-from certifier.region import Region, certified_region
+from certifier.pair.certification import Certification
 from certifier.verify.file import verify_file
 from certifier.verify.region import verify_region
 from db import pairs, regions

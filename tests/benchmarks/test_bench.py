@@ -13,11 +13,11 @@ import pytest
 
 from benchmarks import agreement, catalogue, compare, growth, report, service, survey
 from benchmarks.compare import Verdict, verdict
-from certifier.closest import closest
 from certifier.errors import CirisError
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD
 from certifier.outcome import Outcome
+from certifier.pair.closest import closest
 
 
 def bench(*arguments: str) -> dict[str, Any]:

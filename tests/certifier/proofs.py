@@ -7,13 +7,13 @@ from functools import cache
 
 import numpy as np
 
-from certifier.disproof import DualProof, WitnessProof
+from certifier.jobs.region import certified_region
 from certifier.model import WORLD, Pair, Scene
 from certifier.outcome import Outcome
-from certifier.pair import Certification
-from certifier.proof import PairProof
-from certifier.proof_file import with_scene
-from certifier.region import certified_region
+from certifier.pair.certification import Certification
+from certifier.proof.container import with_scene
+from certifier.proof.negative import DualProof, WitnessProof
+from certifier.proof.pair import PairProof
 from tests.certifier.scenes import accepted, ball, box, cube, planar_arm
 
 

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from certifier.growth_actions import Accepted
+from certifier.growth.actions import Accepted
 from certifier.kinematics import rotation
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
 

@@ -13,8 +13,8 @@ import httpx2
 import numpy as np
 import pytest
 
+from certifier.jobs.region import Region
 from certifier.model import Scene
-from certifier.region import Region
 from certifier.verify.region import verify_region
 from client.cli import _joined
 from client.find import data_dir

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import inspect
 
-from certifier.growth_actions import Certify, action_from_document, action_to_document
+from certifier.growth.actions import Certify, action_from_document, action_to_document
 from db import jobs, migrate, pairs, scenes
 from db.session import Database
 from tests.db.builders import a_running_job

@@ -9,8 +9,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 
 from certifier.model import Array, Pair, Polytope, Scene
-from certifier.polytope import chebyshev_center
-from certifier.sampling import hit_and_run
+from certifier.polytopes.polytope import chebyshev_center
+from certifier.polytopes.sampling import hit_and_run
 from certifier.scene.file import read_scene_file
 
 

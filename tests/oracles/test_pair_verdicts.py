@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from benchmarks.arms import random_arm, random_faces
+from certifier.jobs.reference import Reference
 from certifier.model import WORLD, JointKind
 from certifier.outcome import Outcome
-from certifier.pair import certify_pair
-from certifier.reference import Reference
+from certifier.pair.certification import certify_pair
 from tests.certifier.scenes import ball, box, planar_arm
 
 FAR_BOX = box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (2.0, 1.2, 0.0))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import yaml
 
-from certifier.growth_options import GrowthOptions
-from certifier.local import grow
+from certifier.growth.options import GrowthOptions
+from certifier.jobs.local import grow
 from certifier.model import Polytope
 from certifier.scene import load_scene
 from tests.certifier.scenes import cube

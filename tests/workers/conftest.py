@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import yaml
 
-from certifier.forecast import forecast
 from certifier.model import Scene
+from certifier.pair.forecast import forecast
 from certifier.scene import load_scene
 from tests.services import Queue, queue_server
 from tests.workers.service import Service, running_service

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from certifier.growth_actions import Failed, Proposed
+from certifier.growth.actions import Failed
 from certifier.outcome import Outcome
+from certifier.seeding.proposal import Proposal
 from db.states import JobState, StepKind, StepState
 from tests.scenes import slider
 from tests.workers.options import box_around
@@ -14,7 +15,9 @@ from workers.coordinator import ending, next_transition, step_report
 
 def test_the_report_of_a_step_is_what_it_found_or_its_error() -> None:
     found = {"C": [[1.0]], "d": [1.0], "center": [0.0], "contain": [], "info": {}}
-    assert step_report(StepKind.PROPOSE, StepState.DONE, found) == Proposed(**found)
+    proposal = step_report(StepKind.PROPOSE, StepState.DONE, found)
+    assert isinstance(proposal, Proposal)
+    assert proposal.to_document() == found
     assert step_report(StepKind.STEP, StepState.FAILED, {"code": "x"}) == Failed({"code": "x"})
 
 

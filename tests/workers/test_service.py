@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from certifier.growth_options import GrowthOptions
-from certifier.local import grow
+from certifier.growth.options import GrowthOptions
+from certifier.jobs.local import grow
 from certifier.model import Scene
 from certifier.verify.region import verify_region
 from db import jobs, pairs, proofs, regions

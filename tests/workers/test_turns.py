@@ -13,8 +13,8 @@ from sqlalchemy import update
 from sqlalchemy.exc import OperationalError
 
 from certifier.errors import CirisError
-from certifier.forecast import forecast
 from certifier.outcome import Outcome
+from certifier.pair.forecast import forecast
 from db import jobs, pairs, regions, steps
 from db.models import JobRow, PairRow, ProofRow, StepRow
 from db.session import database

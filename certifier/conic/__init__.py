@@ -1,0 +1,1 @@
+"""Weighted sums of squares as cones, and the interior-point methods over them."""

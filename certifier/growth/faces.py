@@ -1,0 +1,168 @@
+"""Targeted contraction: faces that cut away where the program (11) of a pair fails, and little else.
+
+A pair that is not certifiable comes with the means of its dual point's pseudo-moments, where no plane of this degree works, and with the
+derivatives of the program's optimum for the joints' ranges. The polytope is measured by an ellipsoid about its analytic centre, a
+distance in it being seen from the hull of the centre and the points to keep.
+
+    a mean farther than ``near``     -> a face between it and the hull
+    all means nearer                 -> the pair fails because it turns too far: the joint where that helps most gets a shorter
+                                        range, all its joints do when that has not helped for long
+    a collision                      -> a face, wherever it is
+
+Faces have normals in the joints between the two bodies only: the other joints do not move the one relative to the other. Where only planes
+at rest were tried the program knows the joints' ranges alone, and faces have normals in one joint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import nnls
+
+from certifier.model import Array, Polytope, Scene
+from certifier.polytopes.polytope import bounds, drop_redundant
+
+BACKOFF, BACKOFF_GROWTH, LARGEST_BACKOFF = 0.2, 1.2, 0.6
+"""How far a face moves from the mean towards the hull, more each time the same pair fails, as a part of the distance."""
+SHORTER = 0.6
+"""What is left of a joint's range."""
+PATIENCE = 12
+"""Attempts after which all of a pair's joints are shortened at once."""
+KEPT_SLACK = 0.05
+"""Part of a joint's range that stays free around the points to keep."""
+SMALLEST_RANGE = 1e-6
+NEAR_RANGES = 0.5
+"""Share of the distance at which a mean gets a face, where a face is a shorter range on one side."""
+_HULL_WEIGHT = 1e3
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A pair that is not certified on the polytope.
+
+    Attributes:
+        joints: position indices of the joints between its bodies.
+        points: (w, n) where it fails; without points nothing is known but that it fails.
+        pull: (n,) how much it would help to shorten each joint's range; 0 where bodies are in contact at the points.
+        attempts: how often faces were added for this pair before.
+        ranges_alone: the program that failed knows nothing of the polytope but the joints' ranges: a face helps in one joint alone.
+    """
+
+    joints: tuple[int, ...]
+    points: Array
+    pull: Array
+    attempts: int
+    ranges_alone: bool = False
+
+
+@dataclass(frozen=True)
+class Measure:
+    """The ellipsoid {center + shape v : |v| <= 1}."""
+
+    center: Array
+    covariance: Array
+
+    @property
+    def log_volume(self) -> float:
+        """Up to a constant."""
+        return float(np.linalg.slogdet(self.covariance)[1]) / 2
+
+
+def measure(polytope: Polytope, start: Array) -> Measure:
+    """The analytic centre and sqrt(2) times Dikin's ellipsoid there, which is the inscribed one for a box.
+
+    Args:
+        start: (n,) strictly inside.
+    """
+    C, d, s = polytope.C, polytope.d, start
+    for _ in range(200):
+        scaled = C / (d - C @ s)[:, None]
+        gradient, hessian = scaled.sum(axis=0), scaled.T @ scaled
+        step = -np.linalg.solve(hessian, gradient)
+        decrement = float(np.sqrt(max(-gradient @ step, 0.0)))
+        if decrement < 1e-8:
+            break
+        s = s + step / (1 + decrement if decrement > 0.25 else 1.0)
+    scaled = C / (d - C @ s)[:, None]
+    return Measure(s, 2 * np.linalg.inv(scaled.T @ scaled))
+
+
+def contract(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, failures: list[Failure], near: float) -> Polytope | None:
+    """The polytope with faces added for every failure, redundant faces dropped.
+
+    Args:
+        polytope: its last 2n rows are the joint limits; so are the result's.
+        keep: (k, n) points that stay inside.
+        near: distance in the ellipsoid; at 1 it does not notice a face.
+
+    Returns:
+        None when a joint's range would become too short to go on.
+    """
+    limits = 2 * scene.n
+    C, d = [polytope.C[:-limits]], [polytope.d[:-limits]]
+    for failure in failures:
+        if failure.ranges_alone:
+            worst = replace(failure, joints=(_worst_joint(scene, polytope, failure),))
+            found = _face(ellipsoid, keep, worst, NEAR_RANGES * near)
+        else:
+            found = _face(ellipsoid, keep, failure, near)
+        if found is None:
+            found = _shorter_range(scene, polytope, ellipsoid, keep, failure)
+        if found is None:
+            return None
+        C.append(found[0])
+        d.append(found[1])
+    limited = scene.polytope(np.concatenate(C), np.concatenate(d))
+    kept = drop_redundant(limited, fixed=limits)
+    return Polytope(limited.C[kept], limited.d[kept])
+
+
+def _face(ellipsoid: Measure, keep: Array, failure: Failure, near: float) -> tuple[Array, Array] | None:
+    """A face before the farthest mean; None when all are near and none is a collision."""
+    if not len(failure.points):
+        return None
+    joints = list(failure.joints)
+    root = np.linalg.inv(np.linalg.cholesky(ellipsoid.covariance[np.ix_(joints, joints)]))
+    hull = np.concatenate([ellipsoid.center[None], keep])[:, joints]
+    best: tuple[float, Array, Array] | None = None
+    for point in failure.points[:, joints]:
+        system = np.vstack([root @ (hull - point).T, np.full((1, len(hull)), _HULL_WEIGHT)])
+        weights, _ = nnls(system, np.append(np.zeros(len(joints)), _HULL_WEIGHT))
+        nearest = weights @ hull / weights.sum()
+        distance = float(np.linalg.norm(root @ (point - nearest)))
+        if best is None or distance > best[0]:
+            best = distance, point, nearest
+    assert best is not None
+    distance, point, nearest = best
+    if distance == 0 or (distance < near and failure.pull.any()):
+        return None
+    backoff = min(LARGEST_BACKOFF, BACKOFF * BACKOFF_GROWTH**failure.attempts)
+    normal = root.T @ root @ (point - nearest)
+    normal /= np.linalg.norm(normal)
+    row = np.zeros(len(ellipsoid.center))
+    row[joints] = normal
+    return row[None], np.array([normal @ nearest + (1 - backoff) * (normal @ (point - nearest))])
+
+
+def _shorter_range(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, failure: Failure) -> tuple[Array, Array] | None:
+    """Two faces about the centre that shorten the range of the joint that turns far and where that helps."""
+    lower, upper = bounds(polytope)
+    center = ellipsoid.center
+    joints = [_worst_joint(scene, polytope, failure)] if failure.attempts < PATIENCE else list(failure.joints)
+    width = (upper - lower)[joints]
+    if width.min() < SMALLEST_RANGE:
+        return None
+    middle, kept = center[joints], keep[:, joints]
+    low = np.minimum(middle - SHORTER * (middle - lower[joints]), kept.min(axis=0) - KEPT_SLACK * width)
+    high = np.maximum(middle + SHORTER * (upper[joints] - middle), kept.max(axis=0) + KEPT_SLACK * width)
+    rows = np.eye(len(center))[joints]
+    return np.concatenate([rows, -rows]), np.concatenate([high, -low])
+
+
+def _worst_joint(scene: Scene, polytope: Polytope, failure: Failure) -> int:
+    """The joint of the pair that turns far and where a shorter range helps."""
+    lower, upper = bounds(polytope)
+    turn = np.where(scene.revolute, 2 * (np.arctan(upper) - np.arctan(lower)), upper - lower)
+    gain = turn * failure.pull if len(failure.points) else turn
+    return max(failure.joints, key=lambda i: float(gain[i]))

@@ -1,0 +1,85 @@
+"""What a growth job may be asked for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, Literal
+
+from certifier.errors import RegionError
+
+EFFORT = (
+    (4, {"contractions": 2, "pushes": 10, "max_rounds": 3}),
+    (6, {"contractions": 2, "pushes": 2, "max_rounds": 0}),
+    (math.inf, {"contractions": 1, "pushes": 0, "max_rounds": 0}),
+)
+"""Defaults, by the most joints that any pair has between its bodies: for seconds, a minute, or the first region, itself a minute."""
+NEAR = (1.0, 0.6, 0.3)
+"""Of the contractions, one after the other: from how near on a pair's failure calls for a shorter range and not for a face."""
+
+
+@dataclass(frozen=True)
+class GrowthOptions:
+    """What a job asks for.
+
+    Attributes:
+        kind: ``grow`` a region from a seed, or ``certify`` a given polytope as it is.
+        seed: the document of :class:`certifier.seeding.propose.SeedOptions`; for ``certify`` its ``C``, ``d`` and optional ``center``.
+        contraction: ``targeted`` or ``uniform``.
+        contractions: how many targeted contractions of the proposal are tried; each is given up when it is smaller than the best so far.
+            None, of this and the two that follow it, is what pays: see EFFORT.
+        bisection_steps: certifications spent on uniform contraction after the two ends are known.
+        pushes: how often the faces are pushed out after the contractions; each push that fails is followed by a shorter one.
+        max_rounds: rounds of the polytope step (12) after the pushes.
+        tolerance: relative growth of the ellipsoid's volume that is still worth a push or a round.
+        backoff: how many times a stepped polytope that fails to certify is halved towards the last certified one.
+        random_seed: seeds every random choice of the certification.
+    """
+
+    kind: Literal["grow", "certify"] = "grow"
+    seed: dict[str, Any] = field(default_factory=dict)
+    contraction: Literal["targeted", "uniform"] = "targeted"
+    contractions: int | None = None
+    bisection_steps: int = 6
+    pushes: int | None = None
+    max_rounds: int | None = None
+    tolerance: float = 0.02
+    backoff: int = 2
+    random_seed: int = 0
+
+    def to_document(self) -> dict[str, Any]:
+        """The options as JSON-able data."""
+        return asdict(self)
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any]) -> GrowthOptions:
+        """Inverse of :meth:`to_document`.
+
+        Raises:
+            RegionError: an unknown or out-of-range option; the error names it.
+        """
+        known = {f.name for f in fields(cls)}
+        for name in document:
+            if name not in known:
+                raise RegionError(
+                    "unknown_option", f"there is no option {name!r}", field=f"options.{name}", hint=f"options: {', '.join(sorted(known))}"
+                )
+        options = cls(**document)
+        if options.kind not in ("grow", "certify"):
+            raise RegionError("option_value", "kind is 'grow' or 'certify'", field="options.kind")
+        if options.contraction not in ("targeted", "uniform"):
+            raise RegionError("option_value", "contraction is 'targeted' or 'uniform'", field="options.contraction")
+        if options.contractions is not None and not (isinstance(options.contractions, int) and 1 <= options.contractions <= len(NEAR)):
+            raise RegionError("option_value", f"contractions must be an integer from 1 to {len(NEAR)}", field="options.contractions")
+        integers = (("bisection_steps", 60), ("pushes", 1000), ("max_rounds", 1000), ("backoff", 20), ("random_seed", 2**63 - 1))
+        for name, upper in integers:
+            value = getattr(options, name)
+            if name in EFFORT[0][1] and value is None:
+                continue
+            if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= upper:
+                raise RegionError("option_value", f"{name} must be an integer from 0 to {upper}", field=f"options.{name}")
+        if options.contraction == "uniform" and options.seed.get("contain"):
+            raise RegionError("option_value", "only targeted contraction keeps points inside", field="options.contraction")
+        if not (isinstance(options.tolerance, (int, float)) and 0 < options.tolerance < 10):
+            raise RegionError("option_value", "tolerance must be a number between 0 and 10", field="options.tolerance")
+        return options

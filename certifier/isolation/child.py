@@ -1,0 +1,167 @@
+"""Run one function in a process that may die, hang or swallow memory without harming the caller.
+
+Loading Drake takes longer than most of what is then asked of it. So a nursery (:mod:`certifier.isolation.nursery`) loads a module once
+and forks a child for every call of one of its functions; it is kept for the next call, and sees nothing of what the children read.
+
+Arguments and results travel as JSON; NumPy arrays in it as ``{"__array__": ..., "dtype": ...}``. Whatever native code prints goes to a
+log, whose tail explains a death.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+from multiprocessing.connection import Pipe
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from certifier.errors import CirisError, RegionError, SceneError
+
+ERRORS = {cls.__name__: cls for cls in (CirisError, SceneError, RegionError)}
+STATUS = struct.Struct("i")
+"""How a child ended, before its answer: 0, an exit status, or a signal with a minus."""
+_TAIL_BYTES = 2000
+_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+
+def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes: int, directory: Path | None = None) -> Any:
+    """``function(payload)`` computed by a child process that is killed when it takes too long or outlives this process.
+
+    Args:
+        function: ``"package.module:name"``.
+        payload: JSON-able data; NumPy arrays are allowed anywhere in it, as in the result.
+        timeout_s: wall-clock limit in seconds.
+        memory_bytes: limit of the child's address space.
+        directory: the child's working directory; None for this process's own.
+
+    Raises:
+        CirisError: the function's own error, of the class it was raised with; or ``child_timeout``, ``child_memory``, or
+            ``child_died`` with the tail of its standard error.
+    """
+    module, _, name = function.partition(":")
+    where = str(directory or Path.cwd())
+    request = encode({"function": name, "payload": payload, "memory_bytes": int(memory_bytes), "directory": where})
+    nursery = _idle.pop(module, None)
+    if nursery is None or nursery.process.poll() is not None:
+        nursery = _Nursery(module)
+    try:
+        status, answer = nursery.ask(request, timeout_s)
+    except TimeoutError:
+        raise CirisError("child_timeout", f"it took more than {timeout_s:g} s and was stopped{nursery.tail()}") from None
+    except (EOFError, ConnectionError):
+        raise _death(nursery.process.returncode, nursery.tail(), memory_bytes) from None
+    tail = nursery.tail()
+    if _idle.setdefault(module, nursery) is not nursery:
+        nursery.kill()
+    if status != 0:
+        raise _death(status, tail, memory_bytes)
+    return _result(json.loads(answer, object_hook=decode))
+
+
+def prepare(function: str) -> None:
+    """Begins to load what the first call of a function needs, without waiting."""
+    module = function.partition(":")[0]
+    if module not in _idle:
+        _idle[module] = _Nursery(module)
+
+
+class _Nursery:
+    """A process that has loaded a module, and the connection to it."""
+
+    def __init__(self, module: str) -> None:
+        self._connection, theirs = Pipe()
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
+        root = str(Path(__file__).resolve().parents[2])
+        path = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
+        with theirs:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", "certifier.isolation.nursery", module, str(theirs.fileno())],
+                stdin=subprocess.DEVNULL,
+                stdout=self._log,
+                stderr=self._log,
+                pass_fds=[theirs.fileno()],
+                process_group=0,
+                env={**os.environ, **_ONE_THREAD, "PYTHONPATH": path},
+            )
+
+    def ask(self, request: bytes, timeout_s: float) -> tuple[int, bytes]:
+        """How the child ended, and its answer. Whatever is raised, the nursery is killed before.
+
+        Raises:
+            TimeoutError: the child has not ended in time.
+            EOFError, ConnectionError: the nursery itself has.
+        """
+        self._log.seek(0)
+        self._log.truncate()
+        try:
+            self._connection.send_bytes(request)
+            if not self._connection.poll(timeout_s):
+                raise TimeoutError
+            reply = self._connection.recv_bytes()
+        except BaseException:
+            self.kill()
+            raise
+        return STATUS.unpack_from(reply)[0], reply[STATUS.size :]
+
+    def kill(self) -> None:
+        """Ends the process with its children."""
+        if self.process.poll() is None:
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.wait()
+        self._connection.close()
+
+    def tail(self) -> str:
+        """The last lines of the log in one, without the frames of a traceback, after a colon; empty for an empty log."""
+        self._log.seek(max(0, self._log.seek(0, os.SEEK_END) - _TAIL_BYTES))
+        lines = self._log.read().decode(errors="replace").splitlines()
+        text = " ".join(line.strip() for line in lines if line.strip() and not line.startswith((" ", "Traceback")))
+        return f": {text}" if text else ""
+
+
+_idle: dict[str, _Nursery] = {}
+"""Module -> the nursery that waits for the next call; one each, however many were needed at once."""
+os.register_at_fork(after_in_child=_idle.clear)
+
+
+def _result(answer: dict[str, Any]) -> Any:
+    if "error" in answer:
+        raise ERRORS[answer["class"]](**answer["error"])
+    return answer["result"]
+
+
+def _death(status: int, tail: str, memory_bytes: int) -> CirisError:
+    if "MemoryError" in tail or "bad_alloc" in tail:
+        return CirisError("child_memory", f"it needed more than {memory_bytes / 2**30:.3g} GiB of memory{tail}")
+    how = f"signal {signal.Signals(-status).name}" if status < 0 else f"exit status {status}"
+    return CirisError("child_died", f"the process died ({how}){tail}")
+
+
+def encode(value: Any) -> bytes:
+    """JSON with NumPy arrays.
+
+    Raises:
+        TypeError: something else cannot be JSON.
+    """
+
+    def array(x: Any) -> Any:
+        if isinstance(x, np.generic):
+            return x.item()
+        if isinstance(x, np.ndarray):
+            return {"__array__": x.tolist(), "dtype": str(x.dtype), "shape": x.shape}
+        raise TypeError(f"{type(x).__name__} cannot travel to another process")
+
+    return json.dumps(value, default=array).encode()
+
+
+def decode(document: dict[str, Any]) -> Any:
+    """The ``object_hook`` that makes arrays again of what :func:`encode` made of them."""
+    if "__array__" in document:
+        return np.array(document["__array__"], dtype=document["dtype"]).reshape(document["shape"])
+    return document

@@ -1,0 +1,103 @@
+"""``python -m certifier.isolation.nursery MODULE FD``: loads a module once and forks a child for every call of one of its functions.
+
+A module's ``warm_up()`` is called once, to load what is otherwise loaded by the first call. The calls come over the connection FD from
+certifier.isolation.child. A nursery ends when that is closed, and its child with it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import json
+import os
+import resource
+import signal
+import sys
+import traceback
+from multiprocessing.connection import Connection, wait
+from types import ModuleType
+
+from certifier.errors import CirisError
+from certifier.isolation.child import ERRORS, STATUS, decode, encode
+
+_PR_SET_PDEATHSIG = 1
+_MOST_WRITTEN = 2**28
+"""Bytes of its answer, and of any file that a child may write, its log among them."""
+_CHUNK = 2**16
+
+
+def main() -> None:
+    module, connection = importlib.import_module(sys.argv[1]), Connection(int(sys.argv[2]))
+    if hasattr(module, "warm_up"):
+        module.warm_up()
+    try:
+        while True:
+            connection.send_bytes(_call(module, connection, connection.recv_bytes()))
+    except (EOFError, ConnectionError):
+        return
+
+
+def _call(module: ModuleType, connection: Connection, request: bytes) -> bytes:
+    """How a child ended that was given the request, and its answer.
+
+    Raises:
+        EOFError: whoever asked is gone, and so is the child.
+    """
+    reading, writing = os.pipe()
+    nursery = os.getpid()
+    child = os.fork()
+    if child == 0:
+        os.close(reading)
+        connection.close()
+        os._exit(_answer(module, request, writing, nursery))
+    os.close(writing)
+    answer, gone = bytearray(), False
+    while len(answer) <= _MOST_WRITTEN:
+        gone = connection in wait([reading, connection])  # who asked says nothing before there is an answer
+        chunk = b"" if gone else os.read(reading, _CHUNK)
+        if not chunk:
+            break
+        answer += chunk
+    os.close(reading)
+    if gone or len(answer) > _MOST_WRITTEN:
+        os.kill(child, signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    if gone:
+        raise EOFError
+    return STATUS.pack(os.waitstatus_to_exitcode(status)) + answer
+
+
+def _answer(module: ModuleType, request: bytes, writing: int, nursery: int) -> int:
+    """Answers a call in the child; its exit status."""
+    try:
+        call = json.loads(request, object_hook=decode)
+        _confine(call["memory_bytes"], nursery)
+        os.chdir(call["directory"])
+        try:
+            reply = {"result": getattr(module, call["function"])(call["payload"])}
+        except CirisError as error:
+            reply = {"error": error.to_document(), "class": type(error).__name__ if type(error).__name__ in ERRORS else "CirisError"}
+        with os.fdopen(writing, "wb") as answer:
+            answer.write(encode(reply))
+    except BaseException:
+        traceback.print_exc()
+        return 1
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    return 0
+
+
+def _confine(memory_bytes: int, nursery: int) -> None:
+    """Limits what this process may take, has it write no core file, and die with the nursery."""
+    resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (_MOST_WRITTEN, _MOST_WRITTEN))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != nursery:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
+if __name__ == "__main__":
+    main()

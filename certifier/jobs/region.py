@@ -1,0 +1,113 @@
+"""A certified region: its proof file and its manifest (docs/architecture.md, "Manifest")."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from certifier.growth.actions import Accepted
+from certifier.jobs.archimedean import archimedean
+from certifier.model import SCHEMA_VERSION, Polytope, Scene
+from certifier.outcome import Guarantee
+from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume
+from certifier.polytopes.polytope import chebyshev_center, support
+from certifier.proof.pair import PairProof, digest
+from certifier.proof.region import Implied, RegionProof
+from certifier.verify.region import RegionStatement, verify_region
+
+
+@dataclass(frozen=True)
+class Region:
+    """A region whose proof has been verified.
+
+    Attributes:
+        manifest: JSON-able, without ``seconds`` and the proof's path, which are the caller's.
+        proof: the portable proof file.
+        statement: what the verifier says it proves.
+    """
+
+    manifest: dict[str, Any]
+    proof: bytes
+    statement: RegionStatement
+
+
+def certified_region(scene: Scene, accepted: Accepted, proofs: dict[int, bytes], provenance: dict[str, Any]) -> Region:
+    """Assemble a region from its pairs' proofs, verify the whole, and describe it.
+
+    Args:
+        proofs: pair index -> proof file, for every pair of the scene; one that covers several pairs stands at each of them.
+        provenance: options, versions, growth curve, and seconds: altogether, of the seeding, of all pairs.
+
+    Raises:
+        ProofError: the proof does not hold; nothing may be served as certified then.
+        RegionError: the polytope is empty or unbounded.
+    """
+    C, d = np.array(accepted.C), np.array(accepted.d)
+    polytope = Polytope(C, d)
+    interior = chebyshev_center(polytope)[0] if accepted.center is None else np.array(accepted.center)
+    bound = archimedean(polytope)
+    parts = tuple(PairProof.from_bytes(data, scene) for data in dict.fromkeys(proofs[index] for index in range(len(scene.pairs))))
+    data = RegionProof(scene, C, d, interior, _implied(polytope, parts), bound, parts).to_bytes()
+    statement = verify_region(data)
+    ellipsoid = inscribed_ellipsoid(polytope)
+    size, error = volume(polytope, seed=0)
+    manifest = {
+        "schema_version": SCHEMA_VERSION,
+        "scene": {"name": scene.name, "hash": scene.hash, "directives": scene.provenance.get("directives")},
+        "space": {
+            "kind": "tangent",
+            "joints": [joint.name for joint in scene.moving],
+            "q_star": scene.q_star.tolist(),
+            "q_lower": scene.q_lower.tolist(),
+            "q_upper": scene.q_upper.tolist(),
+            "s_lower": scene.s_lower.tolist(),
+            "s_upper": scene.s_upper.tolist(),
+        },
+        "halfspace_normals": C.tolist(),
+        "halfspace_offsets": d.tolist(),
+        "interior_point": interior.tolist(),
+        "inscribed_ellipsoid": {"center": ellipsoid.center.tolist(), "shape": ellipsoid.shape.tolist()},
+        "volume": {"ellipsoid": ellipsoid.volume, "polytope": size, "polytope_stderr": error},
+        "seed": None if accepted.seed is None else scene.to_q(np.array(accepted.seed)).tolist(),
+        "pairs": [
+            {"a": p.a, "b": p.b, "outcome": "certified", "margin": statement.gaps[p], "proof_digest": digest(proofs[index])}
+            for index, p in enumerate(scene.pairs)
+        ],
+        "ignored": [{"a": i.a, "b": i.b, "reason": i.reason} for i in scene.ignored],
+        "padding": scene.padding,
+        "archimedean": {"N": bound.N},
+        "guarantee": Guarantee.EXACT.value,
+        "provenance": provenance,
+    }
+    return Region(manifest, data, statement)
+
+
+def versions(scene: Scene) -> dict[str, Any]:
+    """Versions that a region's provenance names."""
+
+    def of(package: str) -> str | None:
+        try:
+            return version(package)
+        except PackageNotFoundError:
+            return None
+
+    return {"ciris": of("ciris"), "drake": scene.provenance.get("drake") or of("drake"), "python-flint": of("python-flint")}
+
+
+def _implied(polytope: Polytope, proofs: tuple[PairProof, ...]) -> Implied:
+    """The grounds' faces that are not, or no longer, faces of the region; a joint limit may have the normal of one that went."""
+    own: dict[bytes, float] = {}
+    for c, d in zip(polytope.C + 0.0, polytope.d, strict=True):
+        own[c.tobytes()] = min(d, own.get(c.tobytes(), np.inf))
+    faces = ((c, d) for proof in proofs for c, d in zip(proof.ground.C + 0.0, proof.ground.d, strict=True))
+    rows = {c.tobytes(): c for c, d in faces if own.get(c.tobytes(), np.inf) > d}
+    found = [(c, *support(polytope, c)) for c in rows.values()]
+    m, n = polytope.C.shape
+    return Implied(
+        np.array([c for c, _, _ in found]).reshape(-1, n),
+        np.array([bound for _, bound, _ in found]),
+        np.array([y for _, _, y in found]).reshape(-1, m),
+    )

@@ -1,0 +1,79 @@
+"""Which faces a pair's program uses: few first, more as the dual point asks for them.
+
+Every face costs time in each iteration, and faces in other joints than those between the bodies bring these joints into play.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from certifier.conic.interior_point import Solution, Status
+from certifier.model import Polytope
+from certifier.pair.frames import Frame
+from certifier.pair.program import Sides
+
+FACES_AT_A_TIME = 16
+"""A polytope with many faces is first replaced by its box; then this many faces are added at a time, as the dual asks for them."""
+DEAR_JOINTS = 10.0
+"""Few faces that couple the path's joints with others are all tried at once, unless the other joints make the program dearer by this."""
+
+
+class FaceChoice:
+    """The choice on one polytope, whose m faces, then 1 + u_i, then 1 - u_i of its box, are numbered as in a proof.
+
+    Args:
+        faces: without those that are redundant.
+        box_first: begin with the box's faces, whatever P's are.
+    """
+
+    def __init__(self, faces: Polytope, box_first: bool) -> None:
+        self._faces, self._box_first = faces, box_first
+        self._moved = faces.C != 0
+        self.every = tuple(range(len(faces.d)))
+
+    def first(self, frame: Frame, every_face: bool = False) -> tuple[int, ...]:
+        """The faces to begin with: P's in the joints that the plane moves with, and its box's where those may not bound them; unless it
+        has to be every face, its box's alone where P has many. Where P has few and they couple those joints with others, all of them."""
+        (m, n), joints = self._faces.C.shape, list(frame.joints)
+        box = [(m + n * (sign > 0) + i, i, sign) for sign in (-1, 1) for i in joints]
+        others = self._moved.copy()
+        others[:, joints] = False
+        own = np.flatnonzero(~others.any(axis=1))
+        alone = own[self._moved[own].sum(axis=1) == 1]
+        C = self._faces.C[alone]
+        needed = [face for face, i, sign in box if len(own) < m and not (C[:, i] * sign > 0).any()]
+        coupled = bool((others.any(axis=1) & self._moved[:, joints].any(axis=1)).any())
+        if coupled and not self._box_first and m <= 2 * n + FACES_AT_A_TIME and frame.growth(n) < DEAR_JOINTS:
+            return self.every
+        many = self._box_first or len(own) + len(needed) > len(box) + FACES_AT_A_TIME
+        if not joints or (many and not every_face):
+            return tuple(face for face, _, _ in box)
+        return (*own.tolist(), *needed)
+
+    def joints(self, frame: Frame, faces: tuple[int, ...]) -> tuple[int, ...]:
+        """The joints in play, ascending: those that the plane moves with and those of the faces."""
+        joints = set(frame.joints)
+        for j in faces:
+            joints |= set(np.flatnonzero(self._moved[j]).tolist()) if j < len(self.every) else set()
+        return tuple(sorted(joints))
+
+    def more(self, frame: Frame, sides: Sides, solution: Solution) -> tuple[int, ...]:
+        """The faces to go on with after a program on a superset of P had no solution; the same ones when it had none on P either.
+
+        The dual point shows infeasibility for every face j with Lambda_j(x) psd; the faces where it is not are worth having.
+        """
+        unused = tuple(j for j in self.every if j not in sides.faces)
+        if not unused or frame.at_rest:
+            return sides.faces
+        if solution.status is not Status.INFEASIBLE:
+            return self.every
+        lowest = np.full(len(unused), np.inf)
+        for chain, x in zip((frame.chain_a, frame.chain_b), solution.x[:2], strict=True):
+            Z = sides.cone_of(chain, unused).adjoint(x)[0]
+            mass = np.trace(Z[:, 0], axis1=1, axis2=2)[:, None]
+            lowest = np.minimum(lowest, (np.linalg.eigvalsh(Z[:, 1:])[:, :, 0] / mass).min(axis=0))
+        wanted = [i for i in np.argsort(lowest) if lowest[i] < 0]
+        inside = [i for i in wanted if not np.delete(self._moved[unused[i]], sides.joints).any()]
+        # Where most faces are used already, it is not worth being choosy.
+        most = 2 * (len(sides.faces) + FACES_AT_A_TIME) > len(self.every) + 2 * len(frame.joints)
+        return (*sides.faces, *(unused[i] for i in (inside or wanted)[: None if most else FACES_AT_A_TIME]))

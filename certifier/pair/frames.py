@@ -1,0 +1,110 @@
+"""Choice of the reference frame of a pair (C-IRIS B.1) and of the joints that its plane moves with.
+
+Each side of a pair costs about (vertices) x N(k)^2 x (faces), N the dimension of B.2 with the k joints between frame and body, so the
+frame sits in the middle of the chain, nearer to the body with more vertices.
+
+Through two arms the chains become long whatever the frame. A plane at rest in the body at which they part knows nothing of the other
+chain's joints and keeps degree 2 in its own, N = 3^k. It is tried first where that is much cheaper, and it alone where a plane that moves
+would be too dear.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from certifier.conic.basis import dimension
+from certifier.kinematics import Kinematics
+from certifier.model import Volume
+
+AFFORDABLE = 16 << 20
+"""Bytes up to which a plane that moves is tried at once; above, one at rest is tried first where it takes half of them or less."""
+LARGEST = 256 << 20
+"""Bytes from which on a plane that moves is not tried; by then it takes half a minute and more."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The frame body F of a pair and the chains to both sides (position indices, ascending).
+
+    Attributes:
+        joints: those the plane moves with: all of both chains, or none.
+    """
+
+    body: str
+    chain_a: tuple[int, ...]
+    chain_b: tuple[int, ...]
+    joints: tuple[int, ...]
+
+    @property
+    def path(self) -> tuple[int, ...]:
+        """All joints between the two bodies."""
+        return tuple(sorted((*self.chain_a, *self.chain_b)))
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the plane knows nothing of the joints between the bodies."""
+        return bool(self.path) and not self.joints
+
+    @property
+    def dimensions(self) -> tuple[int, int]:
+        """N of either side, as long as only faces in the joints of the path are used."""
+        joints = len(self.path)
+        return self._dimension(len(self.chain_a), joints), self._dimension(len(self.chain_b), joints)
+
+    def growth(self, n: int) -> float:
+        """By what the cost grows when all n joints of the scene come into play."""
+        whole = [self._dimension(len(chain), n) for chain in (self.chain_a, self.chain_b)]
+        return sum(N**2 for N in whole) / sum(N**2 for N in self.dimensions)
+
+    def _dimension(self, k: int, joints: int) -> int:
+        return dimension(k, 0, 0) if self.at_rest else dimension(k, k, joints - k)
+
+    def memory(self, volumes: tuple[Volume, Volume]) -> int:
+        """Bytes of the program's factors and columns."""
+        columns = 2 * (4 * len(self.joints) + 5)
+        return sum(8 * len(volume.vertices) * N * (N + columns) for volume, N in zip(volumes, self.dimensions, strict=True))
+
+    @property
+    def tables(self) -> int:
+        """Bytes of the products of the functions of either chain at its points (certifier.conic.cone)."""
+        found = 0
+        for k in (len(self.chain_a), len(self.chain_b)):
+            products = 4**k + k * 4**k // 4 if self.at_rest else 4**k
+            found += 8 * self._dimension(k, k) * products
+        return found
+
+
+def frames_to_try(kinematics: Kinematics, volumes: tuple[Volume, Volume]) -> list[Frame]:
+    """What is tried for two volumes, one after the other until one has a plane."""
+    moving, resting = choose_frame(kinematics, volumes), _resting(kinematics, *(volume.body for volume in volumes))
+    if moving.memory(volumes) <= max(AFFORDABLE, 2 * resting.memory(volumes)):
+        return [moving]
+    return [resting, moving] if moving.memory(volumes) <= LARGEST else [resting]
+
+
+def choose_frame(kinematics: Kinematics, volumes: tuple[Volume, Volume]) -> Frame:
+    """The frame on the path between the two volumes' bodies that is the cheapest once all joints are in play, which also balances the
+    chains well; ties go to the one nearer to a. The plane moves with the whole path."""
+    a, b = volumes
+    return _cheapest(kinematics, a.body, b.body, len(a.vertices), len(b.vertices))
+
+
+@lru_cache(maxsize=4096)
+def _cheapest(kinematics: Kinematics, a: str, b: str, vertices_a: int, vertices_b: int) -> Frame:
+    def cost(frame: Frame) -> int:
+        sides = ((vertices_a, len(frame.chain_a)), (vertices_b, len(frame.chain_b)))
+        return sum(vertices * dimension(k, k, kinematics.scene.n - k) ** 2 for vertices, k in sides)
+
+    return min((_frame(kinematics, body, a, b) for body in kinematics.bodies_between(a, b)), key=cost)
+
+
+@lru_cache(maxsize=4096)
+def _resting(kinematics: Kinematics, a: str, b: str) -> Frame:
+    """The body at which the chains of the two bodies part, and a plane that rests there."""
+    return replace(_frame(kinematics, kinematics.common(a, b), a, b), joints=())
+
+
+def _frame(kinematics: Kinematics, frame: str, a: str, b: str) -> Frame:
+    chain_a, chain_b = (tuple(sorted(kinematics.chain(frame, body))) for body in (a, b))
+    return Frame(frame, chain_a, chain_b, tuple(sorted((*chain_a, *chain_b))))

@@ -1,0 +1,76 @@
+"""Configurations of P at which a pair's bodies are looked at before a program is solved: the centre and samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from certifier.kinematics import Kinematics
+from certifier.model import Array, Polytope, Volume
+from certifier.pair.closest import first_within
+from certifier.pair.frames import Frame
+
+SCREEN_SAMPLES = 64
+NEAREST_JOINTS = 4
+"""Up to so many joints the contact nearest to the centre is what a refutation tells of."""
+GAP_SAMPLES = 16
+APART = 0.15
+"""Least gap at the samples, relative to the way that vertices sweep, for which volumes of several geometries are tried."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A configuration at which two padded bodies touch.
+
+    Attributes:
+        s: (n,).
+        weights: (V,) convex weights of either body's vertices, at whose mean points they touch.
+    """
+
+    s: Array
+    weights: tuple[Array, Array]
+
+
+class Screen:
+    """The configurations of one polytope.
+
+    Args:
+        center: (n,) inside; samples: (S, n) inside.
+
+    Attributes:
+        configurations: (1 + S, n) the centre, then the samples.
+    """
+
+    def __init__(self, kinematics: Kinematics, polytope: Polytope, center: Array, samples: Array) -> None:
+        self._kinematics, self._polytope = kinematics, polytope
+        self._padding = kinematics.scene.padding
+        self.configurations = np.concatenate([center[None], samples])
+        self._first = self.configurations[:SCREEN_SAMPLES]
+        if kinematics.scene.n <= NEAREST_JOINTS:
+            gauge = ((self._first - center) @ polytope.C.T / (polytope.d - polytope.C @ center)).max(axis=1)
+            self._first = self._first[np.argsort(gauge)]
+
+    def contact(self, volumes: tuple[Volume, Volume], frame: Frame) -> Contact | None:
+        """A contact at the centre or at one of the first samples."""
+        return self._contact(volumes, frame, self._first)
+
+    def contact_near(self, volumes: tuple[Volume, Volume], frame: Frame, points: Array) -> Contact | None:
+        """A contact at the centre, at any sample, or at those of the points (w, n) that lie in the polytope."""
+        return self._contact(volumes, frame, np.concatenate([self.configurations, points[self._polytope.contains(points)]]))
+
+    def apart(self, volumes: tuple[Volume, Volume], frame: Frame) -> bool:
+        """Whether the padded volumes keep a distance at some of the samples that is large against what they sweep in the frame."""
+        A, B = (self._points(volume, frame, self.configurations[:GAP_SAMPLES]) for volume in volumes)
+        least = APART * sum(float(np.linalg.norm(np.ptp(points, axis=0), axis=1).max()) for points in (A, B))
+        least += sum(volume.radius for volume in volumes) + 2 * self._padding
+        return first_within(A, B, least) is None
+
+    def _contact(self, volumes: tuple[Volume, Volume], frame: Frame, s: Array) -> Contact | None:
+        a, b = volumes
+        reach = a.radius + b.radius + 2 * self._padding
+        found = first_within(self._points(a, frame, s), self._points(b, frame, s), reach)
+        return None if found is None else Contact(s[found[0]], found[1].weights)
+
+    def _points(self, volume: Volume, frame: Frame, s: Array) -> Array:
+        return self._kinematics.points(frame.body, volume.body, volume.vertices, s)

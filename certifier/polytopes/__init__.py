@@ -1,0 +1,1 @@
+"""Polytopes {s : C s <= d}: bounds, redundancy, the inscribed ellipsoid, samples."""

@@ -1,0 +1,1 @@
+"""Proofs as data and as files. Nothing here decides whether a proof holds: certifier.verify does."""

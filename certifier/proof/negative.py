@@ -1,0 +1,110 @@
+"""Proofs that a pair cannot be certified on a polytope: by functionals that exclude every certificate, or by a configuration in contact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from certifier.errors import ProofError
+from certifier.model import Array, Pair, Scene
+from certifier.proof.container import FORMAT, floats, index, malformed, pack, unpack
+from certifier.proof.pair import Ground, ground_arrays, ground_of, same_scene
+
+
+@dataclass(frozen=True)
+class DualProof:
+    """Functionals that exclude every certificate of one pair on a polytope, in one frame (certifier.verify.dual says how).
+
+    Attributes:
+        frame: body whose frame the planes are expressed in.
+        moments: of a's and of b's vertices, (V, N): values on the monomials in the order of certifier.verify.moments.
+        equations: K of those that have to vanish, the 4 (n + 1) entries of R row by row, or its n + 1 of b where a radius is involved.
+        entries: (K, 3) int64 the moments whose change makes them vanish: side, vertex, monomial.
+        normal: Yaa (3, 3) and Ybb (n + 1, n + 1); empty where no radius is involved.
+    """
+
+    scene: Scene
+    pair: Pair
+    frame: str
+    ground: Ground
+    moments: tuple[Array, Array]
+    equations: tuple[int, ...]
+    entries: np.ndarray
+    normal: tuple[Array, Array]
+
+    def to_bytes(self) -> bytes:
+        """The proof as a file."""
+        header = {
+            "format": FORMAT,
+            "kind": "dual",
+            "scene_hash": self.scene.hash,
+            "pair": [self.pair.a, self.pair.b],
+            "frame": self.frame,
+            "equations": list(self.equations),
+        }
+        arrays = {"moments0": self.moments[0], "moments1": self.moments[1], "entries": self.entries}
+        arrays |= {"normal/aa": self.normal[0], "normal/bb": self.normal[1]}
+        return pack(header, arrays | ground_arrays(self.ground, 0))
+
+    @classmethod
+    def from_bytes(cls, data: bytes, scene: Scene) -> DualProof:
+        """Inverse of :meth:`to_bytes`.
+
+        Raises:
+            ProofError: not a dual proof, or one about another scene.
+        """
+        header, arrays = unpack(data, "dual")
+        with malformed():
+            same_scene(header, scene)
+            a, b = header["pair"]
+            moments = [floats(arrays[f"moments{i}"]) for i in range(2)]
+            if arrays["entries"].dtype != np.int64 or arrays["entries"].shape[1:] != (3,):
+                raise ProofError("proof_malformed", "the entries of a dual proof are not triples of integers")
+            return cls(
+                scene=scene,
+                pair=Pair(a, b),
+                frame=str(header["frame"]),
+                ground=ground_of(arrays, 0),
+                moments=(moments[0], moments[1]),
+                equations=tuple(index(k) for k in header["equations"]),
+                entries=arrays["entries"],
+                normal=(floats(arrays["normal/aa"]), floats(arrays["normal/bb"])),
+            )
+
+
+@dataclass(frozen=True)
+class WitnessProof:
+    """A configuration of a polytope at which the padded bodies of a pair touch.
+
+    Attributes:
+        C, d: (m, n), (m,) the polytope; the joint limits hold besides.
+        s: (n,) the configuration.
+        weights: (V,) convex weights of each body's vertices, at whose mean points they touch; not all zero, their sum is divided out.
+    """
+
+    scene: Scene
+    pair: Pair
+    C: Array
+    d: Array
+    s: Array
+    weights: tuple[Array, Array]
+
+    def to_bytes(self) -> bytes:
+        """The proof as a file."""
+        header = {"format": FORMAT, "kind": "witness", "scene_hash": self.scene.hash, "pair": [self.pair.a, self.pair.b]}
+        return pack(header, {"C": self.C, "d": self.d, "s": self.s, "weights0": self.weights[0], "weights1": self.weights[1]})
+
+    @classmethod
+    def from_bytes(cls, data: bytes, scene: Scene) -> WitnessProof:
+        """Inverse of :meth:`to_bytes`.
+
+        Raises:
+            ProofError: not a witness, or one about another scene.
+        """
+        header, arrays = unpack(data, "witness")
+        with malformed():
+            same_scene(header, scene)
+            a, b = header["pair"]
+            C, d, s, first, second = (floats(arrays[name]) for name in ("C", "d", "s", "weights0", "weights1"))
+            return cls(scene, Pair(a, b), C, d, s, (first, second))

@@ -1,0 +1,272 @@
+"""Proofs as data: what a certificate of a pair, or of a region, consists of, and its portable file.
+
+A pair's proof on P = {s : C s <= d} holds, in the frame F and the coordinates u = (s - mid)/half of a box around P,
+the plane [a; b] = Z [1; u], a margin t, a bound kappa of |a|, and for every vertex v of either volume Gram factors L_j with
+
+    +-(a'p_v + b den) - (r kappa + t) den - sigma (|L_0' rho|^2 + sum_j g_j |L_j' rho|^2)  ~  0,
+
+the g_j some of P's faces d_j - c_j's and of its box's, 1 + u_i and 1 - u_i, rho the 2^k products of the chain's coordinates u_i
+(plain monomials). The factors are fixed-point numbers, one exponent a face, of 30 bits or, where rounding would eat up the margin,
+of 48. Nothing here decides whether a proof holds: certifier.verify does. The file is described in docs/proofs.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from certifier.errors import ProofError
+from certifier.model import Array, Pair, Scene, Volume
+from certifier.proof.container import FORMAT, floats, index, malformed, npy, pack, unpack
+
+BITS = {"int32": 30, "int64": 48}
+"""Bits of a Gram factor's mantissa by its type."""
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The polytope a proof is about and its box.
+
+    Attributes:
+        C, d: (m, n), (m,) faces; the joint limits hold besides.
+        mid, half: (n,) the box.
+        Y_lower, Y_upper: (n, m + 2n) multipliers of the faces, the upper and the lower joint limits, that prove the box.
+    """
+
+    C: Array
+    d: Array
+    mid: Array
+    half: Array
+    Y_lower: Array
+    Y_upper: Array
+
+    @classmethod
+    def of_box(cls, mid: Array, half: Array) -> Ground:
+        """A box as a polytope: its upper, then its lower faces, a rounding inside the exact ones."""
+        eye, unit = np.eye(len(mid)), np.eye(2 * len(mid), 4 * len(mid))
+        d = np.concatenate([np.nextafter(mid + half, -np.inf), -np.nextafter(mid - half, np.inf)])
+        return cls(np.concatenate([eye, -eye]), d, mid, half, unit[len(mid) :], unit[: len(mid)])
+
+
+@lru_cache(maxsize=16)
+def lower_triangle(length: int) -> tuple[np.ndarray, np.ndarray]:
+    """Its rows and columns, row by row."""
+    return np.tril_indices(length)
+
+
+@dataclass(frozen=True)
+class Side:
+    """Gram factors of one volume's vertices: factor = mantissa 2^exponent, lower triangles row by row.
+
+    Attributes:
+        chain: position indices of the joints between F and the body, ascending; rho's coordinates in this order.
+        mantissa: (V, f + 1, L (L + 1) / 2) int32 or int64, L = 2^k, for 1 and the f faces used.
+        exponent: (f + 1,) int32.
+    """
+
+    chain: tuple[int, ...]
+    mantissa: np.ndarray
+    exponent: np.ndarray
+
+    @classmethod
+    def rounded(cls, chain: tuple[int, ...], factor: Array, kind: str = "int32") -> Side:
+        """Rounded factors, (V, f + 1, L, L) lower triangular, of Gram matrices in plain monomials; ``kind`` as in BITS."""
+        exponent = np.frexp(np.abs(factor).max(axis=(0, 2, 3)))[1].astype(np.int32) - BITS[kind]
+        rows, columns = lower_triangle(factor.shape[-1])
+        mantissa = np.rint(np.ldexp(factor[:, :, rows, columns], -exponent[:, None])).astype(kind)
+        return cls(chain, mantissa, exponent)
+
+    @property
+    def factors(self) -> Array:
+        """The lower triangular factors, (V, f + 1, L, L)."""
+        length = 2 ** len(self.chain)
+        rows, columns = lower_triangle(length)
+        L = np.zeros((*self.mantissa.shape[:2], length, length))
+        L[:, :, rows, columns] = np.ldexp(self.mantissa.astype(float), self.exponent[:, None])
+        return L
+
+
+@dataclass(frozen=True)
+class PairProof:
+    """A plane that separates two volumes on a polytope, with the sums of squares that prove it.
+
+    It covers every pair of the scene with one geometry in the first volume and the other in the second.
+
+    Attributes:
+        volumes: on the positive and on the negative side of the plane.
+        frame: body whose frame the plane is expressed in.
+        plane: Z, (4, n + 1).
+        t, kappa: margin and bound of |a(u)| on the box (0 where no radius is involved).
+        faces: the f faces used: j for the ground's face j, m + i for 1 + u_i, m + n + i for 1 - u_i.
+        sides: of the volumes.
+    """
+
+    scene: Scene
+    volumes: tuple[Volume, Volume]
+    frame: str
+    ground: Ground
+    plane: Array
+    t: float
+    kappa: float
+    faces: tuple[int, ...]
+    sides: tuple[Side, Side]
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """The pairs of the scene that are covered."""
+        first, second = (set(volume.geometries) for volume in self.volumes)
+        return tuple(p for p in self.scene.pairs if (p.a in first and p.b in second) or (p.a in second and p.b in first))
+
+    @property
+    def needs_box_alone(self) -> bool:
+        """Whether it uses no face of the polytope but those of the box."""
+        return all(j >= len(self.ground.d) for j in self.faces)
+
+    def on_its_box(self) -> PairProof:
+        """The same proof, stated on all of its box; only if it needs no other face."""
+        ground = Ground.of_box(self.ground.mid, self.ground.half)
+        shift = len(ground.d) - len(self.ground.d)
+        return replace(self, ground=ground, faces=tuple(j + shift for j in self.faces))
+
+    def to_bytes(self) -> bytes:
+        """The proof as a file."""
+        pool = Pool(self.scene)
+        headers = [pool.add(self)]
+        header = {"format": FORMAT, "kind": "pair", "scene_hash": self.scene.hash, **pool.header(), "proofs": headers}
+        return pack(header, pool.arrays)
+
+    @classmethod
+    def from_bytes(cls, data: bytes, scene: Scene) -> PairProof:
+        """Inverse of :meth:`to_bytes`.
+
+        Raises:
+            ProofError: not a pair's proof, or one about another scene.
+        """
+        header, arrays = unpack(data, "pair")
+        with malformed():
+            same_scene(header, scene)
+            return Stored(scene, header, arrays).proofs()[0]
+
+
+class Pool:
+    """The arrays of several proofs, with what they share stored once."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self.arrays: dict[str, np.ndarray] = {}
+        self._volumes: list[dict[str, Any]] = []
+        self._known: dict[tuple[str | bytes, ...], int] = {}
+        self._proofs = 0
+
+    def add(self, proof: PairProof) -> dict[str, Any]:
+        """Takes the proof's arrays in; returns its header."""
+        ground, prefix = self._ground(proof.ground), f"proof/{self._proofs}"
+        self._proofs += 1
+        self.arrays |= {f"{prefix}/plane": proof.plane, f"{prefix}/scalars": np.array([proof.t, proof.kappa])}
+        for i, side in enumerate(proof.sides):
+            self.arrays |= {f"{prefix}/mantissa{i}": side.mantissa, f"{prefix}/exponent{i}": side.exponent}
+        return {
+            "volumes": [self._volume(volume) for volume in proof.volumes],
+            "frame": proof.frame,
+            "ground": ground,
+            "faces": list(proof.faces),
+            "chains": [list(side.chain) for side in proof.sides],
+        }
+
+    def header(self) -> dict[str, Any]:
+        """The grounds' number and the volumes, for the file's header."""
+        return {"grounds": sum(name.endswith("/mid") for name in self.arrays), "volumes": self._volumes}
+
+    def _ground(self, ground: Ground) -> int:
+        return self._once("ground", {}, vars(ground))
+
+    def _volume(self, volume: Volume) -> int:
+        header: dict[str, Any] = {"geometries": list(volume.geometries)}
+        arrays = {}
+        if not volume.is_geometry_of(self._scene):
+            header["body"] = volume.body
+            arrays = {"vertices": volume.vertices, "radius": np.array(volume.radius)}
+        index = self._once("volume", header, arrays)
+        if index == len(self._volumes):
+            self._volumes.append(header)
+        return index
+
+    def _once(self, kind: str, header: dict[str, Any], arrays: dict[str, np.ndarray]) -> int:
+        """The number of these arrays among those of their kind, stored if they are new."""
+        key: tuple[str | bytes, ...] = (kind, json.dumps(header), *(npy(a) for a in arrays.values()))
+        if key not in self._known:
+            self._known[key] = index = sum(known[0] == kind for known in self._known)
+            self.arrays |= {f"{kind}/{index}/{name}": value for name, value in arrays.items()}
+        return self._known[key]
+
+
+class Stored:
+    """The proofs of a file."""
+
+    def __init__(self, scene: Scene, header: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
+        self._scene, self._headers, self._arrays = scene, header["proofs"], arrays
+        self._grounds = [ground_of(arrays, i) for i in range(header["grounds"])]
+        self._volumes = [self._volume(i, volume) for i, volume in enumerate(header["volumes"])]
+
+    def proofs(self) -> tuple[PairProof, ...]:
+        return tuple(self._proof(f"proof/{i}", header) for i, header in enumerate(self._headers))
+
+    def _volume(self, i: int, header: dict[str, Any]) -> Volume:
+        names = tuple(str(name) for name in header["geometries"])
+        if "body" not in header:
+            (name,) = names
+            return Volume.of(self._scene.geometry(name))
+        vertices, radius = (floats(self._arrays[f"volume/{i}/{name}"]) for name in ("vertices", "radius"))
+        return Volume(names, str(header["body"]), vertices, radius.item())
+
+    def _proof(self, prefix: str, header: dict[str, Any]) -> PairProof:
+        arrays = self._arrays
+        t, kappa = floats(arrays[f"{prefix}/scalars"]).tolist()
+        first, second = (self._volumes[index(i)] for i in header["volumes"])
+        side_a, side_b = (
+            Side(tuple(index(i) for i in chain), _factors(arrays[f"{prefix}/mantissa{i}"]), arrays[f"{prefix}/exponent{i}"])
+            for i, chain in enumerate(header["chains"])
+        )
+        return PairProof(
+            scene=self._scene,
+            volumes=(first, second),
+            frame=str(header["frame"]),
+            ground=self._grounds[index(header["ground"])],
+            plane=floats(arrays[f"{prefix}/plane"]),
+            t=t,
+            kappa=kappa,
+            faces=tuple(index(j) for j in header["faces"]),
+            sides=(side_a, side_b),
+        )
+
+
+def digest(data: bytes) -> str:
+    """SHA-256 of a proof file."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def same_scene(header: dict[str, Any], scene: Scene) -> None:
+    """Raises ProofError, proof_scene, for the header of a proof about another scene."""
+    if header["scene_hash"] != scene.hash:
+        raise ProofError("proof_scene", "the proof is about another scene")
+
+
+def ground_arrays(ground: Ground, i: int) -> dict[str, np.ndarray]:
+    """The arrays of a file's ground i."""
+    return {f"ground/{i}/{name}": value for name, value in vars(ground).items()}
+
+
+def ground_of(arrays: dict[str, np.ndarray], i: int) -> Ground:
+    """Ground i of a file."""
+    return Ground(*(floats(arrays[f"ground/{i}/{name}"]) for name in ("C", "d", "mid", "half", "Y_lower", "Y_upper")))
+
+
+def _factors(array: np.ndarray) -> np.ndarray:
+    if array.dtype.name not in BITS:
+        raise ProofError("proof_malformed", f"a Gram factor in the proof file is of {array.dtype.name}")
+    return array

@@ -1,0 +1,1 @@
+"""Proposals: polytopes around a seed that are worth certifying."""

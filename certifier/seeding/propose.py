@@ -1,0 +1,140 @@
+"""Proposals to certify: a polytope in s around a seed, or a given one. Nothing here is a proof."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.geometry import QueryObject
+
+from certifier.errors import RegionError
+from certifier.model import Array, Polytope, Scene
+from certifier.outcome import Guarantee
+from certifier.polytopes.polytope import chebyshev_center, drop_redundant
+from certifier.scene.drake_model import build_diagram, geometry_name
+from certifier.seeding.iris import iris
+from certifier.seeding.options import MOST_IRIS_JOINTS, Method, SeedOptions
+from certifier.seeding.proposal import Proposal
+
+
+def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> None:
+    """Refuse joint positions around which no region can be certified.
+
+    Raises:
+        RegionError: ``seed_wrong_length``, ``seed_not_finite``, ``seed_outside_limits`` (the limits themselves are outside) or
+            ``seed_in_collision``, naming the joint or the pair.
+    """
+    q = np.asarray(q, dtype=float)
+    if q.shape != (scene.n,):
+        names = ", ".join(joint.name for joint in scene.moving)
+        raise RegionError(
+            "seed_wrong_length", f"the seed has {q.size} numbers, the scene {scene.n} joints", field=field, hint=f"in order: {names}"
+        )
+    for joint, value in zip(scene.moving, q, strict=True):
+        where = f"{field}[{joint.index}]"
+        if not np.isfinite(value):
+            raise RegionError("seed_not_finite", f"joint {joint.name} is at {value}", field=where)
+        if value <= joint.lower or value >= joint.upper:
+            raise RegionError(
+                "seed_outside_limits",
+                f"joint {joint.name} is at {value:g}, not between its limits {joint.lower:g} and {joint.upper:g}",
+                field=where,
+            )
+    _check_free(scene, q, field)
+
+
+def _check_free(scene: Scene, q: Array, field: str) -> None:
+    """Refuse a configuration in which a pair is closer than twice the padding."""
+    if not scene.pairs:
+        return
+    diagram = build_diagram(scene)
+    context = diagram.CreateDefaultContext()
+    diagram.plant().SetPositions(diagram.mutable_plant_context(context), q)
+    query: QueryObject = diagram.scene_graph().get_query_output_port().Eval(diagram.mutable_scene_graph_context(context))
+    ids = {geometry_name(query.inspector(), g): g for g in query.inspector().GetAllGeometryIds()}
+    distance, pair = min(
+        ((query.ComputeSignedDistancePairClosestPoints(ids[p.a], ids[p.b]).distance, p) for p in scene.pairs), key=lambda found: found[0]
+    )
+    if distance <= 2 * scene.padding:
+        how = (
+            f"overlap by {-distance:.3g} m"
+            if distance <= 0
+            else f"are {distance:.3g} m apart, with a padding of {scene.padding:g} m on each"
+        )
+        raise RegionError(
+            "seed_in_collision", f"{pair.a} and {pair.b} {how}", field=field, hint="move the seed, or ignore the pair in the scene"
+        )
+
+
+def propose(scene: Scene, options: SeedOptions) -> Proposal:
+    """A polytope around the seed, by the options' method; deterministic for ``random_seed``.
+
+    IRIS may take minutes, and native code runs: call it in a process that may die.
+
+    Raises:
+        RegionError: as :func:`check_seed` and ``polytope.chebyshev_center``; ``polytope_shape``; ``center_outside``;
+            ``seed_cut_off`` when the polytope does not contain the seed and ``contain``; ``seeding_failed`` with Drake's words.
+    """
+    start = time.perf_counter()
+    method = options.method or (Method.IRIS_NP2 if scene.n <= MOST_IRIS_JOINTS else Method.LIMITS)
+    for i, q in enumerate(options.contain):
+        check_seed(scene, q, f"seed.contain[{i}]")
+    contain = scene.to_s(np.array(options.contain)) if options.contain else np.zeros((0, scene.n))
+    if method is Method.POLYTOPE:
+        C, d, center = _given(scene, options)
+        said: dict[str, Any] = {}
+    else:
+        assert options.q is not None, "every method but polytope has a seed"
+        check_seed(scene, options.q)
+        center = scene.to_s(options.q)
+        if method is Method.LIMITS:
+            C, d = np.zeros((0, scene.n)), np.zeros(0)
+            said = {}
+        elif method is Method.BOX:
+            C, d = _box(scene, np.concatenate([center[None], contain]), options.half_width)
+            said = {}
+        else:
+            C, d, said = iris(scene, np.concatenate([center[None], contain]), replace(options, method=method))
+    if not (d[:, None] > C @ np.concatenate([center[None], contain]).T).all():
+        problem = f"the polytope of {method} does not contain the seed" + (" and all of contain" if options.contain else "")
+        raise RegionError("seed_cut_off", problem, field="seed", hint="allow fewer iterations, or give points that see one another")
+    guarantee = said.pop("guarantee", Guarantee.NONE)
+    info = {"method": method.value, "guarantee": guarantee.value, "faces": len(d), "seconds": time.perf_counter() - start, **said}
+    return Proposal(C, d, center, contain, info)
+
+
+def warm_up() -> None:
+    """Loads the compiled functions that a proposal needs."""
+    eye = np.eye(2)
+    drop_redundant(Polytope(np.concatenate([eye, -eye]), np.ones(4)))
+
+
+def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:
+    """:func:`propose` in a child process: documents in, the document of the proposal out."""
+    return propose(Scene.from_document(payload["scene"]), SeedOptions.from_document(payload["seed"])).to_document()
+
+
+def _given(scene: Scene, options: SeedOptions) -> tuple[Array, Array, Array]:
+    C, d = np.array(options.C, dtype=object), np.array(options.d, dtype=float)
+    if C.shape != (len(d), scene.n):
+        raise RegionError("polytope_shape", f"C must have a row of {scene.n} numbers for each of the {len(d)} numbers in d", field="seed.C")
+    C = C.astype(float)
+    limited = scene.polytope(C, d)
+    middle, _ = chebyshev_center(limited, tuple(joint.name for joint in scene.moving))
+    if options.center is None:
+        return C, d, middle
+    center = np.array(options.center)
+    if center.shape != (scene.n,) or not np.all(limited.C @ center < limited.d):
+        raise RegionError(
+            "center_outside", "the centre does not lie strictly inside the polytope and the joint limits", field="seed.center"
+        )
+    return C, d, center
+
+
+def _box(scene: Scene, points: Array, half_width: float) -> tuple[Array, Array]:
+    eye, upper, lower = np.eye(scene.n), points.max(axis=0) + half_width, points.min(axis=0) - half_width
+    above, below = upper < scene.s_upper, lower > scene.s_lower
+    return np.concatenate([eye[above], -eye[below]]), np.concatenate([upper[above], -lower[below]])

@@ -1,0 +1,1 @@
+"""The polytope step (12): all pairs coupled, the faces move."""

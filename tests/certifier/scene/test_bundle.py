@@ -1,0 +1,166 @@
+"""Bundles: what is packed, that a bundle is the same scene, and what is refused from strangers."""
+
+import io
+import json
+import zipfile
+
+import pytest
+
+from certifier.errors import SceneError
+from certifier.scene import BundleLimits, load_bundle, pack_bundle
+from certifier.scene.references import references, resolve
+from certifier.scene.unpack import check_bundle
+from tests.certifier.scene.workshop import EXAMPLES, ROOM, SCENE, parsed, write
+
+TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+def zipped(files):
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w") as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return data.getvalue()
+
+
+def names(bundle):
+    return sorted(zipfile.ZipFile(io.BytesIO(bundle)).namelist())
+
+
+def test_a_bundle_is_the_same_scene():
+    path = EXAMPLES / "dual_ur3e" / "scene.yaml"
+    bundle = pack_bundle(path)
+    assert names(bundle) == ["bundle.json", "dual_ur3e/pallet.sdf", "dual_ur3e/scene.yaml", "ur3e_bin/ur3e.urdf"]
+    assert bundle == pack_bundle(path)
+    assert load_bundle(bundle).hash == parsed(path).hash
+
+
+def test_packages_and_meshes_travel_and_strangers_do_not(tmp_path):
+    (tmp_path / "models" / "meshes").mkdir(parents=True)
+    (tmp_path / "models" / "meshes" / "t.obj").write_text("mtllib t.mtl\n" + TETRAHEDRON)
+    (tmp_path / "models" / "meshes" / "t.mtl").write_text("newmtl red\n")
+    (tmp_path / "models" / "meshes" / "unused.obj").write_text(TETRAHEDRON)
+    (tmp_path / "scenes").mkdir()
+    path = write(
+        tmp_path / "scenes",
+        "packages: {mine: ../models, empty: ../empty}\n" + SCENE,
+        shape='<mesh filename="package://mine/meshes/t.obj"/>',
+    )
+    (tmp_path / "empty").mkdir()
+    bundle = pack_bundle(path)
+    assert names(bundle) == [
+        "bundle.json",
+        "empty/",
+        "models/",
+        "models/meshes/t.mtl",
+        "models/meshes/t.obj",
+        "scenes/arm.urdf",
+        "scenes/room.sdf",
+        "scenes/scene.yaml",
+    ]
+    scene = load_bundle(bundle)
+    assert len(scene.geometry("arm/hand/palm").vertices) == 4
+    assert scene.hash == parsed(path).hash
+
+
+@pytest.mark.parametrize(
+    "reference",
+    ["/etc/passwd", "file:///etc/passwd", "http://example.org/a.urdf", "https://example.org/a", "package://other/a", "a\\b", "C:\\a"],
+)
+def test_references_that_cannot_travel_are_refused(tmp_path, reference):
+    with pytest.raises(SceneError) as caught:
+        resolve(reference, tmp_path, {"mine": tmp_path})
+    assert caught.value.code == "bundle_uri"
+    assert repr(reference) in str(caught.value)
+
+
+def test_what_is_broken_in_a_bundle_is_named_without_the_servers_paths(tmp_path):
+    bundle = pack_bundle(write(tmp_path, shape='<mesh filename="nothing.obj"/>'))
+    with pytest.raises(SceneError) as caught:
+        load_bundle(bundle)
+    assert "nothing.obj" in str(caught.value)
+    assert "/tmp" not in str(caught.value)
+    assert "ciris-" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("files", "code", "words"),
+    [
+        ({"arm.urdf": "<!DOCTYPE r [<!ENTITY a 'aaa'><!ENTITY b '&a;&a;'>]><robot name='r'>&b;</robot>"}, "bundle_xml", "arm.urdf"),
+        ({"arm.urdf": "<robot><mesh"}, "bundle_xml", "arm.urdf"),
+        ({"arm.urdf": "<robot><mesh filename='file:///etc/passwd'/></robot>"}, "bundle_uri", "file:///etc/passwd"),
+        ({"arm.urdf": "<robot><mesh filename='http://example.org/m.obj'/></robot>"}, "bundle_uri", "http://"),
+        ({"arm.urdf": "<robot><mesh filename='/etc/m.obj'/></robot>"}, "bundle_uri", "/etc/m.obj"),
+        ({"arm.urdf": "<robot><mesh filename='&#x2e;./m.obj'/></robot>"}, "bundle_uri", "leads out"),
+        ({"arm.urdf": "<robot><mesh filename='package://up/../../m.obj'/></robot>"}, "bundle_uri", "package"),
+        ({"room.sdf": "<sdf><uri> ../../m.obj </uri></sdf>"}, "bundle_uri", "leads out"),
+        ({"room.sdf": "<sdf><uri>x<![CDATA[/../../m.obj]]></uri></sdf>"}, "bundle_uri", "leads out"),
+        ({"m.xml": "<mujoco><compiler meshdir='..'/></mujoco>"}, "bundle_uri", "meshdir"),
+        ({"m.xml": "<mujoco><mesh file='a/../m.obj'/></mujoco>"}, "bundle_uri", ".."),
+        ({"m.dmd.yaml": "directives: [{add_model: {file: '../x.urdf'}}]"}, "bundle_uri", "leads out"),
+        ({"m.dmd.yaml": "a: &a [1]\nb: [*a]"}, "scene_yaml", "alias"),
+        ({"m.obj": "mtllib ../../../etc/passwd\n"}, "bundle_uri", "leads out"),
+        ({"m.obj": b"\xff\xfe"}, "bundle_text", "m.obj"),
+        ({"m.gltf": json.dumps({"buffers": [{"uri": "../x.bin"}]})}, "bundle_uri", "leads out"),
+        ({"m.gltf": "[" * 100000}, "bundle_text", "m.gltf"),
+        ({"m.gltf": "[]"}, "bundle_text", "m.gltf"),
+        ({"m.usda": "#usda 1.0"}, "bundle_file", "m.usda"),
+        ({"run.sh": "true"}, "bundle_file", "run.sh"),
+        ({"scene.yaml": "packages: {up: ..}\n" + SCENE}, "bundle_uri", "packages.up"),
+    ],
+)
+def test_a_hostile_file_is_refused_before_drake_sees_it(tmp_path, files, code, words):
+    scene = write(tmp_path)
+    for name, content in files.items():
+        (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(SceneError) as caught:
+        check_bundle(tmp_path, scene)
+    assert caught.value.code == code, caught.value
+    assert words in str(caught.value)
+
+
+def test_an_honest_directory_passes(tmp_path):
+    honest = (
+        "<robot xmlns:drake='http://drake.mit.edu' name='r'><plugin filename='libx.so'/><!-- file:///x --><mesh filename='m.obj'/></robot>"
+    )
+    scene = write(tmp_path, files={"more.urdf": honest, "m.obj": TETRAHEDRON, "README.yaml": "license: http://example.org\n"})
+    check_bundle(tmp_path, scene)
+
+
+@pytest.mark.parametrize(
+    ("bundle", "code"),
+    [
+        (b"not a zip", "bundle_zip"),
+        (zipped({"scene.yaml": SCENE}), "bundle_zip"),
+        (zipped({"bundle.json": "[]"}), "bundle_zip"),
+        (zipped({"bundle.json": "{"}), "bundle_zip"),
+        (zipped({"bundle.json": '{"scene": 3}'}), "scene_not_found"),
+        (zipped({"bundle.json": '{"scene": "../scene.yaml"}'}), "bundle_path"),
+        (zipped({"../evil": ""}), "bundle_path"),
+        (zipped({"/evil": ""}), "bundle_path"),
+        (zipped({"a/../../evil": ""}), "bundle_path"),
+        (zipped({f"{i}.obj": "" for i in range(30)}), "bundle_too_large"),
+        (zipped({"big.obj": "0" * 30000}), "bundle_too_large"),
+        (bytes(50000), "bundle_too_large"),
+    ],
+)
+def test_a_bad_zip_is_refused(bundle, code):
+    with pytest.raises(SceneError) as caught:
+        load_bundle(bundle, BundleLimits(bytes=40000, unpacked_bytes=20000, files=20))
+    assert caught.value.code == code
+
+
+def test_a_link_in_a_zip_is_refused():
+    link = zipfile.ZipInfo("link.obj")
+    link.external_attr = 0o120777 << 16
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w") as archive:
+        archive.writestr(link, "/etc/passwd")
+    with pytest.raises(SceneError, match="plain file"):
+        load_bundle(data.getvalue())
+
+
+def test_references_of_a_model(tmp_path):
+    path = tmp_path / "a.sdf"
+    path.write_text(ROOM.replace("<box><size>0.1 1 1</size></box>", "<mesh><uri>m.obj</uri><scale>1 1 1</scale></mesh>"))
+    assert references(path) == ["m.obj"]
