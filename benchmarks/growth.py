@@ -73,7 +73,7 @@ def _against(name: str, progress: Progress) -> list[dict[str, Any]]:
         for way, run in sides.items():
             row = {"scene": name, "way": way, **run()}
             drakes = rows[0] if rows else row
-            reached = next((point["seconds"] for point in row["curve"] if point["ellipsoid"] >= drakes["ellipsoid"]), None)
+            reached = next((point["seconds"] for point in row["curve"] if point["ellipsoid_volume"] >= drakes["ellipsoid"]), None)
             row |= {"volume_ratio": row["ellipsoid"] / drakes["ellipsoid"], "reached_seconds": reached}
             row |= {"time_ratio": drakes["seconds"] / reached if reached else None}
             progress(_line(row))
@@ -124,7 +124,7 @@ def _drakes(scene: Scene, C: Array, d: Array) -> dict[str, Any]:
         raise CirisError("start_not_certified", "Drake does not certify the cube that both sides start from", field="HALF_WIDTH")
     last = scene.polytope(*rounds[-1])
     volume = inscribed_ellipsoid(last).volume
-    curve = [{"iteration": len(rounds), "seconds": seconds, "ellipsoid": volume}]
+    curve = [{"iteration": len(rounds), "seconds": seconds, "ellipsoid_volume": volume}]
     return {"seconds": seconds, "ellipsoid": volume, "faces": len(last.d), "curve": curve, "ended": f"after {len(rounds)} rounds"}
 
 

@@ -284,22 +284,37 @@ class Scene:
 
 @dataclass(frozen=True)
 class Polytope:
-    """{s : C s <= d}; C is (m, n), d is (m,). Plain rows: whether the joint limits are among them is up to the maker.
+    """{s : C s <= d}; C is (m, n), d is (m,), finite. Plain rows: whether the joint limits are among them is up to the maker.
 
-    Raises:
-        RegionError: shapes do not fit or a number is not finite.
+    :meth:`given` checks what comes from users.
     """
 
     C: Array
     d: Array
 
-    def __post_init__(self) -> None:
-        if self.C.ndim != 2 or self.d.shape != (len(self.C),):
-            raise RegionError(
-                "polytope_shape", f"C is {self.C.shape} and d is {self.d.shape}; they must be (m, n) and (m,)", field="polytope"
-            )
-        if not (np.isfinite(self.C).all() and np.isfinite(self.d).all()):
-            raise RegionError("polytope_not_finite", "C and d must be finite numbers", field="polytope")
+    @classmethod
+    def given(cls, C: Any, d: Any, n: int | None = None, field: str = "polytope") -> Polytope:
+        """A polytope as users give it: nested lists or arrays of numbers.
+
+        Args:
+            n: number of columns that C has to have; None for any. No rows at all are none of that many columns.
+            field: where the user gave it.
+
+        Raises:
+            RegionError: ``polytope_shape`` or ``polytope_not_finite``.
+        """
+        try:
+            rows, offsets = np.array(C, dtype=float), np.array(d, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise RegionError("polytope_shape", f"C and d must be arrays of numbers: {error}", field=field) from None
+        if rows.size == 0 and n is not None:
+            rows = rows.reshape(0, n)
+        if rows.ndim != 2 or offsets.shape != (len(rows),) or (n is not None and rows.shape[1] != n):
+            hint = f"C is m x {n or 'n'}, one column a joint in the scene's order, and d has m numbers"
+            raise RegionError("polytope_shape", f"C is {rows.shape} and d is {offsets.shape}", field=field, hint=hint)
+        if not (np.isfinite(rows).all() and np.isfinite(offsets).all()):
+            raise RegionError("polytope_not_finite", "C and d must be finite numbers", field=field)
+        return cls(rows, offsets)
 
     def contains(self, s: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
         """Which of the points s, (..., n), satisfy C s <= d + tolerance."""

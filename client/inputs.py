@@ -9,11 +9,9 @@ from zipfile import BadZipFile
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from certifier.errors import CirisError, RegionError
-
-Array = NDArray[np.float64]
+from certifier.model import Array, Polytope
 
 SEED_FILE = "seed.yaml"
 _LIST = "joint positions, separated by commas"
@@ -66,10 +64,9 @@ def seed_of(scene: str, q: str | None) -> list[float]:
 
 @dataclass(frozen=True)
 class PolytopeFile:
-    """C (m, n), d (m,) and optionally center (n,), in s."""
+    """A polytope in s, without the joint limits, and optionally a point inside, (n,)."""
 
-    C: Array
-    d: Array
+    polytope: Polytope
     center: Array | None
 
 
@@ -77,7 +74,7 @@ def polytope_file(path: str) -> PolytopeFile:
     """Reads an npz file with C, d and optionally center.
 
     Raises:
-        RegionError: polytope_file, saying what is wrong.
+        RegionError: polytope_file, or as :meth:`Polytope.given`.
     """
     try:
         with np.load(path, allow_pickle=False) as arrays:
@@ -89,11 +86,9 @@ def polytope_file(path: str) -> PolytopeFile:
     missing = {"C", "d"} - content.keys()
     if missing:
         raise RegionError("polytope_file", f"{path} has no array {' and no array '.join(sorted(missing))}", field="--polytope")
-    C, d, center = content["C"], content["d"], content.get("center")
-    if C.ndim != 2 or d.shape != (len(C),) or (center is not None and center.shape != C.shape[1:]):
-        shapes = f"C is {C.shape}, d is {d.shape}" + ("" if center is None else f", center is {center.shape}")
-        raise RegionError("polytope_shape", f"{shapes}; they must be (m, n), (m,) and (n,)", field="--polytope")
-    for name, array in content.items():
-        if not np.isfinite(array).all():
-            raise RegionError("polytope_not_finite", f"{name} holds a number that is not finite", field="--polytope")
-    return PolytopeFile(C, d, center)
+    polytope, center = Polytope.given(content["C"], content["d"], field="--polytope"), content.get("center")
+    if center is not None and not (center.shape == polytope.C.shape[1:] and np.isfinite(center).all()):
+        raise RegionError(
+            "polytope_shape", f"center must be {polytope.C.shape[1]} finite numbers, as many as C has columns", field="--polytope"
+        )
+    return PolytopeFile(polytope, center)

@@ -6,6 +6,7 @@ from typing import Any
 
 from certifier.errors import SceneError
 from certifier.model import Scene
+from client import verdicts
 from client.inputs import PolytopeFile, is_scene_file
 from client.output import Screen
 from client.service import Grown
@@ -36,17 +37,26 @@ def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], screen: Scre
     return Grown(region.manifest, region.proof, provenance["seconds"], remark=provenance["reason"])
 
 
-def certify(scene: str, polytope: PolytopeFile, screen: Screen, watch: bool, drake: str | None) -> dict[str, Any]:
+def certify(scene: str, given: PolytopeFile, screen: Screen, watch: bool, drake: str | None) -> dict[str, Any]:
     """Certifies a polytope here, or asks Drake with the solver of that name; the document of ``ciris certify --json``."""
     loaded = load(scene)
     progress = screen.line if watch else screen.status
     if drake is None:
         from certifier.jobs import local
 
-        document = local.certify(loaded, polytope.C, polytope.d, polytope.center, progress)
+        verdict = local.certify(loaded, given.polytope, given.center, progress)
     else:
         from certifier.jobs import reference
 
-        document = reference.certify(loaded, polytope.C, polytope.d, drake, progress)
+        verdict = reference.certify(loaded, given.polytope, drake, progress)
     screen.clear()
-    return document
+    pairs = [
+        {
+            **vars(result),
+            "a": loaded.pairs[index].a,
+            "b": loaded.pairs[index].b,
+            "witness_q": None if result.witness_s is None else loaded.to_q(result.witness_s).tolist(),
+        }
+        for index, result in sorted(verdict.results.items())
+    ]
+    return verdicts.document(loaded.name, loaded.hash, verdict.outcome, verdict.guarantee, verdict.seconds, pairs)

@@ -9,6 +9,7 @@ from typing import Any
 
 from certifier.errors import CirisError
 from certifier.outcome import Guarantee, Outcome
+from client import verdicts
 from client.follow import follow
 from client.http import Client, Document
 from client.inputs import PolytopeFile, is_scene_file
@@ -64,15 +65,15 @@ def grow_many(client: Client, requests: Sequence[Document], screen: Screen, watc
     return [_wait(client, job, screen, watch) for job in jobs]
 
 
-def certify(client: Client, scene: Document, polytope: PolytopeFile, screen: Screen, watch: bool = False) -> Document:
+def certify(client: Client, scene: Document, given: PolytopeFile, screen: Screen, watch: bool = False) -> Document:
     """Has the service certify a polytope; the document of ``ciris certify --json``.
 
     Raises:
         CirisError: the polytope was refused, or the job was cancelled.
     """
-    body: dict[str, Any] = {"C": polytope.C.tolist(), "d": polytope.d.tolist()}
-    if polytope.center is not None:
-        body["center"] = polytope.center.tolist()
+    body: dict[str, Any] = {"C": given.polytope.C.tolist(), "d": given.polytope.d.tolist()}
+    if given.center is not None:
+        body["center"] = given.center.tolist()
     job, _ = client.create_job({"kind": "certify", "scene": scene["id"], "polytope": body})
     screen.line(f"job {job['id']}: {client.url}/jobs/{job['id']}")
     job = _wait(client, job["id"], screen, watch)
@@ -81,26 +82,10 @@ def certify(client: Client, scene: Document, polytope: PolytopeFile, screen: Scr
     matrix = client.job_pairs(job["id"])
     names = {pair["index"]: pair for pair in matrix["pairs"]}
     outcome = Outcome(job["outcome"])
-    return {
-        "scene": {"name": scene["name"], "hash": scene["hash"]},
-        "outcome": outcome.value,
-        "guarantee": (Guarantee.EXACT if outcome is Outcome.CERTIFIED else Guarantee.NONE).value,
-        "seconds": _seconds(job),
-        "pairs": [
-            {
-                "a": names[cell["pair"]]["a"],
-                "b": names[cell["pair"]]["b"],
-                "outcome": cell["state"],
-                "margin": cell["margin"],
-                "seconds": cell["seconds"],
-                "stage": cell["stage"],
-                "witness_q": cell["witness_q"],
-                "detail": cell["detail"],
-            }
-            for cell in matrix["cells"]
-            if cell["state"] in set(Outcome)
-        ],
-    }
+    guarantee = Guarantee.EXACT if outcome is Outcome.CERTIFIED else Guarantee.NONE
+    settled = [cell for cell in matrix["cells"] if cell["state"] in set(Outcome)]
+    pairs = [{**cell, "outcome": cell["state"], "a": names[cell["pair"]]["a"], "b": names[cell["pair"]]["b"]} for cell in settled]
+    return verdicts.document(scene["name"], scene["hash"], outcome, guarantee, _seconds(job), pairs)
 
 
 def _wait(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:

@@ -100,9 +100,10 @@ class JobRow(Base):
     options: Mapped[Document]
     """certifier.growth.options.GrowthOptions.to_document()"""
     growth: Mapped[Document | None] = mapped_column(deferred=True)
-    """The state of certifier.growth.machine after the last transition."""
+    """certifier.growth.state.GrowthState.to_document() after the last transition."""
     action: Mapped[Document | None] = mapped_column(deferred=True)
-    """The action that this state waits for."""
+    """Which action this state waits for: its kind, of a certification its iteration, of the end its outcome and reason. The rest of it
+    stands in the iteration and its pairs, or in the step."""
     idempotency_key: Mapped[str | None] = mapped_column(String(255), unique=True)
     request_digest: Mapped[str | None] = mapped_column(String(64))
     """SHA-256 of the request, to tell a repetition from a different request under the same key."""
@@ -185,7 +186,8 @@ class PairRow(Leased, Base):
     seconds: Mapped[float | None]
     detail: Mapped[str | None]
     witness_s: Mapped[list[float] | None] = mapped_column(JSON(none_as_null=True))
-    weak_points: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    weakness: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    """certifier.pair.result.Weakness.to_document()"""
     proof_digest: Mapped[str | None] = mapped_column(ForeignKey("proofs.digest"))
 
 

@@ -15,14 +15,13 @@ from numpy.typing import ArrayLike
 from sqlalchemy import ColumnElement, Select, func, insert, select
 from sqlalchemy.orm import Session, defer
 
+from certifier.pair.result import PairResult
 from db import events, jobs, leases, proofs
 from db.models import IterationRow, JobRow, PairRow
 from db.states import PAIR, IterationState, PairState, transition, unfinished
 from db.types import utcnow
 
 UNFINISHED = unfinished(PAIR)
-STORED = ("stage", "margin", "seconds", "detail", "witness_s", "weak_points")
-"""Fields of a result that are columns of its row."""
 FAILED = frozenset(PairState) - UNFINISHED - {PairState.CERTIFIED, PairState.SKIPPED}
 
 
@@ -54,22 +53,6 @@ class Claim:
     scene_id: str
     iteration: int
     pairs: tuple[Claimed, ...]
-
-
-@dataclass(frozen=True)
-class Result:
-    """What came of one pair; the fields are those of certifier.pair.result.PairResult, and the CirisError document of an ``error``."""
-
-    index: int
-    state: PairState
-    seconds: float
-    stage: str | None = None
-    margin: float | None = None
-    detail: str = ""
-    witness_s: list[float] | None = None
-    weak_points: dict[str, Any] | None = None
-    proof: bytes | None = None
-    error: dict[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -163,8 +146,8 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
     return Claim(token, job.id, job.scene_id, chosen[0].iteration, pairs)
 
 
-def save(session: Session, claim: Claim, results: Sequence[Result]) -> Saved:
-    """Saves results with their proofs, in one transaction, if they are still held.
+def save(session: Session, claim: Claim, results: Mapping[int, PairResult]) -> Saved:
+    """Saves results, pair index -> result, with their proofs, in one transaction, if they are still held.
 
     Enough failures skip the pairs after them; whoever holds one of those stops (leases.kept).
     """
@@ -173,18 +156,18 @@ def save(session: Session, claim: Claim, results: Sequence[Result]) -> Saved:
     mine = (PairRow.job_id == claim.job_id, PairRow.iteration == claim.iteration)
     rows = session.execute(select(*columns).where(*mine).order_by(PairRow.id)).all()
     held = {row.pair_index: row.id for row in rows if row.state == PairState.RUNNING and row.lease_token == claim.token}
-    saved = [result for result in results if result.index in held]
+    saved = {index: result for index, result in results.items() if index in held}
     if not saved:
         return Saved(held=False, finished=False)
-    digests = proofs.put(session, [result.proof for result in saved if result.proof is not None])
-    for result in saved:
-        values = {name: getattr(result, name) for name in STORED}
-        values["proof_digest"] = None if result.proof is None else digests[result.proof]
-        transition(session, PairRow, result.state, PairRow.id == held[result.index], lease_until=None, **values)
-    job.error = next((result.error for result in saved if result.error is not None), job.error)
-    events.emit(session, job, "pairs", {"iteration": claim.iteration, "pairs": [_public(result) for result in saved]})
+    digests = proofs.put(session, [result.proof for result in saved.values() if result.proof is not None])
+    for index, result in saved.items():
+        digest = None if result.proof is None else digests[result.proof]
+        transition(session, PairRow, state_of(result), PairRow.id == held[index], lease_until=None, proof_digest=digest, **_columns(result))
+    job.error = next((result.error for result in saved.values() if result.error is not None), job.error)
+    public = [_public(index, result) for index, result in saved.items()]
+    events.emit(session, job, "pairs", {"iteration": claim.iteration, "pairs": public})
     label, enough = session.execute(select(IterationRow.label, IterationRow.failures).where(*_iteration(job.id, claim.iteration))).one()
-    states = {row.id: row.state for row in rows} | {held[result.index]: result.state.value for result in saved}
+    states = {row.id: row.state for row in rows} | {held[index]: state_of(result).value for index, result in saved.items()}
     failed = [pair for pair, state in states.items() if state in FAILED]
     if enough is not None and len(failed) >= enough:
         late = [pair for pair, state in states.items() if pair > failed[enough - 1] and state in UNFINISHED]
@@ -220,6 +203,12 @@ def reached(session: Session, iteration: IterationRow) -> Sequence[PairRow]:
     if iteration.failures is not None and len(places) >= iteration.failures:
         rows = rows[: places[iteration.failures - 1]]
     return rows
+
+
+def order(session: Session, iteration: IterationRow) -> list[int]:
+    """The indices of an iteration's pairs, in the order in which they are claimed."""
+    mine = (PairRow.job_id == iteration.job_id, PairRow.iteration == iteration.index)
+    return list(session.scalars(select(PairRow.pair_index).where(*mine).order_by(PairRow.id)))
 
 
 def of_iteration(session: Session, job_id: str, iteration: int) -> Sequence[PairRow]:
@@ -270,5 +259,21 @@ def _pairs(job_id: str, iteration: int) -> Select[PairRow]:
     return select(PairRow).where(PairRow.job_id == job_id, PairRow.iteration == iteration)
 
 
-def _public(result: Result) -> dict[str, Any]:
-    return {"index": result.index, "state": result.state, "stage": result.stage, "margin": result.margin, "seconds": result.seconds}
+def state_of(result: PairResult) -> PairState:
+    """The state of a settled pair is its outcome."""
+    return PairState(result.outcome.value)
+
+
+def _columns(result: PairResult) -> dict[str, Any]:
+    return {
+        "stage": result.stage,
+        "margin": result.margin,
+        "seconds": result.seconds,
+        "detail": result.detail,
+        "witness_s": None if result.witness_s is None else result.witness_s.tolist(),
+        "weakness": None if result.weakness is None else result.weakness.to_document(),
+    }
+
+
+def _public(index: int, result: PairResult) -> dict[str, Any]:
+    return {"index": index, "state": state_of(result), "stage": result.stage, "margin": result.margin, "seconds": result.seconds}

@@ -9,30 +9,37 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from certifier.growth.actions import Failed, Report, Stepped, Transition
+from certifier.errors import CirisError
+from certifier.growth.actions import Failed, Report, Transition
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
+from certifier.growth.state import GrowthState
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.seeding.proposal import Proposal
+from certifier.step.stepped import Stepped
 from db.states import JobKind, JobState, StepKind, StepState
 
 
 def next_transition(scene: Scene, options: dict[str, Any], state: dict[str, Any] | None, report: Report | None) -> Transition:
-    """The first transition of a job (no state yet), or the one that follows a report."""
+    """The first transition of a job (no state yet), or the one that follows a report.
+
+    Raises:
+        CirisError: as :meth:`GrowthOptions.from_document`, :meth:`GrowthState.from_document` and :func:`begin`.
+    """
     parsed = GrowthOptions.from_document(options)
     if state is None:
         return begin(scene, parsed)
     if report is None:
         raise ValueError("a job that has begun advances with a report")
-    return advance(scene, state, report)
+    return advance(scene, GrowthState.from_document(state, parsed), report)
 
 
 def step_report(kind: StepKind, state: StepState, report: dict[str, Any]) -> Report:
     """The report of a seeding or a polytope step from its row."""
     if state == StepState.FAILED:
-        return Failed(report)
-    return Proposal.from_document(report) if kind == StepKind.PROPOSE else Stepped(**report)
+        return Failed(CirisError.from_document(report))
+    return Proposal.from_document(report) if kind == StepKind.PROPOSE else Stepped.from_document(report)
 
 
 @dataclass(frozen=True)

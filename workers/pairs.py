@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Sequence
 from functools import lru_cache, partial
 
 from structlog.contextvars import bound_contextvars
 
 from certifier.errors import CirisError
 from certifier.growth.options import GrowthOptions
-from certifier.jobs.reports import weakness
 from certifier.model import Polytope
+from certifier.outcome import Outcome
 from certifier.pair.certification import Certification
+from certifier.pair.result import PairResult
 from db import jobs, leases, pairs
 from db.models import IterationRow, PairRow
 from db.session import database
 from db.settings import settings
-from db.states import JobState, PairState
+from db.states import JobState
 from db.types import Arrays
 from workers.scenes import load_scene
 from workers.transaction import persistently
@@ -39,48 +39,38 @@ def certify_pairs(claim: pairs.Claim) -> bool:
 
 def _certify_and_save(claim: pairs.Claim) -> bool:
     """Whether that finished the iteration."""
-    results: list[pairs.Result] = []
+    results: dict[int, PairResult] = {}
     since = time.monotonic()
     for place, pair in enumerate(claim.pairs, start=1):
         with bound_contextvars(pair=pair.index):
-            results.append(_certify(claim, pair))
-        failed = results[-1].state != PairState.CERTIFIED
+            results[pair.index] = _certify(claim, pair)
+        failed = results[pair.index].outcome is not Outcome.CERTIFIED
         if failed or place == len(claim.pairs) or time.monotonic() - since >= SAVE_SECONDS:
             saved = persistently(partial(_save, claim, results))
             if saved.finished or not saved.held:
                 return saved.finished
-            results, since = [], time.monotonic()
+            results, since = {}, time.monotonic()
     return False
 
 
-def _certify(claim: pairs.Claim, pair: pairs.Claimed) -> pairs.Result:
+def _certify(claim: pairs.Claim, pair: pairs.Claimed) -> PairResult:
     start = time.perf_counter()
     if leases.is_poison(pair.deaths, pair.attempt, settings().max_attempts):
         problem = f"{LOST.format(deaths=pair.deaths, attempts=pair.attempt - 1)} this pair"
-        return _error(pair, CirisError("worker_lost", problem), start)
+        return _error(CirisError("worker_lost", problem), start)
     try:
         certification, hard = _certification(claim.scene_id, claim.job_id, claim.iteration)
-        found = certification.certify(pair.index, every_face=pair.index in hard)
+        return certification.certify(pair.index, every_face=pair.index in hard)
     except CirisError as error:
-        return _error(pair, error, start)
+        return _error(error, start)
     except Exception as error:
         log.exception("the pair failed")
-        return _error(pair, CirisError("internal_error", f"{type(error).__name__}: {error}"), start)
-    return pairs.Result(
-        index=pair.index,
-        state=PairState(found.outcome.value),
-        stage=found.stage,
-        margin=found.margin,
-        seconds=found.seconds,
-        detail=found.detail,
-        witness_s=None if found.witness_s is None else found.witness_s.tolist(),
-        weak_points=weakness(found),
-        proof=found.proof,
-    )
+        return _error(CirisError("internal_error", f"{type(error).__name__}: {error}"), start)
 
 
-def _error(pair: pairs.Claimed, error: CirisError, start: float) -> pairs.Result:
-    return pairs.Result(pair.index, PairState.ERROR, seconds=time.perf_counter() - start, detail=str(error), error=error.to_document())
+def _error(error: CirisError, start: float) -> PairResult:
+    seconds = time.perf_counter() - start
+    return PairResult(Outcome.ERROR, None, seconds=seconds, detail=str(error), error=error.to_document())
 
 
 @lru_cache(maxsize=2)
@@ -96,6 +86,6 @@ def _certification(scene_id: str, job_id: str, iteration: int) -> tuple[Certific
     return Certification(load_scene(scene_id), Polytope(arrays["C"], arrays["d"]), arrays.get("center"), seed), hard
 
 
-def _save(claim: pairs.Claim, results: Sequence[pairs.Result]) -> pairs.Saved:
+def _save(claim: pairs.Claim, results: dict[int, PairResult]) -> pairs.Saved:
     with database().write() as session:
         return pairs.save(session, claim, results)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,17 +13,16 @@ from sqlalchemy.orm import Session
 from structlog.contextvars import bound_contextvars
 
 from certifier.errors import CirisError
-from certifier.growth.actions import Accepted
+from certifier.growth.actions import Candidate
 from certifier.isolation.child import run_in_child
-from certifier.jobs.region import certified_region, versions
-from certifier.jobs.reports import stepped
-from certifier.model import Polytope, Scene
+from certifier.jobs.region import certified_region, growth_point, versions
+from certifier.model import Array, Polytope, Scene
 from certifier.step.step import step as polytope_step
 from db import jobs, leases, pairs, proofs, regions, steps
-from db.models import JobRow, StepRow
+from db.models import IterationRow, JobRow, StepRow
 from db.session import database
 from db.settings import settings
-from db.states import IterationState, JobState, StepKind, StepState
+from db.states import JobState, StepKind, StepState
 from db.types import utcnow
 from workers.app import send_work
 from workers.pairs import LOST
@@ -95,33 +94,48 @@ def _propose(scene: Scene, claim: steps.Claim) -> Done:
 
 def _step(scene: Scene, claim: steps.Claim) -> Done:
     """The polytope step on an accepted polytope with its proofs."""
-    action = claim.input
+    iteration = claim.input["iteration"]
 
-    def read() -> dict[int, bytes]:
+    def read() -> tuple[Polytope, dict[int, bytes]]:
         with database().read() as session:
             rows = steps.accepted(session, claim.job_id)
-            accepted = next(row.input for row in rows if row.input["iteration"] == action["iteration"])
-            return _proofs(session, claim.job_id, accepted["proofs"])
+            accepted = next(row.input for row in rows if row.input["iteration"] == iteration)
+            return _polytope(session, claim.job_id, iteration)[0], _proofs(session, claim.job_id, accepted["proofs"])
 
-    polytope = Polytope(np.array(action["C"]), np.array(action["d"]))
-    return Done(asdict(stepped(polytope_step(scene, polytope, persistently(read), witnesses=np.array(action["contain"])))))
+    return Done(polytope_step(scene, *persistently(read), contain=np.array(claim.input["contain"])).to_document())
 
 
 def _accept(scene: Scene, claim: steps.Claim) -> Done:
     """Assembles and verifies the proof of a region; what the verifier refuses is raised as its ProofError and never stored."""
     accepted = claim.input
 
-    def read() -> tuple[dict[int, bytes], dict[str, Any]]:
+    def read() -> tuple[Candidate, dict[int, bytes], dict[str, Any]]:
         with database().read() as session:
-            return _proofs(session, claim.job_id, accepted["proofs"]), _provenance(session, scene, jobs.get(session, claim.job_id))
+            polytope, center = _polytope(session, claim.job_id, accepted["iteration"])
+            candidate = Candidate(
+                iteration=accepted["iteration"],
+                polytope=polytope,
+                center=center,
+                seed=None if accepted["seed"] is None else np.array(accepted["seed"]),
+                ellipsoid_volume=accepted["ellipsoid_volume"],
+                proofs={int(index): iteration for index, iteration in accepted["proofs"].items()},
+            )
+            held = _proofs(session, claim.job_id, accepted["proofs"])
+            return candidate, held, _provenance(session, scene, jobs.get(session, claim.job_id))
 
-    held, provenance = persistently(read)
-    region = certified_region(scene, Accepted(**accepted), held, provenance)
+    candidate, held, provenance = persistently(read)
+    region = certified_region(scene, candidate, held, provenance)
 
     def save(session: Session, job: JobRow) -> None:
-        regions.add(session, job, accepted["iteration"], region.manifest, region.proof)
+        regions.add(session, job, candidate.iteration, region.manifest, region.proof)
 
-    return Done({"iteration": accepted["iteration"]}, save)
+    return Done({"iteration": candidate.iteration}, save)
+
+
+def _polytope(session: Session, job_id: str, iteration: int) -> tuple[Polytope, Array | None]:
+    """The polytope of an iteration, joint limits included, and the point inside that came with it."""
+    arrays = session.get_one(IterationRow, (job_id, iteration)).arrays
+    return Polytope(arrays["C"], arrays["d"]), arrays.get("center")
 
 
 def _proofs(session: Session, job_id: str, iteration_of: Mapping[str, int]) -> dict[int, bytes]:
@@ -132,14 +146,16 @@ def _proofs(session: Session, job_id: str, iteration_of: Mapping[str, int]) -> d
 
 def _provenance(session: Session, scene: Scene, job: JobRow) -> dict[str, Any]:
     started = job.started_at or job.created_at
-    certified = [row for row in pairs.iterations(session, job.id) if row.state == IterationState.CERTIFIED]
+    finished = {row.index: row.finished_at or started for row in pairs.iterations(session, job.id)}
+    accepted = [step.input for step in steps.accepted(session, job.id)]
     seeded = [step.report for step in steps.of_job(session, job.id) if step.kind == StepKind.PROPOSE and step.report is not None]
     return {
         "job": job.id,
         "options": job.options,
         "versions": versions(scene),
         "growth_curve": [
-            {"iteration": row.index, "seconds": ((row.finished_at or started) - started).total_seconds()} for row in certified
+            growth_point(found["iteration"], (finished[found["iteration"]] - started).total_seconds(), found["ellipsoid_volume"])
+            for found in accepted
         ],
         "seeding_seconds": sum(report["info"]["seconds"] for report in seeded),
         "pair_seconds": pairs.seconds(session, job.id),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import lru_cache, partial
 from typing import Any
@@ -16,19 +16,11 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from certifier.growth.actions import (
-    Certification,
-    Certify,
-    Finish,
-    Propose,
-    Report,
-    Step,
-    Transition,
-    action_from_document,
-    action_to_document,
-)
+from certifier.growth.actions import Candidate, Certify, Finish, Outcomes, Propose, Report, Step, Transition
+from certifier.model import Polytope
 from certifier.outcome import Outcome
 from certifier.pair.forecast import PairCost, forecast
+from certifier.pair.result import Weakness
 from db import jobs, leases, pairs, steps, work
 from db.models import IterationRow, JobRow
 from db.session import database
@@ -119,18 +111,31 @@ def _begin(job_id: str) -> Turn | None:
 
 def _report(session: Session, job: JobRow) -> Report | None:
     """The report on the job's present action; None while that is unfinished."""
-    action = action_from_document(job.action or {})
-    if isinstance(action, Certify):
-        iteration = session.get_one(IterationRow, (job.id, action.iteration))
-        if iteration.state == IterationState.RUNNING:
-            return None
-        rows = pairs.reached(session, iteration)
-        weak = {row.pair_index: row.weak_points for row in rows if row.weak_points is not None}
-        return Certification(action.iteration, {row.pair_index: Outcome(row.state) for row in rows}, weak)
-    step = steps.of_turn(session, job, StepKind(action.kind))
+    action = job.action or {}
+    if action["kind"] == Certify.kind:
+        iteration = session.get_one(IterationRow, (job.id, action["iteration"]))
+        return None if iteration.state == IterationState.RUNNING else _outcomes(session, iteration)
+    step = steps.of_turn(session, job, StepKind(action["kind"]))
     if step is None or step.state in unfinished(STEP):
         return None
     return step_report(StepKind(step.kind), StepState(step.state), step.report or {})
+
+
+def _outcomes(session: Session, iteration: IterationRow) -> Outcomes:
+    """The report on a certification that has ended, from its rows."""
+    action = Certify(
+        iteration=iteration.index,
+        label=iteration.label,
+        polytope=Polytope(iteration.arrays["C"], iteration.arrays["d"]),
+        center=iteration.arrays.get("center"),
+        pairs=pairs.order(session, iteration),
+        reuse={int(pair): source for pair, source in iteration.reuse.items()},
+        hard=iteration.hard,
+        failures=iteration.failures,
+    )
+    rows = pairs.reached(session, iteration)
+    weaknesses = {row.pair_index: Weakness.from_document(row.weakness) for row in rows if row.weakness is not None}
+    return Outcomes(action, {row.pair_index: Outcome(row.state) for row in rows}, weaknesses)
 
 
 def _save(turn: Turn, transition: Transition) -> bool:
@@ -142,23 +147,45 @@ def _save(turn: Turn, transition: Transition) -> bool:
         if job.state == JobState.QUEUED:
             jobs.start(session, job, work.served_by_now(session))
         _advance(job, transition.action)
-        job.growth = transition.state
+        job.growth = transition.state.to_document()
         match transition.action:
-            case Propose() | Step() as action:
-                steps.add(session, job, StepKind(action.kind), action_to_document(action))
-                afterwards.append(send_work)
+            case Propose() as action:
+                _add_step(session, job, StepKind.PROPOSE, {"seed": action.seed}, afterwards)
+            case Step() as action:
+                work_on = {"iteration": action.iteration, "contain": action.contain.tolist()}
+                _add_step(session, job, StepKind.STEP, work_on, afterwards)
             case Certify() as action:
                 _add_iteration(session, job, action, afterwards)
-        if transition.accepted is not None:
-            steps.add(session, job, StepKind.ACCEPT, asdict(transition.accepted), utcnow() + timedelta(seconds=ACCEPT_SECONDS))
+        if transition.candidate is not None:
+            _add_acceptance(session, job, transition.candidate)
     return isinstance(transition.action, Finish) or (isinstance(transition.action, Certify) and not transition.action.pairs)
 
 
 def _advance(job: JobRow, action: Propose | Certify | Step | Finish) -> None:
     job.turn += 1
-    job.action = action_to_document(action)
+    job.action = {"kind": action.kind}
+    if isinstance(action, Certify):
+        job.action["iteration"] = action.iteration
+    elif isinstance(action, Finish):
+        job.action |= {"outcome": action.outcome.value, "reason": action.reason}
     job.coordinator = job.coordinator_until = None
     job.coordinator_attempts = 0
+
+
+def _add_step(session: Session, job: JobRow, kind: StepKind, work_on: dict[str, Any], afterwards: Afterwards) -> None:
+    steps.add(session, job, kind, work_on)
+    afterwards.append(send_work)
+
+
+def _add_acceptance(session: Session, job: JobRow, candidate: Candidate) -> None:
+    """What the candidate's iteration does not hold is the step's input."""
+    work_on = {
+        "iteration": candidate.iteration,
+        "seed": None if candidate.seed is None else candidate.seed.tolist(),
+        "ellipsoid_volume": candidate.ellipsoid_volume,
+        "proofs": candidate.proofs,
+    }
+    steps.add(session, job, StepKind.ACCEPT, work_on, utcnow() + timedelta(seconds=ACCEPT_SECONDS))
 
 
 def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: Afterwards) -> None:
@@ -171,8 +198,8 @@ def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: A
         job,
         index=action.iteration,
         label=action.label,
-        C=action.C,
-        d=action.d,
+        C=action.polytope.C,
+        d=action.polytope.d,
         center=action.center,
         pairs=new,
         reuse=action.reuse,
@@ -214,8 +241,8 @@ def _finish(session: Session, job: JobRow, afterwards: Afterwards) -> None:
         return
     refused = next((step.report for step in rows if step.kind == StepKind.ACCEPT and step.state == StepState.FAILED), None)
     failed = next((step.report for step in reversed(rows) if step.state == StepState.FAILED), None)
-    finish = action_from_document(job.action or {})
-    assert isinstance(finish, Finish)
+    assert job.action is not None, "whoever finishes a job has found its last action"
+    finish = Finish(Outcome(job.action["outcome"]), job.action["reason"])
     if job.state == JobState.CANCELLING:
         jobs.finish(session, job, JobState.CANCELLED, reason=finish.reason)
     elif refused is not None:

@@ -79,20 +79,19 @@ class _Eliminated:
     matrix: Array
 
 
-class Method:
+class Arrow:
     """Iterates and their system.
 
     Args:
         y: (k,) start of the coupled unknowns.
-        free: (k,) which of them may move.
         tick: called with the iteration's number after every group of every pass; what it raises ends the method.
 
     Raises:
         np.linalg.LinAlgError: the start is not inside some cone.
     """
 
-    def __init__(self, groups: Sequence[Group], y: Array, free: Array, tick: Callable[[int], None]) -> None:
-        self.groups, self.free, self.tick = groups, np.flatnonzero(free), tick
+    def __init__(self, groups: Sequence[Group], y: Array, tick: Callable[[int], None]) -> None:
+        self.groups, self.tick = groups, tick
         self.y, self.z = y, [group.start for group in groups]
         self.iterations = 0
         self._x = [[block.start[None].repeat(len(block), axis=0) for block in group.blocks] for group in groups]
@@ -166,11 +165,9 @@ class Method:
     def _direction(self, f: Term) -> tuple[Array, list[Array], float]:
         """Newton's step in y and z, and its decrement."""
         _, g, H = f(self.y)
-        free = self.free
-        gradient = (g + self._gradient)[free]
-        solved = cho_solve(cho_factor((H + self._matrix)[np.ix_(free, free)]), gradient)
-        dy = np.zeros_like(self.y)
-        dy[free] = -solved
+        gradient = g + self._gradient
+        solved = cho_solve(cho_factor(H + self._matrix), gradient)
+        dy = -solved
         dz = [-(part.gradient + part.matrix @ dy[part.index]) for part in self._eliminated]
         return dy, dz, float(np.sqrt(gradient @ solved + self._square))
 

@@ -88,7 +88,7 @@ def solve(blocks: list[Block], max_iterations: int = 60, gap: float = np.inf) ->
     Args:
         gap: a certificate is taken once the gap is below this multiple of its margin: inf for the first one, 1 for one near the middle.
     """
-    method = _Method(blocks, gap)
+    method = _PathFollowing(blocks, gap)
     status, iteration = None, 0
     while status is None and iteration < max_iterations:
         try:
@@ -101,7 +101,7 @@ def solve(blocks: list[Block], max_iterations: int = 60, gap: float = np.inf) ->
     return method.solution(status or Status.ITERATION_LIMIT, iteration)
 
 
-class _Method:
+class _PathFollowing:
     """The iteration; Gram matrices and their duals are lists over the parts of all blocks' cones, one after the other."""
 
     def __init__(self, blocks: list[Block], gap: float) -> None:

@@ -21,6 +21,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from certifier.model import Array, Polytope, Scene
+from certifier.pair.result import Weakness
 from certifier.polytopes.polytope import bounds, drop_redundant
 
 BACKOFF, BACKOFF_GROWTH, LARGEST_BACKOFF = 0.2, 1.2, 0.6
@@ -43,17 +44,14 @@ class Failure:
 
     Attributes:
         joints: position indices of the joints between its bodies.
-        points: (w, n) where it fails; without points nothing is known but that it fails.
-        pull: (n,) how much it would help to shorten each joint's range; 0 where bodies are in contact at the points.
+        weakness: where it fails; without points nothing is known but that it fails. Where only the joints' ranges count, a face helps in
+            one joint alone.
         attempts: how often faces were added for this pair before.
-        ranges_alone: the program that failed knows nothing of the polytope but the joints' ranges: a face helps in one joint alone.
     """
 
     joints: tuple[int, ...]
-    points: Array
-    pull: Array
+    weakness: Weakness
     attempts: int
-    ranges_alone: bool = False
 
 
 @dataclass(frozen=True)
@@ -62,11 +60,6 @@ class Measure:
 
     center: Array
     covariance: Array
-
-    @property
-    def log_volume(self) -> float:
-        """Up to a constant."""
-        return float(np.linalg.slogdet(self.covariance)[1]) / 2
 
 
 def measure(polytope: Polytope, start: Array) -> Measure:
@@ -102,7 +95,7 @@ def contract(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, 
     limits = 2 * scene.n
     C, d = [polytope.C[:-limits]], [polytope.d[:-limits]]
     for failure in failures:
-        if failure.ranges_alone:
+        if failure.weakness.ranges_alone:
             worst = replace(failure, joints=(_worst_joint(scene, polytope, failure),))
             found = _face(ellipsoid, keep, worst, NEAR_RANGES * near)
         else:
@@ -120,13 +113,13 @@ def contract(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, 
 
 def _face(ellipsoid: Measure, keep: Array, failure: Failure, near: float) -> tuple[Array, Array] | None:
     """A face before the farthest mean; None when all are near and none is a collision."""
-    if not len(failure.points):
+    if not len(failure.weakness.points):
         return None
     joints = list(failure.joints)
     root = np.linalg.inv(np.linalg.cholesky(ellipsoid.covariance[np.ix_(joints, joints)]))
     hull = np.concatenate([ellipsoid.center[None], keep])[:, joints]
     best: tuple[float, Array, Array] | None = None
-    for point in failure.points[:, joints]:
+    for point in failure.weakness.points[:, joints]:
         system = np.vstack([root @ (hull - point).T, np.full((1, len(hull)), _HULL_WEIGHT)])
         weights, _ = nnls(system, np.append(np.zeros(len(joints)), _HULL_WEIGHT))
         nearest = weights @ hull / weights.sum()
@@ -135,7 +128,7 @@ def _face(ellipsoid: Measure, keep: Array, failure: Failure, near: float) -> tup
             best = distance, point, nearest
     assert best is not None
     distance, point, nearest = best
-    if distance == 0 or (distance < near and failure.pull.any()):
+    if distance == 0 or (distance < near and failure.weakness.pull.any()):
         return None
     backoff = min(LARGEST_BACKOFF, BACKOFF * BACKOFF_GROWTH**failure.attempts)
     normal = root.T @ root @ (point - nearest)
@@ -164,5 +157,5 @@ def _worst_joint(scene: Scene, polytope: Polytope, failure: Failure) -> int:
     """The joint of the pair that turns far and where a shorter range helps."""
     lower, upper = bounds(polytope)
     turn = np.where(scene.revolute, 2 * (np.arctan(upper) - np.arctan(lower)), upper - lower)
-    gain = turn * failure.pull if len(failure.points) else turn
+    gain = turn * failure.weakness.pull if len(failure.weakness.points) else turn
     return max(failure.joints, key=lambda i: float(gain[i]))

@@ -26,9 +26,9 @@ from pydrake.solvers import (
 )
 
 from certifier.errors import CirisError, SceneError
-from certifier.growth.machine import given_rows
-from certifier.jobs.local import Progress, document
-from certifier.model import Array, Scene
+from certifier.jobs.local import Progress
+from certifier.jobs.verdict import Verdict
+from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee, Outcome, Stage
 from certifier.pair.result import PairResult
 from certifier.polytopes.polytope import chebyshev_center
@@ -163,20 +163,20 @@ class Reference:
         return [int(np.abs(s - value).argmin()) for value in theirs]
 
 
-def certify(scene: Scene, C: Array, d: Array, solver: str, progress: Progress = lambda _: None) -> dict[str, Any]:
-    """Every pair on {C s <= d} and the joint limits by Drake; the document of ``ciris certify --json``.
+def certify(scene: Scene, polytope: Polytope, solver: str, progress: Progress = lambda _: None) -> Verdict:
+    """Every pair on a polytope and the joint limits by Drake.
 
     Raises:
         CirisError: as :class:`Reference`.
         RegionError: the polytope is malformed, empty or unbounded; on an empty one a solver would "certify" anything.
     """
     start = time.perf_counter()
-    rows, offsets = given_rows(scene, C, d)
-    chebyshev_center(scene.polytope(rows, offsets), tuple(joint.name for joint in scene.moving))
+    given = Polytope.given(polytope.C, polytope.d, scene.n)
+    chebyshev_center(scene.polytope(given.C, given.d), tuple(joint.name for joint in scene.moving))
     reference = Reference(scene, solver)
     results: dict[int, PairResult] = {}
     for index, pair in enumerate(scene.pairs):
-        found = reference.certify(index, rows, offsets)
+        found = reference.certify(index, given.C, given.d)
         results[index] = PairResult(found.outcome, Stage.SOS, found.build_seconds + found.solve_seconds, detail=found.status)
         progress(f"drake: {index + 1}/{len(scene.pairs)} {pair.a} - {pair.b}: {found.outcome}")
-    return document(scene, results, Guarantee.NUMERIC, time.perf_counter() - start)
+    return Verdict(results, Guarantee.NUMERIC, time.perf_counter() - start)

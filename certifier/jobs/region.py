@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from certifier.growth.actions import Accepted
+from certifier.growth.actions import Candidate
 from certifier.jobs.archimedean import archimedean
 from certifier.model import SCHEMA_VERSION, Polytope, Scene
 from certifier.outcome import Guarantee
@@ -34,7 +34,7 @@ class Region:
     statement: RegionStatement
 
 
-def certified_region(scene: Scene, accepted: Accepted, proofs: dict[int, bytes], provenance: dict[str, Any]) -> Region:
+def certified_region(scene: Scene, candidate: Candidate, proofs: dict[int, bytes], provenance: dict[str, Any]) -> Region:
     """Assemble a region from its pairs' proofs, verify the whole, and describe it.
 
     Args:
@@ -45,9 +45,9 @@ def certified_region(scene: Scene, accepted: Accepted, proofs: dict[int, bytes],
         ProofError: the proof does not hold; nothing may be served as certified then.
         RegionError: the polytope is empty or unbounded.
     """
-    C, d = np.array(accepted.C), np.array(accepted.d)
-    polytope = Polytope(C, d)
-    interior = chebyshev_center(polytope)[0] if accepted.center is None else np.array(accepted.center)
+    polytope = candidate.polytope
+    C, d = polytope.C, polytope.d
+    interior = chebyshev_center(polytope)[0] if candidate.center is None else candidate.center
     bound = archimedean(polytope)
     parts = tuple(PairProof.from_bytes(data, scene) for data in dict.fromkeys(proofs[index] for index in range(len(scene.pairs))))
     data = RegionProof(scene, C, d, interior, _implied(polytope, parts), bound, parts).to_bytes()
@@ -71,7 +71,7 @@ def certified_region(scene: Scene, accepted: Accepted, proofs: dict[int, bytes],
         "interior_point": interior.tolist(),
         "inscribed_ellipsoid": {"center": ellipsoid.center.tolist(), "shape": ellipsoid.shape.tolist()},
         "volume": {"ellipsoid": ellipsoid.volume, "polytope": size, "polytope_stderr": error},
-        "seed": None if accepted.seed is None else scene.to_q(np.array(accepted.seed)).tolist(),
+        "seed": None if candidate.seed is None else scene.to_q(candidate.seed).tolist(),
         "pairs": [
             {"a": p.a, "b": p.b, "outcome": "certified", "margin": statement.gaps[p], "proof_digest": digest(proofs[index])}
             for index, p in enumerate(scene.pairs)
@@ -83,6 +83,11 @@ def certified_region(scene: Scene, accepted: Accepted, proofs: dict[int, bytes],
         "provenance": provenance,
     }
     return Region(manifest, data, statement)
+
+
+def growth_point(iteration: int, seconds: float, ellipsoid_volume: float | None) -> dict[str, Any]:
+    """A point of the manifest's growth curve: an iteration that came to a region ``seconds`` after the job began."""
+    return {"iteration": iteration, "seconds": seconds, "ellipsoid_volume": ellipsoid_volume}
 
 
 def versions(scene: Scene) -> dict[str, Any]:

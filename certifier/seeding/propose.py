@@ -118,20 +118,17 @@ def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:
 
 
 def _given(scene: Scene, options: SeedOptions) -> tuple[Array, Array, Array]:
-    C, d = np.array(options.C, dtype=object), np.array(options.d, dtype=float)
-    if C.shape != (len(d), scene.n):
-        raise RegionError("polytope_shape", f"C must have a row of {scene.n} numbers for each of the {len(d)} numbers in d", field="seed.C")
-    C = C.astype(float)
-    limited = scene.polytope(C, d)
+    given = Polytope.given(options.C, options.d, scene.n, field="seed.C")
+    limited = scene.polytope(given.C, given.d)
     middle, _ = chebyshev_center(limited, tuple(joint.name for joint in scene.moving))
     if options.center is None:
-        return C, d, middle
+        return given.C, given.d, middle
     center = np.array(options.center)
     if center.shape != (scene.n,) or not np.all(limited.C @ center < limited.d):
         raise RegionError(
             "center_outside", "the centre does not lie strictly inside the polytope and the joint limits", field="seed.center"
         )
-    return C, d, center
+    return given.C, given.d, center
 
 
 def _box(scene: Scene, points: Array, half_width: float) -> tuple[Array, Array]:

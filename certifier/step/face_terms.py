@@ -2,12 +2,10 @@
 
 The unknowns are, face by face, (c_j, d_j, delta_j), n + 2 numbers: the face is {c_j'w <= d_j}, w = E^-1 (s - s_E), and
 
-    |c_j| <= d_j - delta_j,   |c_j| <= 1,   delta_j >= 0,   d_j <= cap,   c_j'w_k <= d_j for every witness w_k.
+    |c_j| <= d_j - delta_j,   |c_j| <= 1,   delta_j >= 0,   d_j <= cap,   c_j'w_k <= d_j for every point w_k.
 """
 
 from __future__ import annotations
-
-from enum import StrEnum
 
 import numpy as np
 
@@ -18,25 +16,13 @@ EPSILON = 1e-3
 """Added to the margins in the geometric mean, so that a face that cannot move does not hold up the others."""
 
 
-class Objective(StrEnum):
-    """What the margins delta_j between the ellipsoid and the faces are to do."""
-
-    GEOMETRIC_MEAN = "geometric_mean"
-    """Their geometric mean grows: sum of log(delta_j + eps)."""
-    SUM = "sum"
-    """Their sum grows."""
-
-
-def objective_term(kind: Objective, n: int) -> Term:
-    """What is minimised."""
+def objective_term(n: int) -> Term:
+    """What is minimised: the margins delta_j between the ellipsoid and the faces count by -sum log(delta_j + eps)."""
 
     def term(y: Array) -> tuple[float, Array, Array]:
         delta = y.reshape(-1, n + 2)[:, -1]
         gradient, hessian = np.zeros_like(y), np.zeros((len(y), len(y)))
         at = np.arange(n + 1, len(y), n + 2)
-        if kind is Objective.SUM:
-            gradient[at] = -1.0
-            return -float(delta.sum()), gradient, hessian
         gradient[at] = -1 / (delta + EPSILON)
         hessian[at, at] = np.square(gradient[at])
         return -float(np.log(np.maximum(delta + EPSILON, 1e-300)).sum()), gradient, hessian
@@ -44,11 +30,11 @@ def objective_term(kind: Objective, n: int) -> Term:
     return term
 
 
-def face_barrier(n: int, cap: float, witnesses: Array) -> Term:
-    """-log of the slacks, the two cones as second-order cones; witnesses (k, n)."""
+def face_barrier(n: int, cap: float, points: Array) -> Term:
+    """-log of the slacks, the two cones as second-order cones; points (k, n)."""
     # Rows of the linear slacks delta, cap - d, d - c'w_k: constant + rows v.
-    rows = np.zeros((2 + len(witnesses), n + 2))
-    rows[0, -1], rows[1, -2], rows[2:, :n], rows[2:, -2] = 1.0, -1.0, -witnesses, 1.0
+    rows = np.zeros((2 + len(points), n + 2))
+    rows[0, -1], rows[1, -2], rows[2:, :n], rows[2:, -2] = 1.0, -1.0, -points, 1.0
     constant = np.zeros(len(rows))
     constant[1] = cap
     ball = np.diag([-1.0] * n + [0.0, 0.0])

@@ -3,9 +3,9 @@
 The moved polytope is {C s <= d} within a *trust box* B around the current one. With the face multipliers of the proofs fixed, free are the
 faces (C, d), the margins delta, every plane z_p, and the multipliers of 1 and of the faces of B:
 
-    maximise  sum_j log(delta_j + eps)   (or sum_j delta_j)
+    maximise  sum_j log(delta_j + eps)
     s.t.      A_r z_p - t_p den - sum_j lambda_rj (d_j - c_j's)  in  K_B            for every rational r (certifier.step.identities),
-              |E c_j| <= d_j - c_j's_E - delta_j,   |E c_j| <= 1,   delta_j >= 0,   c_j's_k <= d_j for every witness s_k,
+              |E c_j| <= d_j - c_j's_E - delta_j,   |E c_j| <= 1,   delta_j >= 0,   c_j's_k <= d_j for every point s_k to contain,
 
 {E u + s_E} the inscribed ellipsoid and t_p a share of the pair's present margin, so that (11) is strictly feasible on what comes out.
 |E c_j| <= 1 where the paper has |c_j| <= 1: margins are measured against the ellipsoid, whatever the units of the joints.
@@ -18,12 +18,12 @@ have too little margin it starts from a slightly smaller one. What comes out is 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from certifier.conic.arrow import Method, Term
+from certifier.conic.arrow import Arrow, Term
 from certifier.conic.basis import dimension
 from certifier.errors import RegionError
 from certifier.model import Array, Box, Polytope, Scene
@@ -32,8 +32,9 @@ from certifier.pair.certification import Certification
 from certifier.polytopes.ellipsoid import Ellipsoid, inscribed_ellipsoid
 from certifier.polytopes.polytope import bounds, drop_redundant
 from certifier.proof.pair import PairProof
-from certifier.step.face_terms import Objective, face_barrier, objective_term
+from certifier.step.face_terms import face_barrier, objective_term
 from certifier.step.identities import Certificates, face_multipliers, holds_on
+from certifier.step.stepped import Stepped
 
 TRUST = 1.3
 """How far the trust box reaches, relative to the smallest box around the current polytope."""
@@ -55,32 +56,12 @@ MOST_TERMS = 4096
 Progress = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class Step:
-    """The moved polytope and where it came from; both have the same rows, joint limits last.
-
-    Attributes:
-        C, d, center: the new rows and the centre of the ellipsoid, which stays inside.
-        base_C, base_d: the current polytope without the rows that no pair needs, within the trust box; what lies between the two is
-            feasible in (12) as well.
-        growth: relative growth of the inscribed ellipsoid's volume, from the polytope that was given.
-    """
-
-    C: Array
-    d: Array
-    center: Array
-    base_C: Array
-    base_d: Array
-    growth: float
-    info: dict[str, Any]
-
-
-def trust_box(scene: Scene, polytope: Polytope, ellipsoid: Ellipsoid, trust: float = TRUST) -> Box:
+def trust_box(scene: Scene, polytope: Polytope, ellipsoid: Ellipsoid) -> Box:
     """The smallest box around P, enlarged about the ellipsoid's centre and cut to the joint limits."""
     lower, upper = bounds(polytope)
     center = ellipsoid.center
     return Box.around(
-        np.maximum(scene.s_lower, center + trust * (lower - center)), np.minimum(scene.s_upper, center + trust * (upper - center))
+        np.maximum(scene.s_lower, center + TRUST * (lower - center)), np.minimum(scene.s_upper, center + TRUST * (upper - center))
     )
 
 
@@ -88,29 +69,24 @@ def step(
     scene: Scene,
     polytope: Polytope,
     proofs: dict[int, bytes],
-    *,
-    objective: Objective = Objective.GEOMETRIC_MEAN,
-    normals: bool = True,
-    witnesses: Array | None = None,
-    trust: float = TRUST,
+    contain: Array | None = None,
     progress: Progress = lambda _: None,
-) -> Step:
+) -> Stepped:
     """One polytope step from a certified polytope.
 
     Args:
         polytope: joint limits as the last 2n rows.
         proofs: pair index -> proof file; proofs on a polytope that contains this one will do. Those made against the faces of
             :func:`trust_box` (``Certification(..., box=...)``) are used as they are.
-        normals: whether C is free; else d alone.
-        witnesses: (k, n) points of the polytope that must stay inside.
+        contain: (k, n) points of the polytope that stay inside; None for none.
         progress: called many times with a sentence; an exception it raises ends the step.
 
     Raises:
-        RegionError: ``witness_outside``; ``step_too_large``, naming the pair; ``step_failed``, and the current region stands.
+        RegionError: ``point_outside``; ``step_too_large``, naming the pair; ``step_failed``, and the current region stands.
     """
-    points = np.zeros((0, scene.n)) if witnesses is None else witnesses
+    points = np.zeros((0, scene.n)) if contain is None else contain
     if not polytope.contains(points).all():
-        raise RegionError("witness_outside", "a witness point is not in the polytope", field="witnesses")
+        raise RegionError("point_outside", "a point to contain is not in the polytope", field="contain")
     before = inscribed_ellipsoid(polytope)
     failure: Exception | None = None
     for scale in RETREATS:
@@ -118,7 +94,7 @@ def step(
         if not smaller.contains(points).all():
             break
         try:
-            found = _step(scene, smaller, proofs, objective, normals, points, trust, progress)
+            found = _step(scene, smaller, proofs, points, progress)
         except np.linalg.LinAlgError as error:
             failure = error
             continue
@@ -126,7 +102,7 @@ def step(
         if scale < 1.0 and growth <= 0:
             raise RegionError("step_failed", f"nothing larger was found from {scale} of the polytope")
         return replace(found, growth=growth, info=found.info | {"volume_before": before.volume, "from": scale})
-    raise RegionError("step_failed", f"the proofs are not strictly feasible on the trust box: {failure}", hint="a smaller trust")
+    raise RegionError("step_failed", f"the proofs are not strictly feasible on the trust box: {failure}")
 
 
 def _about(center: Array, polytope: Polytope, scale: float, fixed: int) -> Polytope:
@@ -141,12 +117,9 @@ def _step(
     scene: Scene,
     polytope: Polytope,
     proofs: dict[int, bytes],
-    objective: Objective,
-    normals: bool,
     points: Array,
-    trust: float,
     progress: Progress,
-) -> Step:
+) -> Stepped:
     """The step from a polytope on which the proofs are strictly feasible; its growth is from there.
 
     Raises:
@@ -154,7 +127,7 @@ def _step(
     """
     n = scene.n
     before = inscribed_ellipsoid(polytope)
-    box = trust_box(scene, polytope, before, trust)
+    box = trust_box(scene, polytope, before)
     kept = drop_redundant(polytope, fixed=2 * n)[: -2 * n]
     current = _within(box, polytope.C[kept], polytope.d[kept])
     needed = _coupled(scene, polytope, before.center, current, proofs, box, progress)
@@ -163,26 +136,26 @@ def _step(
     start = inscribed_ellipsoid(base)
     faces = _Faces(current.C[used], current.d[used], start)
     certificates = Certificates(scene, box, start, faces.scale, MARGIN_SHARE)
-    info: dict[str, Any] = {"faces": len(used), "coupled_pairs": len(needed), "trust": trust}
+    info: dict[str, Any] = {"faces": len(used), "coupled_pairs": len(needed), "trust": TRUST}
     C, d = faces.rows(faces.start)
     base = scene.polytope(*_rows(scene, box, C, d))
     if needed:
-        method = Method(
+        method = Arrow(
             [certificates.group(proof, Y[:, used]) for proof, Y in needed],
             faces.start,
-            faces.free(normals),
             lambda iteration: progress(f"polytope step: iteration {iteration}"),
         )
         method.shift(PUSH * min(1.0, method.reach(faces.push)) * faces.push)
         reach = float(np.linalg.norm(np.abs(box.mid - start.center) + box.half) / np.linalg.eigvalsh(start.shape)[0])
         barrier = face_barrier(n, 2 * max(reach, float(faces.start.max())), np.linalg.solve(start.shape, (points - start.center).T).T)
-        method.minimise(_weighted(objective_term(objective, n), barrier), TOLERANCE * WEIGHT * len(used))
+        method.minimise(_weighted(objective_term(n), barrier), TOLERANCE * WEIGHT * len(used))
         C, d = faces.rows(method.y)
         info |= {"iterations": method.iterations, "rationals": sum(len(p) for group in method.groups for p in group.blocks)}
     moved = scene.polytope(*_rows(scene, box, C, d))
     after = inscribed_ellipsoid(moved)
     info["volume_after"] = after.volume
-    return Step(moved.C, moved.d, after.center, base.C, base.d, after.volume / before.volume - 1, info)
+    moved, base = (Polytope(np.ascontiguousarray(rows.C), rows.d) for rows in (moved, base))
+    return Stepped(moved, after.center, base, after.volume / before.volume - 1, info)
 
 
 def _coupled(
@@ -271,7 +244,3 @@ class _Faces:
         v = y.reshape(-1, self._n + 2)
         C = np.linalg.solve(self._ellipsoid.shape, v[:, : self._n].T).T
         return C, v[:, self._n] + C @ self._ellipsoid.center
-
-    def free(self, normals: bool) -> Array:
-        """Which unknowns may move."""
-        return np.tile(np.append(np.full(self._n, normals), [True, True]), len(self.scale))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +14,9 @@ from fastapi.testclient import TestClient
 from api.app import create_app
 from certifier.jobs.region import Region, certified_region
 from certifier.model import Scene
+from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import Certification
+from certifier.pair.result import PairResult
 from db import jobs, pairs, regions, scenes
 from db.session import Database
 from db.settings import settings
@@ -118,8 +119,8 @@ def store_region(database: Database, certified: Region) -> str:
         )
         claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
         assert claim is not None
-        found = pairs.Result(0, pairs.PairState.CERTIFIED, seconds=0.1, stage="sos", margin=0.3, detail="", proof=b"proof of a pair")
-        pairs.save(session, claim, [replace(found, index=index) for index, _, _ in names])
+        found = PairResult(Outcome.CERTIFIED, Stage.SOS, seconds=0.1, margin=0.3, proof=b"proof of a pair")
+        pairs.save(session, claim, {index: found for index, _, _ in names})
         region = regions.add(session, job, 0, manifest, certified.proof)
         jobs.finish(session, job, jobs.JobState.SUCCEEDED, reason="as large as asked for", outcome="certified")
         return region.id

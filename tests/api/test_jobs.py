@@ -4,6 +4,7 @@ import json
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
@@ -11,6 +12,8 @@ from api.app import create_app
 from api.schemas.jobs import GrowOptions, Seed
 from certifier.growth.options import GrowthOptions
 from certifier.model import Scene
+from certifier.outcome import Outcome, Stage
+from certifier.pair.result import PairResult
 from certifier.seeding.options import SeedOptions
 from db import jobs, pairs
 from db.session import Database
@@ -161,8 +164,8 @@ def test_a_witness_is_given_in_joint_positions(client: TestClient, database: Dat
         pairs.add_iteration(session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={1: 0}, hard=[], failures=None)
         claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
         assert claim is not None
-        refuted = pairs.Result(0, pairs.PairState.REFUTED, seconds=0.1, stage="screen", margin=None, detail="", witness_s=[0.25])
-        pairs.save(session, claim, [refuted])
+        refuted = PairResult(Outcome.REFUTED, Stage.SCREEN, seconds=0.1, witness_s=np.array([0.25]))
+        pairs.save(session, claim, {0: refuted})
     matrix = client.get(f"/v1/jobs/{job_id}/pairs").json()
     assert matrix["cells"][0]["witness_q"] == scene.to_q([0.25]).tolist()
     assert matrix["iterations"][0]["reused"] == {"1": 0}

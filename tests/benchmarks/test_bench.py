@@ -50,7 +50,7 @@ def test_a_way_to_grow_is_a_row_with_its_region(monkeypatch: pytest.MonkeyPatch)
     (row,) = document["ways"]
     assert (row["scene"], row["way"]) == ("planar_2dof", "pushes")
     assert row["ellipsoid"] > 0.1
-    assert row["curve"][-1]["ellipsoid"] == pytest.approx(row["ellipsoid"])
+    assert row["curve"][-1]["ellipsoid_volume"] == pytest.approx(row["ellipsoid"])
     assert "planar_2dof" in report.text(document)
 
 

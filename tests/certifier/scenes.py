@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from certifier.growth.actions import Accepted
+from certifier.growth.actions import Candidate
 from certifier.kinematics import rotation
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
 
@@ -93,4 +93,4 @@ def cube(scene, center, half):
 
 def accepted(polytope, center):
     """What the growth says of a polytope whose pairs are all certified."""
-    return Accepted(0, polytope.C.tolist(), polytope.d.tolist(), list(center), None, {})
+    return Candidate(0, polytope, np.asarray(center, dtype=float), None, None, {})

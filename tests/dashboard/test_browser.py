@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 
 from certifier.model import Scene
+from certifier.outcome import Outcome, Stage
+from certifier.pair.result import PairResult
 from db import jobs, keys, pairs
 from db.keys import Scope
 from db.session import Database
@@ -67,8 +69,8 @@ def settle(database: Database, job_id: str, index: int) -> None:
         claim = pairs.claim(session, jobs.lock(session, job_id), lease_seconds=60, batch_seconds=0)
         assert claim is not None
         assert [pair.index for pair in claim.pairs] == [index]
-        result = pairs.Result(index, pairs.PairState.CERTIFIED, seconds=0.1, stage="sos", margin=0.01, proof=b"proof")
-        pairs.save(session, claim, [result])
+        result = PairResult(Outcome.CERTIFIED, Stage.SOS, seconds=0.1, margin=0.01, proof=b"proof")
+        pairs.save(session, claim, {index: result})
 
 
 def test_a_job_is_followed_live_to_its_end(page: Any, url: str, database: Database, scene: Scene, job_id: str) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from sqlalchemy.orm import Session
 
+from certifier.outcome import Outcome, Stage
+from certifier.pair.result import PairResult
 from db import jobs, pairs, scenes
 from db.models import JobRow, SceneRow
 from tests.scenes import slider
@@ -43,5 +45,5 @@ def add_pairs(session: Session, job: JobRow, pair_count: int, *, failures: int |
     )
 
 
-def certified(index: int, proof: bytes = b"proof") -> pairs.Result:
-    return pairs.Result(index, pairs.PairState.CERTIFIED, seconds=0.1, stage="sos", margin=0.01, proof=proof)
+def certified(index: int, proof: bytes = b"proof") -> dict[int, PairResult]:
+    return {index: PairResult(Outcome.CERTIFIED, Stage.SOS, seconds=0.1, margin=0.01, proof=proof)}

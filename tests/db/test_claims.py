@@ -10,13 +10,16 @@ from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 
+import numpy as np
 import pytest
 from sqlalchemy import select, update
 
+from certifier.outcome import Outcome, Stage
+from certifier.pair.result import PairResult, Weakness
 from db import events, jobs, leases, pairs, steps, work
 from db.models import IterationRow, PairRow, ProofRow, StepRow
 from db.session import Database
-from db.states import IterationState, JobState, PairState, StepKind, StepState
+from db.states import IterationState, JobState, StepKind, StepState
 from db.types import utcnow
 from tests.db.builders import a_running_job, certified
 
@@ -31,13 +34,13 @@ def claim(db: Database, job_id: str, batch_seconds: float = 0.5) -> pairs.Claim 
         return held
 
 
-def save(db: Database, held: pairs.Claim, results: list[pairs.Result]) -> pairs.Saved:
+def save(db: Database, held: pairs.Claim, results: dict[int, PairResult]) -> pairs.Saved:
     with db.write() as session:
         return pairs.save(session, held, results)
 
 
-def refuted(index: int) -> pairs.Result:
-    return pairs.Result(index, PairState.REFUTED, seconds=0.1, stage="screen", witness_s=[0.5])
+def refuted(index: int) -> dict[int, PairResult]:
+    return {index: PairResult(Outcome.REFUTED, Stage.SCREEN, seconds=0.1, witness_s=np.array([0.5]))}
 
 
 def claim_and_certify(url: str, job_id: str, out: multiprocessing.Queue) -> None:  # type: ignore[type-arg]
@@ -45,7 +48,7 @@ def claim_and_certify(url: str, job_id: str, out: multiprocessing.Queue) -> None
     db = Database(url)
     while (held := claim(db, job_id)) is not None:
         index = held.pairs[0].index
-        out.put((index, save(db, held, [certified(index)]).finished))
+        out.put((index, save(db, held, certified(index)).finished))
     db.close()
 
 
@@ -54,7 +57,7 @@ def test_a_pair_is_expected_to_take_what_it_took_or_else_what_was_forecast(db: D
         job_id = a_running_job(session, 3).id
     held = claim(db, job_id)
     assert held is not None
-    save(db, held, [certified(0)])
+    save(db, held, certified(0))
     with db.read() as session:
         assert pairs.expected_seconds(session, job_id, 0) == {0: 0.1, 1: 1.0, 2: 1.0}
         assert pairs.expected_seconds(session, job_id, 1) == {}
@@ -102,12 +105,12 @@ def test_the_first_failure_in_the_order_of_the_pairs_counts_whenever_it_comes(db
     assert first is not None
     assert second is not None
     assert third is not None
-    assert save(db, second, [refuted(2)]) == pairs.Saved(held=False, finished=False)
+    assert save(db, second, refuted(2)) == pairs.Saved(held=False, finished=False)
     with db.read() as session:
         assert [row.state for row in pairs.of_job(session, job_id)] == ["running", "running", "refuted", "skipped", "skipped"]
-    assert save(db, third, [certified(3)]) == pairs.Saved(held=False, finished=False)
-    assert save(db, first, [certified(0)]) == pairs.Saved(held=True, finished=False)
-    assert save(db, first, [refuted(1)]) == pairs.Saved(held=False, finished=True)
+    assert save(db, third, certified(3)) == pairs.Saved(held=False, finished=False)
+    assert save(db, first, certified(0)) == pairs.Saved(held=True, finished=False)
+    assert save(db, first, refuted(1)) == pairs.Saved(held=False, finished=True)
     with db.read() as session:
         rows, iteration = pairs.of_job(session, job_id), session.get_one(IterationRow, (job_id, 0))
         assert [row.state for row in rows] == ["certified", "refuted", "refuted", "skipped", "skipped"]
@@ -125,12 +128,12 @@ def test_an_iteration_may_wait_for_several_failures(db: Database) -> None:
     assert first is not None
     assert second is not None
     assert third is not None
-    assert save(db, third, [refuted(3)]) == pairs.Saved(held=False, finished=False)
-    assert save(db, second, [refuted(2)]) == pairs.Saved(held=False, finished=False)
+    assert save(db, third, refuted(3)) == pairs.Saved(held=False, finished=False)
+    assert save(db, second, refuted(2)) == pairs.Saved(held=False, finished=False)
     with db.read() as session:
         assert [row.state for row in pairs.of_job(session, job_id)] == ["running", "running", "refuted", "refuted", "skipped"]
-    assert save(db, first, [refuted(0)]) == pairs.Saved(held=True, finished=False)
-    assert save(db, first, [certified(1)]) == pairs.Saved(held=False, finished=True)
+    assert save(db, first, refuted(0)) == pairs.Saved(held=True, finished=False)
+    assert save(db, first, certified(1)) == pairs.Saved(held=False, finished=True)
     with db.read() as session:
         iteration = session.get_one(IterationRow, (job_id, 0))
         assert [row.pair_index for row in pairs.reached(session, iteration)] == [0, 1, 2]
@@ -142,7 +145,7 @@ def test_a_failure_ends_the_batch_that_it_is_in(db: Database) -> None:
         job_id = a_running_job(session, 3).id
     held = claim(db, job_id, batch_seconds=5)
     assert held is not None
-    assert save(db, held, [refuted(0)]) == pairs.Saved(held=False, finished=True)
+    assert save(db, held, refuted(0)) == pairs.Saved(held=False, finished=True)
 
 
 def test_without_early_end_every_pair_gets_its_verdict(db: Database) -> None:
@@ -150,8 +153,9 @@ def test_without_early_end_every_pair_gets_its_verdict(db: Database) -> None:
         job_id = a_running_job(session, 2, failures=None).id
     held = claim(db, job_id, batch_seconds=3)
     assert held is not None
-    assert not save(db, held, [pairs.Result(0, PairState.NOT_CERTIFIABLE, seconds=0.1, weak_points=[[0.1]])]).finished
-    assert save(db, held, [certified(1)]).finished
+    failed = PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, seconds=0.1, weakness=Weakness(np.array([[0.1]]), np.zeros(1)))
+    assert not save(db, held, {0: failed}).finished
+    assert save(db, held, certified(1)).finished
     with db.read() as session:
         assert [row.state for row in pairs.of_job(session, job_id)] == ["not_certifiable", "certified"]
         assert set(pairs.proving(session, job_id, {0: 0, 1: 0})) == {1}
@@ -175,8 +179,8 @@ def test_a_lease_that_ran_out_is_released_and_its_result_is_then_refused(db: Dat
     second = claim(db, job_id)
     assert second is not None
     assert second.pairs == (pairs.Claimed(0, attempt=2, deaths=0),)
-    assert not save(db, first, [certified(0)]).held
-    assert save(db, second, [certified(0)]).finished
+    assert not save(db, first, certified(0)).held
+    assert save(db, second, certified(0)).finished
 
 
 def test_a_lease_of_this_host_ends_with_its_process(db: Database) -> None:

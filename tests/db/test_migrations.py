@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from sqlalchemy import inspect
 
-from certifier.growth.actions import Certify, action_from_document, action_to_document
 from db import jobs, migrate, pairs, scenes
 from db.session import Database
 from tests.db.builders import a_running_job
@@ -54,14 +53,14 @@ def test_jobs_and_their_pairs_survive_the_way_down_and_up(empty_database_url: st
     database = Database(empty_database_url)
     with database.write() as session:
         job = a_running_job(session, pair_count=3)
-        certify = Certify(0, "contract", [[1.0], [-1.0]], [1.0, 1.0], [0.0], [0, 1, 2], {}, [], 1)
-        job.action, job.growth, job_id = action_to_document(certify), {"current": action_to_document(certify)}, job.id
+        certify = {"kind": "certify", "iteration": 0}
+        job.action, job.growth, job_id = certify, {"next": 1}, job.id
     migrate.downgrade(empty_database_url, "0001")
     migrate.upgrade(empty_database_url)
     assert migrate.drift(empty_database_url) == []
     with database.read() as session:
         job = jobs.get(session, job_id)
         assert (job.state, len(pairs.of_job(session, job_id))) == ("running", 3)
-        assert action_from_document(job.action or {}) == action_from_document((job.growth or {})["current"]) == certify
+        assert (job.action, job.growth) == (certify, {"next": 1})
         assert [(row.hard, row.failures, row.faces) for row in pairs.iterations(session, job_id)] == [([], 1, 2)]
     database.close()

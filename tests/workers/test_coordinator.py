@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from certifier.errors import CirisError
 from certifier.growth.actions import Failed
 from certifier.outcome import Outcome
 from certifier.seeding.proposal import Proposal
@@ -18,7 +19,10 @@ def test_the_report_of_a_step_is_what_it_found_or_its_error() -> None:
     proposal = step_report(StepKind.PROPOSE, StepState.DONE, found)
     assert isinstance(proposal, Proposal)
     assert proposal.to_document() == found
-    assert step_report(StepKind.STEP, StepState.FAILED, {"code": "x"}) == Failed({"code": "x"})
+    error = CirisError("x", "it failed", field="seed", hint="try again")
+    failed = step_report(StepKind.STEP, StepState.FAILED, error.to_document())
+    assert isinstance(failed, Failed)
+    assert failed.error.to_document() == error.to_document()
 
 
 @pytest.mark.parametrize(

@@ -314,6 +314,8 @@ def work_all_pairs_and_forge_a_later_region(job_id: str) -> None:
     coordinate(job_id)
     with database().write() as session:
         (good,) = steps.of_job(session, job_id)
+        job, polytope = jobs.lock(session, job_id), {"C": [[1.0], [-1.0]], "d": [0.1, 0.1], "center": [0.0]}
+        pairs.add_iteration(session, job, index=1, label="push", **polytope, pairs=[], reuse={}, hard=[], failures=1)
         session.add(StepRow(job_id=job_id, turn=good.turn + 1, kind="accept", input={**good.input, "iteration": 1, "proofs": {}}))
 
 

@@ -10,12 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from certifier.growth.actions import Certification, Certify, Finish, Propose, action_to_document
+from certifier.growth.actions import Certify, Finish, Outcomes, Propose
 from certifier.growth.faces import Failure, contract, measure
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
+from certifier.growth.state import GrowthState
 from certifier.model import WORLD, Polytope
 from certifier.outcome import Outcome
+from certifier.pair.result import Weakness
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.seeding.proposal import Proposal
 from tests.certifier.scenes import box, cube, planar_arm
@@ -31,10 +33,9 @@ def grow(disc, radius, options, spread=0.0, limit=300):
     """The accepted polytopes and the end when the pair of both joints fails while the polytope meets the disc nearest to the seed."""
     transition, accepted = begin(SCENE, options), []
     for _ in range(limit):
-        state = json.loads(json.dumps(transition.state))
-        json.dumps(action_to_document(transition.action))
-        if transition.accepted:
-            accepted.append(transition.accepted)
+        state = GrowthState.from_document(json.loads(json.dumps(transition.state.to_document())), options)
+        if transition.candidate:
+            accepted.append(transition.candidate.polytope)
         if isinstance(transition.action, Finish):
             return accepted, transition.action
         if isinstance(transition.action, Propose):
@@ -43,11 +44,11 @@ def grow(disc, radius, options, spread=0.0, limit=300):
         action = transition.action
         assert isinstance(action, Certify)
         nearest = disc - radius * disc / np.linalg.norm(disc)
-        meets = Polytope(np.array(action.C), np.array(action.d)).contains(nearest[None])[0]
+        meets = action.polytope.contains(nearest[None])[0]
         failing = [i for i in action.pairs if meets and "link2" in SCENE.pairs[i].a]
         outcomes = {i: Outcome.NOT_CERTIFIABLE if i in failing else Outcome.CERTIFIED for i in action.pairs}
-        weak = {i: {"points": [nearest.tolist()], "pull": [spread, spread]} for i in failing}
-        transition = advance(SCENE, state, Certification(action.iteration, outcomes, weak))
+        weak = {i: Weakness(nearest[None], np.full(2, spread)) for i in failing}
+        transition = advance(SCENE, state, Outcomes(action, outcomes, weak))
     raise AssertionError("growth does not end")
 
 
@@ -55,7 +56,7 @@ def grow(disc, radius, options, spread=0.0, limit=300):
 def test_faces_are_put_where_pairs_fail_and_the_seed_stays(disc):
     accepted, end = grow(np.array(disc), 0.2, OPTIONS)
     assert end.outcome is Outcome.CERTIFIED
-    region = Polytope(np.array(accepted[-1].C), np.array(accepted[-1].d))
+    region = accepted[-1]
     assert (region.C @ np.zeros(2) < region.d).all()
     assert inscribed_ellipsoid(region).volume > 0.4 * np.pi, "more than uniform contraction could keep"
 
@@ -64,7 +65,7 @@ def test_faces_are_put_where_pairs_fail_and_the_seed_stays(disc):
 def test_pairs_that_fail_all_over_get_shorter_ranges(disc):
     accepted, end = grow(np.array(disc), 0.2, OPTIONS, spread=0.1)
     assert end.outcome is Outcome.CERTIFIED
-    assert (np.array(accepted[-1].C) @ np.zeros(2) < np.array(accepted[-1].d)).all()
+    assert (accepted[-1].C @ np.zeros(2) < accepted[-1].d).all()
 
 
 def test_a_seed_that_cannot_be_freed_ends_with_the_pair_named():
@@ -76,10 +77,10 @@ def test_a_seed_that_cannot_be_freed_ends_with_the_pair_named():
 
 def test_pushes_never_lose_volume_and_stay_in_the_proposal():
     accepted, end = grow(np.array([0.8, 0.3]), 0.2, replace(OPTIONS, pushes=4))
-    volumes = [inscribed_ellipsoid(Polytope(np.array(a.C), np.array(a.d))).volume for a in accepted]
+    volumes = [inscribed_ellipsoid(polytope).volume for polytope in accepted]
     assert volumes == sorted(volumes)
     assert end.outcome is Outcome.CERTIFIED
-    region = Polytope(np.array(accepted[-1].C), np.array(accepted[-1].d))
+    region = accepted[-1]
     corners = np.random.default_rng(0).uniform(-2, 2, (2000, 2))
     assert np.abs(corners[region.contains(corners)]).max() <= 1 + 1e-9
 
@@ -98,7 +99,9 @@ def test_a_contraction_is_a_subset_that_keeps_what_is_to_be_kept(seed):
     rng = np.random.default_rng(seed)
     region = cube(SCENE, 0.0, 0.5)
     keep = rng.uniform(-0.2, 0.2, (2, 2))
-    failures = [Failure(joints, rng.uniform(-0.5, 0.5, (3, 2)), rng.uniform(0, 0.3, 2), int(rng.integers(5))) for joints in ((0,), (0, 1))]
+    failures = [
+        Failure(joints, Weakness(rng.uniform(-0.5, 0.5, (3, 2)), rng.uniform(0, 0.3, 2)), int(rng.integers(5))) for joints in ((0,), (0, 1))
+    ]
     smaller = contract(SCENE, region, measure(region, np.zeros(2)), keep, failures, rng.uniform(0.1, 1.0))
     assert smaller is not None
     samples = rng.uniform(-0.6, 0.6, (500, 2))
@@ -112,7 +115,7 @@ def test_several_contractions_keep_the_largest(disc):
     """The second one is given up as soon as it is smaller than the first one's region."""
     single = [grow(np.array(disc), 0.2, replace(OPTIONS, contractions=1), spread=0.1)[0][-1]]
     several, end = grow(np.array(disc), 0.2, replace(OPTIONS, contractions=3), spread=0.1)
-    volumes = [inscribed_ellipsoid(Polytope(np.array(a.C), np.array(a.d))).volume for a in (*single, *several)]
+    volumes = [inscribed_ellipsoid(polytope).volume for polytope in (*single, *several)]
     assert volumes[1:] == sorted(volumes[1:])
     assert volumes[0] == volumes[1]
     assert end.outcome is Outcome.CERTIFIED

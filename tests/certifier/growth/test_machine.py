@@ -7,24 +7,18 @@ import numpy as np
 import pytest
 
 from certifier.errors import CirisError, RegionError
-from certifier.growth.actions import (
-    Certification,
-    Certify,
-    Failed,
-    Finish,
-    Propose,
-    Step,
-    Stepped,
-    action_from_document,
-    action_to_document,
-)
-from certifier.growth.machine import SMALLEST_SCALE, advance, begin
+from certifier.growth.actions import Certify, Failed, Finish, Outcomes, Propose, Step
+from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
+from certifier.growth.state import GrowthState
+from certifier.growth.uniform import SMALLEST_SCALE
 from certifier.jobs.local import grow
 from certifier.model import WORLD, Polytope
 from certifier.outcome import Outcome
+from certifier.pair.result import Weakness
 from certifier.polytopes.polytope import bounds
 from certifier.seeding.proposal import Proposal
+from certifier.step.stepped import Stepped
 from tests.certifier.scenes import box, planar_arm
 
 SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
@@ -43,27 +37,27 @@ def drive(scene, options, verdict, limit=100):
     made, accepted = [], []
     transition = begin(scene, options)
     for _ in range(limit):
-        action = action_from_document(json.loads(json.dumps(action_to_document(transition.action))))
-        assert action == transition.action, "actions survive JSON"
-        state = json.loads(json.dumps(transition.state))
-        if transition.accepted:
-            accepted.append(transition.accepted)
+        action, document = transition.action, transition.state.to_document()
+        state = GrowthState.from_document(json.loads(json.dumps(document)), options)
+        assert state.to_document() == document, "the state survives JSON"
+        if transition.candidate:
+            accepted.append(transition.candidate)
         if isinstance(action, Finish):
             return made, accepted, action
         if isinstance(action, Propose):
             report = PROPOSAL
         elif isinstance(action, Step):
-            moved = [x * 1.1 for x in action.d]
-            report = Stepped(action.C, moved, [0.0, 0.0], action.C, action.d, 0.2, {})
+            moved = Polytope(action.polytope.C, action.polytope.d * 1.1)
+            report = Stepped(moved, np.zeros(2), action.polytope, 0.2, {})
         else:
             assert isinstance(action, Certify)
             made.append(action)
             outcomes = {}
             for index in action.pairs:
-                outcomes[index] = verdict(index, np.array(action.d))
+                outcomes[index] = verdict(index, action.polytope.d)
                 if sum(outcome is not Outcome.CERTIFIED for outcome in outcomes.values()) == action.failures:
                     break
-            report = Certification(action.iteration, outcomes)
+            report = Outcomes(action, outcomes)
         transition = advance(scene, state, report)
     raise AssertionError("the machine does not end")
 
@@ -75,14 +69,14 @@ def certified_if(limit):
 def test_a_proposal_that_certifies_is_taken_whole():
     made, accepted, end = drive(SCENE, UNIFORM, certified_if(5.0))
     assert [action.label for action in made] == ["contract"]
-    assert accepted[-1].d[:4] == [1.0, 1.0, 1.0, 1.0]
+    assert accepted[-1].polytope.d[:4].tolist() == [1.0, 1.0, 1.0, 1.0]
     assert end.outcome is Outcome.CERTIFIED
 
 
 @pytest.mark.parametrize("limit", [0.02, 0.3, 0.77])
 def test_bisection_finds_the_largest_trial_and_never_loses_an_accepted_region(limit):
     made, accepted, end = drive(SCENE, replace(UNIFORM, bisection_steps=12), certified_if(limit))
-    sizes = [region.d[0] for region in accepted]
+    sizes = [region.polytope.d[0] for region in accepted]
     assert sizes == sorted(sizes)
     assert limit * SMALLEST_SCALE ** (1 / 2**11) <= sizes[-1] <= limit
     assert len(made) == 14
@@ -116,7 +110,7 @@ def test_a_seed_that_cannot_be_certified_ends_with_the_pair_named():
 def test_alternation_accepts_rounds_and_backs_off():
     made, accepted, end = drive(SCENE, replace(UNIFORM, max_rounds=3, bisection_steps=3, backoff=2), certified_if(1.15))
     assert [action.label for action in made] == ["contract"] + 7 * ["round"]
-    assert [round(region.d[0], 6) for region in accepted] == [1.0, 1.1, 1.1275]
+    assert [round(region.polytope.d[0], 6) for region in accepted] == [1.0, 1.1, 1.1275]
     assert end.outcome is Outcome.CERTIFIED
 
 
@@ -124,13 +118,13 @@ def test_a_failed_step_keeps_the_certified_region_and_a_failed_seeding_ends():
     options = replace(UNIFORM, max_rounds=3)
     first = begin(SCENE, options)
     assert isinstance(first.action, Propose)
-    error = CirisError("seed_in_collision", "a and b touch").to_document()
+    error = CirisError("seed_in_collision", "a and b touch")
     assert advance(SCENE, first.state, Failed(error)).action == Finish(Outcome.ERROR, "a and b touch")
     certify = advance(SCENE, first.state, PROPOSAL)
-    stepping = advance(SCENE, certify.state, Certification(0, {0: Outcome.CERTIFIED, 1: Outcome.CERTIFIED}))
+    stepping = advance(SCENE, certify.state, Outcomes(certify.action, {0: Outcome.CERTIFIED, 1: Outcome.CERTIFIED}))
     assert isinstance(stepping.action, Step)
-    assert stepping.accepted is not None
-    end = advance(SCENE, stepping.state, Failed(CirisError("step_too_large", "too large").to_document())).action
+    assert stepping.candidate is not None
+    end = advance(SCENE, stepping.state, Failed(CirisError("step_too_large", "too large"))).action
     assert isinstance(end, Finish)
     assert end.outcome is Outcome.CERTIFIED
 
@@ -147,18 +141,18 @@ def test_a_given_polytope_is_certified_once_with_every_pair():
 @pytest.mark.parametrize(("joints", "pushes", "rounds"), [(2, 10, 3), (5, 2, 0), (7, 0, 0)])
 def test_the_longer_the_chains_the_less_is_done_unasked(joints, pushes, rounds):
     scene = planar_arm(joints)
-    proposal = replace(PROPOSAL, C=np.eye(joints), d=np.full(joints, 0.01), center=np.zeros(joints), info={"method": "iris_np2"})
+    proposal = Proposal(np.eye(joints), np.full(joints, 0.01), np.zeros(joints), np.zeros((0, joints)), {"method": "iris_np2"})
     transition, said = begin(scene, GrowthOptions(seed={}, tolerance=1e-6)), []
     while not isinstance(transition.action, Finish):
         report = proposal
         if isinstance(transition.action, Certify):
             said.append(transition.action.label)
-            whole = transition.action.label == "contract" and len(transition.action.d) == 3 * joints
+            whole = transition.action.label == "contract" and len(transition.action.polytope.d) == 3 * joints
             outcome = Outcome.NOT_CERTIFIABLE if whole else Outcome.CERTIFIED
-            report = Certification(transition.action.iteration, dict.fromkeys(transition.action.pairs, outcome))
+            report = Outcomes(transition.action, dict.fromkeys(transition.action.pairs, outcome))
         elif isinstance(transition.action, Step):
             said.append("step")
-            report = Failed(CirisError("step_failed", "no").to_document())
+            report = Failed(CirisError("step_failed", "no"))
         transition = advance(scene, transition.state, report)
     assert said.count("push") <= pushes
     assert ("push" in said, "step" in said) == (pushes > 0, rounds > 0)
@@ -173,11 +167,11 @@ def first_starts(options, verdict, count):
     while len(widths) < count:
         action = transition.action
         assert isinstance(action, Certify)
-        if action.label != "contract" or not transition.state["trim"]["attempts"]:
-            widths.append((action.label, round(bounds(Polytope(np.array(action.C), np.array(action.d)))[1][0], 6)))
+        if action.label != "contract" or not transition.state.cuts.attempts:
+            widths.append((action.label, round(bounds(action.polytope)[1][0], 6)))
         outcomes = {index: verdict(len(widths)) for index in action.pairs}
-        weak = {index: {"points": [[0.9 * action.d[0], 0.0]], "pull": [1.0, 1.0]} for index in action.pairs}
-        transition = advance(SCENE, transition.state, Certification(action.iteration, outcomes, weak))
+        weak = dict.fromkeys(action.pairs, Weakness(np.array([[0.9 * action.polytope.d[0], 0.0]]), np.ones(2)))
+        transition = advance(SCENE, transition.state, Outcomes(action, outcomes, weak))
     return widths
 
 
@@ -197,11 +191,11 @@ def test_pairs_that_failed_are_hard_until_they_are_certified():
     options = GrowthOptions(seed={"q": [0.0, 0.0]}, contractions=1, pushes=0, max_rounds=0)
     begun = advance(SCENE, begin(SCENE, options).state, PROPOSAL)
     assert begun.action.hard == []
-    weak = {"points": [[0.9, 0.0]], "pull": [1.0, 1.0]}
-    failed = advance(SCENE, begun.state, Certification(0, {0: Outcome.CERTIFIED, 1: Outcome.NOT_CERTIFIABLE}, {1: weak}))
+    weak = Weakness(np.array([[0.9, 0.0]]), np.ones(2))
+    failed = advance(SCENE, begun.state, Outcomes(begun.action, {0: Outcome.CERTIFIED, 1: Outcome.NOT_CERTIFIABLE}, {1: weak}))
     assert (failed.action.hard, failed.action.pairs, failed.action.reuse) == ([1], [1], {0: 0})
-    held = advance(SCENE, failed.state, Certification(1, {1: Outcome.CERTIFIED}))
-    assert held.accepted.proofs == {0: 0, 1: 1}
+    held = advance(SCENE, failed.state, Outcomes(failed.action, {1: Outcome.CERTIFIED}))
+    assert held.candidate.proofs == {0: 0, 1: 1}
 
 
 @pytest.mark.parametrize(

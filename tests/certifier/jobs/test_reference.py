@@ -11,7 +11,7 @@ import pytest
 from certifier.errors import CirisError
 from certifier.jobs import reference
 from certifier.jobs.reference import Reference, Solver, available
-from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
+from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Polytope, Scene
 from certifier.outcome import Outcome
 from certifier.pair.certification import certify_pair
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
@@ -65,7 +65,7 @@ def test_what_drake_cannot_take_is_an_error() -> None:
 @pytest.mark.parametrize("d", [[-1.0, -1.0, -1.0, -1.0], [1.0, 1.0, -1.0, 1.0]])
 def test_nothing_is_certified_on_an_empty_polytope(d: list[float]) -> None:
     with pytest.raises(CirisError, match=r"no point satisfies|flat"):
-        reference.certify(planar_arm(2), C, np.array(d), Solver.CLARABEL)
+        reference.certify(planar_arm(2), Polytope(C, np.array(d)), Solver.CLARABEL)
 
 
 def two_arms() -> Scene:

@@ -184,7 +184,7 @@ def test_polytope_is_taken_as_it_is():
         ({"C": [[1.0, 0.0], [-1.0]], "d": [1.0, 1.0]}, "polytope_shape", "seed.C"),
         ({"C": [[1.0, 0.0, 0.0]], "d": [1.0]}, "polytope_shape", "seed.C"),
         ({"C": [], "d": [1.0]}, "polytope_shape", "seed.C"),
-        ({"C": [[1.0, math.nan]], "d": [1.0]}, "polytope_not_finite", "polytope"),
+        ({"C": [[1.0, math.nan]], "d": [1.0]}, "polytope_not_finite", "seed.C"),
         ({"C": [[1.0, 0.0]], "d": [0.5], "center": [0.6, 0.0]}, "center_outside", "seed.center"),
         ({"C": [[1.0, 0.0]], "d": [0.5], "center": [0.0]}, "center_outside", "seed.center"),
     ],

@@ -20,7 +20,7 @@ from certifier.outcome import Outcome
 from certifier.pair.certification import Certification
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.proof.pair import PairProof
-from certifier.step.face_terms import EPSILON, Objective
+from certifier.step.face_terms import EPSILON
 from certifier.step.identities import Certificates, face_multipliers
 from certifier.step.step import step, trust_box
 from certifier.verify.pair import verify_pair
@@ -59,7 +59,7 @@ def test_what_the_step_proposes_is_larger_and_certifies(name):
     for _ in range(3):
         moved = step(scene, region, certified(scene, region))
         assert moved.growth > 0.05
-        before, region = inscribed_ellipsoid(region), Polytope(moved.C, moved.d)
+        before, region = inscribed_ellipsoid(region), moved.polytope
         after = inscribed_ellipsoid(region)
         assert after.volume >= before.volume * (1 + moved.growth) * (1 - 1e-6)
         assert (np.linalg.norm(region.C @ before.shape, axis=1) <= region.d - region.C @ before.center + 1e-9).all()
@@ -71,37 +71,29 @@ def test_what_the_step_proposes_is_larger_and_certifies(name):
 @given(
     half=st.floats(0.02, 0.12),
     trust=st.floats(1.0, 2.0),
-    objective=st.sampled_from(Objective),
-    normals=st.booleans(),
     seed=st.integers(0, 99),
 )
-def test_the_ellipsoid_and_the_witnesses_stay_inside(half, trust, objective, normals, seed):
+def test_the_ellipsoid_and_the_points_to_contain_stay_inside(half, trust, seed):
     scene = SCENES["revolute"]
     region = crosscut(scene, half)
-    witnesses = np.random.default_rng(seed).uniform(-half, half, (50, scene.n))
-    witnesses = witnesses[region.contains(witnesses)]
-    moved = step(scene, region, certified(scene, region), objective=objective, normals=normals, witnesses=witnesses, trust=trust)
+    points = np.random.default_rng(seed).uniform(-half, half, (50, scene.n))
+    points = points[region.contains(points)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(polytope_step, "TRUST", trust)
+        moved = step(scene, region, certified(scene, region), contain=points)
     ellipsoid = inscribed_ellipsoid(region)
     assert moved.growth > -1e-6
     for share in (0.5, 1.0):
-        C, d = (1 - share) * moved.base_C + share * moved.C, (1 - share) * moved.base_d + share * moved.d
-        assert (witnesses @ C.T <= d + 1e-9).all()
+        C, d = (1 - share) * moved.base.C + share * moved.polytope.C, (1 - share) * moved.base.d + share * moved.polytope.d
+        assert (points @ C.T <= d + 1e-9).all()
         assert (np.linalg.norm(C @ ellipsoid.shape, axis=1) <= d - C @ ellipsoid.center + 1e-9).all()
 
 
-def test_with_d_alone_the_normals_stand():
-    scene = SCENES["revolute"]
-    region = crosscut(scene, 0.08)
-    moved = step(scene, region, certified(scene, region), normals=False)
-    assert moved.growth > 0
-    np.testing.assert_allclose(moved.C, moved.base_C)
-
-
-def test_a_witness_outside_is_refused():
+def test_a_point_to_contain_that_is_outside_is_refused():
     scene, region = SCENES["revolute"], crosscut(SCENES["revolute"], 0.05)
     with pytest.raises(RegionError) as refusal:
-        step(scene, region, certified(scene, region), witnesses=np.array([[1.0, 1.0]]))
-    assert refusal.value.code == "witness_outside"
+        step(scene, region, certified(scene, region), contain=np.array([[1.0, 1.0]]))
+    assert refusal.value.code == "point_outside"
 
 
 def test_proofs_that_hold_on_the_trust_box_hold_on_the_moved_polytope():
@@ -111,7 +103,7 @@ def test_proofs_that_hold_on_the_trust_box_hold_on_the_moved_polytope():
     moved = step(scene, region, proofs)
     assert moved.info["coupled_pairs"] == 0
     corner = np.concatenate([box.upper[:1], box.lower[1:]])
-    assert Polytope(moved.C, moved.d).contains(corner)
+    assert moved.polytope.contains(corner)
     for data in proofs.values():
         proof = PairProof.from_bytes(data, scene)
         verify_pair(proof)
@@ -148,7 +140,7 @@ def test_from_where_hardly_any_margin_is_left_it_steps_back_first():
     moved = step(scene, region, certified(scene, region))
     assert moved.info["from"] < 1.0
     assert moved.growth > 0.1
-    assert inscribed_ellipsoid(Polytope(moved.C, moved.d)).volume > inscribed_ellipsoid(region).volume * 1.1
+    assert inscribed_ellipsoid(moved.polytope).volume > inscribed_ellipsoid(region).volume * 1.1
 
 
 def test_an_exception_of_the_progress_ends_the_step():
@@ -235,8 +227,8 @@ def test_faces_handed_on_lie_below_those_of_the_proof(reach):
     assert (own[inside] - (small.d[:m] - s[inside] @ small.C[:m].T) @ Y.T > -1e-9).all()
 
 
-def clarabel(scene, groups, m, cap, objective):
-    """The optimum of (12) by Clarabel, every Gram matrix a variable: sum of the logarithms, or of the margins."""
+def clarabel(scene, groups, m, cap):
+    """The optimum of (12) by Clarabel, every Gram matrix a variable: the sum of the logarithms of the margins."""
     n = scene.n
     program = MathematicalProgram()
     y = program.NewContinuousVariables(m * (n + 2))
@@ -249,45 +241,41 @@ def clarabel(scene, groups, m, cap, objective):
         program.AddLorentzConeConstraint(np.concatenate([[d - delta], c]))
     program.AddBoundingBoxConstraint(0, np.inf, v[:, n + 1])
     program.AddBoundingBoxConstraint(-np.inf, cap, v[:, n])
-    if objective is Objective.SUM:
-        program.AddLinearCost(-np.ones(m), v[:, n + 1])
-    else:
-        program.AddMaximizeGeometricMeanCost(np.eye(m), np.full(m, EPSILON), v[:, n + 1])
+    program.AddMaximizeGeometricMeanCost(np.eye(m), np.full(m, EPSILON), v[:, n + 1])
     result = ClarabelSolver().Solve(program)
     assert result.is_success()
     delta = result.GetSolution(v)[:, n + 1]
-    return delta.sum() if objective is Objective.SUM else np.log(delta + EPSILON).sum()
+    return np.log(delta + EPSILON).sum()
 
 
-@pytest.mark.parametrize("objective", Objective)
-def test_the_optimum_is_clarabels(objective, monkeypatch):
+def test_the_optimum_is_clarabels(monkeypatch):
     """Both from the same identities, which another test checks; a barrier of degree nu and weight w ends within nu/w of the optimum."""
     scene, region = SCENES["revolute"], crosscut(SCENES["revolute"], 0.15)
     proofs = certified(scene, region, trust_box(scene, region, inscribed_ellipsoid(region)))
     coupled = {i: data for i, data in proofs.items() if not PairProof.from_bytes(data, scene).needs_box_alone}
     assert coupled
-    original, terms, found = polytope_step.Method.minimise, polytope_step.face_barrier, {}
+    original, terms, found = polytope_step.Arrow.minimise, polytope_step.face_barrier, {}
 
-    def barrier(n, cap, witnesses):
+    def barrier(n, cap, points):
         found["cap"] = cap
-        return terms(n, cap, witnesses)
+        return terms(n, cap, points)
 
     def value(delta):
-        return delta.sum() if objective is Objective.SUM else np.log(delta + EPSILON).sum()
+        return np.log(delta + EPSILON).sum()
 
     def minimise(self, f, tolerance):
         faces = self.y.reshape(-1, scene.n + 2)
-        found["start"], found["best"] = value(faces[:, -1]), clarabel(scene, self.groups, len(faces), found["cap"], objective)
+        found["start"], found["best"] = value(faces[:, -1]), clarabel(scene, self.groups, len(faces), found["cap"])
         original(self, f, tolerance)
         found["reached"] = value(self.y.reshape(-1, scene.n + 2)[:, -1])
         found["degree"] = sum(len(b) * b.cone.degree for g in self.groups for b in g.blocks) + 6 * len(faces) + len(self.groups)
 
     monkeypatch.setattr(polytope_step, "face_barrier", barrier)
-    monkeypatch.setattr(polytope_step.Method, "minimise", minimise)
+    monkeypatch.setattr(polytope_step.Arrow, "minimise", minimise)
     monkeypatch.setattr(polytope_step, "WEIGHT", 1e3)
     monkeypatch.setattr(polytope_step, "TOLERANCE", 1e-6)
     monkeypatch.setattr(certifier.conic.arrow, "MAX_ITERATIONS", 500)
-    step(scene, region, coupled, objective=objective)
+    step(scene, region, coupled)
     allowed = found["degree"] / 1e3 + 0.01
     assert found["best"] - found["start"] > 10 * allowed
     assert found["best"] - allowed < found["reached"] < found["best"] + 1e-3

@@ -1,0 +1,51 @@
+"""Rounds of the alternation (C-IRIS, Algorithm 1): a polytope step (12), certified by (11), and halved while that fails."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from certifier.growth.actions import Finish, Step, Transition
+from certifier.growth.state import GrowthState, Round, Start
+from certifier.growth.trials import certify, effort
+from certifier.model import Polytope, Scene
+from certifier.outcome import Outcome
+from certifier.step.stepped import Stepped
+
+
+def next_round(scene: Scene, state: GrowthState, start: Start) -> Transition:
+    """The next step from the best region, or the end."""
+    best, rounds = state.best, state.rounds
+    assert best is not None
+    if rounds >= effort(scene, state, "max_rounds"):
+        return Transition(state, Finish(Outcome.CERTIFIED, "certified; the limit of rounds was reached" if rounds else "certified"))
+    return Transition(replace(state, rounds=rounds + 1), Step(best.iteration, best.polytope, start.keep))
+
+
+def certify_step(scene: Scene, state: GrowthState, stepped: Stepped) -> Transition:
+    """Certifies all of a step."""
+    assert state.best is not None
+    round_ = Round(stepped.base, state.best.center, stepped.polytope, stepped.center, stepped.growth)
+    return certify(scene, replace(state, round=round_), "round", stepped.polytope, stepped.center)
+
+
+def after_round(scene: Scene, state: GrowthState, start: Start, accepted: bool) -> Transition:
+    """Accepts and goes on, stops when the growth is small, or backs off towards the last certified polytope."""
+    step, options = state.round, state.options
+    assert step is not None
+    if accepted:
+        if step.growth < options.tolerance:
+            return Transition(state, Finish(Outcome.CERTIFIED, "certified; growth is under the tolerance"))
+        return next_round(scene, state, start)
+    if step.halvings == options.backoff:
+        return Transition(state, Finish(Outcome.CERTIFIED, "certified; the last step could not be certified"))
+    share = 0.5 ** (step.halvings + 1)
+    C, d, center = (
+        (1 - share) * base + share * target
+        for base, target in (
+            (step.base.C, step.target.C),
+            (step.base.d, step.target.d),
+            (step.base_center, step.target_center),
+        )
+    )
+    halved = replace(state, round=replace(step, halvings=step.halvings + 1))
+    return certify(scene, halved, "round", Polytope(C, d), center)

@@ -1,0 +1,193 @@
+"""What the growth of a region knows between two actions; JSON-able, so that a job can be resumed from its rows alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from certifier.errors import CirisError
+from certifier.growth.options import NEAR, GrowthOptions
+from certifier.model import Array, Polytope
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """What growing starts from.
+
+    Attributes:
+        rows: the proposal's faces, then the joint limits, all scaled to |c| = 1.
+        seed: (n,) in s.
+        keep: (k, n) points that stay inside, the first of them well inside.
+        given: the proposal is a box or a polytope of the user's; beyond it nothing is known.
+    """
+
+    rows: Polytope
+    seed: Array
+    keep: Array
+    given: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Best:
+    """The largest certified polytope so far.
+
+    Attributes:
+        iteration: the one that completed it.
+        center: (n,) a point inside.
+    """
+
+    iteration: int
+    polytope: Polytope
+    center: Array
+    ellipsoid_volume: float
+
+
+@dataclass(frozen=True)
+class Cuts:
+    """A targeted contraction or a push, under way.
+
+    Attributes:
+        holds: pair index -> iteration whose proof, on a larger polytope, holds on the present one.
+        attempts: pair index -> how often faces were added for it.
+    """
+
+    holds: dict[int, int] = field(default_factory=dict)
+    attempts: dict[int, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Bisection:
+    """A uniform contraction, under way: delta = (1 - scale) times the radius of the largest ball.
+
+    Attributes:
+        center, radius: of that ball.
+        steps: certifications left.
+        scale: of the present trial.
+        holds: pair index -> an iteration that certified it, and that one's scale.
+        certified, failed: the largest scale that was certified, the last one that was not; None before there is one.
+    """
+
+    center: Array
+    radius: float
+    steps: int
+    scale: float
+    holds: dict[int, tuple[int, float]] = field(default_factory=dict)
+    certified: float | None = None
+    failed: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """A polytope step, being certified.
+
+    Attributes:
+        base, base_center, target, target_center: the step goes from one to the other, row for row.
+        growth: of the inscribed ellipsoid's volume, relative, if all of the step is certified.
+        halvings: how often the step was halved.
+    """
+
+    base: Polytope
+    base_center: Array
+    target: Polytope
+    target_center: Array
+    growth: float
+    halvings: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class GrowthState:
+    """The state of certifier.growth.machine.
+
+    Attributes:
+        next: number of the next iteration.
+        suspects: pairs that failed last, to be certified first.
+        contractions, pushes, rounds: how many of each were begun.
+        near: of the contraction under way: from how near on a failure calls for a shorter range.
+        reach: of the contraction or push under way: how far the faces were pushed out first.
+    """
+
+    options: GrowthOptions
+    next: int = 0
+    best: Best | None = None
+    suspects: tuple[int, ...] = ()
+    start: Start | None = None
+    contractions: int = 0
+    pushes: int = 0
+    rounds: int = 0
+    near: float = NEAR[0]
+    reach: float = 1.0
+    cuts: Cuts = Cuts()
+    bisection: Bisection | None = None
+    round: Round | None = None
+
+    def to_document(self) -> dict[str, Any]:
+        """The state as JSON-able data, without the options."""
+        return {
+            "next": self.next,
+            "best": None if self.best is None else _document(self.best),
+            "suspects": list(self.suspects),
+            "start": None if self.start is None else _document(self.start),
+            "contractions": self.contractions,
+            "pushes": self.pushes,
+            "rounds": self.rounds,
+            "near": self.near,
+            "reach": self.reach,
+            "cuts": _document(self.cuts),
+            "bisection": None if self.bisection is None else _document(self.bisection),
+            "round": None if self.round is None else _document(self.round),
+        }
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any], options: GrowthOptions) -> GrowthState:
+        """Inverse of :meth:`to_document`.
+
+        Raises:
+            CirisError: ``other_version`` for a state of another version of this program.
+        """
+        try:
+            cuts = document["cuts"]
+            parts: dict[str, Any] = {
+                "best": _part(Best, document["best"]),
+                "start": _part(Start, document["start"]),
+                "cuts": Cuts(_by_pair(cuts["holds"]), _by_pair(cuts["attempts"])),
+                "bisection": _part(Bisection, document["bisection"]),
+                "round": _part(Round, document["round"]),
+            }
+            return cls(options, **{**document, **parts, "suspects": tuple(document["suspects"])})
+        except (KeyError, TypeError) as error:
+            message = f"this job was begun by another version of ciris and cannot go on: {type(error).__name__}: {error}"
+            raise CirisError("other_version", message, hint="retry it") from error
+
+
+def _document(part: Best | Start | Cuts | Bisection | Round) -> dict[str, Any]:
+    return {name: _plain(value) for name, value in vars(part).items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Polytope):
+        return {"C": value.C.tolist(), "d": value.d.tolist()}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, dict):
+        return {str(pair): list(held) if isinstance(held, tuple) else held for pair, held in value.items()}
+    return value
+
+
+def _part(kind: type[Any], document: dict[str, Any] | None) -> Any:
+    """A part of the state from its document; polytopes are mappings with C and d, arrays are lists."""
+    return None if document is None else kind(**{name: _value(name, value) for name, value in document.items()})
+
+
+def _value(name: str, value: Any) -> Any:
+    if isinstance(value, dict) and name != "holds":
+        return Polytope(np.array(value["C"]), np.array(value["d"]))
+    if isinstance(value, dict):
+        return {pair: (iteration, scale) for pair, (iteration, scale) in _by_pair(value).items()}
+    return np.array(value) if isinstance(value, list) else value
+
+
+def _by_pair(document: dict[str, Any]) -> dict[int, Any]:
+    """Keys of a JSON object are text."""
+    return {int(pair): value for pair, value in document.items()}

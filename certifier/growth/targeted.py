@@ -1,0 +1,81 @@
+"""Targeted contraction: faces are added where pairs fail (:mod:`certifier.growth.faces`) until every pair is certified.
+
+What was certified stays so, since the polytope only shrinks. The contraction of a proposal is tried a few times with another balance
+between faces and shorter ranges; the largest region counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from certifier.growth.actions import Outcomes, Transition
+from certifier.growth.faces import Failure, contract, measure
+from certifier.growth.options import NEAR
+from certifier.growth.state import Cuts, GrowthState, Start
+from certifier.growth.trials import certify, effort, is_worth_it, joints_between
+from certifier.model import Array, Polytope, Scene
+from certifier.outcome import Outcome
+from certifier.pair.result import Weakness
+from certifier.polytopes.polytope import drop_redundant
+
+MAX_ATTEMPTS = 60
+"""Faces added for one pair before a contraction gives up."""
+FAILURES = 2
+"""Pairs for which faces are added at once, so that two workers can look for them."""
+FAR = 8.0
+"""Factor by which the faces of a given polytope are pushed out from the seed before anything is certified."""
+
+
+def next_contraction(scene: Scene, state: GrowthState, start: Start) -> Transition | None:
+    """Begins the next contraction of the proposal that may come to more than the best region; None when there were enough."""
+    starts = contraction_starts(scene, state, start)
+    for tried in range(state.contractions, len(starts)):
+        reach, near = starts[tried]
+        rows = start.rows
+        polytope = rows if reach == 1.0 else pushed(scene, rows, start.seed, reach, scene.polytope([], []))
+        state = replace(state, contractions=tried + 1, near=near, reach=reach)
+        if is_worth_it(state, polytope):
+            return trim(scene, replace(state, cuts=Cuts()), start, "contract", polytope)
+    return None
+
+
+def contraction_starts(scene: Scene, state: GrowthState, start: Start) -> list[tuple[float, float]]:
+    """Where contractions start: how far the proposal's faces are pushed out first, and one of NEAR.
+
+    What IRIS cut off collides, but beyond a given polytope nothing is known: the first contraction begins far outside of it.
+    """
+    starts = [(1.0, near) for near in NEAR[: effort(scene, state, "contractions")]]
+    return [(FAR, NEAR[0]), *starts] if start.given and effort(scene, state, "pushes") else starts
+
+
+def pushed(scene: Scene, polytope: Polytope, center: Array, reach: float, within: Polytope) -> Polytope:
+    """The faces of a polytope with the joint limits farther from the centre by that factor, within another polytope with them."""
+    limits = 2 * scene.n
+    C, d = polytope.C[:-limits], polytope.d[:-limits]
+    moved = Polytope(np.concatenate([C, within.C]), np.concatenate([C @ center + reach * (d - C @ center), within.d]))
+    kept = drop_redundant(moved, fixed=limits)
+    return Polytope(moved.C[kept], moved.d[kept])
+
+
+def trim(scene: Scene, state: GrowthState, start: Start, label: str, polytope: Polytope) -> Transition:
+    """Certifies what the cuts have come to; a pair certified on a larger polytope is certified on this one."""
+    cuts, center = state.cuts, measure(polytope, start.keep[0]).center
+    hard = sorted(index for index in cuts.attempts if index not in cuts.holds)
+    return certify(scene, state, label, polytope, center, reuse=dict(cuts.holds), hard=hard, failures=FAILURES)
+
+
+def cut(scene: Scene, state: GrowthState, start: Start, report: Outcomes) -> Transition | None:
+    """Adds faces for the pairs that failed and goes on; None when that leads nowhere, or to nothing larger than the best region."""
+    action, attempts = report.action, dict(state.cuts.attempts)
+    certified = {i: action.iteration for i, outcome in report.outcomes.items() if outcome is Outcome.CERTIFIED}
+    found = []
+    for index in report.failures:
+        weakness = report.weaknesses.get(index, Weakness.unknown(scene.n))
+        found.append(Failure(joints_between(scene, index), weakness, attempts.get(index, 0)))
+        attempts[index] = attempts.get(index, 0) + 1
+    smaller = contract(scene, action.polytope, measure(action.polytope, start.keep[0]), start.keep, found, state.near)
+    if smaller is None or max(attempts.values()) > MAX_ATTEMPTS or not is_worth_it(state, smaller):
+        return None
+    return trim(scene, replace(state, cuts=Cuts(state.cuts.holds | certified, attempts)), start, action.label, smaller)

@@ -1,0 +1,33 @@
+"""What a certification of a given polytope has come to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from certifier.outcome import Guarantee, Outcome, combine
+from certifier.pair.result import PairResult
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The results of all pairs of a scene on one polytope.
+
+    Attributes:
+        results: pair index -> its result.
+        worth: what it is worth that every pair is certified.
+        seconds: what it took altogether.
+    """
+
+    results: dict[int, PairResult]
+    worth: Guarantee
+    seconds: float
+
+    @property
+    def outcome(self) -> Outcome:
+        """The worst of the pairs' outcomes."""
+        return combine([result.outcome for result in self.results.values()])
+
+    @property
+    def guarantee(self) -> Guarantee:
+        """Of the polytope: nothing unless every pair is certified."""
+        return self.worth if self.outcome is Outcome.CERTIFIED else Guarantee.NONE

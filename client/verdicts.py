@@ -1,0 +1,28 @@
+"""The document of ``ciris certify --json``, whoever has certified."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from certifier.outcome import Guarantee, Outcome
+
+_RESULT = ("outcome", "margin", "seconds", "stage", "witness_q", "detail")
+
+
+def document(
+    name: str, scene_hash: str, outcome: Outcome, guarantee: Guarantee, seconds: float, pairs: Sequence[dict[str, Any]]
+) -> dict[str, Any]:
+    """One outcome for each pair, with stable keys.
+
+    Args:
+        guarantee: of the whole polytope.
+        pairs: of each its ``a`` and ``b``, ``outcome``, ``margin``, ``seconds``, ``stage``, ``witness_q`` and ``detail``.
+    """
+    return {
+        "scene": {"name": name, "hash": scene_hash},
+        "outcome": outcome.value,
+        "guarantee": guarantee.value,
+        "seconds": seconds,
+        "pairs": [{key: pair[key] for key in ("a", "b", *_RESULT)} for pair in pairs],
+    }
