@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from sqlalchemy import or_, select
 from sqlalchemy.orm import Session
 
@@ -10,7 +12,7 @@ from certifier.model import Scene
 from db import pages
 from db.models import SceneRow
 from db.pages import Page
-from db.session import insert_new
+from db.session import Database, insert_new
 
 ID_LENGTH = 16
 
@@ -36,6 +38,19 @@ def find(session: Session, name: str) -> str:
     if found is None:
         raise SceneError("scene_not_found", f"there is no scene {name!r}", field="scene")
     return found
+
+
+@lru_cache(maxsize=16)
+def load(database: Database, scene_id: str) -> Scene:
+    """The scene with this id, ready for use. A scene never changes and takes long to read, so a process keeps the last few.
+
+    Not to be called in a session: it takes its own.
+
+    Raises:
+        SceneError: scene_not_found.
+    """
+    with database.read() as session:
+        return Scene.from_document(get(session, scene_id).document)
 
 
 def get(session: Session, name: str) -> SceneRow:

@@ -16,7 +16,6 @@ from api import checks
 from api.access import READ, SUBMIT, Db, Submitter
 from api.announce import Announcements
 from api.reading import ReadingRoute
-from api.scene_cache import scene_of
 from api.schemas.common import MAX_INT, Cursor
 from api.schemas.jobs import (
     CertifyRequest,
@@ -58,7 +57,7 @@ def create_job(
     """Start growing a region, or certifying a polytope. The same request under the same Idempotency-Key is the same job."""
     with db.read() as session:
         scene_id = scenes.find(session, body.scene)
-    options = _options(body, scene_of(db, scene_id))
+    options = _options(body, scenes.load(db, scene_id))
     if body.webhook is not None:
         checks.webhook(body.webhook)
     with db.write() as session:
@@ -152,7 +151,7 @@ def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge
         job = jobs.get(session, job_id)
         rows = pairs.of_job(session, job_id) if iteration is None else pairs.of_iteration(session, job_id, iteration)
         iterations = [row for row in pairs.iterations(session, job_id) if iteration in (None, row.index)]
-    scene = scene_of(db, job.scene_id)
+    scene = scenes.load(db, job.scene_id)
     return PairMatrix(
         pairs=[PairInfo(index=index, a=pair.a, b=pair.b) for index, pair in enumerate(scene.pairs)],
         iterations=[_iteration(row) for row in iterations],
@@ -170,7 +169,7 @@ def download_pair_proof(job_id: str, pair: int, iteration: Annotated[int, Query(
             raise CirisError("proof_not_found", f"there is no proof of pair {pair} in iteration {iteration}", field="pair")
         data = proofs.get(session, row.proof_digest)
     headers = {"Content-Disposition": f'attachment; filename="{job_id}-{iteration}-{pair}.proof"'}
-    return Response(with_scene(data, scene_of(db, job.scene_id)), media_type="application/octet-stream", headers=headers)
+    return Response(with_scene(data, scenes.load(db, job.scene_id)), media_type="application/octet-stream", headers=headers)
 
 
 def _iteration(row: IterationRow) -> Iteration:

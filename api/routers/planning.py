@@ -7,7 +7,6 @@ from fastapi import APIRouter
 
 from api import checks
 from api.access import READ, Db
-from api.scene_cache import scene_of
 from api.schemas.regions import Containment, ContainsRequest, ContainsResponse, Hit
 from certifier.model import Polytope
 from certifier.outcome import Guarantee
@@ -23,7 +22,7 @@ def contains(body: ContainsRequest, db: Db) -> ContainsResponse:
     with db.read() as session:
         scene_id = scenes.find(session, body.scene)
         stored = regions.polytopes(session, scene_id)
-    scene = scene_of(db, scene_id)
+    scene = scenes.load(db, scene_id)
     points = to_s(scene, checks.points(scene, body.q, "q")) if body.q is not None else checks.points(scene, body.s or [], "s")
     found = MembershipIndex([Polytope(r.C, r.d) for r in stored], scene.n).locate(points)
     answers = []

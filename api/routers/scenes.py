@@ -10,7 +10,6 @@ from fastapi import APIRouter, File, Query, Response, UploadFile, status
 from api.access import READ, SUBMIT, Db
 from api.children import Children
 from api.reading import ReadingRoute
-from api.scene_cache import scene_of
 from api.schemas.common import Cursor
 from api.schemas.scenes import IgnoredPair, LintReport, PairForecast, SceneDetail, ScenePage, ScenePairs, SceneSummary, Substitution
 from certifier.pair.forecast import forecast
@@ -61,7 +60,7 @@ def get_scene_pairs(scene_id: str, db: Db) -> ScenePairs:
     """The pairs to certify, with the reference frame chosen for each and a forecast of its cost."""
     with db.read() as session:
         scene_id = scenes.find(session, scene_id)
-    scene = scene_of(db, scene_id)
+    scene = scenes.load(db, scene_id)
     names = [joint.name for joint in scene.moving]
     pairs = []
     for index, cost in enumerate(forecast(scene)):

@@ -7,12 +7,16 @@ from typing import Annotated, Any
 from fastapi import Query
 from pydantic import BaseModel, ConfigDict, Field
 
+from certifier.growth.options import WHOLE_NUMBERS
+
 MAX_INT = 2**31 - 1
 """Of the databases' integers."""
 
 Real = Annotated[float, Field(allow_inf_nan=False)]
 Vector = Annotated[list[Real], Field(min_length=1, max_length=64)]
-RandomSeed = Annotated[int, Field(ge=0, le=2**63 - 1, description="Seeds every random choice.")]
+RandomSeed = Annotated[
+    int, Field(ge=WHOLE_NUMBERS["random_seed"][0], le=WHOLE_NUMBERS["random_seed"][1], description="Seeds every random choice.")
+]
 SceneName = Annotated[str, Field(min_length=1, max_length=255, pattern=r"^[^\x00]+$", description="A scene's id, or its name.")]
 Document = dict[str, Any]
 

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 from base64 import b64decode
 from datetime import datetime
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector
 from api.schemas.scenes import PairInfo
+from certifier.growth.options import LARGEST_TOLERANCE, WHOLE_NUMBERS, GrowthOptions
 from certifier.outcome import Outcome, Stage
 from certifier.seeding.options import Method
 from db.models import EventRow, JobRow, WebhookRow
 from db.states import IterationState, JobKind, JobState, PairState, WebhookState
+
+DEFAULTS = GrowthOptions()
+
+
+def _whole(option: str, description: str) -> Any:
+    """Of a growth option that is a whole number."""
+    least, greatest = WHOLE_NUMBERS[option]
+    return Field(ge=least, le=greatest, description=description)
 
 
 class GrowOptions(Request):
@@ -24,33 +33,30 @@ class GrowOptions(Request):
     ] = "targeted"
     contractions: Annotated[
         int | None,
-        Field(
-            ge=1,
-            le=3,
-            description="Targeted contractions, each cutting in another way; the largest region counts. "
+        _whole(
+            "contractions",
+            "Targeted contractions, each cutting in another way; the largest region counts. "
             "Default: 2 for arms of at most six joints between two bodies, else 1.",
         ),
     ] = None
-    bisection_steps: Annotated[int, Field(ge=0, le=60, description="Certifications spent on uniform contraction after its two ends.")] = 6
+    bisection_steps: Annotated[int, _whole("bisection_steps", "Certifications spent on uniform contraction after its two ends.")] = (
+        DEFAULTS.bisection_steps
+    )
     max_rounds: Annotated[
         int | None,
-        Field(
-            ge=0,
-            le=1000,
-            description="Rounds of the polytope step; default: 3 for arms of at most four joints between two bodies, else 0.",
-        ),
+        _whole("max_rounds", "Rounds of the polytope step; default: 3 for arms of at most four joints between two bodies, else 0."),
     ] = None
     pushes: Annotated[
         int | None,
-        Field(
-            ge=0,
-            le=1000,
-            description="How often the faces are pushed out after the contractions; default: 10 for such arms, 2 up to six joints, else 0.",
+        _whole(
+            "pushes", "How often the faces are pushed out after the contractions; default: 10 for such arms, 2 up to six joints, else 0."
         ),
     ] = None
-    tolerance: Annotated[Real, Field(gt=0, lt=10, description="Growth of the ellipsoid's volume under which the alternation stops.")] = 0.02
-    backoff: Annotated[int, Field(ge=0, le=20, description="How often a step that fails to certify is halved.")] = 2
-    random_seed: RandomSeed = 0
+    tolerance: Annotated[
+        Real, Field(gt=0, lt=LARGEST_TOLERANCE, description="Growth of the ellipsoid's volume under which the alternation stops.")
+    ] = DEFAULTS.tolerance
+    backoff: Annotated[int, _whole("backoff", "How often a step that fails to certify is halved.")] = DEFAULTS.backoff
+    random_seed: RandomSeed = DEFAULTS.random_seed
 
 
 class Seed(Request):

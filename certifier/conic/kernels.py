@@ -193,6 +193,8 @@ def line_search(eigenvalues: Array, slope: Array) -> Array:
                 term = value / (1 + a * value)
                 first += term
                 second += term * term
+            if second == 0.0:  # nothing moves
+                break
             following = min(max(a + (first - slope[r]) / second, 0.0), a + 0.9 * (upper - a))
             if abs(following - a) < 1e-3 * max(following, 1e-3):
                 break

@@ -18,6 +18,19 @@ NEAR = (1.0, 0.6, 0.3)
 """Of the contractions, one after the other: from how near on a pair's failure calls for a shorter range and not for a face."""
 
 
+WHOLE_NUMBERS = {
+    "contractions": (1, len(NEAR)),
+    "bisection_steps": (0, 60),
+    "pushes": (0, 1000),
+    "max_rounds": (0, 1000),
+    "backoff": (0, 20),
+    "random_seed": (0, 2**63 - 1),
+}
+"""Option -> its least and its greatest value."""
+LARGEST_TOLERANCE = 10.0
+"""A tolerance lies between 0 and this."""
+
+
 @dataclass(frozen=True)
 class GrowthOptions:
     """What a job asks for.
@@ -69,17 +82,14 @@ class GrowthOptions:
             raise RegionError("option_value", "kind is 'grow' or 'certify'", field="options.kind")
         if options.contraction not in ("targeted", "uniform"):
             raise RegionError("option_value", "contraction is 'targeted' or 'uniform'", field="options.contraction")
-        if options.contractions is not None and not (isinstance(options.contractions, int) and 1 <= options.contractions <= len(NEAR)):
-            raise RegionError("option_value", f"contractions must be an integer from 1 to {len(NEAR)}", field="options.contractions")
-        integers = (("bisection_steps", 60), ("pushes", 1000), ("max_rounds", 1000), ("backoff", 20), ("random_seed", 2**63 - 1))
-        for name, upper in integers:
+        for name, (least, greatest) in WHOLE_NUMBERS.items():
             value = getattr(options, name)
             if name in EFFORT[0][1] and value is None:
                 continue
-            if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= upper:
-                raise RegionError("option_value", f"{name} must be an integer from 0 to {upper}", field=f"options.{name}")
+            if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= greatest:
+                raise RegionError("option_value", f"{name} must be an integer from {least} to {greatest}", field=f"options.{name}")
         if options.contraction == "uniform" and options.seed.get("contain"):
             raise RegionError("option_value", "only targeted contraction keeps points inside", field="options.contraction")
-        if not (isinstance(options.tolerance, (int, float)) and 0 < options.tolerance < 10):
-            raise RegionError("option_value", "tolerance must be a number between 0 and 10", field="options.tolerance")
+        if not (isinstance(options.tolerance, (int, float)) and 0 < options.tolerance < LARGEST_TOLERANCE):
+            raise RegionError("option_value", f"tolerance must be a number between 0 and {LARGEST_TOLERANCE:g}", field="options.tolerance")
         return options

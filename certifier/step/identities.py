@@ -142,8 +142,8 @@ class Lift:
         return lifted
 
 
-class Certificates:
-    """Makes the groups of proofs.
+class IdentityGroups:
+    """Makes the group of identities of each proof.
 
     Args:
         scale: (m,) what the faces are multiplied by in the step's coordinates.

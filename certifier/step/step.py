@@ -33,7 +33,7 @@ from certifier.polytopes.ellipsoid import Ellipsoid, inscribed_ellipsoid
 from certifier.polytopes.polytope import bounds, drop_redundant
 from certifier.proof.pair import PairProof
 from certifier.step.face_terms import face_barrier, objective_term
-from certifier.step.identities import Certificates, face_multipliers, holds_on
+from certifier.step.identities import IdentityGroups, face_multipliers, holds_on
 from certifier.step.stepped import Stepped
 
 TRUST = 1.3
@@ -135,13 +135,13 @@ def _step(
     base = scene.polytope(*_rows(scene, box, current.C[used], current.d[used]))
     start = inscribed_ellipsoid(base)
     faces = _Faces(current.C[used], current.d[used], start)
-    certificates = Certificates(scene, box, start, faces.scale, MARGIN_SHARE)
+    groups = IdentityGroups(scene, box, start, faces.scale, MARGIN_SHARE)
     info: dict[str, Any] = {"faces": len(used), "coupled_pairs": len(needed), "trust": TRUST}
     C, d = faces.rows(faces.start)
     base = scene.polytope(*_rows(scene, box, C, d))
     if needed:
         method = Arrow(
-            [certificates.group(proof, Y[:, used]) for proof, Y in needed],
+            [groups.group(proof, Y[:, used]) for proof, Y in needed],
             faces.start,
             lambda iteration: progress(f"polytope step: iteration {iteration}"),
         )

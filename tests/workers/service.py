@@ -23,7 +23,6 @@ from db.settings import settings
 from db.states import JOB, unfinished
 from workers.app import celery_app, send_coordinate
 from workers.processes import die_with_parent
-from workers.scenes import load_scene
 
 ROOT = Path(__file__).parents[2]
 PATIENCE_SECONDS = 180.0
@@ -34,7 +33,7 @@ Found = TypeVar("Found")
 @contextmanager
 def environment(**variables: str) -> Iterator[None]:
     """The process's settings, database and Celery app as these variables say, for a while."""
-    caches = (settings, database, celery_app, load_scene)
+    caches = (settings, database, celery_app, scenes.load)
     with pytest.MonkeyPatch.context() as patch:
         for name, value in variables.items():
             patch.setenv(name, value)

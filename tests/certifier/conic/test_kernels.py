@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from certifier.conic.cone import inverse_cholesky
-from certifier.conic.kernels import lowest_relative_eigenvalue
+from certifier.conic.kernels import line_search, lowest_relative_eigenvalue
 
 
 def stack(seed, size, count):
@@ -37,3 +37,9 @@ def test_lowest_relative_eigenvalue(seed, size, count):
     expected = np.linalg.eigvalsh(inverse @ D @ np.swapaxes(inverse, 1, 2)).min()
     found = lowest_relative_eigenvalue(inverse, D, 1e-3)
     assert found == pytest.approx(expected, rel=2e-3, abs=1e-9)
+
+
+def test_a_line_along_which_nothing_moves_has_no_length():
+    lengths = line_search(np.array([[0.0, 0.0], [0.5, -0.2]]), np.array([0.0, 0.1]))
+    assert lengths[0] == 0.0
+    assert np.isfinite(lengths[1])

@@ -21,7 +21,7 @@ from certifier.pair.certification import Certification
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.proof.pair import PairProof
 from certifier.step.face_terms import EPSILON
-from certifier.step.identities import Certificates, face_multipliers
+from certifier.step.identities import IdentityGroups, face_multipliers
 from certifier.step.step import step, trust_box
 from certifier.verify.pair import verify_pair
 from tests.certifier.conic.clarabel import add_rationals
@@ -166,8 +166,8 @@ def groups_of(scene, region, proofs, box):
     faces = Polytope(np.concatenate([region.C[:rows], eye, -eye]), np.concatenate([region.d[:rows], box.upper, -box.lower]))
     ellipsoid = inscribed_ellipsoid(region)
     scale = 0.9 / np.linalg.norm(region.C[:rows] @ ellipsoid.shape, axis=1)
-    certificates = Certificates(scene, box, ellipsoid, scale, polytope_step.MARGIN_SHARE)
-    return [certificates.group(proof, face_multipliers(proof, faces, box)) for proof in proofs], ellipsoid, scale
+    groups = IdentityGroups(scene, box, ellipsoid, scale, polytope_step.MARGIN_SHARE)
+    return [groups.group(proof, face_multipliers(proof, faces, box)) for proof in proofs], ellipsoid, scale
 
 
 @pytest.mark.parametrize("name", ["revolute", "ball"])
