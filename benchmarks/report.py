@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
@@ -11,6 +12,9 @@ from benchmarks import scaling
 from benchmarks.catalogue import ROOT
 
 PAGE, FIGURES = ROOT / "docs/benchmarks.md", ROOT / "docs/benchmarks"
+
+LINE = 100
+"""Most characters of a line of docs that is no table's."""
 
 Document = dict[str, Any]
 
@@ -31,9 +35,15 @@ def page(old: str) -> str:
 
     def tables(found: re.Match[str]) -> str:
         measured = (FIGURES / f"{found[2]}.json").exists()
-        return f"{found[1]}\n{text(_document(found[2])) if measured else 'Not measured yet.'}\n\n{found[3]}"
+        return f"{found[1]}\n{_wrapped(text(_document(found[2]))) if measured else 'Not measured yet.'}\n\n{found[3]}"
 
     return re.sub(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", tables, old, flags=re.DOTALL)
+
+
+def _wrapped(text: str) -> str:
+    """The text in lines of at most LINE characters, the rows of tables as they are."""
+    lines = (line if line.startswith("|") else textwrap.fill(line, LINE, break_on_hyphens=False) for line in text.splitlines())
+    return "\n".join(lines)
 
 
 def _document(name: str) -> Document:
