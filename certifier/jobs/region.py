@@ -105,7 +105,7 @@ def versions(scene: Scene) -> dict[str, Any]:
 def _implied(polytope: Polytope, proofs: tuple[PairProof, ...]) -> Implied:
     """Returns the faces of the proofs' polytopes that are not, or no longer, faces of the region, with their bounds and multipliers.
 
-    A joint limit may have the normal of a face that went.
+    A face that is gone may share its normal with a joint limit, so offsets are compared as well.
     """
     own: dict[bytes, float] = {}
     for c, d in zip(polytope.C + 0.0, polytope.d, strict=True):

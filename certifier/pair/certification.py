@@ -80,7 +80,7 @@ class Certification:
     def certify(self, index: int, max_iterations: int = 60, every_face: bool = False) -> PairResult:
         """Certifies pair ``scene.pairs[index]``, alone or with others that the same proof covers.
 
-        Of the pairs that one proof covers, the first to be asked for takes the time.
+        Where a proof covers several pairs, its time counts for the first of them that is asked for.
 
         Args:
             every_face: begin with all of P's faces in the joints of the pair's path; this saves time where fewer faces are known to fail.

@@ -26,7 +26,7 @@ TRACE_SHARE = 1e-7
 
 
 def dual_proof(sides: Sides, pair: Pair, frame: Frame, ground: Ground, blocks: list[Block], x: list[Array]) -> DualProof:
-    """Makes the proof from a dual point x of the pair's program; whether it holds, the verifier says.
+    """Makes the proof from a dual point x of the pair's program; the verifier says whether it holds.
 
     Args:
         blocks: the program (certifier.pair.program.build).

@@ -13,7 +13,7 @@ from certifier.proof.pair import Ground, PairProof, Side
 
 
 def pair_proof(sides: Sides, volumes: tuple[Volume, Volume], frame: Frame, ground: Ground, solution: Solution, kind: str) -> PairProof:
-    """Makes the proof of a feasible point; whether it holds once it is rounded, the verifier says.
+    """Makes the proof of a feasible point; the verifier says whether it holds once it is rounded.
 
     Args:
         kind: type of the Gram factors' numbers, one of BITS.

@@ -1,5 +1,4 @@
-"""The faces of the polytope step get their objective and their barriers here, in coordinates in which the inscribed ellipsoid is the unit
-ball.
+"""The objective and the barriers of the polytope step's faces are made here, where the inscribed ellipsoid is the unit ball.
 
 The unknowns are, face by face, (c_j, d_j, delta_j), which are n + 2 numbers. The face is {c_j'w <= d_j} with w = E^-1 (s - s_E), and
 
