@@ -1,4 +1,4 @@
-"""This module writes regions as files for other programs. Each function returns the file's bytes and its suffix."""
+"""This module writes regions as files for other programs. Each writer returns the file's bytes and its suffix."""
 
 from __future__ import annotations
 

@@ -28,11 +28,14 @@ from certifier.pair.forecast import forecast
 from certifier.pair.result import PairResult
 
 BOXES, ROUND = 60, 40
-"""Number of random arms with boxes alone, and of those that also have balls and capsules."""
+"""The campaign has BOXES random arms with boxes alone, and ROUND that also have balls and capsules."""
 SMALLEST, LARGEST = 0.05, 1.0
-"""Sizes of the smallest and the largest polytope around a random arm. The largest reaches to the joint limits."""
+"""The polytopes around a random arm have sizes from SMALLEST to LARGEST. The largest reaches to the joint limits."""
 BRACKET, APART = 1.02, 1.01
-"""A pair ceases to be certifiable between two sizes whose ratio is at most BRACKET. Drake is asked a factor APART outside of them."""
+"""A pair ceases to be certifiable between two sizes whose ratio is at most BRACKET.
+
+Drake is asked at two sizes that lie outside of these, each by the factor APART.
+"""
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ REGIONS = {
 
 
 class Instance(NamedTuple):
-    """One pair of a scene on one of the scene's regions."""
+    """An instance is one pair of a scene on one of the scene's regions."""
 
     scene: str
     a: str

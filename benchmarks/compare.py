@@ -59,7 +59,7 @@ def same_program(scene: Scene, pair: Pair, frame: str, drakes_frame: str) -> boo
 
 @dataclass(frozen=True)
 class Task:
-    """Pairs of one scene on one polytope."""
+    """A task asks about pairs of one scene on one polytope."""
 
     scene: Scene
     region_kind: str

@@ -28,12 +28,12 @@ WAYS: dict[str, dict[str, Any]] = {
     "one, then pushes": {"contractions": 1, "pushes": 2, "max_rounds": 0},
     "default": {},
 }
-"""Options of a grow job for each way, each with the default seeding."""
+"""Each way to grow has these options of a grow job, with the default seeding."""
 EXAMPLES = ("planar_2dof", "arm_3dof", "ur3e_bin", "iiwa_shelf", "dual_ur3e")
 AGAINST = ("planar_2dof", "arm_3dof")
 """On these examples Drake's alternation ends within minutes."""
 HALF_WIDTH, ROUNDS, TOLERANCE = 0.05, 10, 1e-3
-"""Half the edge, in s, of the cube from which both sides start, and Drake's own limits for the alternation, which both sides use."""
+"""Both sides start from a cube in s with this half-width. They use Drake's own limits for the alternation: its rounds and its tolerance."""
 PUSHES = 10
 SHORT, RUNS = 10.0, 5
 """If Drake's alternation takes fewer than SHORT seconds, all sides are run RUNS times, in turn.

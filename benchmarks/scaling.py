@@ -22,7 +22,7 @@ OBSTACLES = (10, 30, 100, 300, 1000)
 JOINTS = range(2, 8)
 FACES = range(10, 61, 10)
 HALF_WIDTH, RADIUS = 0.03, 0.2
-"""Half the edge of the cubes about the arms, and the radius of the ball that all faces touch; in s."""
+"""The cubes about the arms have this half-width. The ball that all faces touch has this radius. Both are in s."""
 REPEAT = 5
 """A single pair is run this often, and the fastest run counts."""
 ROOM, CLEARANCE = 3.0, 0.2

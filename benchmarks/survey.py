@@ -27,7 +27,9 @@ from certifier.proof.pair import PairProof
 DECIDED = (Outcome.CERTIFIED, Outcome.REFUTED, Outcome.NOT_CERTIFIABLE)
 
 SizeClass = tuple[int, tuple[int, int], tuple[int, int]]
-"""How many joints the plane moves with, the numbers of vertices of A and B, and the dimensions N of their polynomial spaces."""
+"""A size class is the number of joints that the plane moves with, the numbers of vertices of A and B, and the dimensions N of their
+polynomial spaces.
+"""
 
 
 def survey(names: Iterable[str], most: float, progress: Progress) -> dict[str, Any]:

@@ -42,7 +42,7 @@ class _Patient(httpx2.HTTPTransport):
 
 
 class Client:
-    """A connection to the service at ``url``. Every method may raise CirisError: what the service said, or ``unreachable``.
+    """A client is a connection to the service at ``url``. Every method may raise CirisError: what the service said, or ``unreachable``.
 
     Args:
         key: an API key, for a service that asks for one.

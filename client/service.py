@@ -18,7 +18,7 @@ from client.output import NEGATIVE, Screen
 
 @dataclass(frozen=True)
 class Grown:
-    """A region that a job has grown.
+    """Describes a region that a job has grown.
 
     Attributes:
         manifest: the region's manifest.

@@ -89,7 +89,7 @@ def exist(session: Session) -> bool:
 
 @dataclass(frozen=True)
 class Key:
-    """A key that was made; ``digest`` is its SHA-256."""
+    """Describes a key that was made; ``digest`` is its SHA-256."""
 
     id: str
     name: str

@@ -36,7 +36,7 @@ OPEN, RUNNING = PairState.OPEN.value, PairState.RUNNING.value
 """Pairs and steps share these two states."""
 
 LOOK_SECONDS = 0.5
-"""A holder checks every so many seconds whether its work is still wanted. Two checks in a row that say no end the holder."""
+"""A holder checks each time this many seconds have passed whether its work is still wanted. Two checks in a row that say no end it."""
 
 
 def this_worker() -> str:

@@ -35,7 +35,7 @@ class Base(DeclarativeBase):
 
 
 class SceneRow(Base):
-    """A scene, which never changes. ``id`` is the first 16 hexadecimal digits of ``hash``, or all of it where those are taken."""
+    """A scene never changes. ``id`` is the first 16 hexadecimal digits of ``hash``, or all of it where those are taken."""
 
     __tablename__ = "scenes"
 
@@ -163,7 +163,7 @@ class IterationRow(Base):
 
 
 class PairRow(Leased, Base):
-    """One pair of geometries on the polytope of one iteration."""
+    """This row holds one pair of geometries on the polytope of one iteration, and its result."""
 
     __tablename__ = "pairs"
     __table_args__ = (
@@ -217,7 +217,7 @@ class StepRow(Leased, Base):
 
 
 class ProofRow(Base):
-    """A proof file, addressed by its content."""
+    """This row holds a proof file, addressed by its content."""
 
     __tablename__ = "proofs"
 
@@ -228,7 +228,7 @@ class ProofRow(Base):
 
 
 class RegionRow(Base):
-    """A region is a polytope all of whose pairs are certified, stored with the proof of this."""
+    """A region is a polytope all of whose pairs are certified. ``proof_digest`` names the proof of this."""
 
     __tablename__ = "regions"
     __table_args__ = (UniqueConstraint("job_id", "iteration"),)

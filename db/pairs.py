@@ -27,7 +27,7 @@ FAILED = frozenset(PairState) - UNFINISHED - {PairState.CERTIFIED, PairState.SKI
 
 @dataclass(frozen=True)
 class NewPair:
-    """A pair to certify: its position in Scene.pairs, the names of its geometries, and the seconds it is expected to take."""
+    """Describes a pair to certify: its position in Scene.pairs, the names of its geometries, and the seconds it is expected to take."""
 
     index: int
     a: str
@@ -37,7 +37,7 @@ class NewPair:
 
 @dataclass(frozen=True)
 class Claimed:
-    """A pair to certify now. ``attempt`` counts from 1; ``deaths`` is how often the pair may have killed its process."""
+    """Names a pair to certify now. ``attempt`` counts from 1; ``deaths`` is how often the pair may have killed its process."""
 
     index: int
     attempt: int
@@ -46,7 +46,7 @@ class Claimed:
 
 @dataclass(frozen=True)
 class Claim:
-    """Pairs of one iteration that are held under one token."""
+    """A claim holds pairs of one iteration under one token."""
 
     token: str
     job_id: str

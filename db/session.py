@@ -36,9 +36,9 @@ most of what it is used for.
 BUSY_SECONDS = 30.0
 """A caller waits at most this long for a connection, and a writer at most this long for another writer (SQLite)."""
 IDLE_SECONDS = 1.0
-"""A connection to PostgreSQL that was idle for so long is tested before it is used: the server may have been restarted."""
+"""A connection to PostgreSQL that was idle for this many seconds is tested before it is used: the server may have been restarted."""
 SILENCE_SECONDS = 20
-"""A PostgreSQL server or client that says nothing for so long is believed gone, and a client's locks with it."""
+"""A PostgreSQL server or client that says nothing for this many seconds is believed gone. A client's locks end with it."""
 UNAVAILABLE = (OperationalError, InterfaceError, TimeoutError)
 """These are raised when the database cannot be reached, or not in time."""
 _LINK = {

@@ -63,31 +63,31 @@ class Settings(BaseSettings):
     heartbeat_file: Path | None = None
     """A worker touches this file every ten seconds while it is well, for health checks."""
     verify_timeout_seconds: float = 600.0
-    """One check of a stored proof on request may take this long."""
+    """One check of a stored proof on request may take this many seconds."""
     webhook_private: bool = False
     """Webhooks may go to addresses that are not public, as in a private network."""
     time_limit_seconds: float = Field(default=3600.0, gt=0)
-    """One batch of pairs or one step may take this long; then its process is killed. A job with a pair that needs longer is refused."""
+    """A batch of pairs or a step may take this many seconds; then its process is killed. A job with a pair that needs longer is refused."""
     child_memory_bytes: int = 16 << 30
-    """Limit of the address space of the process that runs a seeding or a check on request."""
+    """The process that runs a seeding or a check on request may have an address space of this many bytes."""
     pair_memory_bytes: int = Field(default_factory=_memory_of_a_process)
-    """A job with a pair that needs more memory than this is refused. Default: this machine's memory, divided by its cores."""
+    """A job with a pair that needs more bytes of memory than this is refused. Default: this machine's memory, divided by its cores."""
     max_jobs_per_key: int = Field(default=1000, ge=1)
     """One API key may have this many unfinished jobs. Where the service asks for no key, all callers share the limit."""
 
     @property
     def family(self) -> socket.AddressFamily:
-        """The address family of the API's address."""
+        """Returns the address family of the API's address."""
         return socket.AF_INET6 if ":" in self.host else socket.AF_INET
 
     @property
     def loopback(self) -> bool:
-        """Whether only this machine can reach the API."""
+        """Says whether only this machine can reach the API."""
         return self.host in LOOPBACK_NAMES
 
     @property
     def database(self) -> str:
-        """The database's URL, with the default filled in."""
+        """Returns the database's URL, with the default filled in."""
         return self.database_url or f"sqlite:///{self.data_dir.expanduser().absolute() / 'ciris.sqlite3'}"
 
 

@@ -20,7 +20,7 @@ UNFINISHED = unfinished(STEP)
 
 @dataclass(frozen=True)
 class Claim:
-    """A step that is held under a token, with what is needed to do it. ``attempt`` and ``deaths`` are as in db.pairs.Claimed."""
+    """A claim holds a step under a token, with what is needed to do it. ``attempt`` and ``deaths`` are as in db.pairs.Claimed."""
 
     token: str
     step_id: int

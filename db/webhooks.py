@@ -15,12 +15,12 @@ from db.models import JobRow, WebhookRow
 from db.states import JOB, WebhookState, transition, unfinished
 
 BACKOFF_SECONDS = (10, 60, 300, 1800, 7200, 21600)
-"""The pauses, in seconds, after each failed attempt but the last."""
+"""The service pauses this many seconds after each failed attempt but the last."""
 
 
 @dataclass(frozen=True)
 class Delivery:
-    """One attempt to tell a receiver that a job has ended."""
+    """A delivery is one attempt to tell a receiver that a job has ended."""
 
     webhook: WebhookRow
     job: JobRow

@@ -26,7 +26,7 @@ CONTROL, SOLVE = "control", "solve"
 COORDINATE, WORK = "ciris.coordinate", "ciris.work"
 
 SILENCE_SECONDS = 10
-"""A Redis that says nothing for so many seconds is believed gone, and a new connection is opened."""
+"""A Redis that says nothing for this many seconds is believed gone, and a new connection is opened."""
 GRACE_SECONDS = 30
 """A step ends itself with an error at its own limit. The worker kills its process this many seconds after that limit."""
 
@@ -72,7 +72,7 @@ def send_coordinate(job_id: str) -> bool:
 
 
 def send_work(count: int = 1) -> bool:
-    """Wakes so many solvers. Each of them wakes another while work is left. It returns False as :func:`send_coordinate` does."""
+    """Wakes ``count`` solvers. Each of them wakes another while work is left. It returns False when Redis cannot be reached."""
     return _send(WORK, [[]] * count)
 
 

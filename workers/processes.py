@@ -12,7 +12,7 @@ from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1
 NICENESS = 10
-"""With this niceness a process gets a tenth of what another one gets of a core that both want.
+"""A process with this niceness gets about a tenth of what another one gets of a core that both want.
 
 That is so little that the API answers at once, and enough for the process to go on.
 """

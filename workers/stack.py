@@ -45,7 +45,7 @@ MAX_SOCKET_PATH = 100
 POLL_SECONDS = 0.2
 MAX_BACKOFF_SECONDS = 30.0
 HEALTHY_SECONDS = 30.0
-"""A child that has run this long is started again without waiting when it dies."""
+"""A child that has run for this many seconds is started again without waiting when it dies."""
 START_SECONDS = 60.0
 STOP_SECONDS = 8.0
 

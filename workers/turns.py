@@ -41,7 +41,7 @@ ACCEPT_SECONDS = 20.0
 Making it a region takes as long as verifying all its proofs.
 """
 COORDINATION_SECONDS = 60.0
-"""A coordinator that has not answered after this time is believed dead."""
+"""A coordinator that has not answered after this many seconds is believed dead."""
 
 
 @dataclass(frozen=True)

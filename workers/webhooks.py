@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 
 AT_ONCE = 8
 SECONDS = 15.0
-"""A receiver that has not answered within this time has failed, even if it is still sending."""
+"""A receiver that has not answered within this many seconds has failed, even if it is still sending."""
 
 
 def run(stop: threading.Event) -> None:
