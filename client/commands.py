@@ -1,4 +1,4 @@
-"""What the commands do. Each takes the parsed arguments and returns the exit status."""
+"""Each function here does what one command asks. It takes the parsed arguments and returns the exit status."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ OK, NO = 0, 1
 
 
 def up(args: Namespace) -> int:
-    """Becomes the supervisor of the embedded stack."""
+    """Replaces this process by the supervisor of the embedded stack."""
     options = [f"--{name}={value}" for name, value in (("port", args.port), ("data", args.data)) if value is not None]
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, "-m", "workers.stack", *options])
 
 
 def key(args: Namespace) -> int:
-    """Becomes the command that acts on the keys in the database."""
+    """Replaces this process by the command that acts on the keys in the database."""
     options = [] if args.data is None else [f"--data={args.data}"]
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, "-m", "db.keys", *options, args.verb, *args.words(args)])
@@ -115,7 +115,7 @@ def grow(args: Namespace) -> int:
 
 
 def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, Any], screen: Screen) -> int:
-    """One job a seed; the regions stay on the service."""
+    """Has the service run one job a seed. The regions stay on the service."""
     if args.local or args.out is not None:
         raise CirisError(
             "several_seeds", "several seeds need a service, which keeps their regions", field="--q", hint="leave --local and --out out"
@@ -142,7 +142,10 @@ def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, 
 
 
 def save_proof(manifest: dict[str, Any], proof: bytes, out: str | None) -> Path:
-    """Writes the proof file, here unless told where; its name holds its digest, so the same proof is the same file."""
+    """Writes the proof file and returns its path, which is in this directory unless the user named another one.
+
+    The file's name holds the proof's digest, so the same proof gives the same file.
+    """
     path = Path(out or f"{manifest['scene']['name']}-{hashlib.sha256(proof).hexdigest()[:8]}.proof")
     path.write_bytes(proof)
     return path
@@ -172,7 +175,7 @@ def certify(args: Namespace) -> int:
 
 
 def _drake(args: Namespace) -> str | None:
-    """The solver that Drake is to use; None when the certifier is ours."""
+    """Returns the name of the solver that Drake uses; None when our certifier is asked."""
     if args.backend != "drake":
         if args.solver is not None:
             raise CirisError("option", "only Drake takes a solver", field="--solver", hint="add --backend drake")

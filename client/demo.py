@@ -1,4 +1,7 @@
-"""``./start``: the embedded stack, the example job and its progress, the certified region, its proof verified, the dashboard's address."""
+"""``./start`` runs the embedded stack and the example job.
+
+It shows the job's progress and the certified region, verifies the proof, and prints the dashboard's address.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ STOP_SECONDS = 30
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the demonstration; returns 0 only if the region was certified and its proof verified here."""
+    """Runs the demonstration. Returns 0 only if the region was certified and its proof was verified here."""
     parser = argparse.ArgumentParser(prog="./start", description="A certified collision-free region for a 7-joint arm in front of a shelf.")
     parser.add_argument("--once", action="store_true", help="end after the job")
     once = parser.parse_args(arguments).once
@@ -79,7 +82,7 @@ def _verified(proof: bytes) -> bool:
 
 
 def _key(request: dict[str, Any]) -> str:
-    """One key for this request and this code: a second run shows the region of the first."""
+    """Returns one key for this request and this code, so that a second run shows the region of the first."""
     code = hashlib.sha256(json.dumps(request, sort_keys=True).encode())
     root = Path(certifier.__file__).parent
     for file in sorted(root.rglob("*.py")):
@@ -89,7 +92,7 @@ def _key(request: dict[str, Any]) -> str:
 
 @contextmanager
 def _stack() -> Iterator[str]:
-    """The URL of the stack: the one that runs, or one that runs as long as this block."""
+    """Yields the URL of the stack: of the one that runs already, or of one that runs as long as this block."""
     running = running_stack(data_dir())
     if running is not None and _answers(running):
         yield running

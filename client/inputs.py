@@ -1,4 +1,4 @@
-"""What users type and point to, as numbers."""
+"""This module turns what users type and the files they name into numbers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LIST = "joint positions, separated by commas"
 
 
 def configuration(text: str, field: str = "--q") -> list[float]:
-    """``"0, 0.3, -1.8"`` as numbers.
+    """Returns the numbers of a text such as ``"0, 0.3, -1.8"``.
 
     Raises:
         RegionError: bad_number, naming the place.
@@ -38,15 +38,16 @@ def configuration(text: str, field: str = "--q") -> list[float]:
 
 
 def is_scene_file(scene: str) -> bool:
-    """Whether the user means a file rather than a name or id that the service knows."""
+    """Says whether the user means a file, and not a name or id that the service knows."""
     return scene.endswith((".yaml", ".yml")) or "/" in scene
 
 
 def seed_of(scene: str, q: str | None) -> list[float]:
-    """The seed configuration: ``q``, or the ``q`` of the seed.yaml beside the scene file.
+    """Returns the seed configuration: ``q``, or the ``q`` of the seed.yaml beside the scene file.
 
     Raises:
-        CirisError: scene_not_found for a scene file that is not there; seed_missing, or what is wrong with it.
+        CirisError: scene_not_found for a scene file that does not exist; seed_missing; seed_file.
+        RegionError: bad_number.
     """
     if q is not None:
         return configuration(q)
@@ -64,7 +65,7 @@ def seed_of(scene: str, q: str | None) -> list[float]:
 
 @dataclass(frozen=True)
 class PolytopeFile:
-    """A polytope in s, without the joint limits, and optionally a point inside, (n,)."""
+    """Holds a polytope in s, without the joint limits, and optionally a point inside, (n,), in s."""
 
     polytope: Polytope
     center: Array | None
@@ -74,7 +75,7 @@ def polytope_file(path: str) -> PolytopeFile:
     """Reads an npz file with C, d and optionally center.
 
     Raises:
-        RegionError: polytope_file, or as :meth:`Polytope.given`.
+        RegionError: polytope_file, polytope_shape, or as :meth:`Polytope.given`.
     """
     try:
         with np.load(path, allow_pickle=False) as arrays:
