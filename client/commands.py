@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import sys
 from argparse import Namespace
 from pathlib import Path
@@ -95,6 +96,7 @@ def grow(args: Namespace) -> int:
     }
     if len(seeds) > 1:
         return _grow_many(args, seeds, options, screen)
+    check_writable(args.out)
     seed = seeds[0]
     if args.local:
         from client import local
@@ -141,12 +143,33 @@ def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, 
     return OK if len(volumes) == len(jobs) else NO
 
 
+def file_name(name: str) -> str:
+    """Returns a scene's name as part of a file's name: a name may hold slashes and dots, which must not lead elsewhere."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-") or "scene"
+
+
+def check_writable(out: str | None) -> None:
+    """Refuses, before a job takes minutes, a place that its proof cannot be written to.
+
+    Raises:
+        CirisError: not_writable.
+    """
+    path = Path(out or ".")
+    directory = path.parent if out else path
+    if path.is_dir() and out:
+        raise CirisError("not_writable", f"{out} is a directory", field="--out", hint="name a file")
+    if not directory.is_dir() or not os.access(directory, os.W_OK):
+        raise CirisError(
+            "not_writable", f"the proof cannot be written into {directory.absolute()}", field="--out", hint="name a file elsewhere"
+        )
+
+
 def save_proof(manifest: dict[str, Any], proof: bytes, out: str | None) -> Path:
     """Writes the proof file and returns its path, which is in this directory unless the user named another one.
 
     The file's name holds the proof's digest, so the same proof gives the same file.
     """
-    path = Path(out or f"{manifest['scene']['name']}-{hashlib.sha256(proof).hexdigest()[:8]}.proof")
+    path = Path(out or f"{file_name(manifest['scene']['name'])}-{hashlib.sha256(proof).hexdigest()[:8]}.proof")
     path.write_bytes(proof)
     return path
 

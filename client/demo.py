@@ -19,7 +19,7 @@ from typing import Any
 import certifier
 from certifier.errors import CirisError
 from client import output, service
-from client.commands import save_proof
+from client.commands import file_name, save_proof
 from client.find import api_key, data_dir, running_stack
 from client.http import Client
 from client.inputs import seed_of
@@ -37,9 +37,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with _stack() as url:
-            verified = _demonstrate(url)
+            verified, region = _demonstrate(url)
             if not once:
-                print(f"\nthe service keeps running; dashboard: {url}/   (Ctrl-C ends it)", flush=True)
+                print(f"\nlook at it: {url}/regions/{region}", flush=True)
+                print(f"the service keeps running; dashboard: {url}/   (Ctrl-C ends it)", flush=True)
                 signal.pause()
     except CirisError as error:
         print("error:", " ".join(str(error).split()), file=sys.stderr)
@@ -50,7 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0 if verified else 1
 
 
-def _demonstrate(url: str) -> bool:
+def _demonstrate(url: str) -> tuple[bool, str | None]:
+    """Returns whether the proof of the region was verified here, and the region's id on the service."""
     with Client(url, api_key()) as client:
         scene = client.add_scene(SCENE)
         print(f"ciris is up at {url} (data: {data_dir()})")
@@ -58,14 +60,12 @@ def _demonstrate(url: str) -> bool:
         print(f"scene {scene['name']}: {size}", flush=True)
         request = {"kind": "grow", "scene": scene["id"], "seed": {"q": seed_of(str(SCENE), None)}}
         grown = service.grow(client, request, Screen(), idempotency_key=_key(request))
-    path = save_proof(grown.manifest, grown.proof, str(data_dir() / f"{scene['name']}.proof"))
+    path = save_proof(grown.manifest, grown.proof, str(data_dir() / f"{file_name(scene['name'])}.proof"))
     print("\nevery pair of bodies:")
     output.print_pairs(grown.manifest["pairs"])
     print("\ncertified region:")
     output.print_region(grown.manifest, [("time", output.seconds(grown.seconds)), ("ended", grown.remark), ("proof", str(path))])
-    verified = _verified(grown.proof)
-    print(f"\nlook at it: {url}/regions/{grown.region}", flush=True)
-    return verified
+    return _verified(grown.proof), grown.region
 
 
 def _verified(proof: bytes) -> bool:

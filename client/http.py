@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+from urllib.parse import quote
 
 import httpx2
 
@@ -78,15 +79,15 @@ class Client:
 
     def scene(self, name: str) -> Document:
         """Returns a scene by its id or name."""
-        return self._json("GET", f"/v1/scenes/{name}")
+        return self._json("GET", f"/v1/scenes/{_segment(name)}")
 
     def lint(self, name: str) -> Document:
         """Returns a scene's warnings, substitutions and ignored pairs."""
-        return self._json("GET", f"/v1/scenes/{name}/lint")
+        return self._json("GET", f"/v1/scenes/{_segment(name)}/lint")
 
     def scene_pairs(self, name: str) -> list[Document]:
         """Returns a scene's pairs with the forecast of their cost."""
-        return self._json("GET", f"/v1/scenes/{name}/pairs")["pairs"]
+        return self._json("GET", f"/v1/scenes/{_segment(name)}/pairs")["pairs"]
 
     def create_job(self, request: Document, idempotency_key: str | None = None) -> tuple[Document, bool]:
         """Creates a job. Returns the job and True, or the job made earlier under the same key and False."""
@@ -96,19 +97,19 @@ class Client:
 
     def job(self, job_id: str) -> Document:
         """Returns a job as it is now."""
-        return self._json("GET", f"/v1/jobs/{job_id}")
+        return self._json("GET", f"/v1/jobs/{_segment(job_id)}")
 
     def cancel(self, job_id: str) -> Document:
         """Asks a job to end, and returns it."""
-        return self._json("POST", f"/v1/jobs/{job_id}/cancel")
+        return self._json("POST", f"/v1/jobs/{_segment(job_id)}/cancel")
 
     def retry(self, job_id: str) -> Document:
         """Creates a new job like one that failed or was cancelled, and returns it."""
-        return self._json("POST", f"/v1/jobs/{job_id}/retry")
+        return self._json("POST", f"/v1/jobs/{_segment(job_id)}/retry")
 
     def job_pairs(self, job_id: str, iteration: int | None = None) -> Document:
         """Returns a job's pair matrix, of all iterations or of one."""
-        return self._json("GET", f"/v1/jobs/{job_id}/pairs", params={} if iteration is None else {"iteration": iteration})
+        return self._json("GET", f"/v1/jobs/{_segment(job_id)}/pairs", params={} if iteration is None else {"iteration": iteration})
 
     def events(self, job_id: str, after: int = 0) -> Iterator[Document]:
         """Yields the job's events in order until the job has ended. An interrupted stream goes on where it stopped."""
@@ -124,7 +125,7 @@ class Client:
 
     def _stream(self, job_id: str, after: int) -> Iterator[Document | None]:
         """Yields the events of one connection, and None when the job has ended."""
-        url, timeout = f"/v1/jobs/{job_id}/events/stream", httpx2.Timeout(TIMEOUT_S, read=QUIET_S)
+        url, timeout = f"/v1/jobs/{_segment(job_id)}/events/stream", httpx2.Timeout(TIMEOUT_S, read=QUIET_S)
         try:
             with self._http.stream("GET", url, headers={"Last-Event-ID": str(after)}, timeout=timeout) as response:
                 if response.is_error:
@@ -146,23 +147,23 @@ class Client:
 
     def region(self, region_id: str) -> Document:
         """Returns a region with its manifest."""
-        return self._json("GET", f"/v1/regions/{region_id}")
+        return self._json("GET", f"/v1/regions/{_segment(region_id)}")
 
     def proof(self, region_id: str) -> bytes:
         """Returns a region's proof file."""
-        return self._send("GET", f"/v1/regions/{region_id}/proof").content
+        return self._send("GET", f"/v1/regions/{_segment(region_id)}/proof").content
 
     def verify(self, region_id: str) -> Document:
         """Makes the service check a region's stored proof again. Returns whether it holds, and what it proves."""
-        return self._json("POST", f"/v1/regions/{region_id}/verify")
+        return self._json("POST", f"/v1/regions/{_segment(region_id)}/verify")
 
     def pair_proof(self, job_id: str, iteration: int, pair: int) -> bytes:
         """Returns the proof of a pair's outcome in one iteration of a job, together with the scene."""
-        return self._send("GET", f"/v1/jobs/{job_id}/pairs/{pair}/proof", params={"iteration": iteration}).content
+        return self._send("GET", f"/v1/jobs/{_segment(job_id)}/pairs/{pair}/proof", params={"iteration": iteration}).content
 
     def export(self, region_id: str, format: str) -> bytes:
         """Returns a region as the bytes of a ``json``, ``npz`` or ``drake-yaml`` file."""
-        return self._send("GET", f"/v1/regions/{region_id}/export", params={"format": format}).content
+        return self._send("GET", f"/v1/regions/{_segment(region_id)}/export", params={"format": format}).content
 
     def contains(self, scene: str, q: list[list[float]]) -> Document:
         """Returns which regions of a scene contain each of these configurations."""
@@ -193,6 +194,17 @@ class Client:
 
     def _unreachable(self, error: Exception) -> CirisError:
         return CirisError("unreachable", f"the service at {self.url} does not answer: {error}", hint="is `ciris up` running?")
+
+
+def _segment(name: str) -> str:
+    """Returns a name or an id as one segment of a URL's path.
+
+    Raises:
+        CirisError: not_found for what no name can be.
+    """
+    if not name.strip("."):
+        raise CirisError("not_found", f"{name!r} is no name and no id")
+    return quote(name, safe="")
 
 
 def _problem(response: httpx2.Response) -> CirisError:

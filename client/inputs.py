@@ -14,6 +14,7 @@ from certifier.errors import CirisError, RegionError
 from certifier.model import Array, Polytope
 
 SEED_FILE = "seed.yaml"
+_NPZ = "np.savez(FILE, C=C, d=d) writes one"
 _LIST = "joint positions, separated by commas"
 
 
@@ -82,8 +83,8 @@ def polytope_file(path: str) -> PolytopeFile:
             content = {name: np.asarray(arrays[name], dtype=float) for name in arrays.files if name in ("C", "d", "center")}
     except FileNotFoundError:
         raise RegionError("polytope_file", f"there is no file {path}", field="--polytope") from None
-    except (OSError, ValueError, TypeError, BadZipFile, EOFError) as error:
-        raise RegionError("polytope_file", f"{path} cannot be read as an npz file of numbers: {error}", field="--polytope") from None
+    except (OSError, ValueError, TypeError, BadZipFile, EOFError):
+        raise RegionError("polytope_file", f"{path} is no npz file of numbers", field="--polytope", hint=_NPZ) from None
     missing = {"C", "d"} - content.keys()
     if missing:
         raise RegionError("polytope_file", f"{path} has no array {' and no array '.join(sorted(missing))}", field="--polytope")

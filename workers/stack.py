@@ -124,10 +124,13 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
         ready: called once with the API's URL, when the API answers.
 
     Raises:
-        CirisError: stack_running, port_taken, no_keys, or stack_failed when the API does not come up.
+        CirisError: data_directory, stack_running, port_taken, no_keys, or stack_failed when the API does not come up.
     """
     data = settings.data_dir.expanduser().absolute()
-    (data / "logs").mkdir(parents=True, exist_ok=True)
+    try:
+        (data / "logs").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CirisError("data_directory", f"{data} cannot be made: {error.strerror}", field="--data") from None
     with _only_one(data), _stop_signals() as stopping, _socket_directory(data) as sockets, _reserved_port(settings, port) as bound:
         host = f"[{settings.host}]" if settings.family == socket.AF_INET6 else settings.host
         url = f"http://{host}:{bound}"
