@@ -40,12 +40,13 @@ def hull_vertices(points: Array) -> Array:
         return np.unique(points, axis=0)
 
 
-def outer(points: Array, max_vertices: int) -> tuple[Array, float]:
+def outer(points: Array, max_vertices: int) -> tuple[Array, float, int]:
     """At most ``max_vertices`` >= 8 vertices whose convex hull contains every one of points (k, 3), metres.
 
     Returns:
-        vertices (v, 3), and the inflation: an upper bound in metres on the distance of any point of their hull from the hull of
-        ``points`` (0.0 only when the vertices are the points' own and no point is outside of them by as much as a rounding error).
+        vertices (v, 3); the inflation, an upper bound in metres on the distance of any point of their hull from the hull of ``points``
+        (0.0 only when the vertices are the points' own and no point is outside of them by as much as a rounding error); and the number
+        of vertices that the hull of ``points`` has.
 
     Raises:
         SceneError: rounding errors got the better of it; never a polytope that leaves a point out.
@@ -53,7 +54,7 @@ def outer(points: Array, max_vertices: int) -> tuple[Array, float]:
     points = np.asarray(points, dtype=float)
     extreme = hull_vertices(points)
     if len(extreme) <= max_vertices and _is_hull(extreme, points):
-        return extreme, 0.0
+        return extreme, 0.0, len(extreme)
     solid = hull_vertices(_thickened(extreme))
     center = solid.mean(axis=0)
     solid = solid - center
@@ -61,7 +62,9 @@ def outer(points: Array, max_vertices: int) -> tuple[Array, float]:
     for growth in _GROWTHS:
         vertices = around * (1 + growth)
         if contains(vertices + center, points):
-            return vertices + center, max(_nearest(v, extreme - center)[1] for v in vertices) * (1 + _SAFETY)
+            distance = max(_nearest(v, extreme - center)[1] for v in vertices)
+            inflation = max(distance * (1 + _SAFETY), distance + _ROUNDING * float(np.abs(points).max()))
+            return vertices + center, inflation, len(extreme)
     raise SceneError("hull", f"no polytope of {max_vertices} vertices was found around a mesh of {len(points)} points")
 
 
