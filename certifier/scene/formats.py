@@ -153,6 +153,7 @@ class Sdf(ModelFile):
         + [name for _, name in _COUNTS]
         + [name for shape in _SHAPES.values() for name in shape]
     )
+    UNREAD = frozenset(["plugin", "sensor", "gui"])
 
     def _check(self, element: _Element, parent: str) -> None:
         dimensions = self._SHAPES.get(parent, {}) if _COLLISION in element.around else {}
@@ -164,19 +165,22 @@ class Sdf(ModelFile):
         elif (counts := self._COUNTS.get((parent, element.name))) is not None:
             self._text(element, counts)
         elif element.name == "uri" and parent == "include":
-            self.includes.append(Reference(element.text.strip(), element.line))
+            self.includes.append(Reference(self._whole(element), element.line))
         elif element.name == "uri" and parent == "mesh" and _COLLISION in element.around:
-            self.meshes.append(Reference(element.text.strip(), element.line))
+            self.meshes.append(Reference(self._whole(element), element.line))
         elif element.name in self._SHAPES and parent == "geometry" and _COLLISION in element.around:
             for missing in self._SHAPES[element.name].keys() - element.children:
                 self._refuse(element, f"<{element.name}> has no <{missing}>, and Drake would make one up")
         elif element.name == "geometry" and _COLLISION in element.around and len(element.children) > 1:
             self._refuse(element, "<geometry> has more than one shape, and Drake would read one")
 
-    def _text(self, element: _Element, counts: tuple[int, ...]) -> list[float]:
+    def _whole(self, element: _Element) -> str:
         if element.interrupted:
             self._refuse(element, f"<{element.name}> holds more than text, and Drake would read a part of it")
-        return self._numbers(element, f"<{element.name}>", element.text, counts)
+        return element.text.strip()
+
+    def _text(self, element: _Element, counts: tuple[int, ...]) -> list[float]:
+        return self._numbers(element, f"<{element.name}>", self._whole(element), counts)
 
 
 class Mjcf(ModelFile):
