@@ -19,6 +19,7 @@ from certifier.scene.xml import parse_xml
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _COLLISION = "collision"
+_SHAPES = frozenset(["box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "drake:capsule", "drake:ellipsoid"])
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,10 @@ class ModelFile:
             self._refuse(element, f"{what} is {text[:80]!a} instead of {wanted}")
         return numbers
 
+    def _check_geometry(self, element: _Element) -> None:
+        if element.name == "geometry" and _COLLISION in element.around and len(element.children & _SHAPES) > 1:
+            self._refuse(element, "<geometry> has more than one shape, and Drake would read one")
+
     def _install(self, parser: expat.XMLParserType) -> None:
         def start(name: str, attributes: dict[str, str]) -> None:
             element = _Element(name, parser.CurrentLineNumber, attributes, frozenset())
@@ -113,7 +118,7 @@ class ModelFile:
 class Urdf(ModelFile):
     """URDF: numbers are attributes."""
 
-    ONCE = frozenset(["origin", "axis", "limit", "geometry", "parent", "child"])
+    ONCE = _SHAPES | {"origin", "axis", "limit", "geometry", "parent", "child"}
     UNREAD = frozenset(["gazebo"])
     _COUNTS: ClassVar[dict[str, tuple[int, ...]]] = {
         **dict.fromkeys(("xyz", "rpy", "size"), (3,)),
@@ -125,8 +130,7 @@ class Urdf(ModelFile):
         for key, counts in self._COUNTS.items():
             if key in element.attributes:
                 self._numbers(element, f"{key} of <{element.name}>", element.attributes[key], counts)
-        if _COLLISION in element.around and element.name == "geometry" and len(element.children) > 1:
-            self._refuse(element, "<geometry> has more than one shape, and Drake would read one")
+        self._check_geometry(element)
         if _COLLISION in element.around and element.name == "mesh" and "filename" in element.attributes:
             self.meshes.append(Reference(element.attributes["filename"], element.line))
 
@@ -134,7 +138,7 @@ class Urdf(ModelFile):
 class Sdf(ModelFile):
     """SDFormat: numbers are the text of elements."""
 
-    _SHAPES: ClassVar[dict[str, dict[str, int]]] = {
+    _DIMENSIONS: ClassVar[dict[str, dict[str, int]]] = {
         "box": {"size": 3},
         "sphere": {"radius": 1},
         **{name: {"radius": 1, "length": 1} for name in ("cylinder", "capsule", "drake:capsule")},
@@ -148,15 +152,15 @@ class Sdf(ModelFile):
         ("plane", "normal"): (3,),
         ("mesh", "scale"): (3,),
     }
-    ONCE = frozenset(
-        ["pose", "geometry", "axis", "limit", "uri", "parent", "child"]
-        + [name for _, name in _COUNTS]
-        + [name for shape in _SHAPES.values() for name in shape]
+    ONCE = _SHAPES.union(
+        ["pose", "geometry", "axis", "limit", "uri", "parent", "child"],
+        [name for _, name in _COUNTS],
+        [name for shape in _DIMENSIONS.values() for name in shape],
     )
     UNREAD = frozenset(["plugin", "sensor", "gui"])
 
     def _check(self, element: _Element, parent: str) -> None:
-        dimensions = self._SHAPES.get(parent, {}) if _COLLISION in element.around else {}
+        dimensions = self._DIMENSIONS.get(parent, {}) if _COLLISION in element.around else {}
         if element.name in dimensions:
             if min(self._text(element, (dimensions[element.name],))) <= 0:
                 self._refuse(element, f"<{element.name}> must be positive, and Drake would read another number")
@@ -168,11 +172,10 @@ class Sdf(ModelFile):
             self.includes.append(Reference(self._whole(element), element.line))
         elif element.name == "uri" and parent == "mesh" and _COLLISION in element.around:
             self.meshes.append(Reference(self._whole(element), element.line))
-        elif element.name in self._SHAPES and parent == "geometry" and _COLLISION in element.around:
-            for missing in self._SHAPES[element.name].keys() - element.children:
+        elif element.name in self._DIMENSIONS and parent == "geometry" and _COLLISION in element.around:
+            for missing in self._DIMENSIONS[element.name].keys() - element.children:
                 self._refuse(element, f"<{element.name}> has no <{missing}>, and Drake would make one up")
-        elif element.name == "geometry" and _COLLISION in element.around and len(element.children) > 1:
-            self._refuse(element, "<geometry> has more than one shape, and Drake would read one")
+        self._check_geometry(element)
 
     def _whole(self, element: _Element) -> str:
         if element.interrupted:
