@@ -1,4 +1,4 @@
-"""Dual proofs from the solver's dual points (certifier.verify.dual says what they prove).
+"""Dual proofs from the solver's dual points (certifier.verify.dual says what they prove, and what not).
 
 The solver ends with sum_r A_r'x_r = lam a, lam < 0, a a multiple of sum_r A_r'x_w, x_w the centre: an interior point of the dual cone. So
 x_r + mu x_w, mu > 0, is in the interior too, and its sum vanishes to rounding. What is left of it is made to vanish by changing a few
