@@ -11,7 +11,7 @@ class Outcome(StrEnum):
     REFUTED = "refuted"
     """A configuration inside the polytope is in collision, and the result names it."""
     NOT_CERTIFIABLE = "not_certifiable"
-    """The program (11) has a dual proof that no certificate of this degree exists in this frame."""
+    """No certificate of the form of the program (11) exists, by a dual proof; a plane may separate the pair all the same."""
     INCONCLUSIVE = "inconclusive"
     """A limit or numerical trouble stopped the search before either answer was found; the detail says which."""
     ERROR = "error"

@@ -3,7 +3,7 @@
 What was found                                       -> the outcome and what comes with it
 centre or a sample in contact, verified              -> refuted, with the configuration
 program (11) feasible, proof verified exactly        -> certified, with the proof
-program (11) infeasible, dual proof verified         -> not_certifiable, with the proof and the points where no plane of this degree works
+program (11) infeasible, dual proof verified         -> not_certifiable, with the proof and the points where none of this degree works
 planes at rest infeasible, (11) too dear             -> inconclusive, with those points all the same
 anything else                                        -> inconclusive, with the reason
 """
@@ -131,7 +131,7 @@ class Certification:
         detail = f"{solution.status.value} after {solution.iterations} iterations"
         if frame.at_rest:
             memory = choose_frame(self._kinematics, volumes).memory(volumes)
-            detail = f"no plane at rest in the frame of {frame.body}; one that moves would need {memory / 2**30:.1f} GiB ({detail})"
+            detail = f"found no plane at rest in the frame of {frame.body}; one that moves would need {memory / 2**30:.1f} GiB ({detail})"
         return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weakness=weakness)
 
     def _solve(self, volumes: Volumes, frame: Frame, max_iterations: int, every_face: bool) -> tuple[Sides, list[Block], Solution]:
@@ -192,7 +192,7 @@ class Certification:
             statement = verify_dual(proof)
         except (ProofError, np.linalg.LinAlgError) as error:
             return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"the dual proof found does not hold: {error}")
-        detail = f"no plane affine in s, in the frame of {statement.frame}"
+        detail = f"no certificate of this degree with a plane affine in s, in the frame of {statement.frame}"
         return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, proof=proof.to_bytes())
 
 

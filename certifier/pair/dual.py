@@ -1,4 +1,4 @@
-"""Dual proofs are made here from the solver's dual points (certifier.verify.dual says what they prove).
+"""Dual proofs are made here from the solver's dual points (certifier.verify.dual says what they prove, and what not).
 
 The solver ends with sum_r A_r'x_r = lam a and lam < 0. Here a is a multiple of sum_r A_r'x_w, and x_w is the centre, an interior
 point of the dual cone. So x_r + mu x_w with mu > 0 is in the interior too, and its sum vanishes to rounding.
