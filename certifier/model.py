@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -25,6 +26,27 @@ Array = NDArray[Any]
 
 SCHEMA_VERSION = 1
 WORLD = "world"
+MAX_NAME, MAX_SENTENCE = 200, 500
+"""Characters of a name and of a sentence of free text."""
+_NAME = re.compile(r"[\w\-./:+@#()\[\],=]+(?: [\w\-./:+@#()\[\],=]+)*", re.ASCII)
+
+
+def is_name(text: object) -> bool:
+    """Whether a joint, a body or a geometry may be called so: ASCII letters, digits, ``_-./:+@#()[],=`` and single spaces inside.
+
+    Statements print names, so nothing in them may pass for another line or drive a terminal.
+    """
+    return isinstance(text, str) and len(text) <= MAX_NAME and _NAME.fullmatch(text) is not None
+
+
+def is_sentence(text: object) -> bool:
+    """Whether a reason or a substitution may read so: one line of at most 500 printable characters."""
+    return isinstance(text, str) and len(text) <= MAX_SENTENCE and text.isprintable()
+
+
+def escaped(text: str) -> str:
+    """The text as one line for people: what is not printable, and the backslash, is written as Python escapes it."""
+    return "".join(c if c.isprintable() and c != "\\" else c.encode("unicode_escape").decode() for c in text)
 
 
 class JointKind(StrEnum):
