@@ -21,18 +21,18 @@ MAX_NESTING = 16
 _SHOWN = 60
 
 
-def parse(data: bytes) -> Node:
-    """The document in a JSON text.
+def parse(data: bytes, where: str) -> Any:
+    """The document in a JSON text, which stands there.
 
     Raises:
         CirisError: document, not JSON in UTF-8, or JSON with NaN, an infinity, a key that occurs twice, or too deep a nesting.
     """
     try:
-        return Node(json.loads(data.decode(), object_pairs_hook=_unique, parse_constant=_constant))
+        return json.loads(data.decode(), object_pairs_hook=_unique, parse_constant=_constant)
     except RecursionError:
-        raise CirisError("document", "it is nested too deeply") from None
+        raise CirisError("document", "it is nested too deeply", field=where) from None
     except ValueError as error:
-        raise CirisError("document", f"it is not JSON: {error}") from None
+        raise CirisError("document", f"it is not JSON: {error}", field=where) from None
 
 
 def _unique(members: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -294,8 +294,9 @@ def _read(document: Any) -> Scene:
     Raises:
         CirisError: it is none.
     """
-    if isinstance(document, dict) and document.get("schema_version") != SCHEMA_VERSION:
-        raise SceneError("scene_schema", f"scene schema version {document.get('schema_version')!r} is not {SCHEMA_VERSION}")
+    version = document.get("schema_version") if isinstance(document, dict) else SCHEMA_VERSION
+    if version != SCHEMA_VERSION or type(version) is not int:
+        raise SceneError("scene_schema", f"the scene's schema version is not {SCHEMA_VERSION}", field="schema_version")
     content = ("schema_version", "name", "joints", "bodies", "geometries", "pairs", "ignored", "q_star", "padding")
     scene = Node(document).fields(*content, optional=("hash", "warnings", "provenance"))
     return Scene(

@@ -116,7 +116,7 @@ def _opened(data: bytes) -> Iterator[tuple[zipfile.ZipFile, dict[str, Any]]]:
         raise _malformed(f"it is no zip: {error}") from error
     with archive, malformed():
         _check_members(archive, len(data))
-        header = parse(_content(archive, archive.getinfo(HEADER))).value
+        header = parse(_content(archive, archive.getinfo(HEADER)), "header")
         if not isinstance(header, dict) or header.get("format") != FORMAT or type(header["format"]) is not int:
             raise _malformed(f"it is not of format {FORMAT}, the one that this version reads and writes", "header.format")
         if not isinstance(header.get("kind"), str):

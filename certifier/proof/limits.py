@@ -33,7 +33,7 @@ CONTAINED = 500_000
 FACES = 4_096
 """Half-spaces of a polytope, and those that it implies."""
 MULTIPLIERS = 2
-"""Multipliers that are not 0 in one proof of a half-space, for each joint; as many as joints suffice (Caratheodory)."""
+"""Multipliers that are not 0 in one proof of a half-space, for each joint; one for each suffices (Caratheodory)."""
 
 FACTORS = 1 << 22
 """Entries of the Gram matrices of one vertex."""
