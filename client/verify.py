@@ -48,6 +48,6 @@ def _answer(path: Path) -> dict[str, Any]:
         )
     except CirisError as error:
         if error.code == "no_file":
-            raise CirisError(error.code, error.message, field=str(path)) from None
+            raise CirisError(error.code, error.message, field=escaped(str(path))) from None
         return {"holds": False, "error": {**error.to_document(), "message": escaped(error.message)}}
     return found

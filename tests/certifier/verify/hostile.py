@@ -230,7 +230,8 @@ def array_changed(draw: Draw, data: bytes) -> bytes:
     name, content = found[at]
     try:
         array = np.load(io.BytesIO(content), allow_pickle=False)
-    except (ValueError, EOFError, OSError):
+    except Exception:
+        # What NumPy itself cannot read stays as it is.
         return data
     found[at] = (name, written(draw, array))
     return zipped(found, zipfile.ZIP_DEFLATED)
@@ -295,7 +296,7 @@ def mutants(draw: Draw, family: str) -> tuple[str, bytes]:
     for other in draw(st.lists(st.sampled_from(["header", "array"]), max_size=2)) if family != "bytes" else ():
         try:
             data = FAMILIES[other](draw, data)
-        except (zipfile.BadZipFile, zipfile.LargeZipFile, NotImplementedError, RuntimeError, struct.error, OSError, ValueError):
+        except Exception:
             # What is no zip any more stays as it is.
             break
     return kind, data

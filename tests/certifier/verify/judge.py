@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import base64
 import resource
 from typing import Any
 
-from certifier.verify.file import answer
+from certifier.verify.file import answer_about_file
 
 
 def judge(payload: dict[str, Any]) -> dict[str, Any]:
-    """The answer about ``proof``, in base 64, and the child's peak memory in bytes."""
-    found = answer(base64.b64decode(payload["proof"]))
-    return {"answer": found, "peak": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024}
+    """The answer about the file at ``path``, and the child's peak memory in bytes."""
+    return {"answer": answer_about_file(payload), "peak": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024}

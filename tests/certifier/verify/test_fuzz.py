@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import os
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -29,7 +29,7 @@ from certifier.outcome import Outcome
 from certifier.pair.certification import Certification
 from certifier.proof.container import unpack
 from certifier.proof.negative import DualProof, WitnessProof
-from certifier.proof.pair import PairProof
+from certifier.proof.pair import Ground, PairProof
 from certifier.proof.region import RegionProof
 from certifier.scene.bundle import load_bundle, pack_bundle
 from certifier.verify.pair import verify_pair
@@ -62,13 +62,11 @@ FIGURES = Figures()
 
 def judged(family: str, kind: str, data: bytes) -> dict[str, Any]:
     """The verifier's answer, which it gives in a child with little memory; counted."""
-    began = time.perf_counter()
-    found = run_in_child(
-        "tests.certifier.verify.judge:judge",
-        {"proof": base64.b64encode(data).decode()},
-        timeout_s=SECONDS_A_CASE,
-        memory_bytes=MEMORY_BYTES,
-    )
+    with tempfile.NamedTemporaryFile(suffix=".proof") as file:
+        file.write(data)
+        file.flush()
+        began, payload = time.perf_counter(), {"path": file.name}
+        found = run_in_child("tests.certifier.verify.judge:judge", payload, timeout_s=SECONDS_A_CASE, memory_bytes=MEMORY_BYTES)
     FIGURES.slowest = max(FIGURES.slowest, time.perf_counter() - began)
     FIGURES.peak = max(FIGURES.peak, found["peak"])
     answer: dict[str, Any] = found["answer"]
@@ -127,7 +125,22 @@ def dual_is_true(data: bytes, scene: Scene) -> None:
     assert polytope.contains(proof.interior, 1e-9)
     with suppress(RegionError):
         result = Certification(scene, polytope).certify(scene.pairs.index(proof.pair))
-        assert result.outcome is not Outcome.CERTIFIED
+        assert result.outcome is not Outcome.CERTIFIED or not contradicts(PairProof.from_bytes(result.proof, scene), proof)
+
+
+def contradicts(found: PairProof, proof: DualProof) -> bool:
+    """Whether what was found is of the kind that the dual proof excludes: in its frame, with its faces, or with some farther out."""
+    every, used = half_spaces(proof.ground), half_spaces(found.ground)
+    return found.frame == proof.frame and all(
+        any(np.array_equal(c, normal) and offset <= d + 1e-12 for normal, offset in every) for c, d in (used[j] for j in found.faces)
+    )
+
+
+def half_spaces(ground: Ground) -> list[tuple[np.ndarray, float]]:
+    """The faces of a ground and of its box, numbered as in a pair's proof, as c's <= d."""
+    eye = np.eye(len(ground.mid))
+    lower, upper = zip(-eye, ground.half - ground.mid, strict=True), zip(eye, ground.mid + ground.half, strict=True)
+    return [*zip(ground.C, ground.d, strict=True), *lower, *upper]
 
 
 def witness_is_true(data: bytes, scene: Scene) -> None:

@@ -94,9 +94,19 @@ def test_no_statement_follows_from_the_scenes_name(kind):
     assert found["scene"]["name"] == "x\\n  hash 0000\\x1b[1A"
 
 
-@pytest.mark.parametrize("path", [("kind",), ("proofs", 0, "frame"), ("volumes", 0, "geometries", 0), ("scene", "joints", 0, "kind")])
-def test_errors_are_printed_escaped(path):
-    assert "\\x1b" in refusal(with_value(valid("region"), path, "\x1b[2K"))["message"]
+PRINTED: list[tuple[str, tuple]] = [
+    ("region", ("kind",)),
+    ("region", ("proofs", 0, "frame")),
+    ("region", ("volumes", 0, "geometries", 0)),
+    ("region", ("scene", "joints", 0, "kind")),
+    ("witness", ("pair", 0)),
+    ("witness", ("scene", "geometries", 0, "body")),
+]
+
+
+@pytest.mark.parametrize(("kind", "path"), PRINTED)
+def test_errors_are_printed_escaped(kind, path):
+    refusal(with_value(valid(kind), path, "\x1b[2K\n  guarantee: exact"))
 
 
 # Polytopes without a point
