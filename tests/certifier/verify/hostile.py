@@ -174,10 +174,10 @@ def header_changed(draw: Draw, data: bytes) -> bytes:
     node = header
     for key in path[:-1]:
         node = node[key]
-    way = draw(st.integers(0, 9))
-    if way <= 2:
+    way = draw(st.integers(-6, 9))
+    if way in (4, 5):
         node[path[-1]] = draw(HOSTILE)
-    elif way <= 5:
+    elif way <= 3:
         node[path[-1]] = another(draw, header, node[path[-1]])
     elif way == 6:
         del node[path[-1]]
@@ -187,8 +187,8 @@ def header_changed(draw: Draw, data: bytes) -> bytes:
         node.insert(0, draw(HOSTILE))
     elif isinstance(node, dict):
         node[draw(st.sampled_from(["more", "scene", "kind", "hash", "body", ""]))] = draw(HOSTILE)
-    text = text_of(fitting(header) if draw(st.integers(0, 3)) else header)
-    if draw(st.integers(0, 19)) == 0:
+    text = text_of(header if draw(st.integers(0, 9)) == 7 else fitting(header))
+    if draw(st.integers(0, 29)) == 17:
         text = text.replace(b'"kind": ', b'"kind": "pair", "kind": ', 1)
     return zipped([(name, text if name == "header.json" else content) for name, content in found.items()], zipfile.ZIP_DEFLATED)
 
