@@ -21,7 +21,7 @@ from certifier.proof import limits
 from certifier.proof.container import pack, unpack, with_scene
 from certifier.proof.negative import DualProof
 from certifier.proof.pair import Ground, PairProof, Side
-from certifier.verify.moments import table
+from certifier.verify.moments import monomials
 from tests.certifier.proofs import region
 from tests.certifier.scenes import ball, pose
 from tests.certifier.verify.hostile import fitting, members, zipped
@@ -175,27 +175,22 @@ def polytope() -> bytes:
 
 
 def dual() -> bytes:
-    """As many moments and as large localising matrices as may be."""
+    """The longest chain and the most joints with the moments of a uniform distribution; it fails at the equations."""
     scene = chain(6, 1, 1.0)
-    n = scene.n
-    sizes = [table(joints, n).max() + 1 for joints in (tuple(range(n)), ())]
-    V = 6  # more than so many of six joints would be sums of too many products
-    body = scene.geometries[0].body
-    rng = np.random.default_rng(0)
-    many = Geometry("a/many", body, rng.normal(size=(V, 3)), 0.0, {})
-    scene = replace(scene, geometries=(many, scene.geometries[1]), pairs=(Pair("a/many", scene.geometries[1].name),))
-    moments = tuple(
-        rng.normal(size=(count, size)) * 10.0 ** rng.uniform(-300, 0, size=(count, size)) for count, size in zip((V, 1), sizes, strict=True)
-    )
-    for values in moments:
-        values[:, 0] = 1e9
-    normal = (np.eye(3) * 1e-9, np.eye(n + 1) * 1e-9)
+    first, other = scene.geometries
+    n, rng, V = scene.n, np.random.default_rng(0), 6  # more vertices would be sums of too many products
+    many = Geometry("a/many", first.body, rng.normal(size=(V, 3)), 0.0, {})
+    scene = replace(scene, geometries=(many, other), pairs=(Pair(many.name, other.name),))
+    exponents = [monomials(joints, n) for joints in (tuple(range(n)), ())]
+    one, two = (np.prod(np.where(e % 2, 0.0, 1 / (e + 1)), axis=1) for e in exponents)
     faces = limits.LOCALISED // (V * 4**n) - 2 * n - 1
     box, none = whole_box(n), np.zeros((n, faces))
     Y = [np.concatenate([none, multipliers], axis=1) for multipliers in (box.Y_lower, box.Y_upper)]
     ground = Ground(rng.normal(size=(faces, n)), np.full(faces, 99.0), box.mid, box.half, *Y)
-    proof = DualProof(scene, scene.pairs[0], WORLD, ground, np.zeros(n), moments, (0,), np.array([[0, 0, 1]]), normal)
-    return with_scene(proof.to_bytes(), scene)
+    normal = (np.eye(3), np.eye(n + 1))
+    moments = (np.tile(one, (V, 1)), two[None])
+    entries = np.zeros((0, 3), dtype=np.int64)
+    return with_scene(DualProof(scene, scene.pairs[0], WORLD, ground, np.zeros(n), moments, (), entries, normal).to_bytes(), scene)
 
 
 FILES: tuple[Callable[[], bytes], ...] = (
