@@ -223,5 +223,5 @@ def head(header: dict[str, Any], *names: str) -> dict[str, Node]:
     Raises:
         CirisError: it has others.
     """
-    scene = ("scene",) if header["kind"] == "region" else ("scene_hash",)
-    return Node(header, "header").fields("format", "kind", *scene, *names, optional=() if header["kind"] == "region" else ("scene",))
+    scene, more = ("scene", ()) if header["kind"] == "region" else ("scene_hash", ("scene",))
+    return Node(header, "header").fields("format", "kind", scene, *names, optional=more)

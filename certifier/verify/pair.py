@@ -117,15 +117,19 @@ def faces_of(ground: Ground) -> list[list[fmpq]]:
 
 
 class PairCheck:
-    """Checks proofs that share one ground, which :func:`check_ground` has accepted."""
+    """Checks proofs that share one ground, which :func:`check_ground` has accepted.
 
-    def __init__(self, scene: Scene, ground: Ground) -> None:
+    Args:
+        contained: volumes that are known to contain their geometries, by id; checks of one scene may share it.
+    """
+
+    def __init__(self, scene: Scene, ground: Ground, contained: dict[int, Volume] | None = None) -> None:
         self._scene, self._ground = scene, ground
         ring = fmpq_mpoly_ctx.get([f"u{i}" for i in range(scene.n)], Ordering.lex)
         self._kinematics = ExactKinematics.on_box(scene, ring, ground.mid, ground.half)
         self._faces = faces_of(ground)
         self._numerators: dict[tuple[str, str], Numerators] = {}
-        self._contained: dict[int, Volume] = {}
+        self._contained: dict[int, Volume] = {} if contained is None else contained
 
     def verify(self, proof: PairProof) -> PairStatement:
         """Check one proof on the ground.

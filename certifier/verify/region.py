@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from certifier.errors import ProofError
-from certifier.model import Pair, Scene
+from certifier.model import Pair, Scene, Volume
 from certifier.proof import limits
 from certifier.proof.pair import Ground
 from certifier.proof.region import RegionProof
@@ -71,6 +71,7 @@ def verify_region(data: bytes) -> RegionStatement:
     _check_polytope(proof)
     _check_implied(proof)
     checks: dict[int, PairCheck] = {}
+    contained: dict[int, Volume] = {}
     gaps: dict[Pair, float] = {}
     check_contained(scene, {id(volume): volume for part in proof.proofs for volume in part.volumes}.values())
     for part in proof.proofs:
@@ -78,7 +79,7 @@ def verify_region(data: bytes) -> RegionStatement:
         if id(ground) not in checks:
             check_ground(scene, ground)
             _check_inside(proof, ground)
-            checks[id(ground)] = PairCheck(scene, ground)
+            checks[id(ground)] = PairCheck(scene, ground, contained)
         statement = checks[id(ground)].verify(part)
         for pair in statement.pairs:
             gaps[pair] = max(statement.gap, gaps.get(pair, 0.0))

@@ -29,8 +29,8 @@ def check_contained(scene: Scene, volumes: Iterable[Volume]) -> None:
     Raises:
         ProofError: proof_too_large.
     """
-    known = (name for volume in volumes for name in volume.geometries if scene.has_geometry(name))
-    if sum(len(scene.geometry(name).vertices) for name in known) > limits.CONTAINED:
+    larger = (volume.geometries for volume in volumes if _is_known(scene, volume) and not volume.is_geometry_of(scene))
+    if sum(len(scene.geometry(name).vertices) for names in larger for name in names) > limits.CONTAINED:
         raise ProofError("proof_too_large", f"the proof's volumes stand for more than {limits.CONTAINED} vertices of geometries")
 
 
@@ -40,7 +40,7 @@ def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> N
     Raises:
         ProofError: it does not; the message names the geometry.
     """
-    if not volume.geometries or not all(map(scene.has_geometry, volume.geometries)):
+    if not _is_known(scene, volume):
         raise ProofError("proof_volume", "a volume stands for nothing, or for what is no geometry of the scene")
     if volume.is_geometry_of(scene):
         return
@@ -60,6 +60,11 @@ def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> N
                 or _near_segment(v, corners, reach - radius)
             ):
                 raise ProofError("proof_volume", f"{name} is not contained in the volume that stands for it")
+
+
+def _is_known(scene: Scene, volume: Volume) -> bool:
+    """Whether the volume names geometries of the scene, and at least one."""
+    return bool(volume.geometries) and all(map(scene.has_geometry, volume.geometries))
 
 
 def _vertices(kinematics: ExactKinematics, body: str, geometry: Geometry) -> list[Point]:

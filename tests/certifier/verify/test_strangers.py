@@ -377,6 +377,7 @@ def test_a_directory_of_millions_is_not_read(monkeypatch):
 
 
 def test_files_beyond_the_limits_are_refused(monkeypatch):
+    assert all(answer(valid(kind))["holds"] for kind in KINDS)
     for name, least in (("POSITIONS", 1), ("GEOMETRIES", 4), ("VERTICES", 7), ("PAIRS", 5), ("FACES", 3), ("JOINTS", 1), ("CONTAINED", 7)):
         with monkeypatch.context() as patch:
             patch.setattr(limits, name, least)
@@ -385,6 +386,19 @@ def test_files_beyond_the_limits_are_refused(monkeypatch):
         with monkeypatch.context() as patch:
             patch.setattr(limits, name, least)
             assert refusal(valid("region"))["code"] == "proof_malformed", name
+    for name, least in (("FILE_BYTES", 1000), ("UNPACKED_BYTES", 1000), ("HEADER_BYTES", 100), ("MEMBERS", 10), ("FREE_BYTES", -(1 << 30))):
+        with monkeypatch.context() as patch:
+            patch.setattr(limits, name, least)
+            assert refusal(valid("region"))["code"] == "proof_too_large", name
+    for name, least, code in (
+        ("EXPONENT", 10, "malformed"),
+        ("DIMENSION", 1, "malformed"),
+        ("PATH", 1, "model"),
+        ("MULTIPLIERS", 0, "archimedean"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(limits, name, least)
+            assert refusal(valid("region"))["code"] == f"proof_{code}", name
     for name, kind in (("FACTORS", "pair"), ("MOMENTS", "dual"), ("LOCALISED", "dual")):
         with monkeypatch.context() as patch:
             patch.setattr(limits, name, 10)
