@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from certifier.errors import RegionError, SceneError
+from certifier.document import Node
+from certifier.errors import CirisError, RegionError, SceneError
 
 Array = NDArray[Any]
 
@@ -189,6 +190,10 @@ class Scene:
     def _geometry(self) -> dict[str, Geometry]:
         return {g.name: g for g in self.geometries}
 
+    def has_geometry(self, name: str) -> bool:
+        """Whether a geometry is called ``name``."""
+        return name in self._geometry
+
     def geometry(self, name: str) -> Geometry:
         """The geometry called ``name``.
 
@@ -199,6 +204,18 @@ class Scene:
             return self._geometry[name]
         except KeyError:
             raise SceneError("unknown_geometry", f"no geometry is called {name!r}", hint="names are model/body/geometry") from None
+
+    @cached_property
+    def _pairs_of(self) -> dict[str, list[tuple[int, Pair]]]:
+        found: dict[str, list[tuple[int, Pair]]] = {}
+        for i, pair in enumerate(self.pairs):
+            for name in (pair.a, pair.b):
+                found.setdefault(name, []).append((i, pair))
+        return found
+
+    def pairs_of(self, name: str) -> list[tuple[int, Pair]]:
+        """The pairs that a geometry is one of, each with its place among all."""
+        return self._pairs_of.get(name, [])
 
     def polytope(self, C: ArrayLike, d: ArrayLike) -> Polytope:
         """The polytope {C s <= d} with the joint limits added as its last 2n rows (upper, then lower)."""
@@ -254,54 +271,88 @@ class Scene:
         }
 
     @classmethod
-    def from_document(cls, document: dict[str, Any]) -> Scene:
+    def from_document(cls, document: Any) -> Scene:
         """Inverse of :meth:`to_document`.
 
         Raises:
-            SceneError: the schema version is unknown or the stored hash does not match the content.
+            SceneError: it is no scene document, its schema version is unknown, or the stored hash does not match the content.
         """
-        if document.get("schema_version") != SCHEMA_VERSION:
-            raise SceneError("scene_schema", f"scene schema version {document.get('schema_version')!r} is not {SCHEMA_VERSION}")
-        scene = cls(
-            name=document["name"],
-            joints=tuple(
-                Joint(
-                    name=j["name"],
-                    kind=JointKind(j["kind"]),
-                    parent=j["parent"],
-                    child=j["child"],
-                    axis=np.array(j["axis"], dtype=float),
-                    X_PF=np.array(j["X_PF"], dtype=float),
-                    X_BM=np.array(j["X_BM"], dtype=float),
-                    index=j["index"],
-                    lower=j["lower"],
-                    upper=j["upper"],
-                )
-                for j in document["joints"]
-            ),
-            bodies=tuple(document["bodies"]),
-            geometries=tuple(
-                Geometry(
-                    name=g["name"],
-                    body=g["body"],
-                    vertices=np.array(g["vertices"], dtype=float).reshape(-1, 3),
-                    radius=float(g["radius"]),
-                    shape=g["shape"],
-                    substitution=g["substitution"],
-                    inflation=float(g["inflation"]),
-                )
-                for g in document["geometries"]
-            ),
-            pairs=tuple(Pair(a, b) for a, b in document["pairs"]),
-            ignored=tuple(Ignored(i["pair"][0], i["pair"][1], i["reason"]) for i in document["ignored"]),
-            q_star=np.array(document["q_star"], dtype=float),
-            padding=float(document["padding"]),
-            warnings=tuple(document.get("warnings", ())),
-            provenance=document.get("provenance", {}),
-        )
-        if "hash" in document and document["hash"] != scene.hash:
+        try:
+            scene = _read(document)
+        except SceneError:
+            raise
+        except CirisError as error:
+            raise SceneError("scene_document", error.message, field=error.field) from None
+        if document.get("hash", scene.hash) != scene.hash:
             raise SceneError("scene_hash", "the scene's stored hash does not match its content")
         return scene
+
+
+def _read(document: Any) -> Scene:
+    """The scene of a document, its hash unseen.
+
+    Raises:
+        CirisError: it is none.
+    """
+    version = document.get("schema_version") if isinstance(document, dict) else SCHEMA_VERSION
+    if version != SCHEMA_VERSION or type(version) is not int:
+        raise SceneError("scene_schema", f"the scene's schema version is not {SCHEMA_VERSION}", field="schema_version")
+    content = ("schema_version", "name", "joints", "bodies", "geometries", "pairs", "ignored", "q_star", "padding")
+    scene = Node(document).fields(*content, optional=("hash", "warnings", "provenance"))
+    return Scene(
+        name=scene["name"].text(),
+        joints=tuple(_joint(joint) for joint in scene["joints"].items()),
+        bodies=tuple(body.text() for body in scene["bodies"].items()),
+        geometries=tuple(_geometry(geometry) for geometry in scene["geometries"].items()),
+        pairs=tuple(Pair(*_texts(pair)) for pair in scene["pairs"].items()),
+        ignored=tuple(_ignored(ignored) for ignored in scene["ignored"].items()),
+        q_star=scene["q_star"].array(None),
+        padding=float(scene["padding"].number()),
+        warnings=tuple(warning.text() for warning in scene["warnings"].items()) if "warnings" in scene else (),
+        provenance=scene["provenance"].free() if "provenance" in scene else {},
+    )
+
+
+def _joint(node: Node) -> Joint:
+    joint = node.fields("name", "kind", "parent", "child", "axis", "X_PF", "X_BM", "index", "lower", "upper")
+    kind = joint["kind"].text()
+    if kind not in set(JointKind):
+        joint["kind"].refuse("a kind of joint: " + ", ".join(JointKind))
+    return Joint(
+        name=joint["name"].text(),
+        kind=JointKind(kind),
+        parent=joint["parent"].text(),
+        child=joint["child"].text(),
+        axis=joint["axis"].array(3),
+        X_PF=joint["X_PF"].array(4, 4),
+        X_BM=joint["X_BM"].array(4, 4),
+        index=None if joint["index"].value is None else joint["index"].count(),
+        lower=None if joint["lower"].value is None else joint["lower"].number(),
+        upper=None if joint["upper"].value is None else joint["upper"].number(),
+    )
+
+
+def _geometry(node: Node) -> Geometry:
+    geometry = node.fields("name", "body", "vertices", "radius", "shape", "substitution", "inflation")
+    return Geometry(
+        name=geometry["name"].text(),
+        body=geometry["body"].text(),
+        vertices=geometry["vertices"].array(None, 3),
+        radius=float(geometry["radius"].number()),
+        shape=geometry["shape"].free(),
+        substitution=None if geometry["substitution"].value is None else geometry["substitution"].text(),
+        inflation=float(geometry["inflation"].number()),
+    )
+
+
+def _ignored(node: Node) -> Ignored:
+    ignored = node.fields("pair", "reason")
+    return Ignored(*_texts(ignored["pair"]), ignored["reason"].text())
+
+
+def _texts(node: Node) -> tuple[str, str]:
+    first, second = node.two()
+    return first.text(), second.text()
 
 
 @dataclass(frozen=True)

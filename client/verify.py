@@ -1,20 +1,32 @@
-"""``ciris verify``: a proof file checked on this machine, with nothing installed but numpy and python-flint."""
+"""``ciris verify``: a proof file checked on this machine, with nothing installed but numpy and python-flint.
+
+Files come from strangers: a child process checks them, with limits on its time and its memory.
+"""
 
 from __future__ import annotations
 
 import sys
 from argparse import Namespace
 from pathlib import Path
+from typing import Any
 
 from certifier.errors import CirisError
-from certifier.verify.file import answer
+from certifier.isolation.child import run_in_child
+from certifier.model import escaped
 from client.output import print_json
 
 HOLDS, DOES_NOT = 0, 1
+MEMORY_BYTES = 4 << 30
+TIMEOUT_S = 3600.0
 
 
 def verify(args: Namespace) -> int:
-    found = answer(Path(args.proof).read_bytes())
+    """Checks a file and prints what it proves.
+
+    Raises:
+        CirisError: the file cannot be read.
+    """
+    found = _answer(Path(args.proof))
     if args.json:
         print_json(found)
     elif found["holds"]:
@@ -22,5 +34,20 @@ def verify(args: Namespace) -> int:
     if found["holds"]:
         return HOLDS
     problem = CirisError.from_document(found["error"])
-    print("error:", " ".join(f"{args.proof}: the proof does not hold: {problem}".split()), file=sys.stderr)
+    what = "could not be checked" if problem.code.startswith("child_") else "does not hold"
+    print("error:", escaped(f"{args.proof}: the proof {what}: ") + " ".join(str(problem).split()), file=sys.stderr)
     return DOES_NOT
+
+
+def _answer(path: Path) -> dict[str, Any]:
+    """What :func:`certifier.verify.file.answer` says of the file, or why that took too much."""
+    payload = {"path": str(path.absolute())}
+    try:
+        found: dict[str, Any] = run_in_child(
+            "certifier.verify.file:answer_about_file", payload, timeout_s=TIMEOUT_S, memory_bytes=MEMORY_BYTES
+        )
+    except CirisError as error:
+        if error.code == "no_file":
+            raise CirisError(error.code, error.message, field=escaped(str(path))) from None
+        return {"holds": False, "error": {**error.to_document(), "message": escaped(error.message)}}
+    return found

@@ -53,7 +53,8 @@ def dual_proof(sides: Sides, pair: Pair, frame: Frame, ground: Ground, blocks: l
         Y = blocks[2].cone.adjoint(x[2])[0][0, 0]
         aa, bb = (Y[:3, :3] + Y[:3, :3].T) / 2, _lifted((Y[3:, 3:] + Y[3:, 3:].T) / 2, sides)
         normal = (aa - TRACE_SHARE * np.trace(Y) * np.eye(3), bb)
-    return DualProof(scene, pair, frame.body, ground, (moments[0], moments[1]), tuple(int(k) for k in np.sort(equations)), entries, normal)
+    named = tuple(int(k) for k in np.sort(equations))
+    return DualProof(scene, pair, frame.body, ground, sides.center, (moments[0], moments[1]), named, entries, normal)
 
 
 def _moments(sides: Sides, chain: tuple[int, ...], x: Array) -> Array:

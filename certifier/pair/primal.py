@@ -39,7 +39,7 @@ def pair_proof(sides: Sides, volumes: tuple[Volume, Volume], frame: Frame, groun
             at = 1 + len(sides.faces) + 2 * resting.index(i)
             factor[:, at : at + 2] = _of_range(_factor(part, whole[whole[:, chain.index(i)] == 0])[:, 0], chain.index(i), whole)
         found.append(Side.rounded(chain, factor, kind))
-    return PairProof(scene, volumes, frame.body, ground, plane, solution.t, kappa, faces, (found[0], found[1]))
+    return PairProof(scene, volumes, frame.body, ground, sides.center, plane, solution.t, kappa, faces, (found[0], found[1]))
 
 
 def _factor(Q: Array, members: np.ndarray) -> Array:

@@ -53,7 +53,7 @@ class Sides:
         samples: Array,
     ) -> None:
         self.kinematics, self.box, self.joints, self.faces = kinematics, box, joints, faces
-        self.u_c = box.to_u(center)
+        self.center, self.u_c = center, box.to_u(center)
         eye = np.eye(len(center))
         constant = np.concatenate([polytope.d - polytope.C @ box.mid, np.ones(2 * len(center))])
         slopes = np.concatenate([-polytope.C * box.half, eye, -eye])

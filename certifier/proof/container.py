@@ -1,10 +1,16 @@
-"""The container of a proof: a zip of one JSON header and plain arrays (docs/proofs.md, "The file")."""
+"""The container of a proof: a zip of one JSON header and plain arrays (docs/proofs.md, "The file").
+
+Files come from strangers. What can be written in two ways is read in one: a zip with a comment, a member twice, an array in Fortran's
+order or with a header of its own making are refused, as is what no part of the proof reads.
+"""
 
 from __future__ import annotations
 
 import io
 import json
 import math
+import re
+import struct
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,21 +19,26 @@ from typing import Any
 
 import numpy as np
 
-from certifier.errors import ProofError
+from certifier.document import LARGEST, Node, parse
+from certifier.errors import CirisError, ProofError
 from certifier.model import Array, Scene
+from certifier.proof import limits
 
-FORMAT = 2
-MAX_BYTES = 1 << 30
+FORMAT = 3
 WORTH_DEFLATING = 1024
 """Bytes; a compressor takes longer to set up than a smaller member to write."""
-TYPES = ("float64", "int32", "int64")
-LARGEST = 1e100
-"""Numbers above it stand for nothing real; sums and products of a few below it do not overflow."""
+TYPES: dict[bytes, np.dtype[Any]] = {b"<f8": np.dtype("<f8"), b"<i4": np.dtype("<i4"), b"<i8": np.dtype("<i8")}
+HEADER = "header.json"
+_NPY = re.compile(rb"\x93NUMPY\x01\x00..\{'descr': '(<..)', 'fortran_order': False, 'shape': \(([0-9, ]{0,60})\), \} *\n", re.DOTALL)
+_END = struct.Struct("<4s4H2LH")
+"""Of a zip: signature, disks, members (twice), size and offset of the directory, length of the comment."""
+_LOCAL, _ENTRY = 30, 46
+"""Bytes of a member in a zip before its content and in the directory, besides its name."""
 
 
 @contextmanager
 def malformed() -> Iterator[None]:
-    """Whatever a broken file makes its parser raise is the same error: the file is malformed.
+    """Whatever a broken file says of itself is the same error: the file is malformed.
 
     Raises:
         ProofError: proof_malformed, or the one that was raised.
@@ -36,15 +47,19 @@ def malformed() -> Iterator[None]:
         yield
     except ProofError:
         raise
-    except Exception as error:
-        raise ProofError("proof_malformed", f"the proof file is malformed: {type(error).__name__}: {error}") from error
+    except CirisError as error:
+        raise _malformed(error.message, error.field) from error
+
+
+def _malformed(problem: str, where: str | None = None) -> ProofError:
+    return ProofError("proof_malformed", f"the proof file is malformed: {problem}", field=where)
 
 
 def pack(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> bytes:
     """The file; the same content gives the same bytes."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
-        members = {"header.json": json.dumps(header, sort_keys=True).encode(), **{f"{name}.npy": npy(a) for name, a in arrays.items()}}
+        members = {HEADER: json.dumps(header, sort_keys=True).encode(), **{f"{name}.npy": npy(a) for name, a in arrays.items()}}
         for name, content in members.items():
             kind = zipfile.ZIP_DEFLATED if len(content) >= WORTH_DEFLATING else zipfile.ZIP_STORED
             archive.writestr(zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), content, kind)
@@ -67,74 +82,146 @@ def unpack(data: bytes, kind: str) -> tuple[dict[str, Any], dict[str, np.ndarray
     """Header and arrays of a file of this kind; every double is at most LARGEST in magnitude.
 
     Raises:
-        ProofError: not such a file of this format, or one that unpacks to more than MAX_BYTES.
+        ProofError: not such a file of this format, or one beyond the limits.
     """
     with _opened(data) as (archive, header):
         if header["kind"] != kind:
-            raise ProofError("proof_malformed", f"the proof is of a {header['kind']}, not of a {kind}")
-        names = [name for name in archive.namelist() if name.endswith(".npy")]
-        return header, {name.removesuffix(".npy"): _array(archive.read(name)) for name in names}
+            raise _malformed(f"it is a proof of kind {header['kind']}, not {kind}", "header.kind")
+        names = [info for info in archive.infolist() if info.filename != HEADER]
+        return header, {info.filename.removesuffix(".npy"): _array(info.filename, _content(archive, info)) for info in names}
 
 
 def header_of(data: bytes) -> dict[str, Any]:
-    """The header of a file of any kind.
+    """The header of a file of any kind, with its ``kind`` in it, a text.
 
     Raises:
-        ProofError: not a file of this format.
+        ProofError: not a file of this format, or one beyond the limits.
     """
     with _opened(data) as (_, header):
         return header
 
 
 def with_scene(data: bytes, scene: Scene) -> bytes:
-    """The file with the scene itself instead of its hash: whoever has it can check it."""
+    """The file with the scene itself besides its hash: whoever has it can check it."""
     header, arrays = unpack(data, header_of(data)["kind"])
     return pack({**header, "scene": scene.to_document()}, arrays)
 
 
 @contextmanager
 def _opened(data: bytes) -> Iterator[tuple[zipfile.ZipFile, dict[str, Any]]]:
-    with malformed(), zipfile.ZipFile(io.BytesIO(data)) as archive:
-        if sum(info.file_size for info in archive.infolist()) > MAX_BYTES:
-            raise ProofError("proof_too_large", f"the proof file unpacks to more than {MAX_BYTES} bytes")
-        header = json.loads(archive.read("header.json"))
-        if header["format"] != FORMAT:
-            raise ProofError("proof_malformed", f"the proof file is of format {header['format']!r}, not {FORMAT}")
+    _check_end(data)
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(data))
+    except Exception as error:  # zipfile raises what it likes about a broken file
+        raise _malformed(f"it is no zip: {error}") from error
+    with archive, malformed():
+        _check_members(archive, len(data))
+        header = parse(_content(archive, archive.getinfo(HEADER)), "header")
+        if not isinstance(header, dict) or header.get("format") != FORMAT or type(header["format"]) is not int:
+            raise _malformed(f"it is not of format {FORMAT}, the one that this version reads and writes", "header.format")
+        if not isinstance(header.get("kind"), str):
+            raise _malformed("it does not say of what kind the proof is", "header.kind")
         yield archive, header
 
 
-def _array(data: bytes) -> np.ndarray:
-    stream = io.BytesIO(data)
-    version = np.lib.format.read_magic(stream)
-    if version != (1, 0):
-        raise ValueError(f"an array of format {version}")
-    shape, fortran_order, dtype = np.lib.format.read_array_header_1_0(stream)
-    # Looked at before anything is allocated.
-    if fortran_order or dtype.name not in TYPES or math.prod(shape) * dtype.itemsize != len(data) - stream.tell():
-        raise ValueError(f"an array of {dtype} with shape {shape} in {len(data)} bytes")
-    array = np.frombuffer(data, dtype, offset=stream.tell()).reshape(shape)
-    if dtype.kind == "f" and not (np.abs(array) <= LARGEST).all():
-        raise ValueError("a number is not finite")
+def _check_end(data: bytes) -> None:
+    """The end of the zip is where it belongs and says that its directory is not too long: zipfile would read it all."""
+    if len(data) > limits.FILE_BYTES:
+        raise ProofError("proof_too_large", f"the proof file has {len(data)} bytes, more than {limits.FILE_BYTES}")
+    if len(data) < _END.size:
+        raise _malformed(f"it has {len(data)} bytes, fewer than the end of a zip")
+    signature, disk, first_disk, here, members, size, offset, comment = _END.unpack(data[-_END.size :])
+    if (signature, disk, first_disk, comment) != (b"PK\5\6", 0, 0, 0) or here != members or offset + size + _END.size != len(data):
+        raise _malformed("it does not end as a zip of one piece without a comment does")
+    if members > limits.MEMBERS or size > members * (_ENTRY + limits.MEMBER_NAME):
+        raise ProofError("proof_too_large", f"the proof file has more than {limits.MEMBERS} members, or too long names")
+
+
+def _check_members(archive: zipfile.ZipFile, size: int) -> None:
+    members = {info.filename: info for info in archive.infolist()}
+    if len(members) < len(archive.infolist()):
+        raise _malformed("it has two members of the same name")
+    if HEADER not in members:
+        raise _malformed("it has no header.json")
+    for name, info in members.items():
+        kinds = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+        if info.compress_type not in kinds or info.flag_bits or info.extra or info.comment or not (name == HEADER or name.endswith(".npy")):
+            raise _malformed("it is no plain array, stored or deflated", name)
+    if sum(_LOCAL + len(name) + info.compress_size for name, info in members.items()) != archive.start_dir:
+        raise _malformed("its members do not lie one after the other, or hold more than the directory says")
+    total = sum(info.file_size for info in members.values())
+    if total > min(limits.UNPACKED_BYTES, limits.FREE_BYTES + limits.RATIO * size):
+        most = f"{limits.UNPACKED_BYTES} or {limits.RATIO} times what it takes"
+        raise ProofError("proof_too_large", f"the proof file unpacks to {total} bytes, more than {most}")
+    if members[HEADER].file_size > limits.HEADER_BYTES:
+        raise ProofError("proof_too_large", f"the header has {members[HEADER].file_size} bytes, more than {limits.HEADER_BYTES}")
+
+
+def _content(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
+    """A member of the length that the directory says; no more is inflated, whatever it holds."""
+    try:
+        with archive.open(info) as member:
+            content = member.read(info.file_size)
+    except Exception as error:  # as in _opened
+        raise _malformed(f"it cannot be read: {error}", info.filename) from error
+    if len(content) != info.file_size:
+        raise _malformed(f"it has {len(content)} bytes, not {info.file_size}", info.filename)
+    return content
+
+
+def _array(name: str, data: bytes) -> np.ndarray:
+    match = _NPY.match(data)
+    if match is None or match[1] not in TYPES:
+        raise _malformed("it is no array of doubles, int32 or int64 in C's order", name)
+    dtype, shape = TYPES[match[1]], tuple(int(length) for length in match[2].replace(b",", b" ").split())
+    if not data.startswith(_npy_header(dtype.str, shape)) or max(shape, default=0) > limits.DIMENSION:
+        raise _malformed("its header is not the one that NumPy writes for such an array", name)
+    if math.prod(shape) * dtype.itemsize != len(data) - match.end():
+        raise _malformed(f"an array of {dtype} of shape {shape} has not {len(data) - match.end()} bytes", name)
+    array = np.frombuffer(data, dtype, offset=match.end()).reshape(shape)
+    if dtype.kind == "f" and array.size and not (array.min() >= -LARGEST and array.max() <= LARGEST):
+        raise _malformed(f"a number is not finite, or larger than {LARGEST:g}", name)
     return array
 
 
-def floats(array: np.ndarray) -> Array:
-    """The array, of doubles.
+class Arrays:
+    """The arrays of a file, to be read once each."""
+
+    def __init__(self, arrays: dict[str, np.ndarray]) -> None:
+        self._left = dict(arrays)
+
+    def take(self, name: str, *types: str) -> np.ndarray:
+        """An array, of one of these types.
+
+        Raises:
+            ProofError: proof_malformed.
+        """
+        array = self._left.pop(name, None)
+        if array is None:
+            raise _malformed("it is missing", f"{name}.npy")
+        if array.dtype.name not in types:
+            raise _malformed(f"it holds {array.dtype.name} where {' or '.join(types)} belongs", f"{name}.npy")
+        return array
+
+    def floats(self, name: str) -> Array:
+        """An array of doubles.
+
+        Raises:
+            ProofError: proof_malformed.
+        """
+        return self.take(name, "float64")
+
+    def end(self) -> None:
+        """Raises ProofError, proof_malformed, if there are more than were read."""
+        if self._left:
+            raise _malformed("it is no part of the proof", f"{min(self._left)}.npy")
+
+
+def head(header: dict[str, Any], *names: str) -> dict[str, Node]:
+    """The members of a header that has these besides format, kind and the scene or its hash.
 
     Raises:
-        ProofError: proof_malformed.
+        CirisError: it has others.
     """
-    if array.dtype != np.float64:
-        raise ProofError("proof_malformed", f"an array of the proof file holds {array.dtype.name} where doubles belong")
-    return array
-
-
-def index(value: Any) -> int:
-    """A number of the header that counts something.
-
-    Raises:
-        ProofError: proof_malformed.
-    """
-    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
-        raise ProofError("proof_malformed", f"{value!r} stands in the proof file where a number from 0 belongs")
-    return value
+    scene, more = ("scene", ()) if header["kind"] == "region" else ("scene_hash", ("scene",))
+    return Node(header, "header").fields("format", "kind", scene, *names, optional=more)

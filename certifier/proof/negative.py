@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from certifier.errors import ProofError
+from certifier.errors import CirisError
 from certifier.model import Array, Pair, Scene
-from certifier.proof.container import FORMAT, floats, index, malformed, pack, unpack
-from certifier.proof.pair import Ground, ground_arrays, ground_of, same_scene
+from certifier.proof.container import FORMAT, Arrays, head, malformed, pack, unpack
+from certifier.proof.pair import Ground, ground_arrays, read_ground, same_scene
 
 
 @dataclass(frozen=True)
@@ -18,6 +18,7 @@ class DualProof:
 
     Attributes:
         frame: body whose frame the planes are expressed in.
+        interior: (n,) a point of the ground's polytope, which is therefore not empty.
         moments: of a's and of b's vertices, (V, N): values on the monomials in the order of certifier.verify.moments.
         equations: K of those that have to vanish, the 4 (n + 1) entries of R row by row, or its n + 1 of b where a radius is involved.
         entries: (K, 3) int64 the moments whose change makes them vanish: side, vertex, monomial.
@@ -28,6 +29,7 @@ class DualProof:
     pair: Pair
     frame: str
     ground: Ground
+    interior: Array
     moments: tuple[Array, Array]
     equations: tuple[int, ...]
     entries: np.ndarray
@@ -43,7 +45,7 @@ class DualProof:
             "frame": self.frame,
             "equations": list(self.equations),
         }
-        arrays = {"moments0": self.moments[0], "moments1": self.moments[1], "entries": self.entries}
+        arrays = {"interior": self.interior, "moments0": self.moments[0], "moments1": self.moments[1], "entries": self.entries}
         arrays |= {"normal/aa": self.normal[0], "normal/bb": self.normal[1]}
         return pack(header, arrays | ground_arrays(self.ground, 0))
 
@@ -54,23 +56,27 @@ class DualProof:
         Raises:
             ProofError: not a dual proof, or one about another scene.
         """
-        header, arrays = unpack(data, "dual")
+        header, unpacked = unpack(data, "dual")
         with malformed():
-            same_scene(header, scene)
-            a, b = header["pair"]
-            moments = [floats(arrays[f"moments{i}"]) for i in range(2)]
-            if arrays["entries"].dtype != np.int64 or arrays["entries"].shape[1:] != (3,):
-                raise ProofError("proof_malformed", "the entries of a dual proof are not triples of integers")
-            return cls(
+            fields, arrays = head(header, "pair", "frame", "equations"), Arrays(unpacked)
+            same_scene(fields, scene)
+            a, b = fields["pair"].two()
+            entries = arrays.take("entries", "int64")
+            if entries.shape[1:] != (3,):
+                raise CirisError("document", f"it is {entries.shape}, not (K, 3)", field="entries.npy")
+            proof = cls(
                 scene=scene,
-                pair=Pair(a, b),
-                frame=str(header["frame"]),
-                ground=ground_of(arrays, 0),
-                moments=(moments[0], moments[1]),
-                equations=tuple(index(k) for k in header["equations"]),
-                entries=arrays["entries"],
-                normal=(floats(arrays["normal/aa"]), floats(arrays["normal/bb"])),
+                pair=Pair(a.text(), b.text()),
+                frame=fields["frame"].text(),
+                ground=read_ground(arrays, 0),
+                interior=arrays.floats("interior"),
+                moments=(arrays.floats("moments0"), arrays.floats("moments1")),
+                equations=tuple(k.count() for k in fields["equations"].items(4 * (scene.n + 1))),
+                entries=entries,
+                normal=(arrays.floats("normal/aa"), arrays.floats("normal/bb")),
             )
+            arrays.end()
+            return proof
 
 
 @dataclass(frozen=True)
@@ -102,9 +108,11 @@ class WitnessProof:
         Raises:
             ProofError: not a witness, or one about another scene.
         """
-        header, arrays = unpack(data, "witness")
+        header, unpacked = unpack(data, "witness")
         with malformed():
-            same_scene(header, scene)
-            a, b = header["pair"]
-            C, d, s, first, second = (floats(arrays[name]) for name in ("C", "d", "s", "weights0", "weights1"))
-            return cls(scene, Pair(a, b), C, d, s, (first, second))
+            fields, arrays = head(header, "pair"), Arrays(unpacked)
+            same_scene(fields, scene)
+            a, b = fields["pair"].two()
+            C, d, s, first, second = (arrays.floats(name) for name in ("C", "d", "s", "weights0", "weights1"))
+            arrays.end()
+            return cls(scene, Pair(a.text(), b.text()), C, d, s, (first, second))

@@ -12,17 +12,22 @@ of 48. Nothing here decides whether a proof holds: certifier.verify does. The fi
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from certifier.errors import ProofError
+from certifier.document import Node
+from certifier.errors import CirisError, ProofError
 from certifier.model import Array, Pair, Scene, Volume
-from certifier.proof.container import FORMAT, floats, index, malformed, npy, pack, unpack
+from certifier.proof import limits
+from certifier.proof.container import FORMAT, Arrays, head, malformed, npy, pack, unpack
+
+_T = TypeVar("_T")
 
 BITS = {"int32": 30, "int64": 48}
 """Bits of a Gram factor's mantissa by its type."""
@@ -100,6 +105,7 @@ class PairProof:
     Attributes:
         volumes: on the positive and on the negative side of the plane.
         frame: body whose frame the plane is expressed in.
+        interior: (n,) a point of the ground's polytope, which is therefore not empty; of a region's proofs the region's own.
         plane: Z, (4, n + 1).
         t, kappa: margin and bound of |a(u)| on the box (0 where no radius is involved).
         faces: the f faces used: j for the ground's face j, m + i for 1 + u_i, m + n + i for 1 - u_i.
@@ -110,6 +116,7 @@ class PairProof:
     volumes: tuple[Volume, Volume]
     frame: str
     ground: Ground
+    interior: Array
     plane: Array
     t: float
     kappa: float
@@ -118,9 +125,10 @@ class PairProof:
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
-        """The pairs of the scene that are covered."""
+        """The pairs of the scene that are covered, in its order."""
         first, second = (set(volume.geometries) for volume in self.volumes)
-        return tuple(p for p in self.scene.pairs if (p.a in first and p.b in second) or (p.a in second and p.b in first))
+        found = {i: p for name in first for i, p in self.scene.pairs_of(name) if (p.b if p.a == name else p.a) in second}
+        return tuple(found[i] for i in sorted(found))
 
     @property
     def needs_box_alone(self) -> bool:
@@ -138,7 +146,7 @@ class PairProof:
         pool = Pool(self.scene)
         headers = [pool.add(self)]
         header = {"format": FORMAT, "kind": "pair", "scene_hash": self.scene.hash, **pool.header(), "proofs": headers}
-        return pack(header, pool.arrays)
+        return pack(header, {"interior": self.interior, **pool.arrays})
 
     @classmethod
     def from_bytes(cls, data: bytes, scene: Scene) -> PairProof:
@@ -147,10 +155,15 @@ class PairProof:
         Raises:
             ProofError: not a pair's proof, or one about another scene.
         """
-        header, arrays = unpack(data, "pair")
+        header, unpacked = unpack(data, "pair")
         with malformed():
-            same_scene(header, scene)
-            return Stored(scene, header, arrays).proofs()[0]
+            fields, arrays = head(header, *SHARED), Arrays(unpacked)
+            same_scene(fields, scene)
+            proofs = read_proofs(scene, fields, arrays, arrays.floats("interior"))
+            arrays.end()
+            if len(proofs) != 1:
+                raise CirisError("document", f"a pair's file holds one proof, not {len(proofs)}", field="header.proofs")
+            return proofs[0]
 
 
 class Pool:
@@ -205,44 +218,83 @@ class Pool:
         return self._known[key]
 
 
-class Stored:
-    """The proofs of a file."""
+SHARED = ("grounds", "volumes", "proofs")
+"""What of a header :class:`Pool` writes and :func:`read_proofs` reads."""
 
-    def __init__(self, scene: Scene, header: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
-        self._scene, self._headers, self._arrays = scene, header["proofs"], arrays
-        self._grounds = [ground_of(arrays, i) for i in range(header["grounds"])]
-        self._volumes = [self._volume(i, volume) for i, volume in enumerate(header["volumes"])]
 
-    def proofs(self) -> tuple[PairProof, ...]:
-        return tuple(self._proof(f"proof/{i}", header) for i, header in enumerate(self._headers))
+def read_proofs(scene: Scene, header: dict[str, Node], arrays: Arrays, interior: Array) -> tuple[PairProof, ...]:
+    """The proofs of a file; they share grounds and volumes, none of which is there for nothing.
 
-    def _volume(self, i: int, header: dict[str, Any]) -> Volume:
-        names = tuple(str(name) for name in header["geometries"])
-        if "body" not in header:
-            (name,) = names
-            return Volume.of(self._scene.geometry(name))
-        vertices, radius = (floats(self._arrays[f"volume/{i}/{name}"]) for name in ("vertices", "radius"))
-        return Volume(names, str(header["body"]), vertices, radius.item())
+    Args:
+        interior: (n,) what the file has for a point of all grounds.
 
-    def _proof(self, prefix: str, header: dict[str, Any]) -> PairProof:
-        arrays = self._arrays
-        t, kappa = floats(arrays[f"{prefix}/scalars"]).tolist()
-        first, second = (self._volumes[index(i)] for i in header["volumes"])
-        side_a, side_b = (
-            Side(tuple(index(i) for i in chain), _factors(arrays[f"{prefix}/mantissa{i}"]), arrays[f"{prefix}/exponent{i}"])
-            for i, chain in enumerate(header["chains"])
+    Raises:
+        CirisError: something is missing, superfluous, or not of its kind.
+    """
+    count = header["grounds"].count()
+    if count > limits.GROUNDS:
+        raise CirisError("document", f"there are {count} of them, at most {limits.GROUNDS} are read", field="header.grounds")
+    grounds = [read_ground(arrays, i) for i in range(count)]
+    volumes = [_volume(scene, arrays, i, node) for i, node in enumerate(header["volumes"].items(limits.VOLUMES))]
+    proofs = tuple(
+        _proof(scene, arrays, f"proof/{i}", node, grounds, volumes, interior)
+        for i, node in enumerate(header["proofs"].items(limits.PROOFS))
+    )
+    used = {id(part) for proof in proofs for part in (proof.ground, *proof.volumes)}
+    if not all(id(part) in used for part in (*grounds, *volumes)):
+        raise CirisError("document", "a polytope or a volume of it belongs to no proof", field="header")
+    return proofs
+
+
+def _volume(scene: Scene, arrays: Arrays, i: int, node: Node) -> Volume:
+    header = node.fields("geometries", optional=("body",))
+    names = tuple(name.text() for name in header["geometries"].items())
+    if "body" in header:
+        vertices, radius = arrays.floats(f"volume/{i}/vertices"), arrays.floats(f"volume/{i}/radius")
+        if vertices.ndim != 2 or vertices.shape[1] != 3 or not 0 < len(vertices) <= limits.CORNERS or radius.shape != ():
+            raise CirisError("document", f"it has no vertices, more than {limits.CORNERS} or no radius", field=node.where)
+        return Volume(names, header["body"].text(), vertices, radius.item())
+    if len(names) != 1:
+        raise CirisError("document", "a volume without a body is one geometry", field=node.where)
+    return Volume.of(scene.geometry(names[0]))
+
+
+def _proof(
+    scene: Scene, arrays: Arrays, prefix: str, node: Node, grounds: list[Ground], volumes: list[Volume], interior: Array
+) -> PairProof:
+    header = node.fields("volumes", "frame", "ground", "faces", "chains")
+    scalars = arrays.floats(f"{prefix}/scalars")
+    if scalars.shape != (2,):
+        raise CirisError("document", f"it is {scalars.shape}, not (2,)", field=f"{prefix}/scalars.npy")
+    first, second = (_item(i, volumes) for i in header["volumes"].two())
+    side_a, side_b = (
+        Side(
+            tuple(joint.count() for joint in chain.items(scene.n)),
+            arrays.take(f"{prefix}/mantissa{i}", *BITS),
+            arrays.take(f"{prefix}/exponent{i}", "int32"),
         )
-        return PairProof(
-            scene=self._scene,
-            volumes=(first, second),
-            frame=str(header["frame"]),
-            ground=self._grounds[index(header["ground"])],
-            plane=floats(arrays[f"{prefix}/plane"]),
-            t=t,
-            kappa=kappa,
-            faces=tuple(index(j) for j in header["faces"]),
-            sides=(side_a, side_b),
-        )
+        for i, chain in enumerate(header["chains"].two())
+    )
+    return PairProof(
+        scene=scene,
+        volumes=(first, second),
+        frame=header["frame"].text(),
+        ground=_item(header["ground"], grounds),
+        interior=interior,
+        plane=arrays.floats(f"{prefix}/plane"),
+        t=scalars[0].item(),
+        kappa=scalars[1].item(),
+        faces=tuple(j.count() for j in header["faces"].items()),
+        sides=(side_a, side_b),
+    )
+
+
+def _item(node: Node, items: list[_T]) -> _T:
+    """The item of this number."""
+    number = node.count()
+    if number >= len(items):
+        raise CirisError("document", f"there is no number {number}, only {len(items)}", field=node.where)
+    return items[number]
 
 
 def digest(data: bytes) -> str:
@@ -250,9 +302,9 @@ def digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def same_scene(header: dict[str, Any], scene: Scene) -> None:
+def same_scene(header: dict[str, Node], scene: Scene) -> None:
     """Raises ProofError, proof_scene, for the header of a proof about another scene."""
-    if header["scene_hash"] != scene.hash:
+    if header["scene_hash"].text() != scene.hash:
         raise ProofError("proof_scene", "the proof is about another scene")
 
 
@@ -261,12 +313,6 @@ def ground_arrays(ground: Ground, i: int) -> dict[str, np.ndarray]:
     return {f"ground/{i}/{name}": value for name, value in vars(ground).items()}
 
 
-def ground_of(arrays: dict[str, np.ndarray], i: int) -> Ground:
+def read_ground(arrays: Arrays, i: int) -> Ground:
     """Ground i of a file."""
-    return Ground(*(floats(arrays[f"ground/{i}/{name}"]) for name in ("C", "d", "mid", "half", "Y_lower", "Y_upper")))
-
-
-def _factors(array: np.ndarray) -> np.ndarray:
-    if array.dtype.name not in BITS:
-        raise ProofError("proof_malformed", f"a Gram factor in the proof file is of {array.dtype.name}")
-    return array
+    return Ground(*(arrays.floats(f"ground/{i}/{field.name}") for field in dataclasses.fields(Ground)))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from certifier.errors import CirisError
 from certifier.model import Array, Scene
-from certifier.proof.container import FORMAT, floats, malformed, pack, unpack
-from certifier.proof.pair import PairProof, Pool, Stored
+from certifier.proof.container import FORMAT, Arrays, head, malformed, pack, unpack
+from certifier.proof.pair import SHARED, PairProof, Pool, read_proofs
 
 
 @dataclass(frozen=True)
@@ -75,17 +77,21 @@ class RegionProof:
         Raises:
             ProofError: not a region's proof.
         """
-        header, arrays = unpack(data, "region")
+        header, unpacked = unpack(data, "region")
         with malformed():
-            scene = Scene.from_document(header["scene"])
-            fields = ("N", "lower", "upper", "Y_lower", "Y_upper", "y")
-            values = {name: floats(arrays[f"archimedean/{name}"]) for name in fields}
-            return cls(
+            fields, arrays = head(header, *SHARED), Arrays(unpacked)
+            scene, interior = Scene.from_document(header["scene"]), arrays.floats("region/interior")
+            N, *bounds = (arrays.floats(f"archimedean/{field.name}") for field in dataclasses.fields(Archimedean))
+            if N.shape != ():
+                raise CirisError("document", f"it is {N.shape}, not a number", field="archimedean/N.npy")
+            proof = cls(
                 scene=scene,
-                C=floats(arrays["region/C"]),
-                d=floats(arrays["region/d"]),
-                interior=floats(arrays["region/interior"]),
-                implied=Implied(*(floats(arrays[f"implied/{name}"]) for name in ("C", "d", "Y"))),
-                archimedean=Archimedean(values.pop("N").item(), **values),
-                proofs=Stored(scene, header, arrays).proofs(),
+                C=arrays.floats("region/C"),
+                d=arrays.floats("region/d"),
+                interior=interior,
+                implied=Implied(*(arrays.floats(f"implied/{field.name}") for field in dataclasses.fields(Implied))),
+                archimedean=Archimedean(N.item(), *bounds),
+                proofs=read_proofs(scene, fields, arrays, interior),
             )
+            arrays.end()
+            return proof

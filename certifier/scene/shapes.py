@@ -57,7 +57,7 @@ def cylinder(radius: float, length: float, sides: int) -> Body:
     ring = reach * np.column_stack([np.cos(angle), np.sin(angle)])
     vertices = np.concatenate([np.column_stack([ring, np.full(sides, z)]) for z in (-length / 2, length / 2)])
     shape = {"kind": "cylinder", "radius": radius, "length": length}
-    return Body(vertices, 0.0, shape, f"cylinder -> circumscribed prism with {sides} sides", reach - radius)
+    return Body(vertices, 0.0, shape, f"cylinder -> circumscribed prism with {sides} sides", float(reach - radius))
 
 
 def ellipsoid(semi_axes: tuple[float, float, float], max_vertices: int) -> Body:

@@ -17,7 +17,7 @@ import numpy as np
 
 from certifier.model import Array
 from certifier.proof.region import Archimedean
-from certifier.verify.box import check_box, upper_bound
+from certifier.verify.box import Halfspaces
 from certifier.verify.kinematics import exact
 
 
@@ -27,10 +27,11 @@ def check_archimedean(C: Array, d: Array, proof: Archimedean) -> bool:
     The slope l + u of the remainder is not a double in general. It is split into its double c and the rest e, and e's
     is bounded over the box.
     """
-    if not check_box(C, d, proof.lower, proof.upper, proof.Y_lower, proof.Y_upper) or not np.all(proof.lower < proof.upper):
+    rows = Halfspaces(C, d)
+    if not rows.lie_in_box(proof.lower, proof.upper, proof.Y_lower, proof.Y_upper) or not np.all(proof.lower < proof.upper):
         return False
     c = proof.lower + proof.upper
-    bound = upper_bound(C, d, c, proof.y)
+    bound = rows.upper_bound(c, proof.y)
     if bound is None or not np.isfinite(proof.N):
         return False
     for lower, upper, rounded in zip(proof.lower, proof.upper, c, strict=True):

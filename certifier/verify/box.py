@@ -10,50 +10,72 @@ import numpy as np
 from flint import fmpq
 
 from certifier.model import Array
+from certifier.proof import limits
 from certifier.verify.kinematics import exact
 
 
-def upper_bound(C: Array, d: Array, c: Array, y: Array) -> fmpq | None:
-    """An exact upper bound of c's on {C s <= d}, with C (m, n), d (m,), c (n,), y (m,).
+class Halfspaces:
+    """{s : C s <= d}, C (m, n), d (m,), and what those rows say in which no other coordinate occurs.
 
-    None when y proves nothing: a multiplier is negative or not finite, or a residual meets no row that bounds its
-    coordinate alone.
+    Attributes:
+        upper, lower: for each coordinate the least upper and the largest lower bound of such rows; None where there is none.
     """
-    if y.shape != d.shape or not np.all(np.isfinite(y)) or np.any(y < 0):
-        return None
-    bound = fmpq(0)
-    residual = [exact(x) for x in c]
-    for j in np.flatnonzero(y):
-        weight = exact(y[j])
-        bound += weight * exact(d[j])
-        for k in np.flatnonzero(C[j]):
-            residual[k] -= weight * exact(C[j, k])
-    for i, r in enumerate(residual):
-        if r:
-            limits = _single_row_limits(C, d, i, upper=r > 0)
-            if not limits:
-                return None
-            bound += r * (min(limits) if r > 0 else max(limits))
-    return bound
+
+    def __init__(self, C: Array, d: Array) -> None:
+        self.C, self.d = C, d
+        self.upper: list[fmpq | None] = [None] * C.shape[1]
+        self.lower: list[fmpq | None] = [None] * C.shape[1]
+        for j in np.flatnonzero(np.count_nonzero(C, axis=1) == 1):
+            (i,) = np.flatnonzero(C[j])
+            bounds, closer = (self.upper, min) if C[j, i] > 0 else (self.lower, max)
+            bound, known = exact(d[j]) / exact(C[j, i]), bounds[i]
+            bounds[i] = bound if known is None else closer(bound, known)
+
+    def contains(self, point: Array) -> bool:
+        """Whether the point, (n,) doubles, satisfies every row, exactly."""
+        s = [exact(x) for x in point]
+        return all(_dot(c, s) <= exact(d) for c, d in zip(self.C, self.d, strict=True))
+
+    def upper_bound(self, c: Array, y: Array) -> fmpq | None:
+        """An exact upper bound of c's, with c (n,), y (m,).
+
+        None when y proves nothing: a multiplier is negative or not finite, there are more of them than limits.MULTIPLIERS for each
+        coordinate, or a residual meets no row that bounds its coordinate alone.
+        """
+        if y.shape != self.d.shape or not np.all(np.isfinite(y)) or np.any(y < 0):
+            return None
+        if np.count_nonzero(y) > limits.MULTIPLIERS * len(c):
+            return None
+        bound = fmpq(0)
+        residual = [exact(x) for x in c]
+        for j in np.flatnonzero(y):
+            weight = exact(y[j])
+            bound += weight * exact(self.d[j])
+            for k in np.flatnonzero(self.C[j]):
+                residual[k] -= weight * exact(self.C[j, k])
+        for i, r in enumerate(residual):
+            if r:
+                limit = self.upper[i] if r > 0 else self.lower[i]
+                if limit is None:
+                    return None
+                bound += r * limit
+        return bound
+
+    def lie_in(self, c: Array, value: float, y: Array) -> bool:
+        """True when y proves c's <= value, exactly."""
+        bound = self.upper_bound(c, y)
+        return bound is not None and bool(np.isfinite(value)) and bound <= exact(value)
+
+    def lie_in_box(self, lower: Array, upper: Array, Y_lower: Array, Y_upper: Array) -> bool:
+        """True when row i of Y_upper (n, m) proves s_i <= upper_i and row i of Y_lower proves -s_i <= -lower_i, exactly, for every i."""
+        m, n = self.C.shape
+        if not (lower.shape == upper.shape == (n,) and Y_lower.shape == Y_upper.shape == (n, m)):
+            return False
+        eye = np.eye(n)
+        return all(
+            self.lie_in(eye[i], float(upper[i]), Y_upper[i]) and self.lie_in(-eye[i], -float(lower[i]), Y_lower[i]) for i in range(n)
+        )
 
 
-def _single_row_limits(C: Array, d: Array, i: int, upper: bool) -> list[fmpq]:
-    """Upper (or lower) bounds of s_i by the rows in which no other coordinate occurs."""
-    alone = np.count_nonzero(C, axis=1) == 1
-    rows = np.flatnonzero(alone & (C[:, i] > 0 if upper else C[:, i] < 0))
-    return [exact(d[j]) / exact(C[j, i]) for j in rows]
-
-
-def check_box(C: Array, d: Array, lower: Array, upper: Array, Y_lower: Array, Y_upper: Array) -> bool:
-    """True when row i of Y_upper (n, m) proves s_i <= upper_i and row i of Y_lower proves -s_i <= -lower_i, exactly, for every i."""
-    n = C.shape[1]
-    if not (lower.shape == upper.shape == (n,) and Y_lower.shape == Y_upper.shape == (n, len(d))):
-        return False
-    eye = np.eye(n)
-    return all(holds(C, d, eye[i], float(upper[i]), Y_upper[i]) and holds(C, d, -eye[i], -float(lower[i]), Y_lower[i]) for i in range(n))
-
-
-def holds(C: Array, d: Array, c: Array, value: float, y: Array) -> bool:
-    """True when y proves c's <= value on {C s <= d}, exactly."""
-    bound = upper_bound(C, d, c, y)
-    return bound is not None and bool(np.isfinite(value)) and bound <= exact(value)
+def _dot(c: Array, s: list[fmpq]) -> fmpq:
+    return sum((exact(x) * y for x, y in zip(c, s, strict=True)), fmpq(0))

@@ -40,12 +40,13 @@ from flint import Ordering, arb, arb_mat, ctx, fmpq, fmpq_mpoly_ctx
 
 from certifier.errors import ProofError
 from certifier.model import Array, Pair, Scene, Volume
+from certifier.proof import limits
 from certifier.proof.negative import DualProof
 from certifier.proof.pair import Ground
 from certifier.verify import limbs
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.moments import localised, table
-from certifier.verify.pair import check_ground, faces_of
+from certifier.verify.pair import check_ground, check_interior, faces_of
 from certifier.verify.residual import POSITION_BITS, Numerators, dyadic
 from certifier.verify.scene import check_scene
 
@@ -85,6 +86,7 @@ def verify_dual(proof: DualProof) -> DualStatement:
         raise ProofError("proof_pair", "the proof is about no pair, or no body, of the scene")
     check_ground(scene, proof.ground)
     _check_tight(scene, proof.ground)
+    check_interior(scene, proof.ground, proof.interior)
     precision = ctx.prec
     ctx.prec = PRECISION
     try:
@@ -195,6 +197,8 @@ class _Side:
         self._index = table(self._chain, n)
         if moments.shape != (V, self._index.max() + 1):
             raise ProofError("proof_malformed", f"the moments of {volume.geometries[0]} do not fit")
+        if moments.size > limits.MOMENTS:
+            raise ProofError("proof_too_large", f"a body has {moments.size} moments; at most {limits.MOMENTS} are checked")
         self._moments = moments
         places, vertex_bits = dyadic([[*(exact(x) for x in vertex), fmpq(1)] for vertex in volume.vertices])
         values, moment_bits = dyadic([[exact(x) for x in row] for row in moments])
@@ -229,6 +233,8 @@ class _Side:
     def check(self, faces: Array, change: arb) -> None:
         """Every localising matrix is positive definite."""
         k = len(self._chain)
+        if len(faces) * len(self._moments) * 4**k > limits.LOCALISED:
+            raise ProofError("proof_too_large", f"a body's localising matrices have more than {limits.LOCALISED} entries")
         subsets = np.arange(2**k)[:, None] >> np.arange(k) & 1
         code = (subsets[:, None, :] + subsets[None, :, :]) @ 3 ** np.arange(k)
         values, errors = _enclosed(self._moments, faces, self._chain, change)

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from certifier.errors import ProofError
-from certifier.model import Scene
+from certifier.errors import CirisError, ProofError
+from certifier.model import Scene, escaped
 from certifier.outcome import Guarantee
+from certifier.proof import limits
 from certifier.proof.container import header_of, malformed
 from certifier.proof.negative import DualProof, WitnessProof
 from certifier.proof.pair import PairProof
@@ -22,6 +23,9 @@ from certifier.verify.pair import verify_pair
 from certifier.verify.region import verify_region
 from certifier.verify.witness import TOLERANCE, verify_witness
 
+LONGEST = 500
+"""Characters of an error's message."""
+
 
 @dataclass(frozen=True)
 class FileStatement:
@@ -29,7 +33,7 @@ class FileStatement:
 
     Attributes:
         kind: ``region``, ``pair``, ``dual`` or ``witness``.
-        lines: the statement in plain words, the guarantee last.
+        lines: the statement in plain words, the guarantee last; it follows from what the scene's hash covers and from the proof.
     """
 
     kind: str
@@ -45,33 +49,36 @@ def verify_file(data: bytes) -> FileStatement:
         ProofError: the file is malformed, carries no scene, or its proof does not hold.
     """
     header = header_of(data)
-    kind = header.get("kind")
+    kind = header["kind"]
     if kind == "region":
         statement = verify_region(data)
         return FileStatement(kind, statement.scene, tuple(statement.lines()), Guarantee.EXACT)
     if kind not in _READERS:
-        raise ProofError("proof_malformed", f"the file is a proof of kind {kind!r}, which is none")
+        raise ProofError("proof_malformed", f"the file is a proof of kind {kind[:40]!r}, which is none", field="header.kind")
     if "scene" not in header:
         hint = "a file that the service hands out carries it"
         raise ProofError("proof_without_scene", "the file names its scene by its hash and does not carry it", hint=hint)
     with malformed():
         scene = Scene.from_document(header["scene"])
     found, guarantee = _READERS[kind](data, scene)
-    padding = f"padding {exactly(scene.padding)} m around every body"
-    return FileStatement(kind, scene, (f"scene {scene.name}, hash {scene.hash}", padding, *found, guarantee_line(guarantee)), guarantee)
+    about = (f"scene of hash {scene.hash}", f"padding {exactly(scene.padding)} m around every body")
+    return FileStatement(kind, scene, (*about, *found, guarantee_line(guarantee)), guarantee)
 
 
 def answer(data: bytes) -> dict[str, Any]:
-    """The statement of a proof file, or why there is none, as JSON-able data; stable keys."""
+    """The statement of a proof file, or why there is none, as JSON-able data; stable keys, and no text that is not printable.
+
+    ``scene.name`` is what the file calls its scene; no proof is about it.
+    """
     try:
         statement = verify_file(data)
     except ProofError as error:
-        return {"holds": False, "error": error.to_document()}
+        return _refused(error)
     return {
         "holds": True,
         "kind": statement.kind,
-        "scene": {"name": statement.scene.name, "hash": statement.scene.hash},
-        "statement": list(statement.lines),
+        "scene": {"name": escaped(statement.scene.name), "hash": statement.scene.hash},
+        "statement": [escaped(line) for line in statement.lines],
         "guarantee": statement.guarantee.value,
     }
 
@@ -88,8 +95,30 @@ def answer_about_region(payload: dict[str, Any]) -> dict[str, Any]:
         proof = RegionProof.from_bytes(data)
         same = np.array_equal(proof.C, payload["C"]) and np.array_equal(proof.d, payload["d"])
         if proof.scene.hash != payload["scene_hash"] or not same:
-            return {"holds": False, "error": ProofError("proof_region", "the proof is about another region").to_document()}
+            return _refused(ProofError("proof_region", "the proof is about another region"))
     return found
+
+
+def answer_about_file(payload: dict[str, Any]) -> dict[str, Any]:
+    """The answer about the file at ``path``, as a child process gives it.
+
+    Raises:
+        CirisError: no_file, it cannot be read.
+    """
+    try:
+        with open(payload["path"], "rb") as file:
+            return answer(file.read(limits.FILE_BYTES + 1))
+    except OSError as error:
+        raise CirisError("no_file", error.strerror or str(error)) from None
+
+
+def _refused(error: ProofError) -> dict[str, Any]:
+    document = {key: text and _cut(escaped(text)) for key, text in error.to_document().items()}
+    return {"holds": False, "error": document}
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
 
 
 def guarantee_line(guarantee: Guarantee) -> str:
@@ -104,7 +133,7 @@ def guarantee_line(guarantee: Guarantee) -> str:
 def _pair(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
     proof = PairProof.from_bytes(data, scene)
     statement = verify_pair(proof)
-    polytope = f"a polytope of {len(proof.ground.d)} half-spaces within the joint limits, should there be any,"
+    polytope = f"a polytope of {len(proof.ground.d)} half-spaces within the joint limits, which is not empty,"
     lines = [f"at every configuration of {polytope} these padded bodies are at least {rounded_down(statement.gap)} m apart:"]
     return lines + [f"  {pair.a} and {pair.b}" for pair in statement.pairs], Guarantee.EXACT
 

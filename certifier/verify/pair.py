@@ -13,21 +13,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from flint import Ordering, arb, fmpq, fmpq_mpoly_ctx
 
 from certifier.errors import ProofError
-from certifier.model import Pair, Scene, Volume
-from certifier.proof.pair import Ground, PairProof
-from certifier.verify.box import check_box
+from certifier.model import Array, Pair, Scene, Volume
+from certifier.proof import limits
+from certifier.proof.pair import Ground, PairProof, Side
+from certifier.verify.box import Halfspaces
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.residual import Numerators, largest_residual
 from certifier.verify.scene import check_scene
-from certifier.verify.volume import check_volume
+from certifier.verify.volume import check_contained, check_volume
 
 MAX_CORNER_JOINTS = 16
+TOGETHER = 1 << 20
+"""Entries of the Gram matrices that are checked at once."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,8 @@ def verify_pair(proof: PairProof) -> PairStatement:
     """
     check_scene(proof.scene)
     check_ground(proof.scene, proof.ground)
+    check_interior(proof.scene, proof.ground, proof.interior)
+    check_contained(proof.scene, proof.volumes)
     return PairCheck(proof.scene, proof.ground).verify(proof)
 
 
@@ -61,13 +66,14 @@ def check_ground(scene: Scene, ground: Ground) -> None:
         ProofError: they do not.
     """
     n, m = scene.n, ground.d.size
+    if m > limits.FACES:
+        raise ProofError("proof_too_large", f"a polytope has {m} faces; at most {limits.FACES} are checked")
     shapes = {"C": (m, n), "d": (m,), "mid": (n,), "half": (n,), "Y_lower": (n, m + 2 * n), "Y_upper": (n, m + 2 * n)}
     for name, shape in shapes.items():
         if getattr(ground, name).shape != shape:
             raise ProofError("proof_malformed", f"{name} of a polytope is {getattr(ground, name).shape}, not {shape}")
     if not (ground.half > 0).all():
         raise ProofError("proof_box", "the box of a polytope is empty")
-    limited = scene.polytope(ground.C, ground.d)
     # Doubles just inside the exact corners mid -+ half imply the corners.
     lower, upper = np.nextafter(ground.mid - ground.half, np.inf), np.nextafter(ground.mid + ground.half, -np.inf)
     for i in range(n):
@@ -76,8 +82,24 @@ def check_ground(scene: Scene, ground: Ground) -> None:
             and exact(upper[i]) <= exact(ground.mid[i]) + exact(ground.half[i])
         ):
             raise ProofError("proof_box", "the box of a polytope cannot be represented")
-    if not check_box(limited.C, limited.d, lower, upper, ground.Y_lower, ground.Y_upper):
+    if not _limited(scene, ground).lie_in_box(lower, upper, ground.Y_lower, ground.Y_upper):
         raise ProofError("proof_box", "the multipliers do not prove the box around the polytope")
+
+
+def check_interior(scene: Scene, ground: Ground, point: Array) -> None:
+    """Check that a ground has a point within the joint limits: of an empty polytope everything could be said.
+
+    Raises:
+        ProofError: the point is not in it.
+    """
+    if point.shape != (scene.n,) or not _limited(scene, ground).contains(point):
+        raise ProofError("proof_interior", "the point that should show that the polytope is not empty is not in it")
+
+
+def _limited(scene: Scene, ground: Ground) -> Halfspaces:
+    """The ground's faces and the joint limits."""
+    polytope = scene.polytope(ground.C, ground.d)
+    return Halfspaces(polytope.C, polytope.d)
 
 
 def faces_of(ground: Ground) -> list[list[fmpq]]:
@@ -95,15 +117,19 @@ def faces_of(ground: Ground) -> list[list[fmpq]]:
 
 
 class PairCheck:
-    """Checks proofs that share one ground, which :func:`check_ground` has accepted."""
+    """Checks proofs that share one ground, which :func:`check_ground` has accepted.
 
-    def __init__(self, scene: Scene, ground: Ground) -> None:
+    Args:
+        contained: volumes that are known to contain their geometries, by id; checks of one scene may share it.
+    """
+
+    def __init__(self, scene: Scene, ground: Ground, contained: dict[int, Volume] | None = None) -> None:
         self._scene, self._ground = scene, ground
         ring = fmpq_mpoly_ctx.get([f"u{i}" for i in range(scene.n)], Ordering.lex)
         self._kinematics = ExactKinematics.on_box(scene, ring, ground.mid, ground.half)
         self._faces = faces_of(ground)
         self._numerators: dict[tuple[str, str], Numerators] = {}
-        self._contained: dict[int, Volume] = {}
+        self._contained: dict[int, Volume] = {} if contained is None else contained
 
     def verify(self, proof: PairProof) -> PairStatement:
         """Check one proof on the ground.
@@ -114,7 +140,8 @@ class PairCheck:
         scene = self._scene
         if proof.scene.hash != scene.hash:
             raise ProofError("proof_scene", "the proof is about another scene")
-        if not proof.pairs:
+        pairs = proof.pairs
+        if not pairs:
             raise ProofError("proof_pair", f"{_names(proof)} are not a pair of the scene")
         if proof.frame not in scene.bodies:
             raise ProofError("proof_frame", f"the scene has no body {proof.frame!r}")
@@ -142,17 +169,36 @@ class PairCheck:
         for volume, radius, side, sign in zip(proof.volumes, radii, proof.sides, (1, -1), strict=True):
             rows = [[sign * x for x in row] for row in plane]
             rows[3][0] -= radius * kappa + t
-            residuals.append(largest_residual(self._between(proof.frame, volume.body), volume, side, rows, weights))
+            residuals.append(_residual(self._between(proof.frame, volume.body), volume, side, rows, weights))
         margin = t - max(residuals)
         if not margin > 0:
             eaten = f"the residual {arb(max(residuals)).str(3, radius=False)} eats up the margin {proof.t:.3g}"
             raise ProofError("proof_residual", f"{_names(proof)}: {eaten}")
-        return PairStatement(proof.pairs, _lower_root(4 * margin * margin / norm))
+        return PairStatement(pairs, _lower_root(4 * margin * margin / norm))
 
     def _between(self, frame: str, body: str) -> Numerators:
         if (frame, body) not in self._numerators:
             self._numerators[frame, body] = Numerators.between(self._kinematics, frame, body)
         return self._numerators[frame, body]
+
+
+def _residual(
+    numerators: Numerators, volume: Volume, side: Side, plane: Sequence[Sequence[fmpq]], weights: Sequence[Sequence[fmpq]]
+) -> fmpq:
+    """Largest bound of |e_v| on the box, over the volume's vertices, so many at once as fit into little memory."""
+    k, V = len(side.chain), len(volume.vertices)
+    entries = max(len(weights) * 4**k, 4 * len(plane[0]) * 3**k)
+    if entries > limits.FACTORS:
+        raise ProofError("proof_too_large", f"the Gram matrices of a vertex have {entries} entries; at most {limits.FACTORS} are checked")
+    if side.mantissa.ndim != 3 or len(side.mantissa) != V:
+        raise ProofError("proof_malformed", f"the Gram factors of {', '.join(volume.geometries)} do not fit")
+    parts = [slice(first, first + max(1, TOGETHER // entries)) for first in range(0, V, max(1, TOGETHER // entries))]
+    return max(
+        largest_residual(
+            numerators, replace(volume, vertices=volume.vertices[part]), replace(side, mantissa=side.mantissa[part]), plane, weights
+        )
+        for part in parts
+    )
 
 
 def _names(proof: PairProof) -> str:

@@ -9,15 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from certifier.errors import ProofError
-from certifier.model import Pair, Scene
+from certifier.model import Pair, Scene, Volume
+from certifier.proof import limits
 from certifier.proof.pair import Ground
 from certifier.proof.region import RegionProof
 from certifier.verify.archimedean import check_archimedean
-from certifier.verify.box import holds
+from certifier.verify.box import Halfspaces
 from certifier.verify.decimals import exactly, rounded_down, rounded_up
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.pair import PairCheck, check_ground
 from certifier.verify.scene import check_scene
+from certifier.verify.volume import check_contained
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class RegionStatement:
         unlisted = [f"{count} of {a} and {b}" for (a, b), count in _unlisted(scene).items()]
         closest = min(self.gaps, key=self.gaps.__getitem__, default=None)
         return [
-            f"scene {scene.name}, hash {scene.hash}",
+            f"scene of hash {scene.hash}",
             f"{scene.n} joints, within their limits:",
             *joints,
             f"a bounded, non-empty polytope of {self.faces} half-spaces in tangent space; |s|^2 <= {rounded_up(self.N, 6)}",
@@ -88,15 +90,18 @@ def verify_region(data: bytes) -> RegionStatement:
     _check_polytope(proof)
     _check_implied(proof)
     checks: dict[int, PairCheck] = {}
+    contained: dict[int, Volume] = {}
     gaps: dict[Pair, float] = {}
+    check_contained(scene, {id(volume): volume for part in proof.proofs for volume in part.volumes}.values())
     for part in proof.proofs:
         ground = part.ground
         if id(ground) not in checks:
             check_ground(scene, ground)
             _check_inside(proof, ground)
-            checks[id(ground)] = PairCheck(scene, ground)
+            checks[id(ground)] = PairCheck(scene, ground, contained)
         statement = checks[id(ground)].verify(part)
-        gaps |= {pair: max(statement.gap, gaps.get(pair, 0.0)) for pair in statement.pairs}
+        for pair in statement.pairs:
+            gaps[pair] = max(statement.gap, gaps.get(pair, 0.0))
     missing = next((pair for pair in scene.pairs if pair not in gaps), None)
     if missing:
         raise ProofError("proof_pairs", f"no proof covers the pair {missing.a} and {missing.b}")
@@ -106,10 +111,12 @@ def verify_region(data: bytes) -> RegionStatement:
 def _check_polytope(proof: RegionProof) -> None:
     """The region has the joint limits among its rows, a point strictly inside, and is Archimedean, hence bounded."""
     scene, n = proof.scene, proof.scene.n
-    if proof.C.ndim != 2 or proof.C.shape[1] != n or proof.d.shape != (len(proof.C),) or proof.interior.shape != (n,):
+    if max(proof.d.size, proof.implied.d.size) > limits.FACES:
+        raise ProofError("proof_too_large", f"the region has more than {limits.FACES} half-spaces, or implies more")
+    if proof.C.shape != (proof.d.size, n) or proof.d.ndim != 1 or proof.interior.shape != (n,):
         raise ProofError("proof_malformed", "the region's arrays do not fit the scene")
-    limits = scene.polytope(np.zeros((0, n)), np.zeros(0))
-    if not _among(proof.C, proof.d, limits.C, limits.d):
+    limited = scene.polytope(np.zeros((0, n)), np.zeros(0))
+    if not _among(proof.C, proof.d, limited.C, limited.d):
         raise ProofError("proof_limits", "the joint limits are not among the region's half-spaces")
     point = [exact(x) for x in proof.interior]
     for c, d in zip(proof.C, proof.d, strict=True):
@@ -122,10 +129,12 @@ def _check_polytope(proof: RegionProof) -> None:
 def _check_implied(proof: RegionProof) -> None:
     """The multipliers prove the implied half-spaces."""
     implied, n = proof.implied, proof.scene.n
-    if implied.C.shape != (len(implied.d), n) or implied.Y.shape != (len(implied.d), len(proof.d)):
+    h = implied.d.size
+    if implied.d.shape != (h,) or implied.C.shape != (h, n) or implied.Y.shape != (h, len(proof.d)):
         raise ProofError("proof_malformed", "the implied half-spaces do not fit the region")
+    rows = Halfspaces(proof.C, proof.d)
     for c, d, y in zip(implied.C, implied.d, implied.Y, strict=True):
-        if not holds(proof.C, proof.d, c, float(d), y):
+        if not rows.lie_in(c, float(d), y):
             raise ProofError("proof_implied", "the multipliers do not prove a half-space around the region")
 
 

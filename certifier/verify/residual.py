@@ -22,6 +22,7 @@ from flint import fmpq
 
 from certifier.errors import ProofError
 from certifier.model import Array, Volume
+from certifier.proof import limits
 from certifier.proof.pair import Side, lower_triangle
 from certifier.verify import limbs
 from certifier.verify.kinematics import ExactKinematics, exact
@@ -30,7 +31,6 @@ POSITION_BITS = 128
 MAX_CHAIN = 7
 """With k joints 4^k products of two limbs of a factor are added, and 4 such sums, as a factor's 64 bits are 4 limbs: below 2^52. Then
 k + 1 differences of two products of matrices are, 16 arrays below 2^48."""
-MAX_EXPONENT = 1000
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def largest_residual(
     if side.chain != numerators.chain or side.mantissa.shape != shape or side.exponent.shape != (len(weights),):
         raise ProofError("proof_malformed", f"the Gram factors of {', '.join(volume.geometries)} do not fit")
     exponents = [2 * int(e) for e in side.exponent]
-    if max(map(abs, exponents)) > 2 * MAX_EXPONENT:
+    if max(map(abs, exponents)) > 2 * limits.EXPONENT:
         raise ProofError("proof_malformed", "a Gram factor is out of range")
 
     (places, vertex_bits), plane_bits, weight_bits = dyadic(vertices), _bits(plane), _bits(weights)

@@ -1,4 +1,7 @@
-"""Exact checks need a model that makes sense: a tree of rigid links, limits that tan((q - q*)/2) can express, bodies that are not empty."""
+"""Exact checks need a model that makes sense: a tree of rigid links, limits that tan((q - q*)/2) can express, bodies that are not empty.
+
+It must also be one whose statement can be printed, names and reasons as they stand, and that can be checked within limits.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from certifier.document import LARGEST
 from certifier.errors import ProofError
-from certifier.model import WORLD, Joint, JointKind, Scene
-from certifier.proof.container import LARGEST, malformed
+from certifier.model import WORLD, Joint, JointKind, Scene, escaped, is_name, is_sentence
+from certifier.proof import limits
 
 RIGID = 1e-9
 """How far the numbers of a rotation or of an axis may be from orthonormal; those of a parsed model are so to about 1e-16."""
@@ -20,13 +24,14 @@ def check_scene(scene: Scene) -> None:
     """Check the model that a proof is about.
 
     Raises:
-        ProofError: proof_model, with what is wrong.
+        ProofError: proof_model, with what is wrong, or proof_too_large.
     """
-    with malformed():
-        _check_tree(scene)
-        for joint in scene.joints:
-            _check_joint(scene, joint)
-        _check_bodies(scene)
+    _check_size(scene)
+    _check_words(scene)
+    _check_tree(scene)
+    for joint in scene.joints:
+        _check_joint(scene, joint)
+    _check_bodies(scene)
 
 
 def _require(condition: Any, problem: str) -> None:
@@ -34,26 +39,50 @@ def _require(condition: Any, problem: str) -> None:
         raise ProofError("proof_model", f"the model of the proof makes no sense: {problem}")
 
 
+def _check_size(scene: Scene) -> None:
+    numbers = {
+        "joints": (len(scene.joints), limits.JOINTS),
+        "bodies": (len(scene.bodies), limits.JOINTS + 1),
+        "joints that move": (len(scene.q_star), limits.POSITIONS),
+        "geometries": (len(scene.geometries), limits.GEOMETRIES),
+        "vertices of a geometry": (max((len(g.vertices) for g in scene.geometries), default=0), limits.VERTICES),
+        "pairs": (len(scene.pairs), limits.PAIRS),
+        "ignored pairs": (len(scene.ignored), limits.PAIRS),
+    }
+    for what, (number, most) in numbers.items():
+        if number > most:
+            raise ProofError("proof_too_large", f"the model of the proof has {number} {what}; at most {most} are checked")
+
+
+def _check_words(scene: Scene) -> None:
+    for what, names in (
+        ("joint", [joint.name for joint in scene.joints]),
+        ("body", scene.bodies),
+        ("geometry", [geometry.name for geometry in scene.geometries]),
+    ):
+        wrong = next((name for name in names if not is_name(name)), None)
+        _require(wrong is None, f"{escaped(str(wrong))[:100]} is no name for a {what}")
+        _require(len(set(names)) == len(names), f"two of them are called the same: a {what}")
+    _require(all(g.substitution is None or is_sentence(g.substitution) for g in scene.geometries), "a substitution is no sentence")
+    _require(all(is_sentence(ignored.reason) for ignored in scene.ignored), "the reason why a pair is ignored is no sentence")
+
+
 def _finite(*values: Any) -> bool:
     return all(isinstance(x, (int, float)) and not isinstance(x, bool) and abs(x) <= LARGEST for x in values)
 
 
-def _unique(names: Iterable[Any]) -> bool:
-    names = list(names)
-    return all(isinstance(name, str) for name in names) and len(set(names)) == len(names)
-
-
 def _check_tree(scene: Scene) -> None:
     above = {joint.child: joint.parent for joint in scene.joints}
-    _require(_unique(scene.bodies) and WORLD in scene.bodies, "its bodies")
     _require(
         len(above) == len(scene.joints) and {*above, WORLD} == set(scene.bodies) and WORLD not in above, "every body has one joint above"
     )
     for body in scene.bodies:
         path = [body]
         while path[-1] != WORLD:
-            _require(len(path) <= len(above) and above[path[-1]] in scene.bodies, f"{body} does not hang on the world")
+            _require(len(path) <= limits.PATH, f"{body} does not hang on the world by at most {limits.PATH} joints")
+            _require(above[path[-1]] == WORLD or above[path[-1]] in above, f"the parent of {path[-1]} is no body")
             path.append(above[path[-1]])
+    _require(scene.q_star.size, "no joint of it moves")
     positions = [joint.index for joint in scene.joints if joint.index is not None]
     _require(scene.q_star.shape == (len(positions),) and (np.abs(scene.q_star) <= LARGEST).all(), "q*")
     _require(all(type(i) is int for i in positions) and sorted(positions) == list(range(scene.n)), "the joints' positions")
@@ -77,12 +106,17 @@ def _check_joint(scene: Scene, joint: Joint) -> None:
 
 def _check_bodies(scene: Scene) -> None:
     _require(_finite(scene.padding) and scene.padding >= 0, "the padding")
-    _require(_unique(geometry.name for geometry in scene.geometries), "the geometries' names")
+    bodies, names = set(scene.bodies), {geometry.name for geometry in scene.geometries}
     for geometry in scene.geometries:
         vertices = geometry.vertices
-        _require(geometry.body in scene.bodies, f"the body of {geometry.name}")
-        _require(vertices.ndim == 2 and len(vertices) > 0 and (np.abs(vertices) <= LARGEST).all(), f"the vertices of {geometry.name}")
+        _require(geometry.body in bodies, f"the body of {geometry.name}")
+        _require(vertices.ndim == 2 and vertices.shape[1] == 3 and len(vertices) > 0, f"the vertices of {geometry.name}")
+        _require((np.abs(vertices) <= LARGEST).all(), f"the vertices of {geometry.name}")
         _require(_finite(geometry.radius) and geometry.radius >= 0, f"the radius of {geometry.name}")
-    names = {geometry.name for geometry in scene.geometries}
     _require(len(set(scene.pairs)) == len(scene.pairs), "its pairs")
-    _require(all(p.a in names and p.b in names and p.a != p.b for p in scene.pairs), "a pair of unknown geometries")
+    for what, pairs in (("a pair", scene.pairs), ("an ignored pair", scene.ignored)):
+        _require(_all_known(names, pairs), f"{what} of unknown geometries")
+
+
+def _all_known(names: set[str], pairs: Iterable[Any]) -> bool:
+    return all(p.a in names and p.b in names and p.a != p.b for p in pairs)

@@ -11,15 +11,27 @@ vertices are taken into the volume's frame through welds; fixed frames are rigid
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from flint import fmpq
 
 from certifier.errors import ProofError
 from certifier.model import Array, Geometry, Scene, Volume
+from certifier.proof import limits
 from certifier.verify.kinematics import ExactKinematics, exact
 
 Point = tuple[fmpq, ...]
+
+
+def check_contained(scene: Scene, volumes: Iterable[Volume]) -> None:
+    """Check that it is within limits to see whether the volumes contain their geometries.
+
+    Raises:
+        ProofError: proof_too_large.
+    """
+    larger = (volume.geometries for volume in volumes if _is_known(scene, volume) and not volume.is_geometry_of(scene))
+    if sum(len(scene.geometry(name).vertices) for names in larger for name in names) > limits.CONTAINED:
+        raise ProofError("proof_too_large", f"the proof's volumes stand for more than {limits.CONTAINED} vertices of geometries")
 
 
 def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> None:
@@ -28,9 +40,8 @@ def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> N
     Raises:
         ProofError: it does not; the message names the geometry.
     """
-    known = {geometry.name for geometry in scene.geometries}
-    if not volume.geometries or not known.issuperset(volume.geometries):
-        raise ProofError("proof_volume", f"a volume stands for what is no geometry of the scene: {', '.join(volume.geometries)}")
+    if not _is_known(scene, volume):
+        raise ProofError("proof_volume", "a volume stands for nothing, or for what is no geometry of the scene")
     if volume.is_geometry_of(scene):
         return
     if volume.vertices.ndim != 2 or volume.vertices.shape[1] != 3 or len(volume.vertices) == 0 or not volume.radius >= 0:
@@ -49,6 +60,11 @@ def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> N
                 or _near_segment(v, corners, reach - radius)
             ):
                 raise ProofError("proof_volume", f"{name} is not contained in the volume that stands for it")
+
+
+def _is_known(scene: Scene, volume: Volume) -> bool:
+    """Whether the volume names geometries of the scene, and at least one."""
+    return bool(volume.geometries) and all(map(scene.has_geometry, volume.geometries))
 
 
 def _vertices(kinematics: ExactKinematics, body: str, geometry: Geometry) -> list[Point]:

@@ -1,5 +1,6 @@
 """What each room may import from outside: import-linter holds the rooms apart, this holds them to their third parties."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -59,18 +60,22 @@ class Absent:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 sys.meta_path.insert(0, Absent())
-from client.cli import main
-
-sys.exit(main(sys.argv[1:]))
 """
 
 
-def ciris(*arguments: object) -> "subprocess.CompletedProcess[str]":
-    """The command where nothing is installed but what `pip install '.[verify]'` installs."""
-    return subprocess.run([sys.executable, "-c", VERIFY_ONLY, *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, check=False)
+@pytest.fixture
+def bare(tmp_path: Path) -> dict[str, str]:
+    """The surroundings of processes that find nothing but what `pip install '.[verify]'` installs; their children's are the same."""
+    (tmp_path / "sitecustomize.py").write_text(VERIFY_ONLY)
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
 
 
-def test_every_proof_is_checked_where_only_numpy_and_flint_are_installed(tmp_path: Path) -> None:
+def ciris(bare: dict[str, str], *arguments: object) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-m", "client.cli", *map(str, arguments)]
+    return subprocess.run(command, cwd=ROOT, env=bare, capture_output=True, text=True, check=False)
+
+
+def test_every_proof_is_checked_where_only_numpy_and_flint_are_installed(tmp_path: Path, bare: dict[str, str]) -> None:
     words = {
         "region": "6 pairs of bodies separated",
         "pair": "are at least",
@@ -80,19 +85,19 @@ def test_every_proof_is_checked_where_only_numpy_and_flint_are_installed(tmp_pat
     for kind, data in files().items():
         path = tmp_path / f"{kind}.proof"
         path.write_bytes(data)
-        done = ciris("verify", path)
+        done = ciris(bare, "verify", path)
         assert (done.returncode, done.stderr) == (0, "")
         assert words[kind] in done.stdout
         assert "padding" in done.stdout
         assert f"guarantee: {'numeric' if kind == 'witness' else 'exact'}" in done.stdout
         path.write_bytes(data[:-30])
-        done = ciris("verify", path)
+        done = ciris(bare, "verify", path)
         assert (done.returncode, done.stdout) == (1, "")
         assert "the proof does not hold" in done.stderr
 
 
-def test_another_command_says_what_is_missing() -> None:
-    done = ciris("scene", "ls")
+def test_another_command_says_what_is_missing(bare: dict[str, str]) -> None:
+    done = ciris(bare, "scene", "ls")
     assert (done.returncode, done.stdout) == (2, "")
     assert "httpx2" in done.stderr
     assert "pip install" in done.stderr

@@ -22,7 +22,7 @@ from certifier.polytopes.polytope import (
     support,
 )
 from certifier.polytopes.sampling import hit_and_run
-from certifier.verify.box import check_box, upper_bound
+from certifier.verify.box import Halfspaces
 
 
 def box(lower, upper):
@@ -65,7 +65,7 @@ def test_bounds_of_a_simplex():
 def test_bound_multipliers_prove_a_tight_box_exactly(case):
     polytope, _ = case
     lo, hi, Y_lo, Y_hi = bound_multipliers(polytope)
-    assert check_box(polytope.C, polytope.d, lo, hi, Y_lo, Y_hi)
+    assert Halfspaces(polytope.C, polytope.d).lie_in_box(lo, hi, Y_lo, Y_hi)
     low, high = bounds(polytope)
     scale = 1 + np.abs(polytope.d).max()
     assert np.allclose(lo, low, atol=1e-8 * scale)
@@ -83,20 +83,20 @@ def test_the_exact_checker_refuses_what_is_not_proved(case, seed):
     wrong = hi.copy()
     wrong[i] = np.nextafter(np.maximum(center[i], 0), -np.inf) if center[i] < hi[i] else -np.inf
     wrong[i] = min(wrong[i], center[i] - 1e-9)
-    assert not check_box(polytope.C, polytope.d, lo, wrong, Y_lo, Y_hi)
-    assert not check_box(polytope.C, polytope.d, lo, wrong, Y_lo, rng.exponential(size=Y_hi.shape))
-    assert not check_box(polytope.C, polytope.d, lo, hi, Y_lo, -Y_hi)
-    assert not check_box(polytope.C, polytope.d, lo, hi, Y_lo, np.full_like(Y_hi, np.nan))
-    assert not check_box(polytope.C, polytope.d, lo, hi, Y_lo[:, 1:], Y_hi)
+    assert not Halfspaces(polytope.C, polytope.d).lie_in_box(lo, wrong, Y_lo, Y_hi)
+    assert not Halfspaces(polytope.C, polytope.d).lie_in_box(lo, wrong, Y_lo, rng.exponential(size=Y_hi.shape))
+    assert not Halfspaces(polytope.C, polytope.d).lie_in_box(lo, hi, Y_lo, -Y_hi)
+    assert not Halfspaces(polytope.C, polytope.d).lie_in_box(lo, hi, Y_lo, np.full_like(Y_hi, np.nan))
+    assert not Halfspaces(polytope.C, polytope.d).lie_in_box(lo, hi, Y_lo[:, 1:], Y_hi)
 
 
 def test_the_exact_bound_is_exact():
     """0.1 is not a tenth: the residual 1 - 10 * double(0.1) is bounded by the row that bounds s alone."""
     C, d = np.array([[0.1], [1.0], [-1.0]]), np.array([0.1, 5.0, 0.0])
-    bound = upper_bound(C, d, np.ones(1), np.array([10.0, 0, 0]))
+    bound = Halfspaces(C, d).upper_bound(np.ones(1), np.array([10.0, 0, 0]))
     tenth = Fraction(0.1)
     assert Fraction(int(bound.p), int(bound.q)) == 10 * tenth  # 1 - 10 * tenth < 0 meets the lower bound, which is 0
-    assert upper_bound(C[:2], d[:2], np.ones(1), np.array([10.0, 0])) is None
+    assert Halfspaces(C[:2], d[:2]).upper_bound(np.ones(1), np.array([10.0, 0])) is None
 
 
 @settings(max_examples=30, deadline=None)
@@ -105,7 +105,7 @@ def test_support_is_proved_and_attained(case, seed):
     polytope, center = case
     c = np.random.default_rng(seed).normal(size=len(center))
     value, y = support(polytope, c)
-    exact = upper_bound(polytope.C, polytope.d, c, y)
+    exact = Halfspaces(polytope.C, polytope.d).upper_bound(c, y)
     reached = -linprog(-c, polytope.C, polytope.d, bounds=(None, None)).fun
     assert exact is not None
     assert Fraction(int(exact.p), int(exact.q)) <= Fraction(value)

@@ -215,6 +215,7 @@ def hostile(added: int, normal: float, first: float, offset: float, scale: float
         proof,
         scene=scene,
         ground=Ground(C, d, mid, half, Y_lower, Y_upper),
+        interior=np.array([ground.mid[0] - 0.9 * ground.half[0], ground.mid[1], *[0.9 * REACH] * added]),
         moments=(moments[0], moments[1]),
         equations=equations,
         normal=(aa * scale, (lifted + lifted.T) / 2 * scale),

@@ -19,13 +19,9 @@ import numpy as np
 import pytest
 
 from certifier.errors import ProofError
-from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Pair, Scene, Volume
 from certifier.outcome import Outcome
 from certifier.pair.certification import Certification
-from certifier.pair.closest import closest
-from certifier.polytopes.polytope import chebyshev_center
-from certifier.polytopes.sampling import hit_and_run
 from certifier.proof.container import pack, unpack
 from certifier.proof.negative import DualProof
 from certifier.proof.region import RegionProof
@@ -34,21 +30,10 @@ from certifier.verify.region import RegionStatement, verify_region
 from certifier.verify.witness import verify_witness
 from tests.certifier.proofs import dual, region, scene, witness
 from tests.certifier.scenes import box, cube
+from tests.certifier.truth import distances
 
 CAMPAIGN = 1000
 LONG_CAMPAIGN = 20_000
-
-
-def distances(world: Scene, C: np.ndarray, d: np.ndarray, count: int) -> dict[Pair, float]:
-    """Least distance of each pair's padded bodies over samples of the polytope, in floating point."""
-    polytope = world.polytope(C, d)
-    s = hit_and_run(polytope, chebyshev_center(polytope)[0], count, 0)
-    kinematics, found = Kinematics(world), {}
-    for pair in world.pairs:
-        a, b = world.geometry(pair.a), world.geometry(pair.b)
-        A, B = (kinematics.points(WORLD, g.body, g.vertices, s) for g in (a, b))
-        found[pair] = min(closest(x, y).gap for x, y in zip(A, B, strict=True)) - a.radius - b.radius - 2 * world.padding
-    return found
 
 
 @cache

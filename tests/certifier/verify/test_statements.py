@@ -12,7 +12,7 @@ from certifier.jobs.region import certified_region
 from certifier.model import Ignored, Volume
 from certifier.pair.certification import Certification
 from certifier.proof.pair import Ground, PairProof, Side
-from certifier.verify.pair import verify_pair
+from certifier.verify.pair import PairCheck, verify_pair
 from certifier.verify.region import verify_region
 from tests.certifier.scenes import accepted, cube, planar_arm
 
@@ -33,9 +33,12 @@ def test_a_plane_without_a_normal_on_an_empty_polytope_is_refused():
             factor[:, 1:, 1, 1] = root * 1.6
         mantissas.append(Side.rounded(chain, factor, "int64"))
     plane = np.zeros((4, 2))
-    proof = PairProof(scene, volumes, "world", limits, plane, 1.0, 0.0, (0, 1), (mantissas[0], mantissas[1]))
+    proof = PairProof(scene, volumes, "world", limits, np.zeros(1), plane, 1.0, 0.0, (0, 1), (mantissas[0], mantissas[1]))
     with pytest.raises(ProofError) as refusal:
         verify_pair(proof)
+    assert refusal.value.code == "proof_interior"
+    with pytest.raises(ProofError) as refusal:
+        PairCheck(scene, limits).verify(proof)
     assert refusal.value.code == "proof_norm"
 
 
