@@ -23,6 +23,7 @@ from api.access import READ, Db
 from api.routers import jobs, regions, scenes
 from api.schemas.jobs import GrowthPoint, Iteration, Job, PairCell, PairMatrix
 from api.schemas.scenes import PairInfo
+from certifier.verify.decimals import at_least_mm
 from db.session import Database
 
 _ROOT = Path(dashboard.__file__).parent
@@ -35,6 +36,7 @@ _SECURITY = {
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse, dependencies=[READ])
 templates = Jinja2Templates(_ROOT / "templates")
+templates.env.filters["at_least_mm"] = at_least_mm
 
 
 def install(app: FastAPI) -> None:
@@ -179,7 +181,7 @@ def _cell(cell: PairCell | None, pair: int, iteration: Iteration) -> Cell:
     if cell.seconds is not None:
         parts.append(f"{cell.seconds:.3g} s")
     if cell.margin is not None:
-        parts.append(f"margin {1000 * cell.margin:.3g} mm")
+        parts.append(f"margin at least {at_least_mm(cell.margin)}")
     if cell.witness_q is not None:
         parts.append("in collision at q = " + ", ".join(f"{value:.4g}" for value in cell.witness_q))
     if cell.detail:

@@ -18,6 +18,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from flint import arb, ctx
 from numpy.typing import ArrayLike, NDArray
 
 from certifier.document import Node
@@ -170,11 +171,19 @@ class Scene:
 
     @cached_property
     def s_lower(self) -> Array:
-        return self.to_s(self.q_lower)
+        return self._limits_in_s(self.q_lower)
 
     @cached_property
     def s_upper(self) -> Array:
-        return self.to_s(self.q_upper)
+        return self._limits_in_s(self.q_upper)
+
+    def _limits_in_s(self, limits: Array) -> Array:
+        """Tangent-space coordinates of joint limits, (n,), the same on every machine.
+
+        Proofs rest on them to the last bit, and NumPy's tangent depends on the processor; that of ball arithmetic does not.
+        """
+        delta = limits - self.q_star
+        return np.array([_tangent(x / 2) if revolute else x for x, revolute in zip(delta.tolist(), self.revolute, strict=True)])
 
     def to_s(self, q: ArrayLike) -> Array:
         """Tangent-space coordinates of positions q, (..., n) -> (..., n)."""
@@ -286,6 +295,15 @@ class Scene:
         if document.get("hash", scene.hash) != scene.hash:
             raise SceneError("scene_hash", "the scene's stored hash does not match its content")
         return scene
+
+
+def _tangent(angle: float) -> float:
+    precision = ctx.prec
+    ctx.prec = 256
+    try:
+        return float(arb(angle).tan().mid())
+    finally:
+        ctx.prec = precision
 
 
 def _read(document: Any) -> Scene:

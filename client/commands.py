@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from certifier.errors import CirisError
+from certifier.verify.decimals import at_most_mm, exactly
 from client import output, service
 from client.find import api_key, service_url
 from client.http import Client
@@ -65,7 +66,7 @@ def scene_show(args: Namespace) -> int:
     if args.json:
         print_json({**scene, "lint": lint, "pair_list": pairs})
         return OK
-    print(f"{scene['name']} ({scene['id']}), padding {output.metres(scene['padding'])}")
+    print(f"{scene['name']} ({scene['id']}), padding {exactly(scene['padding'])} m")
     rows = [(j["name"], j["kind"], f"{j['lower']:.4f}", f"{j['upper']:.4f}", f"{j['q_star']:.4f}") for j in scene["positions"]]
     output.print_table(("joint", "kind", "lower", "upper", "q*"), rows, right="lower upper q*")
     print()
@@ -75,7 +76,7 @@ def scene_show(args: Namespace) -> int:
     ]
     output.print_table(("pair", "frame", "Gram", "N", "forecast"), rows, right="Gram N forecast")
     for item in lint["substitutions"]:
-        print(f"{item['geometry']}: {item['substitution']} (reaches outside by at most {output.metres(item['inflation'])})")
+        print(f"{item['geometry']}: {item['substitution']} (reaches outside by at most {at_most_mm(item['inflation'])})")
     for item in lint["ignored"]:
         print(f"ignored: {item['a']} - {item['b']} ({item['reason']})")
     for warning in lint["warnings"]:

@@ -8,6 +8,8 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from certifier.verify.decimals import at_least_mm
+
 Row = Sequence[str]
 
 NEGATIVE = {"not_grown"}
@@ -76,9 +78,9 @@ def seconds(value: float | None) -> str:
     return f"{value:.2f} s" if value < 10 else f"{value:.0f} s" if value < 600 else f"{value / 60:.0f} min"
 
 
-def metres(value: float | None) -> str:
-    """Returns a distance, in metres, as a text for people, in millimetres."""
-    return "-" if value is None else f"{1000 * value:.3g} mm"
+def margin(value: float | None) -> str:
+    """Returns a lower bound of a distance, in metres, as a text for people that is no larger."""
+    return "-" if value is None else at_least_mm(value)
 
 
 def print_pairs(pairs: Iterable[dict[str, Any]]) -> None:
@@ -86,7 +88,7 @@ def print_pairs(pairs: Iterable[dict[str, Any]]) -> None:
     ordered = sorted(pairs, key=lambda pair: pair["outcome"] != "certified")
     timed = any("stage" in pair for pair in ordered)
     rows = [
-        (f"{p['a']} - {p['b']}", plain(p["outcome"]), metres(p["margin"]), *((plain(p["stage"]), seconds(p["seconds"])) if timed else ()))
+        (f"{p['a']} - {p['b']}", plain(p["outcome"]), margin(p["margin"]), *((plain(p["stage"]), seconds(p["seconds"])) if timed else ()))
         for p in ordered
     ]
     print_table(("pair", "outcome", "margin", *(("stage", "time") if timed else ())), rows, right="margin time")
@@ -107,7 +109,7 @@ def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()
             ("faces", f"{faces}, {limits} of them joint limits" if faces > limits else str(faces)),
             ("volume", f"inscribed ellipsoid {volume['ellipsoid']:.4g}, polytope {polytope} (in s)"),
             ("pairs", f"{sum(p['outcome'] == 'certified' for p in pairs)} of {len(pairs)} certified, {len(manifest['ignored'])} ignored"),
-            *([("margin", f"at least {metres(closest['margin'])}: {closest['a']} - {closest['b']}")] if closest else []),
+            *([("margin", f"at least {margin(closest['margin'])}: {closest['a']} - {closest['b']}")] if closest else []),
             ("guarantee", manifest["guarantee"]),
             *extra,
         ]

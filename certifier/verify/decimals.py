@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 
-def rounded_down(x: float, digits: int = 3) -> str:
-    """The largest decimal of so many significant digits that is no more than x, a finite number."""
-    return f"{Context(digits, ROUND_FLOOR).create_decimal_from_float(x):g}"
+def rounded_down(x: float, digits: int = 3, times: int = 1) -> str:
+    """Returns the largest decimal of so many significant digits that is no more than x, a finite number, times a whole number."""
+    return f"{Context(digits, ROUND_FLOOR).multiply(Decimal(x), Decimal(times)):g}"
 
 
-def rounded_up(x: float, digits: int = 3) -> str:
-    """The least decimal of so many significant digits that is no less than x, a finite number."""
-    return f"{Context(digits, ROUND_CEILING).create_decimal_from_float(x):g}"
+def rounded_up(x: float, digits: int = 3, times: int = 1) -> str:
+    """Returns the least decimal of so many significant digits that is no less than x, a finite number, times a whole number."""
+    return f"{Context(digits, ROUND_CEILING).multiply(Decimal(x), Decimal(times)):g}"
+
+
+def at_least_mm(metres: float) -> str:
+    """Returns a lower bound in metres as a text in millimetres that is no larger."""
+    return f"{rounded_down(metres, times=1000)} mm"
+
+
+def at_most_mm(metres: float) -> str:
+    """Returns an upper bound in metres as a text in millimetres that is no smaller."""
+    return f"{rounded_up(metres, times=1000)} mm"
 
 
 def exactly(x: float) -> str:
-    """The shortest decimal that is read back as this double."""
+    """Returns the shortest decimal that is read back as this double."""
     return repr(float(x))

@@ -1,10 +1,16 @@
-"""Names and sentences: what a statement may print."""
+"""Names and sentences: what a statement may print. Joint limits in s: the same on every machine."""
 
 from __future__ import annotations
 
-import pytest
+import math
 
-from certifier.model import escaped, is_name, is_sentence
+import numpy as np
+import pytest
+from flint import arb, ctx
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from certifier.model import WORLD, Joint, JointKind, Scene, escaped, is_name, is_sentence
 
 
 @pytest.mark.parametrize("name", ["world", "arm/link_1/Box_2", "a::b/c", "sub/a b (1) [2], x=3", "m/world-a", "a@b#c+d", "x" * 200])
@@ -29,3 +35,17 @@ def test_sentences():
 def test_escaped_text_is_one_printable_line_and_tells_different_texts_apart():
     assert escaped("a\n\x1b[31m\u202e\ud800\\n") == "a\\n\\x1b[31m\\u202e\\ud800\\\\n"
     assert escaped("4 mm \u00fcber") == "4 mm \u00fcber"
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5))
+def test_joint_limits_are_the_doubles_nearest_to_their_tangents(upper, center):
+    assume(-3.14 < upper - center < 3.14)
+    joint = Joint("a/j", JointKind.REVOLUTE, WORLD, "a/b", np.array([0.0, 0.0, 1.0]), np.eye(4), np.eye(4), 0, upper - 0.1, upper)
+    scene = Scene("s", (joint,), (WORLD, "a/b"), (), (), (), np.array([center]))
+    precision, ctx.prec = ctx.prec, 1000
+    try:
+        exact = (arb(upper - center) / 2).tan()
+        error = abs(arb(float(scene.s_upper[0])) - exact)
+        assert error <= arb(math.ulp(float(scene.s_upper[0]))) * 0.5000001
+    finally:
+        ctx.prec = precision

@@ -98,7 +98,7 @@ def matrix() -> PairMatrix:
 def test_the_matrix_has_a_cell_for_every_pair_and_iteration(matrix: PairMatrix) -> None:
     rows = matrix_rows(matrix)
     assert [[cell.state for cell in row.cells] for row in rows] == [["certified", "reused"], ["refuted", "running"], ["absent", "open"]]
-    assert rows[0].cells[0].title == "certified; by sos; 0.5 s; margin 12.3 mm"
+    assert rows[0].cells[0].title == "certified; by sos; 0.5 s; margin at least 12.3 mm"
     assert rows[0].cells[1].title == "certified by the proof of iteration 0"
     assert rows[1].cells[0].title == "refuted; in collision at q = 0.5, 1"
 
