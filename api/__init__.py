@@ -1,1 +1,1 @@
-"""The HTTP service: routes, schemas, problems, events and the dashboard's pages. Never loads Drake."""
+"""This is the HTTP service: routes, schemas, problems, events and the dashboard's pages. It never loads Drake."""

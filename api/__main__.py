@@ -1,4 +1,4 @@
-"""``python -m api``: the HTTP service on the settings' host and port, on a migrated database."""
+"""``python -m api`` runs the HTTP service on the host and port of the settings. The database must be migrated already."""
 
 from __future__ import annotations
 
@@ -15,19 +15,23 @@ from db import keys, logs
 from db.settings import settings
 
 SHUTDOWN_SECONDS = 2
-"""How long open streams may hold up the end."""
+"""When the service ends, open streams may delay its end by at most this many seconds."""
 KEEP_ALIVE_SECONDS = 75
-"""Longer than clients keep idle connections: whoever closes first must not be the one who answers."""
+"""The service keeps an idle connection open for this many seconds. This is longer than clients keep one: if the service
+closed first, a client's next request could be lost.
+"""
 BACKLOG = 2048
-"""Connections that may wait to be taken, as many as uvicorn has by itself."""
+"""At most this many connections may wait until the service accepts them. The number is uvicorn's own default."""
 NOT_STARTED = 3
-"""The exit status that ``uvicorn.run`` has then."""
+"""The process exits with this status when the server did not start, as ``uvicorn.run`` does."""
 GARBAGE = 20_000, 10, 100
-"""After how many objects, and passes, the collector looks at the young, the middle and the old ones."""
+"""The thresholds of Python's garbage collector: how many new objects start a pass over the young objects, then how many passes
+start one over the middle and over the old objects.
+"""
 
 
 def main() -> None:
-    """Serves until a signal ends it; refuses an address that others can reach while there are no keys."""
+    """Serves until a signal ends the process. It refuses an address that others can reach while there are no API keys."""
     logs.configure("api")
     try:
         keys.check_bind(settings())
@@ -51,13 +55,16 @@ def main() -> None:
 
 
 def _shared_socket() -> socket.socket:
-    """Listens beside the other API processes of this service; the kernel deals out the connections."""
+    """Returns a listening socket on the port that all API processes of this service share. The kernel distributes the connections."""
     address = settings().host, settings().port
     return socket.create_server(address, family=settings().family, reuse_port=True, backlog=BACKLOG)
 
 
 def _frozen_app() -> FastAPI:
-    """The application. Looking for garbage stops every request: never in what is loaded with it, and seldom in the rest."""
+    """Makes the application, and limits how often the garbage collector runs, because it stops every request while it runs.
+
+    The collector never looks at objects that exist when the application is made, and seldom at the later ones.
+    """
     app = create_app()
     gc.collect()
     gc.freeze()

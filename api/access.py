@@ -1,4 +1,4 @@
-"""Who is asking and what they may do, and the database for those who may."""
+"""This module finds out who sends a request and what the caller may do, and gives the routes the database."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from db.session import Database
 
 COOKIE = "ciris_key"
 KEYS_SECONDS = 1.0
-"""How long what was read of the keys is believed."""
+"""The keys that were read from the database are trusted for this many seconds."""
 AGAIN_SECONDS = 0.1
-"""Between two looks for keys that are not known yet, whoever and however many ask for them."""
+"""When requests bring unknown keys, the database is read at most once in this many seconds, however many requests there are."""
 
 
 @dataclass(frozen=True)
 class Caller:
-    """Who made a request; without a key where the service asks for none."""
+    """A caller is whoever sent a request. The caller has no key where the service asks for none."""
 
     scope: Scope
     key_id: str | None = None
@@ -36,10 +36,10 @@ class Caller:
 
 
 class Keyring:
-    """Tells callers by their keys, which are read from the database once in half of ``KEYS_SECONDS`` and not for every request.
+    """A keyring recognises callers by their keys. It reads the keys about twice in ``KEYS_SECONDS``, not for every request.
 
-    A key that was revoked is refused after that time at the latest; while the database answers, nobody waits for it. What strangers
-    send is not kept, and makes nobody read more than once in ``AGAIN_SECONDS``.
+    A revoked key is refused after ``KEYS_SECONDS`` at the latest. While the database answers, no request waits for a reading. What
+    strangers send is not stored, and makes the keyring read the database at most once in ``AGAIN_SECONDS``.
     """
 
     def __init__(self, database: Database, *, open_without_keys: bool) -> None:
@@ -49,7 +49,7 @@ class Keyring:
         self._reading: asyncio.Future[None] | None = None
 
     async def caller(self, given: str | None) -> Caller | None:
-        """The caller by the key that came with a request; None for those who may not come in by what is known."""
+        """Returns the caller to whom the key of a request belongs; None when the keys known now do not let this caller in."""
         ring = await self._as_of(time.monotonic() - KEYS_SECONDS)
         if self._read_at < time.monotonic() - KEYS_SECONDS / 2:
             self._read_soon()
@@ -59,23 +59,27 @@ class Keyring:
         return Caller(Scope.ADMIN) if self._open and not ring.keys else None
 
     async def newcomer(self, given: str | None) -> Caller | None:
-        """The caller by a key that :meth:`caller` does not know, in case it has just been made."""
+        """Returns the caller of a key that :meth:`caller` does not know, which may have just been made; else None."""
         if given is None or not self._ring.misses(given):
             return None
         await self._as_of(time.monotonic(), pause=AGAIN_SECONDS)
         return await self.caller(given)
 
     async def _as_of(self, moment: float, pause: float = 0.0) -> Ring:
-        """The keys as they were at that moment or later. Of many who ask one reads, ``pause`` after the last reading; it fails for all."""
+        """Returns the keys as they were at that moment or later.
+
+        Of many requests that wait, one reads: ``pause`` seconds after the last reading began. If it fails, it fails for all of them.
+        """
         while self._read_at < moment:
             await asyncio.shield(self._read_soon(pause))
         return self._ring
 
     def _read_soon(self, pause: float = 0.0) -> asyncio.Future[None]:
-        """The reading under way, begun if there is none."""
+        """Returns the reading that is under way, and starts one if there is none."""
         if self._reading is None:
             self._reading = asyncio.ensure_future(self._read_again(self._read_at + pause))
-            self._reading.add_done_callback(lambda reading: reading.cancelled() or reading.exception())  # nobody may be waiting for it
+            # Looking at the error keeps asyncio from complaining about it when nobody waits for the reading.
+            self._reading.add_done_callback(lambda reading: reading.cancelled() or reading.exception())
         return self._reading
 
     async def _read_again(self, not_before: float) -> None:
@@ -93,7 +97,7 @@ class Keyring:
 
 
 def presented_key(headers: Headers) -> str | None:
-    """The key that came with a request, in the Authorization header or else the cookie."""
+    """Returns the key that came with a request: that of the Authorization header, or else that of the cookie."""
     kind, _, value = headers.get("authorization", "").partition(" ")
     if kind.lower() == "bearer":
         return value.strip()
@@ -101,14 +105,17 @@ def presented_key(headers: Headers) -> str | None:
 
 
 class _Needs(HTTPBearer):
-    """The dependency of a route that needs a scope: the caller that the guard has let in. What it inherits documents the key."""
+    """A route depends on this when it needs a scope. It returns the caller whom the guard has let in.
+
+    The base class makes the OpenAPI document say that the route needs a key.
+    """
 
     def __init__(self, scope: Scope) -> None:
         super().__init__(scheme_name="key", description="An API key. The service on loopback needs none until one is made.")
         self._scope = scope
 
     async def __call__(self, request: Request) -> Caller:  # type: ignore[override]
-        """The caller, if the scope suffices.
+        """Returns the caller if the scope of its key suffices.
 
         Raises:
             CirisError: scope_missing.
@@ -121,7 +128,7 @@ class _Needs(HTTPBearer):
 
 
 READ, SUBMIT, ADMIN = (Security(_Needs(scope), scopes=[scope.value]) for scope in Scope)
-"""Dependencies of a route: the scope that it needs."""
+"""A route depends on one of these to demand that scope."""
 
 Submitter = Annotated[Caller, SUBMIT]
 

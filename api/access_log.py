@@ -1,4 +1,4 @@
-"""One log line for every request: what was asked, by whom, what came of it, how long it took. Never what was in it."""
+"""The access log has one line for every request: what was asked, who asked, the status, and the time it took. It never shows bodies."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ log = logging.getLogger(__name__)
 
 
 class AccessLog:
-    """ASGI middleware, the outermost; it counts the requests too. A stream is logged when it ends."""
+    """This ASGI middleware writes the log line of each request and counts it. It is the outermost one. It logs a stream when it ends."""
 
     def __init__(self, app: ASGIApp, requests: Requests) -> None:
         self._app, self._requests = app, requests

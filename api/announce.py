@@ -1,4 +1,7 @@
-"""Telling the control worker of jobs: one message after the other, so that a Redis that is slow or away takes no threads of requests."""
+"""The API tells the control worker about jobs, one message after the other.
+
+So a Redis that is slow or away does not occupy the threads that answer requests.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +13,17 @@ from fastapi import Depends, Request
 from workers.app import send_coordinate
 
 WAITING = 1000
-"""Messages that may wait; the sweeper sends what is dropped."""
+"""At most this many messages wait. The API drops the ones beyond, and the sweeper sends them later."""
 
 
 class Announcer:
-    """Sends messages after the answers that they follow from."""
+    """An announcer sends messages to the control worker. It sends each one after the route has answered."""
 
     def __init__(self) -> None:
         self._limiter = CapacityLimiter(1)
 
     async def announce(self, job_id: str) -> None:
-        """Asks for a coordination of the job."""
+        """Asks the control worker to coordinate the job."""
         if self._limiter.statistics().tasks_waiting < WAITING:
             await to_thread.run_sync(send_coordinate, job_id, limiter=self._limiter)
 

@@ -1,4 +1,4 @@
-"""The application: routes, problems, the guard and the dashboard put together."""
+"""The application puts the routes, the problems, the guard and the dashboard together."""
 
 from __future__ import annotations
 
@@ -24,16 +24,17 @@ from db.settings import LOOPBACK_NAMES, settings
 
 DESCRIPTION = """Certified collision-free regions of robot configuration space.
 
-A scene goes in, a job grows or certifies a polytope, its regions come out with proofs that anyone can check offline.
-Errors are problem+json (RFC 9457) with a `code`, the `field` and a `hint`; unknown fields and numbers that are not finite are refused."""
+You upload a scene and start a job that grows or certifies a polytope. You get certified regions with proofs that anyone can check
+offline. Errors are problem+json (RFC 9457) with a `code`, the `field` and a `hint`. The service refuses unknown fields and numbers that
+are not finite."""
 
 
 THREADS = CONNECTIONS - AT_ONCE - READERS
-"""What is left of the connections when two uploads or checks and the routes that only read have theirs."""
+"""All other requests share this many threads: those connections that uploads, checks and reading routes leave."""
 
 
 def create_app(db: Database | None = None) -> FastAPI:
-    """The service on this database; default: the one of the settings."""
+    """Makes the service on this database; the default is the database of the settings."""
     app = FastAPI(
         title="ciris",
         version="1",
@@ -67,7 +68,7 @@ def create_app(db: Database | None = None) -> FastAPI:
 
 @asynccontextmanager
 async def _lifespan(_app: FastAPI) -> AsyncIterator[None]:
-    """Requests are answered by a few threads, each with its connection to the database: more would only wait for each other."""
+    """Limits the threads that answer requests. Each has its connection to the database, so more threads would only wait for each other."""
     to_thread.current_default_thread_limiter().total_tokens = THREADS
     expect_bundles()
     yield

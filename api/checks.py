@@ -1,4 +1,4 @@
-"""Checks of a request's numbers against the scene they are about: cheap ones, no Drake. The job makes the others."""
+"""These checks compare the numbers of a request with its scene. They are cheap and need no Drake; the job makes the other checks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from workers.addresses import is_public
 
 
 def seed(scene: Scene, body: Seed) -> SeedOptions:
-    """The options of a seeding. Refuses what contradicts itself, and a configuration of the wrong length or outside the joint limits.
+    """Returns the options of a seeding.
+
+    It refuses options that contradict each other, a configuration of the wrong length, and one outside the joint limits.
 
     Raises:
         RegionError: seed_wrong_length, seed_outside_limits, polytope_shape, or as SeedOptions.from_document; the field names the place.
@@ -42,7 +44,7 @@ def _within_limits(scene: Scene, q: Sequence[float]) -> None:
 
 
 def polytope(scene: Scene, body: PolytopeBody) -> None:
-    """Refuse a polytope whose shapes do not fit the scene or each other, or whose centre is outside of it.
+    """Refuses a polytope whose shapes do not fit the scene or each other, or whose centre is outside of it.
 
     Raises:
         RegionError: polytope_shape, center_outside.
@@ -63,7 +65,7 @@ def polytope(scene: Scene, body: PolytopeBody) -> None:
 
 
 def webhook(body: WebhookRequest) -> None:
-    """Refuse a receiver that could never be called.
+    """Refuses a webhook whose receiver the service could never call.
 
     Raises:
         CirisError: webhook_url, webhook_address.
@@ -78,13 +80,13 @@ def webhook(body: WebhookRequest) -> None:
     try:
         private = not is_public(url.hostname or "")
     except ValueError:
-        return  # a name, which is looked up when it is called
+        return  # the host is a name: the worker that calls it resolves it
     if private and not settings().webhook_private:
         raise CirisError("webhook_address", f"{url.hostname} is not a public address", field="webhook.url")
 
 
 def points(scene: Scene, rows: Sequence[Sequence[float]], field: str) -> Array:
-    """Points as (k, n).
+    """Returns the points of a request as an array (k, n).
 
     Raises:
         RegionError: wrong_length.

@@ -1,4 +1,4 @@
-"""Requests that are answered by a child process: reading an upload, checking a proof."""
+"""Some requests are answered by a child process: reading an uploaded scene, checking a proof. This module limits how many."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fastapi import Depends, Request
 from certifier.errors import CirisError
 
 AT_ONCE = 2
-"""Each may take minutes and gigabytes, and none may take the threads of other requests."""
+"""At most this many run at once: each may take minutes and gigabytes. They never occupy the threads of other requests."""
 WAITING = 16
 
 Answer = TypeVar("Answer")
@@ -19,16 +19,16 @@ Arguments = TypeVarTuple("Arguments")
 
 
 class ChildLimiter:
-    """A few such requests at once, a few more that wait."""
+    """Lets ``AT_ONCE`` requests of this kind run at once, and ``WAITING`` more wait."""
 
     def __init__(self) -> None:
         self._limiter = CapacityLimiter(AT_ONCE)
 
     async def run(self, function: Callable[[*Arguments], Answer], *arguments: *Arguments) -> Answer:
-        """``function(*arguments)`` in a thread, once it is its turn.
+        """Runs ``function(*arguments)`` in a thread when its turn comes, and returns the result.
 
         Raises:
-            CirisError: busy, when too many wait already.
+            CirisError: busy, when too many requests wait already.
         """
         if self._limiter.statistics().tasks_waiting >= WAITING:
             raise CirisError("busy", "too many requests of this kind wait already", hint="try again in a while")

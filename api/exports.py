@@ -1,4 +1,4 @@
-"""Regions as files for other programs."""
+"""This module writes regions as files for other programs. Each writer returns the file's bytes and its suffix."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ MEDIA_TYPES = {"json": "application/json", "npz": "application/x-npz", "drake-ya
 
 
 def manifest(row: RegionRow) -> tuple[bytes, str]:
-    """The manifest, and the suffix of its file."""
+    """Writes the manifest as JSON."""
     return json.dumps(row.manifest, indent=1, allow_nan=False).encode(), "json"
 
 
 def npz(row: RegionRow) -> tuple[bytes, str]:
-    """C (m, n) and d (m,) with the joint limits, center (n,), ellipsoid_center (n,) and ellipsoid_shape (n, n), in s."""
+    """Writes arrays in s as npz: C (m, n) and d (m,) with the joint limits, center (n,), ellipsoid_center (n,), ellipsoid_shape (n, n)."""
     buffer = io.BytesIO()
     ellipsoid = row.manifest["inscribed_ellipsoid"]
     np.savez(
@@ -34,7 +34,7 @@ def npz(row: RegionRow) -> tuple[bytes, str]:
 
 
 def drake_yaml(row: RegionRow) -> tuple[bytes, str]:
-    """Drake's IrisRegions with one HPolyhedron, named after the region, in s."""
+    """Writes the region as Drake's IrisRegions in YAML: one HPolyhedron in s, named after the region."""
     C, d = row.arrays["C"], row.arrays["d"]
     rows = "\n".join(f"    - [{_numbers(c)}]" for c in C)
     text = f'"{row.id}":\n  ambient_dimension: {C.shape[1]}\n  A:\n{rows}\n  b: [{_numbers(d)}]\n'

@@ -1,8 +1,8 @@
-"""What stands before the routes: no visits from other web sites, bodies of limited size, a key where one is needed, a limited rate.
+"""The guard stands before all routes: it checks where a request comes from, its length, its key, and how often the caller asks.
 
-The service has no keys on the loopback interface unless somebody makes one, so a page that the user's browser happens to show must
-not be able to talk to it: neither under a name of its own that resolves to this machine, nor by sending forms across sites.
-Whoever has no key is turned away before the body of the request is read.
+The service on the loopback interface has no keys unless somebody makes one. So a web page that the user's browser shows must not
+be able to talk to the service, in either of two ways: under a name of its own that resolves to this machine, or with a form that
+is sent across sites. A caller without a key is refused before the body of the request is read.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from certifier.errors import CirisError
 from db.session import UNAVAILABLE
 
 BODY_BYTES = 16 * 2**20
-"""More than the largest request of every route but uploads."""
+"""The largest body of a request, in bytes, for every route but uploads. The largest valid request is smaller."""
 UPLOAD_BYTES = 64 * 2**20
 UPLOADS = "/v1/scenes"
 PUBLIC = frozenset({"/healthz", "/readyz", "/login", "/logout"})
@@ -32,7 +32,7 @@ STATIC = "/static/"
 
 
 class TooManyRequests(CirisError):
-    """The caller is to wait."""
+    """The caller has sent too many requests and must wait."""
 
     def __init__(self, seconds: float) -> None:
         super().__init__("too_many_requests", "more requests than one caller may make", hint="wait as long as Retry-After says")
@@ -49,11 +49,12 @@ class KeyNeeded(CirisError):
 
 
 class Guard:
-    """ASGI middleware.
+    """The guard is an ASGI middleware. It passes a request on, or answers it with an error.
 
     Args:
         hosts: names under which the service may be called; None for any.
-        respond: the response for an error.
+        rate: requests a second that one key, or one address without a key, may make for long.
+        respond: makes the response for an error.
     """
 
     def __init__(
@@ -87,10 +88,10 @@ class Guard:
             raise CirisError("cross_site", f"requests from {origin} are not accepted", field="Origin")
 
     async def _check_caller(self, scope: Scope, headers: Headers) -> None:
-        """Finds out who asks (``request.state.caller``), unless anybody may, and counts the request.
+        """Finds out who asks (``request.state.caller``), except on public paths, and counts the request.
 
-        Who has a valid key is counted by it, wherever they are, so that nobody who shares their address can use up what they may ask.
-        Everybody else is counted by address, before anything is done for them.
+        A caller with a valid key is counted by the key, wherever the caller is. So others behind the same address cannot use up the
+        caller's requests. Everybody else is counted by address, before the guard does anything else for them.
         """
         public = scope["path"] in PUBLIC or scope["path"].startswith(STATIC)
         given = None if public else presented_key(headers)
@@ -107,7 +108,10 @@ class Guard:
 
 
 def _network(scope: Scope) -> str:
-    """Where a request comes from: its address, or the network of an IPv6 one, since who has one of those has all of its network's."""
+    """Returns where a request comes from: its IPv4 address, or the /64 network of its IPv6 address.
+
+    Whoever has one IPv6 address has all addresses of its network.
+    """
     address = str(scope["client"][0]) if scope.get("client") else ""
     try:
         ip = ip_address(address.partition("%")[0])
@@ -117,13 +121,13 @@ def _network(scope: Scope) -> str:
 
 
 def _name(host: str) -> str:
-    """The host without its port and brackets."""
+    """Returns the host without its port and brackets."""
     name = host.rpartition(":")[0] if ":" in host and not host.endswith("]") else host
     return name.strip("[]")
 
 
 def _check_url(scope: Scope) -> None:
-    """Refuses what no database can look up."""
+    """Refuses a zero byte in the path or the query: no database can look it up."""
     if "\0" in scope["path"] or b"%00" in scope["query_string"]:
         raise CirisError("invalid_request", "the address holds a zero byte")
 
@@ -139,9 +143,9 @@ def _check_length(headers: Headers, limit: int) -> None:
 
 
 def _counted(receive: Receive, limit: int) -> Receive:
-    """``receive`` that refuses to go on once too much came, whatever length was announced.
+    """Returns a ``receive`` that stops when the body becomes longer than the limit, whatever length was announced.
 
-    It does so by an HTTPException: FastAPI takes any other error while it reads a body for a body that cannot be parsed.
+    It raises an HTTPException, because FastAPI takes every other error that occurs while it reads a body for a body that cannot be parsed.
     """
     received = 0
 

@@ -1,7 +1,7 @@
-"""How often one caller may ask: token buckets.
+"""Token buckets limit how often one caller may ask.
 
-They live in the API's process. Redis may be away or start empty at any time without anybody noticing, so nothing that guards the
-service stands in it; several API processes allow their callers as many times the rate, which is what they can serve.
+The buckets are in the memory of each API process, not in Redis: Redis may be away, or start empty, at any time. With k API
+processes a caller may therefore ask k times as often, and k processes can serve that.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ class _Bucket:
 
 
 class Buckets:
-    """One token bucket for each name: ``rate`` tokens a second, at most ``BURST_SECONDS`` of them kept.
+    """There is one token bucket for each name. It gains ``rate`` tokens a second and keeps those of at most ``BURST_SECONDS``.
 
-    Of more than ``MAX_BUCKETS`` names the one that was quiet for longest is forgotten.
+    When there are more than ``MAX_BUCKETS`` names, the name that was quiet for longest is forgotten.
     """
 
     def __init__(self, rate: float, clock: Callable[[], float] = time.monotonic) -> None:
@@ -32,7 +32,7 @@ class Buckets:
         self._buckets: OrderedDict[str, _Bucket] = OrderedDict()
 
     def take(self, name: str) -> float:
-        """Takes a token; returns 0, or the seconds until there is one again."""
+        """Takes a token. Returns 0, or the seconds until the next token when the bucket is empty."""
         now = self._clock()
         bucket = self._buckets.setdefault(name, _Bucket(self._size, now))
         self._buckets.move_to_end(name)

@@ -1,4 +1,4 @@
-"""Signing in: a browser keeps an API key in a cookie that scripts cannot read and other sites cannot send."""
+"""A person signs in with an API key. The browser keeps it in a cookie that scripts cannot read and other sites cannot send."""
 
 from __future__ import annotations
 
@@ -40,5 +40,5 @@ def sign_out() -> Response:
 
 
 def _local(path: str) -> str:
-    """The path, unless it could lead to another site."""
+    """Returns the path, or ``/`` when the path could lead to another site."""
     return path if re.fullmatch(r"/([\w.-]+(/[\w.-]+)*)?", path, re.ASCII) else "/"

@@ -1,4 +1,7 @@
-"""Prometheus' text format (version 0.0.4): what the database holds, what waits in the queue, what was answered."""
+"""The metrics are in Prometheus' text format (version 0.0.4).
+
+They count the rows of the database, the messages in the queues and the requests that were answered.
+"""
 
 from __future__ import annotations
 
@@ -18,25 +21,26 @@ Samples = Mapping[tuple[tuple[str, str], ...], float]
 
 
 class Requests:
-    """Requests answered, by method and status, and the seconds that they took together: by this process and by those that share its port.
+    """Counts the answered requests by method and status, and sums the seconds they took.
 
-    Each of them counts in a file of its own, which all map into their memory, and goes on where it was when it is started again.
+    Every API process of the service counts in a file of its own, which it maps into its memory. A process that is started again goes on
+    with the counts of its file. The totals are those of all files.
 
     Args:
-        file: this process's; the other files of its directory are those of the others. None for a process that shares with nobody.
+        file: this process's file; the other files of its directory belong to the other processes. None for a process that is alone.
     """
 
     def __init__(self, file: Path | None = None) -> None:
         self._file, self._cells = file, memoryview(_mapped(file)).cast("d")
 
     def note(self, method: str, status: int, seconds: float) -> None:
-        """Counts one; methods that nobody uses count as one, however many a client thinks up."""
+        """Counts one request. All methods outside ``METHODS`` count as ``OTHER``, however many a client invents."""
         cell = _cell(method, status)
         self._cells[cell] += 1
         self._cells[cell + 1] += seconds
 
     def totals(self) -> dict[tuple[str, int], tuple[int, float]]:
-        """(method, status) -> how many, and their seconds."""
+        """Returns (method, status) -> (how many requests, their seconds), summed over all processes."""
         every = [self._cells]
         if self._file is not None:
             others = [path.read_bytes() for path in self._file.parent.iterdir() if path != self._file]
@@ -66,7 +70,7 @@ def _mapped(file: Path | None) -> mmap.mmap:
 
 
 def render(statistics: Statistics, waiting: Mapping[str, int], requests: Requests) -> str:
-    """All metrics.
+    """Returns all metrics as text.
 
     Args:
         waiting: messages in each queue; empty when Redis cannot be reached.

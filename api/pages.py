@@ -1,4 +1,4 @@
-"""The dashboard's pages: the templates of dashboard/, fed by the same functions as the JSON routes."""
+"""These are the dashboard's pages. They fill the templates of dashboard/ with what the functions of the JSON routes return."""
 
 from __future__ import annotations
 
@@ -38,13 +38,16 @@ templates = Jinja2Templates(_ROOT / "templates")
 
 
 def install(app: FastAPI) -> None:
-    """Adds the pages and their static files."""
+    """Adds the pages and their static files to the application."""
     app.include_router(router)
     app.mount("/static", StaticFiles(directory=_ROOT / "static"), name="static")
 
 
 def render_problem(request: Request, problem: problems.Problem) -> Response:
-    """A page for people who look at pages (who sign in first where a key is needed), problem+json for everything else."""
+    """Answers a browser with an HTML page, and everybody else with problem+json.
+
+    Where a key is needed, a browser that asked for a page is sent to the page for signing in.
+    """
     if request.url.path.startswith(("/v1/", "/static/")) or "text/html" not in request.headers.get("accept", ""):
         return problems.as_json(problem)
     if problem.code == "key_needed" and request.method == "GET":
@@ -92,7 +95,7 @@ def scene_page(request: Request, scene_id: str, db: Db) -> Response:
 
 
 def page(request: Request, name: str, context: dict[str, Any], status: int = 200) -> Response:
-    """A template of the dashboard, filled in, with what keeps it from loading anything foreign."""
+    """Fills in a template of the dashboard. The response's headers forbid the page to load anything from other sites."""
     return templates.TemplateResponse(request, name, context, status_code=status, headers=_SECURITY)
 
 
@@ -124,13 +127,13 @@ def _job(db: Database, job_id: str) -> dict[str, Any]:
 
 
 def elapsed(job: Job) -> float | None:
-    """Seconds from the job's start to its end, or until now; None before the start."""
+    """Returns the seconds from the job's start to its end, or until now; None before the start."""
     return None if job.started_at is None else ((job.finished_at or datetime.now(UTC)) - job.started_at).total_seconds()
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What the matrix shows for one pair in one iteration."""
+    """A cell is what the matrix shows for one pair in one iteration."""
 
     state: str
     glyph: str
@@ -139,7 +142,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Row:
-    """A pair and its cells, one for each iteration."""
+    """A row is a pair and its cells, one for each iteration."""
 
     pair: PairInfo
     cells: list[Cell]
@@ -160,7 +163,7 @@ _GLYPHS = {
 
 
 def matrix_rows(matrix: PairMatrix) -> list[Row]:
-    """The pair matrix, row by row, every gap filled."""
+    """Returns the rows of the pair matrix. A pair that an iteration has no result for gets a cell that says why."""
     cells = {(cell.pair, cell.iteration): cell for cell in matrix.cells}
     return [Row(pair, [_cell(cells.get((pair.index, it.index)), pair.index, it) for it in matrix.iterations]) for pair in matrix.pairs]
 
@@ -186,11 +189,11 @@ def _cell(cell: PairCell | None, pair: int, iteration: Iteration) -> Cell:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far the last iteration is.
+    """Says how far the last iteration is.
 
     Attributes:
-        parts: (state, count), certified first.
-        settled: pairs that have their outcome or were reused.
+        parts: (state, number of pairs), certified first.
+        settled: number of pairs that have their outcome or were reused.
     """
 
     iteration: Iteration
@@ -200,7 +203,7 @@ class Progress:
 
 
 def progress(matrix: PairMatrix) -> Progress | None:
-    """Progress of the last iteration; None before the first."""
+    """Returns the progress of the last iteration; None before the first."""
     if not matrix.iterations:
         return None
     last = matrix.iterations[-1]
@@ -214,7 +217,7 @@ def progress(matrix: PairMatrix) -> Progress | None:
 
 @dataclass(frozen=True)
 class Chart:
-    """A step line in an SVG of ``width`` by ``height``, logarithmic in the volume."""
+    """A chart is a step line in an SVG of ``width`` by ``height`` pixels. Its vertical axis is logarithmic in the volume."""
 
     width: int
     height: int
@@ -223,7 +226,7 @@ class Chart:
 
 
 def growth_chart(curve: list[GrowthPoint]) -> Chart | None:
-    """The certified volume over time; None before the first region."""
+    """Draws the certified volume over time; returns None before the first region."""
     if not curve:
         return None
     width, height = _CHART

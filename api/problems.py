@@ -1,4 +1,4 @@
-"""Every error is an RFC 9457 problem: what is wrong (``code``), where (``field``), what to do (``hint``)."""
+"""Every error is an RFC 9457 problem: it says what is wrong (``code``), where (``field``) and what to do (``hint``)."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ RETRY_SECONDS = 5
 
 
 class FieldProblem(BaseModel):
-    """One thing that is wrong with the request."""
+    """Names one field of the request that is wrong, and says why."""
 
     field: str
     message: str
 
 
 class Problem(BaseModel):
-    """An error (RFC 9457): ``code`` is stable, ``detail`` is for people."""
+    """Describes an error (RFC 9457). Programs read `code`, which is stable; people read `detail`."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -80,7 +80,7 @@ Render = Callable[[Request, Problem], Response]
 
 
 def problem_of(error: CirisError, status: HTTPStatus | None = None, errors: Sequence[FieldProblem] = ()) -> Problem:
-    """The problem that an error is, with the status of its code unless one is given."""
+    """Turns an error into a problem. The status is the given one, or else that of the error's code."""
     status = _STATUS_OF_CODE.get(error.code, HTTPStatus.UNPROCESSABLE_ENTITY) if status is None else status
     return Problem(
         type=f"urn:ciris:problem:{error.code}",
@@ -95,18 +95,18 @@ def problem_of(error: CirisError, status: HTTPStatus | None = None, errors: Sequ
 
 
 def as_json(problem: Problem) -> Response:
-    """A problem as a response for programs."""
+    """Returns a problem as a JSON response for programs."""
     return JSONResponse(problem.model_dump(), problem.status, media_type=MEDIA_TYPE)
 
 
 def install(app: FastAPI, render: Render) -> None:
-    """Makes every error that leaves a route a problem, presented by ``render``."""
+    """Makes the application answer every error that leaves a route with a problem, which ``render`` presents."""
     for kind in _EXPLANATIONS:
         app.add_exception_handler(kind, partial(respond, render))
 
 
 def respond(render: Render, request: Request, error: Exception) -> Response:
-    """The response for an error, presented by ``render``, with the headers that the error asks for."""
+    """Returns the response for an error, presented by ``render``, with the headers that the error asks for."""
     explain = next(_EXPLANATIONS[kind] for kind in type(error).__mro__ if kind in _EXPLANATIONS)
     response = render(request, explain(error))
     response.headers.update(getattr(error, "headers", None) or {})
@@ -149,7 +149,7 @@ _EXPLANATIONS: dict[type, Callable[[Any], Problem]] = {
 
 
 def _field(loc: Sequence[str | int]) -> str:
-    """``("body", "grow", "seed", "q", 3)`` -> ``"seed.q[3]"``: what the client wrote, without what only the parser knows."""
+    """Returns the name of a field as the client wrote it: ``("body", "grow", "seed", "q", 3)`` -> ``"seed.q[3]"``."""
     parts = list(loc[1:])
     if loc[0] == "body" and parts and parts[0] in ("grow", "certify"):
         del parts[0]
@@ -164,14 +164,17 @@ def _sentence(error: dict[str, Any]) -> str:
 
 
 def describe(app: FastAPI) -> dict[str, Any]:
-    """The OpenAPI document, with the problem as every operation's error response."""
+    """Returns the OpenAPI document, in which every operation has the problem as its error response."""
     if app.openapi_schema is None:
         document = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
         schemas = document["components"]["schemas"]
         for name in ("HTTPValidationError", "ValidationError"):
             schemas.pop(name, None)
         schemas.update(models_json_schema([(Problem, "serialization")], ref_template="#/components/schemas/{model}")[1]["$defs"])
-        problem = {"description": "What is wrong", "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}}
+        problem = {
+            "description": "A problem says what is wrong.",
+            "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
+        }
         for path in document["paths"].values():
             for operation in path.values():
                 operation["responses"].pop("422", None)

@@ -1,4 +1,4 @@
-"""``ciris bench``."""
+"""Runs one benchmark of ciris and prints what it measured."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ OK, CONTRADICTED, BAD_INPUT = 0, 1, 2
 
 
 def main() -> int:
-    """Runs one benchmark; exit status 1 when verdicts contradict each other."""
+    """Runs one benchmark. It returns exit status 1 when verdicts contradict each other."""
     logging.getLogger("drake").setLevel(logging.WARNING)
     args = _parser().parse_args()
     if args.benchmark == "docs":
@@ -61,27 +61,29 @@ def _parser() -> ArgumentParser:
     json = ArgumentParser(add_help=False)
     json.add_argument("--json", action="store_true", help="print one JSON document")
     against = ArgumentParser(add_help=False, parents=[json])
-    against.add_argument("--against", choices=["drake"], help="Drake with Clarabel, in the same run")
+    against.add_argument("--against", choices=["drake"], help="measure Drake with Clarabel too, in the same run")
     repeat = ArgumentParser(add_help=False)
-    repeat.add_argument("--repeat", type=int, default=1, metavar="N", help="run ours this often; the fastest run counts")
-    kinds.add_parser("pairs", parents=[against, repeat], help="pairs with longer and longer chains, each feasible and infeasible")
-    scene = kinds.add_parser("scene", parents=[against, repeat], help="the pairs of a scene")
+    repeat.add_argument("--repeat", type=int, default=1, metavar="N", help="run ciris this often; the fastest run counts")
+    kinds.add_parser(
+        "pairs", parents=[against, repeat], help="measure pairs with longer and longer chains, each one feasible and infeasible"
+    )
+    scene = kinds.add_parser("scene", parents=[against, repeat], help="measure the pairs of a scene")
     scene.add_argument("scene", nargs="?", default="iiwa_shelf", help=f"default iiwa_shelf; {', '.join(catalogue.SCENES)}")
     regions = "; ".join(f"{name}: {what}" for name, what in catalogue.REGIONS.items())
     scene.add_argument("--region", choices=list(catalogue.REGIONS), default="middle", help=f"default middle; {regions}")
-    scene.add_argument("--match", default="", metavar="TEXT", help="only pairs with this in their names")
-    scene.add_argument("--pairs", type=int, metavar="N", help="only the N cheapest of them")
-    grown = kinds.add_parser("growth", parents=[against], help="regions grown in several ways")
+    scene.add_argument("--match", default="", metavar="TEXT", help="measure only pairs with this text in their names")
+    scene.add_argument("--pairs", type=int, metavar="N", help="measure only the N cheapest of these pairs")
+    grown = kinds.add_parser("growth", parents=[against], help="grow regions in several ways")
     grown.add_argument("scenes", nargs="*", metavar="EXAMPLE", default=list(growth.EXAMPLES), help=f"default: {', '.join(growth.EXAMPLES)}")
-    kinds.add_parser("agreement", parents=[json], help="verdicts on hundreds of pairs")
-    kinds.add_parser("scaling", parents=[against], help="how the cost grows with obstacles, joints and faces")
-    surveyed = kinds.add_parser("survey", parents=[json], help="every pair of every scene on every region")
+    kinds.add_parser("agreement", parents=[json], help="compare verdicts on hundreds of pairs with Drake's")
+    kinds.add_parser("scaling", parents=[against], help="measure how the cost grows with obstacles, joints and faces")
+    surveyed = kinds.add_parser("survey", parents=[json], help="certify every pair of every scene on every region")
     surveyed.add_argument("scenes", nargs="*", metavar="SCENE", default=list(catalogue.SCENES), help="default: all")
     surveyed.add_argument("--most", type=float, default=5.0, metavar="SECONDS", help="leave pairs with a longer forecast out; default 5")
-    served = kinds.add_parser("service", parents=[json], help="the service beside --local")
+    served = kinds.add_parser("service", parents=[json], help="measure the service beside --local")
     served.add_argument("example", nargs="?", default="iiwa_shelf", metavar="EXAMPLE", help="default iiwa_shelf")
-    served.add_argument("--processes", type=int, default=1, metavar="N", help="solving processes of the service; default 1")
-    served.add_argument("--turns", type=int, default=5, metavar="N", help="how often each; default 5")
+    served.add_argument("--processes", type=int, default=1, metavar="N", help="number of the service's solving processes; default 1")
+    served.add_argument("--turns", type=int, default=5, metavar="N", help="how often each is run; default 5")
     kinds.add_parser("docs", help="write the tables of docs/benchmarks.md from docs/benchmarks/*.json")
     return parser
 

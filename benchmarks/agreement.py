@@ -1,7 +1,9 @@
-"""The agreement campaign: our verdicts against Drake's, on pairs that are feasible and on their infeasible twins.
+"""The agreement campaign compares our verdicts with Drake's, on pairs that are feasible and on their infeasible twins.
 
-Drake chooses the frame of a pair its own way. Where ours is another one of equal cost, naming the two bodies the other way round makes ours
-Drake's, and the programs the same; what remains is said in the verdict. Every answer of ours is checked from the bytes of its proof.
+Drake chooses the frame of a pair in its own way. Our frame may be another one of equal cost. Where naming the two bodies in the other
+order makes it Drake's frame, we do so, and the two programs are the same. Where the frames still differ, the verdict says so.
+
+Every answer of ours is checked from the bytes of its proof.
 """
 
 from __future__ import annotations
@@ -26,16 +28,19 @@ from certifier.pair.forecast import forecast
 from certifier.pair.result import PairResult
 
 BOXES, ROUND = 60, 40
-"""Random arms with boxes alone, and with balls and capsules among them."""
+"""The campaign has BOXES random arms with boxes alone, and ROUND that also have balls and capsules."""
 SMALLEST, LARGEST = 0.05, 1.0
-"""Sizes of the nested polytopes around a random arm; the largest reaches to the joint limits."""
+"""The polytopes around a random arm have sizes from SMALLEST to LARGEST. The largest reaches to the joint limits."""
 BRACKET, APART = 1.02, 1.01
-"""How closely the size at which a pair ceases to be certifiable is bracketed, and how far on either side Drake is asked."""
+"""A pair ceases to be certifiable between two sizes whose ratio is at most BRACKET.
+
+Drake is asked at two sizes that lie outside of these, each by the factor APART.
+"""
 
 
 @dataclass(frozen=True)
 class Question:
-    """A scene of one pair, and a polytope."""
+    """Asks about the one pair of a scene on one polytope."""
 
     name: str
     group: str
@@ -44,13 +49,17 @@ class Question:
 
 
 def questions(boxes: int = BOXES, rounded: int = ROUND) -> Iterator[Question]:
-    """The whole campaign: arms of either kind, each at four sizes."""
+    """Yields the whole campaign: arms of either kind, each with polytopes of four sizes."""
     yield from _questions("boxes", boxes, rounded=False)
     yield from _questions("round", rounded, rounded=True)
 
 
 def _questions(group: str, count: int, rounded: bool) -> Iterator[Question]:
-    """Arms of 2 to 4 joints with the first pair that is certified at the smallest size and not at the largest: each has its twin."""
+    """Yields the questions about arms of 2 to 4 joints.
+
+    Each arm keeps the first of its pairs, in random order, that is certified at the smallest size and not at the largest. So each
+    feasible question has its infeasible twin.
+    """
     made = seed = 0
     while made < count:
         rng = np.random.default_rng([seed, rounded])
@@ -81,7 +90,7 @@ def _certifies(scene: Scene, region: Region) -> bool:
 
 
 def _bracket(scene: Scene, region: Region) -> tuple[float, float]:
-    """Sizes just below and just above the one at which the pair ceases to be certifiable."""
+    """Returns a size just below, and one just above, the size at which the pair ceases to be certifiable."""
     certified, failed = SMALLEST, LARGEST
     while failed > BRACKET * certified:
         middle = float(np.sqrt(certified * failed))
@@ -90,7 +99,7 @@ def _bracket(scene: Scene, region: Region) -> tuple[float, float]:
 
 
 def campaign(questions: Iterable[Question], progress: Progress) -> dict[str, Any]:
-    """Ask both sides everything; the document of ``ciris bench agreement``.
+    """Asks both sides everything, and returns the document of ``ciris bench agreement``.
 
     Raises:
         ProofError: a proof of ours does not hold.
@@ -133,7 +142,10 @@ def _ask(question: Question) -> dict[str, Any]:
 
 
 def _in_frame(scene: Scene, frame: str) -> tuple[Scene, str]:
-    """The scene of one pair, its bodies named in the order in which our frame is this one, if there is such an order; and our frame."""
+    """Returns the scene of one pair and the frame that we choose for it.
+
+    The pair's bodies are named in the order in which our frame is the given one, if such an order exists.
+    """
     (pair,) = scene.pairs
     named = [replace(scene, pairs=(order,)) for order in (pair, Pair(pair.b, pair.a))]
     ours = [(some, forecast(some)[0].frame) for some in named]

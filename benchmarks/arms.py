@@ -1,4 +1,4 @@
-"""Arms made of numbers: random ones for comparing verdicts, regular ones for measuring how the cost grows."""
+"""These arms are made of numbers: random ones to compare verdicts, regular ones to measure how the cost grows."""
 
 from __future__ import annotations
 
@@ -11,18 +11,24 @@ from certifier.model import WORLD, Array, Geometry, Joint, JointKind, Pair, Scen
 
 
 def box(name: str, body: str, size: Array, center: Array, R: Array | None = None) -> Geometry:
-    """A box with these edges, turned by R (3, 3)."""
+    """Returns a box on a body, in the body's frame.
+
+    Args:
+        size: (3,) edges in metres.
+        center: (3,) centre in metres.
+        R: (3, 3) rotation of the box; None for none.
+    """
     corners = np.array(list(itertools.product(*((-x / 2, x / 2) for x in size))))
     return Geometry(name, body, corners @ (np.eye(3) if R is None else R).T + center, 0.0, {"kind": "box"})
 
 
 def random_arm(rng: np.random.Generator, n: int, rounded: bool = False) -> Scene:
-    """An arm of n joints about random axes, one in four prismatic, with a body on every link and two in the world.
+    """Returns an arm of n joints about random axes, one in four prismatic, with a body on every link and two bodies in the world.
 
-    Pairs: every link with both obstacles, and links two joints or more apart with each other.
+    Its pairs are every link with both obstacles, and links two joints or more apart with each other.
 
     Args:
-        rounded: half of the bodies are balls and capsules; otherwise all are boxes.
+        rounded: True makes half of the bodies balls and capsules; otherwise all are boxes.
     """
     joints, bodies, links = [], [WORLD], []
     for i in range(n):
@@ -45,7 +51,7 @@ def random_arm(rng: np.random.Generator, n: int, rounded: bool = False) -> Scene
 
 
 def random_faces(rng: np.random.Generator, center: Array, size: float) -> tuple[Array, Array]:
-    """3n random faces, C (3n, n) and d (3n,), at distances of size to twice that from the centre."""
+    """Returns 3n random faces, C (3n, n) and d (3n,), at distances from the centre between size and twice that."""
     n = len(center)
     C = rng.normal(size=(3 * n, n))
     C /= np.linalg.norm(C, axis=1, keepdims=True)
@@ -53,7 +59,10 @@ def random_faces(rng: np.random.Generator, center: Array, size: float) -> tuple[
 
 
 def serial_arm(n: int, obstacles: list[Geometry]) -> Scene:
-    """An arm of n joints, by turns about z and y, of links 0.25 m long, among obstacles; pairs: every link with every obstacle."""
+    """Returns an arm of n joints, by turns about z and y, with links 0.25 m long, among obstacles.
+
+    Its pairs are every link with every obstacle.
+    """
     joints, bodies, links = [], [WORLD], []
     for i in range(n):
         X_PF = np.eye(4)
@@ -77,7 +86,7 @@ def _random_box(rng: np.random.Generator, name: str, body: str, center: Array) -
 
 
 def _rounded(rng: np.random.Generator, body: Geometry) -> Geometry:
-    """The box itself, or a ball or a capsule in its place."""
+    """Returns the box itself, or a ball or a capsule in its place."""
     count, radius = (0, 1, 0, 2)[rng.integers(4)], float(rng.uniform(0.05, 0.2))
     if count == 0:
         return body

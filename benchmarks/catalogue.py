@@ -1,4 +1,4 @@
-"""The scenes that are measured, and the regions about their seeds."""
+"""The catalogue holds the scenes that are measured, and the regions about their seeds."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from certifier.scene import load_scene
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ("planar_2dof", "arm_3dof", "ur3e_bin", "iiwa_shelf", "dual_ur3e")
-"""In the order of their cost."""
+"""The examples are in the order of their cost."""
 FILES = {name: ROOT / "examples" / name / "scene.yaml" for name in EXAMPLES} | {"rail_arm": ROOT / "benchmarks/scenes/rail_arm/scene.yaml"}
 VARIANTS = {
     f"iiwa_{figure}_{furniture or 'shelf'}": (figure, furniture)
@@ -39,11 +39,11 @@ REGIONS = {
     "wide": "a cube of half-width 0.4",
     "whole": "the joint limits alone",
 }
-"""Of s; the joint limits hold besides."""
+"""These are the kinds of regions, in s. The joint limits always hold as well."""
 
 
 class Instance(NamedTuple):
-    """One pair of a scene on one of its regions."""
+    """An instance is one pair of a scene on one of the scene's regions."""
 
     scene: str
     a: str
@@ -63,16 +63,18 @@ LADDER = [
     Instance("iiwa_shelf", "iiwa/link_7/box", "shelf/boards/upper", "middle"),
     Instance("iiwa_shelf", "iiwa/link_7/box", "shelf/boards/upper", "wide"),
 ]
-"""What ``ciris bench pairs`` measures: growing chains, each pair on a region where it can be certified and on one where it cannot."""
+"""``ciris bench pairs`` measures these instances: the chains grow, and each pair is on a region where it can be certified and on one
+where it cannot.
+"""
 
 
 @dataclass(frozen=True)
 class Region:
-    """{C s <= d} within the joint limits, and a point inside.
+    """Describes {C s <= d} within the joint limits, and a point inside.
 
     Attributes:
-        C, d: (m, n), (m,); the joint limits are not among them.
-        center: (n,).
+        C, d: (m, n), (m,) in s; the joint limits are not among them.
+        center: (n,) in s.
     """
 
     C: Array
@@ -82,7 +84,7 @@ class Region:
 
 @cache
 def scene(name: str) -> Scene:
-    """A scene of the catalogue with all its pairs.
+    """Returns a scene of the catalogue with all its pairs.
 
     Raises:
         CirisError: ``unknown_scene``.
@@ -95,13 +97,13 @@ def scene(name: str) -> Scene:
 
 
 def seed(name: str) -> Array:
-    """The seed of a scene, joint positions (n,)."""
+    """Returns the seed of a scene, joint positions (n,)."""
     file = FILES["iiwa_shelf" if name in VARIANTS else name]
     return np.array(yaml.safe_load((file.parent / "seed.yaml").read_text(encoding="utf-8"))["q"])
 
 
 def region(name: str, kind: str) -> Region:
-    """One of REGIONS about the seed of a scene."""
+    """Returns the region of this kind (one of REGIONS) about the seed of a scene."""
     center = scene(name).to_s(seed(name))
     if kind == "middle":
         return Region(*tangent(np.random.default_rng(0), center, 12, 0.05), center)
@@ -111,13 +113,13 @@ def region(name: str, kind: str) -> Region:
 
 
 def cube(center: Array, half_width: float) -> tuple[Array, Array]:
-    """|s - center|_inf <= half_width as C (2n, n) and d (2n,)."""
+    """Returns |s - center|_inf <= half_width as C (2n, n) and d (2n,)."""
     eye = np.eye(len(center))
     return np.concatenate([eye, -eye]), np.concatenate([center + half_width, half_width - center])
 
 
 def tangent(rng: np.random.Generator, center: Array, count: int, distance: float) -> tuple[Array, Array]:
-    """Faces with random normals, all at one distance from the centre: C (count, n), d (count,), none of them redundant."""
+    """Returns faces with random normals, all at one distance from the centre: C (count, n), d (count,). None of them is redundant."""
     C = rng.normal(size=(count, len(center)))
     C /= np.linalg.norm(C, axis=1, keepdims=True)
     return C, C @ center + distance

@@ -1,4 +1,7 @@
-"""The document of ``ciris bench pairs`` and ``ciris bench scene``: verdict by verdict, with the time that either side took."""
+"""This module makes the document of ``ciris bench pairs`` and ``ciris bench scene``.
+
+It compares verdict by verdict, with the time that either side took.
+"""
 
 from __future__ import annotations
 
@@ -18,20 +21,24 @@ from certifier.pair.forecast import PairCost, forecast
 
 
 class Verdict(StrEnum):
-    """Our outcome against Drake's."""
+    """A verdict says how our outcome and Drake's relate."""
 
     AGREE = "agree"
-    """Both certified the pair, or neither did and both said so."""
+    """Both sides certified the pair, or neither did and both said so."""
     UNDECIDED = "undecided"
     """One side, or both, could not tell."""
     PROGRAMS_DIFFER = "programs differ"
-    """One side found a plane, the other shows that there is none in another frame or with another relaxation of balls."""
+    """One side found a plane. The other shows that there is none, but in another frame or with another relaxation of balls."""
     CONTRADICTION = "contradiction"
-    """One side certified what the other refutes, or what it proves infeasible as the very same program: one of them is wrong."""
+    """One side certified what the other refutes, or what the other proves infeasible as the very same program: one of them is wrong."""
 
 
 def verdict(ours: Outcome, theirs: Outcome, same_program: bool) -> Verdict:
-    """What the two outcomes mean together; ``same_program`` when frame and relaxation are the same."""
+    """Returns what the two outcomes mean together.
+
+    Args:
+        same_program: True when both sides have the same frame and the same relaxation.
+    """
     undecided = (Outcome.INCONCLUSIVE, Outcome.ERROR)
     if ours in undecided or theirs in undecided:
         return Verdict.UNDECIDED
@@ -43,13 +50,16 @@ def verdict(ours: Outcome, theirs: Outcome, same_program: bool) -> Verdict:
 
 
 def same_program(scene: Scene, pair: Pair, frame: str, drakes_frame: str) -> bool:
-    """Whether (11) is the same program on both sides: Drake relaxes balls another way."""
+    """Says whether (11) is the same program on both sides.
+
+    It is not where the frames differ, nor where the pair has a ball, because Drake relaxes balls in another way.
+    """
     return frame == drakes_frame and not any(scene.geometry(name).radius for name in (pair.a, pair.b))
 
 
 @dataclass(frozen=True)
 class Task:
-    """Pairs of one scene on one polytope."""
+    """A task asks about pairs of one scene on one polytope."""
 
     scene: Scene
     region_kind: str
@@ -58,7 +68,7 @@ class Task:
 
 
 def ladder() -> list[Task]:
-    """The catalogue's ladder, a task an instance, each in a scene of its own."""
+    """Returns the catalogue's ladder, one task for each instance. Each task has a scene of its own."""
     return [_alone(instance) for instance in catalogue.LADDER]
 
 
@@ -68,7 +78,7 @@ def _alone(instance: Instance) -> Task:
 
 
 def whole_scene(name: str, kind: str, match: str = "", count: int | None = None) -> Task:
-    """The pairs of a scene, or the ``count`` cheapest by their forecast, with ``match`` in the names.
+    """Returns the task for the pairs of a scene with ``match`` in their names, or for the ``count`` cheapest of them by their forecast.
 
     Raises:
         CirisError: ``unknown_scene``; ``no_pairs`` when none matches.
@@ -81,7 +91,10 @@ def whole_scene(name: str, kind: str, match: str = "", count: int | None = None)
 
 
 def compare(benchmark: str, tasks: list[Task], against: bool, repeat: int, progress: Progress) -> dict[str, Any]:
-    """Measure all tasks; of ``repeat`` runs of ours the fastest counts. A first run, not counted, loads the compiled kernels."""
+    """Measures all tasks. Of ``repeat`` runs of ours the fastest counts.
+
+    A first run that does not count loads the compiled kernels.
+    """
     first = tasks[0]
     measure.ours(first.scene, first.region, first.indices[:1])
     measured = [_task(task, against, repeat, progress) for task in tasks]
@@ -141,7 +154,7 @@ def _row(scene: Scene, cost: PairCost, ours: Ours, theirs: ReferenceResult | Non
 
 
 def _total(tasks: list[dict[str, Any]]) -> dict[str, Any]:
-    """Sums over all pairs; ``ratio`` is everything against everything, ``solve_ratio`` solver against solver."""
+    """Returns the sums over all pairs. ``ratio`` compares everything with everything, ``solve_ratio`` solver with solver."""
     rows = [row for task in tasks for row in task["pairs"]]
     ciris = {name: sum(row["ciris"][name] for row in rows) for name in ("solve_seconds", "verify_seconds")}
     ciris["setup_seconds"] = sum(task["setup"]["ciris"] for task in tasks)

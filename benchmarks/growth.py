@@ -1,4 +1,7 @@
-"""How large regions grow and how soon: our ways to grow one beside each other, and beside Drake's alternation from the same start."""
+"""This module measures how large regions grow and how soon.
+
+It compares our ways to grow a region with each other, and with Drake's alternation from the same start.
+"""
 
 from __future__ import annotations
 
@@ -25,20 +28,23 @@ WAYS: dict[str, dict[str, Any]] = {
     "one, then pushes": {"contractions": 1, "pushes": 2, "max_rounds": 0},
     "default": {},
 }
-"""Options of a grow job, each with the default seeding."""
+"""Each way to grow has these options of a grow job, with the default seeding."""
 EXAMPLES = ("planar_2dof", "arm_3dof", "ur3e_bin", "iiwa_shelf", "dual_ur3e")
 AGAINST = ("planar_2dof", "arm_3dof")
-"""Examples on which Drake's alternation ends within minutes."""
+"""On these examples Drake's alternation ends within minutes."""
 HALF_WIDTH, ROUNDS, TOLERANCE = 0.05, 10, 1e-3
-"""Of the cube that both sides start from, and Drake's own limits for the alternation."""
+"""Both sides start from a cube in s with this half-width. They use Drake's own limits for the alternation: its rounds and its tolerance."""
 PUSHES = 10
 SHORT, RUNS = 10.0, 5
-"""Seconds of Drake's alternation up to which all sides are run that often, in turn: what shares the machine then disturbs them alike."""
+"""If Drake's alternation takes fewer than SHORT seconds, all sides are run RUNS times, in turn.
+
+Other programs on the machine then disturb all sides alike.
+"""
 
 
 def growth(names: list[str], against: bool, progress: Progress) -> dict[str, Any]:
-    """Grow a region on every example in every way; the document of ``ciris bench growth``."""
-    # the first run loads the compiled kernels
+    """Grows a region on every example in every way, and returns the document of ``ciris bench growth``."""
+    # This first run loads the compiled kernels and does not count.
     _grown(names[0], {**_seed(names[0]), "method": "box"}, {"pushes": 0, "max_rounds": 0})
     ways = []
     for name in names:
@@ -50,10 +56,10 @@ def growth(names: list[str], against: bool, progress: Progress) -> dict[str, Any
 
 
 def _against(name: str, progress: Progress) -> list[dict[str, Any]]:
-    """Drake's alternation from a cube about the seed; our alternation and our pushes from the same cube; our default from the seed.
+    """Compares four sides: Drake's alternation, our alternation and our pushes from one cube about the seed; our default from the seed.
 
-    ``reached_seconds``: when our certified region first had at least the volume of Drake's last; None if never.
-    ``time_ratios``: Drake's seconds by that, of every run; ``seconds``, ``reached_seconds`` and ``time_ratio`` are their medians.
+    ``reached_seconds`` is when our certified region first had at least the volume of Drake's last one; None if never.
+    ``time_ratios`` are Drake's seconds divided by that, for every run. ``seconds``, ``reached_seconds`` and ``time_ratio`` are medians.
     """
     scene = catalogue.scene(name)
     center = scene.to_s(catalogue.seed(name))
@@ -83,7 +89,7 @@ def _against(name: str, progress: Progress) -> list[dict[str, Any]]:
 
 
 def _median(runs: list[dict[str, Any]]) -> dict[str, Any]:
-    """One row of several runs that came to the same region."""
+    """Makes one row of several runs that came to the same region."""
     ratios = [row["time_ratio"] for row in runs if row["time_ratio"]]
     medians = {
         name: statistics.median(row[name] for row in runs) if runs[0][name] else None
@@ -97,7 +103,7 @@ def _seed(name: str) -> dict[str, Any]:
 
 
 def _grown(name: str, seed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
-    """One region of ours, its proof verified. Where none could be certified, the row says why."""
+    """Grows one region of ours and verifies its proof. If no region could be certified, the row says why."""
     start = time.perf_counter()
     try:
         region = grow(catalogue.scene(name), GrowthOptions(seed=seed, **options))

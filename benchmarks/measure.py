@@ -1,5 +1,6 @@
-"""Both sides on the same pairs and the same faces, in processor time of this process: other programs on the machine do not count,
-threads that a side might start do.
+"""This module measures both sides on the same pairs and the same faces, in processor time of this process.
+
+So other programs on the machine do not count, but threads that a side might start do.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ PACKAGES = ("drake", "numpy", "scipy", "numba", "python-flint")
 
 
 def machine() -> dict[str, Any]:
-    """Where and with what a measurement is made, JSON-able."""
+    """Returns where and with what a measurement is made, JSON-able."""
     path = Path("/proc/cpuinfo")
     found = re.search(r"^model name\s*:\s*(.+)$", path.read_text(), re.MULTILINE) if path.exists() else None
     return {
@@ -45,11 +46,11 @@ def machine() -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Ours:
-    """One pair by our certifier.
+    """Describes one pair that our certifier answered.
 
     Attributes:
-        seconds: everything, verification included; what pairs share is paid by the first that needs it, a shared proof included.
-        verify_seconds: what checking the proof takes, measured by checking it once more.
+        seconds: time for everything, verification included. What pairs share, such as a proof, counts for the first pair that needs it.
+        verify_seconds: time to check the proof, measured by checking it once more.
         covers: how many pairs the proof is about.
     """
 
@@ -68,14 +69,14 @@ Answer = TypeVar("Answer", Ours, ReferenceResult)
 
 @dataclass(frozen=True)
 class Run(Generic[Answer]):
-    """One side: the seconds spent once for all pairs, and the answer for every pair by its index."""
+    """Describes one side: the seconds spent once for all pairs, and the answer for every pair by its index."""
 
     setup_seconds: float
     pairs: dict[int, Answer]
 
 
 def ours(scene: Scene, region: Region, indices: list[int], progress: Progress = lambda _: None) -> Run[Ours]:
-    """The pairs by our certifier; every proof is checked as it is made, and once more for its time.
+    """Certifies the pairs with our certifier. Every proof is checked as it is made, and once more to measure its time.
 
     Raises:
         ProofError: a proof does not hold.
@@ -95,7 +96,7 @@ def ours(scene: Scene, region: Region, indices: list[int], progress: Progress = 
 
 @dataclass(frozen=True)
 class Check:
-    """What was checked, in words, of how many pairs, and how long it took; a proof that has been checked takes no time again."""
+    """Says in words what was checked, of how many pairs, and how many seconds it took. A proof checked before takes no time again."""
 
     what: str
     covers: int
@@ -103,7 +104,7 @@ class Check:
 
 
 class Verifier:
-    """Checks the proofs of one scene from their bytes; those on one polytope share what is the same, as in the certifier."""
+    """Checks the proofs of one scene from their bytes. Proofs on one polytope share what is the same, as in the certifier."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -111,10 +112,10 @@ class Verifier:
         self._done: dict[bytes, Check] = {}
 
     def verify(self, result: PairResult) -> Check:
-        """Check the proof of an outcome.
+        """Checks the proof of an outcome.
 
         Raises:
-            ProofError: it does not hold.
+            ProofError: the proof does not hold.
         """
         if result.proof is None:
             return Check("none", 1, 0.0)
@@ -140,7 +141,7 @@ class Verifier:
 
 
 def drake(scene: Scene, region: Region, indices: list[int], progress: Progress) -> Run[ReferenceResult]:
-    """The pairs by Drake's program and Clarabel."""
+    """Certifies the pairs with Drake's program and Clarabel."""
     reference, found = Reference(scene), {}
     for index in indices:
         found[index] = answer = reference.certify(index, region.C, region.d)

@@ -1,4 +1,4 @@
-"""Outlines of the set where a field on a grid is negative (marching squares)."""
+"""This module finds outlines of the set where a field on a grid is negative (marching squares)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ Corner = tuple[int, int]
 Edge = tuple[Corner, Corner]
 
 ROUND = ((0, 0), (1, 0), (1, 1), (0, 1))
-"""A cell's corners, in order around it."""
+"""The corners of a cell, in order around it."""
 
 
 def outlines(field: Array) -> list[Array]:
-    """The closed boundaries of {field < 0}, in coordinates of the grid.
+    """Returns the closed boundaries of {field < 0}, in coordinates of the grid.
 
     Args:
         field: (nx, ny) values at the points (i, j); the set ends where the grid does.
@@ -39,12 +39,12 @@ def outlines(field: Array) -> list[Array]:
 
 
 def _links(inside: Array) -> dict[Edge, Edge]:
-    """From each edge that the boundary crosses to the one that it crosses next."""
+    """Returns a map from each edge that the boundary crosses to the edge that it crosses next."""
     links: dict[Edge, Edge] = {}
     counts = sum(inside[i : i + len(inside) - 1, j : j + inside.shape[1] - 1].astype(int) for i, j in ROUND)
     for i, j in np.argwhere((counts > 0) & (counts < len(ROUND))).tolist():
         corners = [(i + a, j + b) for a, b in ROUND]
-        # Going around the cell, what is left of the set at one edge is entered again at the next edge that is crossed.
+        # On the way around the cell, the crossed edge that leaves the set is linked to the next one, which enters it again.
         crossed = [(a, b) for a, b in zip(corners, (*corners[1:], corners[0]), strict=True) if inside[a] != inside[b]]
         for here, there in zip(crossed, (*crossed[1:], crossed[0]), strict=True):
             if inside[here[0]]:

@@ -1,4 +1,4 @@
-"""The picture of docs/introduction.md: a region of examples/planar_2dof, in the workspace and in s.
+"""This module draws the picture of docs/introduction.md: a region of examples/planar_2dof, in the workspace and in s.
 
 ``python -m benchmarks.pictures`` grows the region anew and draws it.
 """
@@ -26,15 +26,15 @@ PICTURE, REGION = (catalogue.ROOT / f"docs/pictures/{EXAMPLE}.{ending}" for endi
 
 WIDTH, HEIGHT = 1040, 520
 TOP, SIDE = 84, 350
-"""Of both panels: where they begin, how high they are."""
+"""Both panels begin at TOP and are SIDE pixels high."""
 GRID = (181, 131)
 OBSTACLES = ("block", "post", "wall")
 TURNS = (-120, -90, -45, 0, 45, 90, 120)
-"""Degrees named on the axes."""
+"""The axes name these angles, in degrees."""
 LABEL = np.array([[0.2, 0.075, 0]])
-"""Where a configuration's letter is, in the frame of the last link: beside its middle."""
+"""The letter of a configuration is drawn here, in the frame of the last link, beside the link's middle; metres."""
 INWARDS = 0.06
-"""How far a drawn configuration is from the region's corner, relative to the corner's distance from the middle."""
+"""A configuration is drawn this far inwards from the region's corner, relative to the corner's distance from the middle."""
 
 STYLE = """
 svg { --paper: #ffffff; --ink: #24292f; --faint: #8c959f; --grid: #e4e8ec;
@@ -54,7 +54,7 @@ text { font: 13px sans-serif; fill: var(--ink) } .small { font-size: 11px; fill:
 
 @dataclass(frozen=True)
 class Panel:
-    """A rectangle of the picture, in pixels, that shows a rectangle of the plane, its second axis upwards."""
+    """A panel is a rectangle of the picture, in pixels. It shows a rectangle of the plane, with the second axis upwards."""
 
     left: float
     top: float
@@ -71,7 +71,7 @@ class Panel:
         return self.top + self.scale * (self.upper[1] - self.lower[1])
 
     def __call__(self, points: Array) -> Array:
-        """Pixels (k, 2) of points (k, 2)."""
+        """Returns the pixels (k, 2) of points (k, 2)."""
         return np.column_stack(
             [self.left + self.scale * (points[:, 0] - self.lower[0]), self.top + self.scale * (self.upper[1] - points[:, 1])]
         )
@@ -82,19 +82,19 @@ class Panel:
 
 
 def grown() -> dict[str, Any]:
-    """The example's region: its seed in s, and its half-spaces, joint limits among them."""
+    """Grows the example's region. Returns its seed in s, and its half-spaces, joint limits among them."""
     scene, q = catalogue.scene(EXAMPLE), catalogue.seed(EXAMPLE)
     manifest = local.grow(scene, GrowthOptions(seed={"q": q.tolist()})).manifest
     return {"seed": scene.to_s(q).tolist()} | {key: manifest[key] for key in ("halfspace_normals", "halfspace_offsets")}
 
 
 def polytope(region: dict[str, Any]) -> Polytope:
-    """The region's half-spaces."""
+    """Returns the polytope of the region's half-spaces."""
     return Polytope(np.array(region["halfspace_normals"]), np.array(region["halfspace_offsets"]))
 
 
 def picture(region: dict[str, Any]) -> str:
-    """The region as SVG: the arm at a few of its configurations, and the region among the configurations that collide."""
+    """Returns the region as SVG: the arm at a few of its configurations, and the region among the configurations that collide."""
     scene = catalogue.scene(EXAMPLE)
     kinematics, corners, seed = Kinematics.of(scene), _corners(polytope(region)), np.array(region["seed"])
     configurations = _shown(corners, seed)
@@ -157,7 +157,7 @@ def _tangent(panel: Panel, kinematics: Kinematics, corners: Array, configuration
 
 
 def _axes(panel: Panel, scene: Scene) -> Iterator[str]:
-    """Ticks of s below and on the left, of q above and on the right."""
+    """Draws the ticks: s below and on the left, q above and on the right."""
     for value in range(-3, 4):
         x, y = panel(np.array([[value, value]]))[0]
         yield f'<line class="grid" x1="{_number(x)}" y1="{_number(panel.top)}" x2="{_number(x)}" y2="{_number(panel.bottom)}"/>'
@@ -190,12 +190,12 @@ def _legend() -> Iterator[str]:
 
 
 def _letter(index: int, x: float, y: float) -> str:
-    """The name of a configuration, its middle at (x, y)."""
+    """Draws the name of a configuration, with its middle at (x, y)."""
     return f'<text class="letter halo" x="{_number(x)}" y="{_number(y + 5)}">{"ABCD"[index]}</text>'
 
 
 def _corners(region: Polytope) -> Array:
-    """The corners (k, 2) of a polytope in the plane, in order around it."""
+    """Returns the corners (k, 2) of a polytope in the plane, in order around it."""
     rows = [
         np.linalg.solve(region.C[[i, j]], region.d[[i, j]])
         for i, j in itertools.combinations(range(len(region.d)), 2)
@@ -210,17 +210,17 @@ def _meet(region: Polytope, i: int, j: int) -> bool:
 
 
 def _shown(corners: Array, seed: Array) -> Array:
-    """The configurations that are drawn: the seed, halfway to the leftmost corner, nearly there, and near the lowest corner."""
+    """Returns the configurations to draw: the seed, one halfway to the leftmost corner, one near it, and one near the lowest corner."""
     ends = corners[[np.argmin(corners[:, 0]), np.argmin(corners[:, 1])]]
     left, low = ends * (1 - INWARDS) + INWARDS * corners.mean(axis=0)
     return np.array([seed, (seed + left) / 2, left, low])
 
 
 def clearance(kinematics: Kinematics, obstacle: str, s: Array) -> Array:
-    """The distance between the arm and an obstacle at the rows of s, (S,); negative where they overlap.
+    """Returns the distance between the arm and an obstacle at the rows of s, (S,) in metres; negative where they overlap.
 
-    Everything is as high above the plane as below it, so the distance is that of the outlines: the largest gap along any normal of an edge
-    or line between two vertices.
+    Every body is as high above the plane as below it, so the distance is that of the outlines seen from above. It is the largest gap
+    along any normal of an edge, or along any line between two vertices.
     """
     fixed = _geometry(kinematics.scene, obstacle)
     B = _flat(kinematics, fixed, s)
@@ -247,7 +247,7 @@ def _turned(direction: Array) -> Array:
 
 
 def _flat(kinematics: Kinematics, geometry: Geometry, s: Array) -> Array:
-    """The vertices above the plane, as seen from above, at the rows of s: (S, v, 2)."""
+    """Returns the vertices above the plane, seen from above, at the rows of s: (S, v, 2)."""
     upper = geometry.vertices[geometry.vertices[:, 2] >= 0]
     return kinematics.points(WORLD, geometry.body, upper, s)[:, :, :2]
 
@@ -277,7 +277,7 @@ def _signed(value: int) -> str:
 
 
 def _number(value: float) -> str:
-    """Two decimals, so that what differs from machine to machine is not seen."""
+    """Writes a number with two decimals, which hides what differs from machine to machine."""
     return f"{value:.2f}".rstrip("0").rstrip(".")
 
 

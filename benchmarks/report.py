@@ -1,4 +1,4 @@
-"""The documents of the benchmarks as tables: on a terminal, and between the marks of docs/benchmarks.md."""
+"""This module writes the documents of the benchmarks as tables: on a terminal, and between the marks of docs/benchmarks.md."""
 
 from __future__ import annotations
 
@@ -14,24 +14,27 @@ from benchmarks.catalogue import ROOT
 PAGE, FIGURES = ROOT / "docs/benchmarks.md", ROOT / "docs/benchmarks"
 
 LINE = 100
-"""Most characters of a line of docs that is no table's."""
+"""A line of docs has at most this many characters, unless it is a line of a table."""
 
 Document = dict[str, Any]
 
 
 def text(document: Document) -> str:
-    """A document for people: the machine, then its tables."""
+    """Returns a document as text for people: the machine, then the document's tables."""
     return "\n\n".join([machine(document), *_TABLES[document["benchmark"]](document)])
 
 
 def write() -> None:
-    """Put the tables of all documents in docs/benchmarks into docs/benchmarks.md, and draw the curves."""
+    """Writes the tables of all documents in docs/benchmarks into docs/benchmarks.md, and draws the curves."""
     PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
     (FIGURES / "scaling.svg").write_text(scaling.picture(_document("scaling")), encoding="utf-8")
 
 
 def page(old: str) -> str:
-    """The page, what stands between ``<!-- NAME -->`` and ``<!-- end -->`` written anew from docs/benchmarks/NAME.json if it is there."""
+    """Returns the page with new tables between each ``<!-- NAME -->`` and ``<!-- end -->``.
+
+    The tables come from docs/benchmarks/NAME.json, if that file exists.
+    """
 
     def tables(found: re.Match[str]) -> str:
         measured = (FIGURES / f"{found[2]}.json").exists()
@@ -41,7 +44,7 @@ def page(old: str) -> str:
 
 
 def _wrapped(text: str) -> str:
-    """The text in lines of at most LINE characters, the rows of tables as they are."""
+    """Breaks the text into lines of at most LINE characters. It leaves the rows of tables as they are."""
     lines = (line if line.startswith("|") else textwrap.fill(line, LINE, break_on_hyphens=False) for line in text.splitlines())
     return "\n".join(lines)
 
@@ -52,7 +55,7 @@ def _document(name: str) -> Document:
 
 
 def machine(document: Document) -> str:
-    """Where it was measured, in a sentence."""
+    """Returns a sentence that says on what machine, and with what software, the measurement was made."""
     here = document["machine"]
     versions = ", ".join(f"{package} {number}" for package, number in here["versions"].items())
     where = f"{here['processor']}, {here['cores']} cores, {here['memory_gib']} GiB; Python {here['python']}, {versions}"
@@ -60,7 +63,7 @@ def machine(document: Document) -> str:
 
 
 def seconds(value: float) -> str:
-    """Three significant digits, milliseconds at the least."""
+    """Writes a duration with three significant digits, but nothing finer than milliseconds."""
     digits = 0 if value >= 99.95 else 1 if value >= 9.995 else 2 if value >= 0.995 else 3
     return f"{value:.{digits}f}"
 
@@ -74,7 +77,7 @@ def _plain(outcome: str) -> str:
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Markdown with aligned columns; numbers to the right."""
+    """Returns a Markdown table with aligned columns. Columns of numbers are aligned to the right."""
     lines = [list(header), *map(list, rows)]
     widths = [max(3, *(len(line[i]) for line in lines)) for i in range(len(header))]
     right = [all(re.fullmatch(r"[\d.,e+-]*", line[i].replace(" ", "")) for line in lines[1:]) for i in range(len(header))]
@@ -86,7 +89,7 @@ def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def _compared(document: Document) -> list[str]:
-    """A line a pair, then the sums."""
+    """Returns a table with one line for each pair, then the sums."""
     against = document["verdicts"] is not None
     header = ["pair", "region", "joints", "vertices", "ciris", "covers", "solve", "verify"]
     header += ["Drake", "build", "solve", "ratio", "verdicts"] if against else []

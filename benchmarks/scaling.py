@@ -1,4 +1,4 @@
-"""How the cost of a certification grows with the number of obstacles, of joints and of faces: data, and a picture of it."""
+"""This module measures how the cost of a certification grows with the number of obstacles, joints and faces, and draws the curves."""
 
 from __future__ import annotations
 
@@ -22,21 +22,24 @@ OBSTACLES = (10, 30, 100, 300, 1000)
 JOINTS = range(2, 8)
 FACES = range(10, 61, 10)
 HALF_WIDTH, RADIUS = 0.03, 0.2
-"""Of the cubes about the arms; of the ball that all faces touch."""
+"""The cubes about the arms have this half-width. The ball that all faces touch has this radius. Both are in s."""
 REPEAT = 5
-"""Runs of a single pair; the fastest counts."""
+"""A single pair is run this often, and the fastest run counts."""
 ROOM, CLEARANCE = 3.0, 0.2
-"""Obstacles lie within this many metres of the base, and at least that far from the arm."""
+"""The centres of obstacles lie within ROOM metres of the base along each axis, and obstacles at least CLEARANCE metres from the arm."""
 
 
 def curves(against: bool, progress: Progress) -> dict[str, Any]:
-    """Measure all three curves; the document of ``ciris bench scaling``.
+    """Measures all three curves, and returns the document of ``ciris bench scaling``.
 
-    obstacles: boxes scattered around an arm of three joints, all pairs. joints: the last link of an arm against one box, both on
-    a cube. faces: link 5 of iiwa_shelf against a board, on a regular simplex with more and more planes cutting its
-    corners off; all planes touch one ball, so none is redundant. Drake, if asked, answers the last two.
+    - ``obstacles``: boxes scattered around an arm of three joints, all pairs, on a cube.
+    - ``joints``: the last link of an arm against one box, on a cube.
+    - ``faces``: link 5 of iiwa_shelf against a board, on a regular simplex. More and more planes cut its corners off. All planes touch
+      one ball, so none is redundant.
+
+    Drake, if asked, answers the last two.
     """
-    _obstacles(1)  # loads the compiled kernels
+    _obstacles(1)  # This run loads the compiled kernels and does not count.
     return {
         "benchmark": "scaling",
         "machine": measure.machine(),
@@ -47,7 +50,7 @@ def curves(against: bool, progress: Progress) -> dict[str, Any]:
 
 
 def picture(document: dict[str, Any]) -> str:
-    """The three curves as SVG."""
+    """Draws the three curves as SVG."""
     panels = []
     for name, title in (("obstacles", "obstacles around 3 joints"), ("joints", "joints, last link"), ("faces", "faces, link 5 of 7")):
         points = document[name]
@@ -82,7 +85,7 @@ def _faces(count: int, against: bool) -> dict[str, Any]:
 
 
 def _scattered(rng: np.random.Generator, count: int, s: Array) -> Iterator[Geometry]:
-    """Boxes with edges of 5 to 20 cm, none near the arm of three joints at s."""
+    """Yields boxes with edges of 5 to 20 cm, none of them near the arm of three joints at s."""
     links, made = _bodies(serial_arm(3, []), s), 0
     while made < count:
         obstacle = box(f"world/box{made}", WORLD, rng.uniform(0.05, 0.2, 3), rng.uniform(-ROOM, ROOM, 3))
@@ -92,7 +95,7 @@ def _scattered(rng: np.random.Generator, count: int, s: Array) -> Iterator[Geome
 
 
 def _bodies(scene: Scene, s: Array) -> list[Array]:
-    """The vertices of every body in the world when the arm is at s."""
+    """Returns the vertices of every body, in the world frame, when the arm is at s."""
     kinematics = Kinematics.of(scene)
     return [kinematics.points(WORLD, body.body, body.vertices, s[None])[0] for body in scene.geometries]
 

@@ -1,4 +1,7 @@
-"""What the service costs: ``ciris grow`` beside ``ciris grow --local``, the same example in turn, by the clock and in processor time."""
+"""This module measures what the service costs beside ``--local``.
+
+It runs ``ciris grow`` and ``ciris grow --local`` on the same example in turn, and takes their time by the clock and in processor time.
+"""
 
 from __future__ import annotations
 
@@ -31,9 +34,10 @@ class _Service:
 
 
 def beside_local(name: str, processes: int, turns: int, progress: Progress) -> dict[str, Any]:
-    """Grow the example's region in both ways, so often, each time the other way first; the document of ``ciris bench service``.
+    """Grows the example's region in both ways, ``turns`` times, and returns the document of ``ciris bench service``.
 
-    Seeding and pairs are the same computations in both, and on a machine that others share they vary by more than all the rest is.
+    The way that comes first changes with every turn. Both ways do the same computations for seeding and pairs. On a machine that others
+    share, the time of these varies by more than all the rest takes.
 
     Raises:
         CirisError: the service does not start, a command fails, or the two come to different regions.
@@ -57,7 +61,7 @@ def beside_local(name: str, processes: int, turns: int, progress: Progress) -> d
 
 
 def _more(rows: list[dict[str, Any]], what: str) -> dict[str, Any]:
-    """The medians, and how much more the service takes, in every turn, as a share of the seconds of the ``--local`` command then."""
+    """Returns the medians, and how much more the service takes in every turn, as a share of that turn's ``--local`` command's seconds."""
     by_way = {way: [row for row in sorted(rows, key=lambda row: row["turn"]) if row["way"] == way] for way in (SERVICE, LOCAL)}
     shares = [(mine[what] - other[what]) / other["seconds"] for mine, other in zip(by_way[SERVICE], by_way[LOCAL], strict=True)]
     medians = {way: statistics.median(row[what] for row in found) for way, found in by_way.items()}
@@ -65,14 +69,14 @@ def _more(rows: list[dict[str, Any]], what: str) -> dict[str, Any]:
 
 
 def _grown(name: str, way: str, service: _Service, directory: Path) -> dict[str, Any]:
-    """One command: its seconds, what it spent besides seeding and pairs, and the processor time of it and of the service meanwhile."""
+    """Runs one command. Returns its seconds, those besides seeding and pairs, and the processor time of the command and the service."""
     command = [*CIRIS, "grow", str(catalogue.ROOT / "examples" / name / "scene.yaml"), "--json", "--out", str(directory / "proof")]
     command += [LOCAL] if way == LOCAL else ["--url", service.url]
     before, start, busy = _stolen(), time.perf_counter(), _processor_seconds(service.pid)
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stderr is not None
-        output, said = process.stdout.read(), process.stderr.read()  # what is said on the way fits into a pipe
+        output, said = process.stdout.read(), process.stderr.read()  # what the command says on standard error fits into a pipe
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode != 0:
@@ -92,7 +96,7 @@ def _grown(name: str, way: str, service: _Service, directory: Path) -> dict[str,
 
 @contextmanager
 def _running(directory: Path, processes: int) -> Iterator[_Service]:
-    """A service of its own, with a database of its own."""
+    """Runs a separate service with a separate database while the block runs."""
     own = {"CIRIS_SOLVE_PROCESSES": str(processes)}
     environment = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")} | own
     command = [*CIRIS, "up", "--data", str(directory / "data"), "--port", "0"]
@@ -108,7 +112,7 @@ def _running(directory: Path, processes: int) -> Iterator[_Service]:
 
 
 def _processor_seconds(root: int) -> float:
-    """What a process, all that came of it, and those of them that were waited for have computed so far (Linux)."""
+    """Returns the processor seconds so far of a process, its descendants, and those of them that have been waited for (Linux)."""
     fields = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -124,7 +128,7 @@ def _processor_seconds(root: int) -> float:
 
 
 def _stolen() -> float:
-    """Seconds that the host gave this machine's cores to others."""
+    """Returns the seconds, since the machine started, that the host gave this machine's cores to others."""
     return int(Path("/proc/stat").read_text().split(maxsplit=9)[8]) / os.sysconf("SC_CLK_TCK")
 
 

@@ -1,4 +1,7 @@
-"""Every pair of every scene on every region, ours alone: the outcomes, what is left undecided, what a pair costs by its size."""
+"""The survey certifies every pair of every scene on every region, with our certifier alone.
+
+It shows the outcomes, what is left undecided, and what a pair costs by its size.
+"""
 
 from __future__ import annotations
 
@@ -24,14 +27,16 @@ from certifier.proof.pair import PairProof
 DECIDED = (Outcome.CERTIFIED, Outcome.REFUTED, Outcome.NOT_CERTIFIABLE)
 
 SizeClass = tuple[int, tuple[int, int], tuple[int, int]]
-"""How many joints the plane moves with, the vertices of A and of B, the dimensions N of their polynomial spaces."""
+"""A size class is the number of joints that the plane moves with, the numbers of vertices of A and B, and the dimensions N of their
+polynomial spaces.
+"""
 
 
 def survey(names: Iterable[str], most: float, progress: Progress) -> dict[str, Any]:
-    """Certify every pair of these scenes on every region of the catalogue; the document of ``ciris bench survey``.
+    """Certifies every pair of these scenes on every region of the catalogue, and returns the document of ``ciris bench survey``.
 
     Args:
-        most: pairs with a forecast of more seconds are left out, and counted.
+        most: seconds; pairs with a longer forecast are left out, and counted.
     """
     counts, undecided = [], []
     spent: dict[SizeClass, list[float]] = defaultdict(list)
@@ -63,7 +68,7 @@ def survey(names: Iterable[str], most: float, progress: Progress) -> dict[str, A
 
 
 def _certified(scene: Scene, region: Region) -> Iterator[tuple[PairResult, float]]:
-    """Every pair and its processor time; whatever is raised is an outcome, as it is in the service."""
+    """Yields the result of every pair and its processor time. As in the service, an exception becomes the outcome ``error``."""
     certification = Certification(scene, scene.polytope(region.C, region.d), region.center)
     for index in range(len(scene.pairs)):
         start = time.process_time()
@@ -80,7 +85,10 @@ def _sizes(scene: Scene) -> list[SizeClass]:
 
 
 def _fit(seconds: dict[SizeClass, float]) -> dict[str, Any]:
-    """The constants of the forecast that fit these mean times best, by relative error, and how well they and the present ones do."""
+    """Returns the constants of the forecast that fit these mean times best, by relative error.
+
+    It also returns how well these constants and the present ones fit.
+    """
     rows = np.array([terms(joints, list(vertices), list(N)) for joints, vertices, N in seconds])
     measured = np.array(list(seconds.values()))
     constants, _ = nnls(rows / measured[:, None], np.ones(len(measured)))

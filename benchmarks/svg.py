@@ -1,4 +1,4 @@
-"""Curves on doubly logarithmic axes as SVG, without a plotting library."""
+"""This module draws curves on doubly logarithmic axes as SVG, without a plotting library."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes.
+    """A panel is one pair of axes.
 
     Attributes:
         series: name -> points (x, y), all positive.
@@ -26,7 +26,11 @@ class Panel:
 
 
 def draw(panels: list[Panel], unit: str) -> str:
-    """The panels side by side, the colours named in the last; ``unit`` is what all ordinates are in."""
+    """Draws the panels side by side. The last one names the colours.
+
+    Args:
+        unit: unit of all ordinates.
+    """
     body = "\n".join(line for i, panel in enumerate(panels) for line in _panel(panel, i * WIDTH, unit, named=panel is panels[-1]))
     white = '<rect width="100%" height="100%" fill="#fff"/>'
     size = f'width="{len(panels) * WIDTH}" height="{HEIGHT}" viewBox="0 0 {len(panels) * WIDTH} {HEIGHT}"'
@@ -58,7 +62,7 @@ def _panel(panel: Panel, x0: float, unit: str, named: bool) -> Iterator[str]:
 
 
 class _Axis:
-    """A logarithmic axis from ``start`` to ``end`` in the picture that has room for all values."""
+    """A logarithmic axis runs from ``start`` to ``end`` in the picture, and has room for all values."""
 
     def __init__(self, values: list[float], start: float, end: float) -> None:
         margin = 1.15
@@ -69,7 +73,7 @@ class _Axis:
         return self._start + (math.log(value) - self._low) / (self._high - self._low) * (self._end - self._start)
 
     def ticks(self) -> list[float]:
-        """1, 2, 5 times the powers of ten, or the powers alone where there are many."""
+        """Returns 1, 2 and 5 times the powers of ten, or the powers alone where there are many."""
         low, high = math.exp(self._low), math.exp(self._high)
         powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
         fine = [m * 10.0**p for p in powers for m in (1, 2, 5) if low <= m * 10.0**p <= high]

@@ -1,4 +1,4 @@
-"""Variants of the 7-joint example: the same arm with other figures about its links, before other furniture."""
+"""These variants of the 7-joint example have the same arm, with other figures about its links and other furniture before it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.arms import box
 from certifier.model import WORLD, Array, Geometry, Pair, Scene
 
 CHAMFER = 0.15
-"""Part of every edge that the polytopes' chamfers take away at either end."""
+"""The polytopes' chamfers take away this part of every edge at either end."""
 
 
 def _box(link: Geometry, index: int) -> Iterator[Geometry]:
@@ -20,7 +20,11 @@ def _box(link: Geometry, index: int) -> Iterator[Geometry]:
 
 
 def _balls(cells: tuple[int, int, int]) -> Callable[[Geometry, int], Iterator[Geometry]]:
-    """Balls about the cells of the box, so many along its shortest, middle and longest edge: together they cover it."""
+    """Covers the box with balls about its cells.
+
+    Args:
+        cells: number of cells along the box's shortest, middle and longest edge.
+    """
 
     def figure(link: Geometry, index: int) -> Iterator[Geometry]:
         center, half = _extent(link)
@@ -34,7 +38,7 @@ def _balls(cells: tuple[int, int, int]) -> Callable[[Geometry, int], Iterator[Ge
 
 
 def _primitive(link: Geometry, index: int) -> Iterator[Geometry]:
-    """By turns a capsule about the middle of the box, the box, and a ball."""
+    """Yields, by turns, a capsule about the middle of the box, the box itself, and a ball."""
     center, half = _extent(link)
     longest = int(np.argmax(half))
     along = np.eye(3)[longest] * half[longest]
@@ -47,7 +51,7 @@ def _primitive(link: Geometry, index: int) -> Iterator[Geometry]:
 
 
 def _polytope(link: Geometry, index: int) -> Iterator[Geometry]:
-    """The box with its corners cut off, 24 vertices."""
+    """Yields the box with its corners cut off, which has 24 vertices."""
     center, half = _extent(link)
     corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     cut = np.ones((3, 3)) - 2 * CHAMFER * np.eye(3)
@@ -82,14 +86,14 @@ FURNITURE = {
         )
     ],
 }
-"""Boxes: sizes and centres in metres."""
+"""Each piece of furniture is a list of boxes, given by their sizes and centres in metres."""
 
 
 def variant(example: Scene, figure: str, furniture: str | None) -> Scene:
-    """The example with this figure about every link and, if named, this furniture in place of its own.
+    """Returns the example with this figure about every link and, if named, this furniture in place of the example's own.
 
-    Figures are paired where their links are in the example. A link that is paired with the first piece of the example's furniture is
-    paired with every piece of the new.
+    Figures are paired where their links are paired in the example. A link that is paired with the first piece of the example's furniture
+    is paired with every piece of the new furniture.
     """
     links = [g for g in example.geometries if _on_arm(g)]
     figures = {link.name: list(FIGURES[figure](link, i)) for i, link in enumerate(links)}
@@ -110,7 +114,7 @@ def _on_arm(geometry: Geometry) -> bool:
 
 
 def _extent(link: Geometry) -> tuple[Array, Array]:
-    """Centre and half edges of a box whose edges are its link's axes."""
+    """Returns the centre and the half edges of a box whose edges are parallel to its link's axes."""
     lower, upper = link.vertices.min(axis=0), link.vertices.max(axis=0)
     return (lower + upper) / 2, (upper - lower) / 2
 

@@ -1,12 +1,12 @@
-"""Errors a user can act on: what is wrong, where, and what to do."""
+"""The errors here tell a user what is wrong, where, and what to do."""
 
 
 class CirisError(Exception):
-    """A problem the user can mend.
+    """This error reports a problem that the user can mend.
 
     Attributes:
         code: stable machine-readable name, e.g. ``"seed_in_collision"``.
-        field: where in the user's input, e.g. ``"seed.q[3]"``; None when the input as a whole is meant.
+        field: where in the user's input the problem is, e.g. ``"seed.q[3]"``; None when the input as a whole is meant.
         hint: what to do about it; may be empty.
     """
 
@@ -19,22 +19,22 @@ class CirisError(Exception):
         return f"{where}{self.message}" + (f" ({self.hint})" if self.hint else "")
 
     def to_document(self) -> dict[str, str | None]:
-        """The error as a JSON-able dict with the keys code, message, field, hint."""
+        """Returns the error as a JSON-able dict with the keys code, message, field, hint."""
         return {"code": self.code, "message": self.message, "field": self.field, "hint": self.hint}
 
     @classmethod
     def from_document(cls, document: dict[str, str | None]) -> "CirisError":
-        """Inverse of :meth:`to_document`; the result is a plain CirisError."""
+        """Does the inverse of :meth:`to_document`; the result is a plain CirisError."""
         return cls(document["code"] or "error", document["message"] or "", field=document["field"], hint=document["hint"] or "")
 
 
 class SceneError(CirisError):
-    """The scene cannot be used: broken file, unsupported joint or shape, unknown name."""
+    """The scene cannot be used: a file is broken, a joint or a shape is not supported, or a name is unknown."""
 
 
 class RegionError(CirisError):
-    """The polytope or the seed cannot be used: empty, unbounded, in collision, outside the limits, wrong length."""
+    """The polytope or the seed cannot be used: it is empty, unbounded, in collision, outside the limits, or of the wrong length."""
 
 
 class ProofError(CirisError):
-    """The proof does not hold, or the file is not one."""
+    """The proof does not hold, or the file is not a proof."""

@@ -1,11 +1,14 @@
-"""Rational forward kinematics, evaluated at sample points.
+"""Rational forward kinematics is evaluated here at sample points.
 
     prod_i (1 + s_i^2) X_FA(s) = product over the joints from F to A of  X_left (T0 + T1 s_i + T2 s_i^2) X_right
 
-For a revolute joint with axis u, R* = R(q*) and the half-angle substitution s = tan((q - q*)/2):
-T0 = diag(R*, 1), T1 = diag(2 R*[u], 0), T2 = diag(R*(I + 2[u]^2), 1). For a prismatic joint T0 = [I, u q*; 0, 1],
-T1 = [0, u; 0, 0], and there is no denominator. Going up the tree the inverse joint is used: u -> -u, R* -> R*',
-outer transforms inverted and swapped; a weld contributes its fixed transform. C-IRIS eq. (4)-(6); nothing is symbolic.
+Let a revolute joint have the axis u, and let R* = R(q*). With the half-angle substitution s = tan((q - q*)/2) its terms are
+T0 = diag(R*, 1), T1 = diag(2 R*[u], 0), T2 = diag(R*(I + 2[u]^2), 1).
+A prismatic joint has T0 = [I, u q*; 0, 1], T1 = [0, u; 0, 0], and no denominator. A weld contributes its fixed transform.
+
+On the way up the tree the inverse joint is used: u becomes -u, R* becomes R*', and the outer transforms are inverted and swapped.
+
+The formulas are C-IRIS eq. (4)-(6). Nothing is symbolic.
 """
 
 from __future__ import annotations
@@ -21,11 +24,11 @@ from certifier.model import WORLD, Array, Joint, JointKind, Scene
 
 @dataclass(frozen=True)
 class Factor:
-    """One joint on a path: X = left (T[0] + T[1] s + T[2] s^2) right, already multiplied out.
+    """A factor is one joint on a path, already multiplied out: X = left (T[0] + T[1] s + T[2] s^2) right.
 
     Attributes:
-        index: position index, None for a weld (then only T[0] is set).
-        terms: (3, 4, 4), left and right included.
+        index: position index; None for a weld, of which only T[0] is set.
+        terms: (3, 4, 4) T[0], T[1] and T[2], left and right included.
         revolute: whether the factor carries the denominator 1 + s^2.
     """
 
@@ -35,7 +38,7 @@ class Factor:
 
 
 class Kinematics:
-    """Paths and numerators of one scene; see :meth:`of`."""
+    """Gives the paths and the numerators of one scene; :meth:`of` makes it."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -44,7 +47,7 @@ class Kinematics:
     @staticmethod
     @lru_cache(maxsize=8)
     def of(scene: Scene) -> Kinematics:
-        """The scene's, made once."""
+        """Returns the kinematics of the scene, which is made once and kept."""
         return Kinematics(scene)
 
     @cached_property
@@ -52,30 +55,30 @@ class Kinematics:
         return {joint.child: joint for joint in self.scene.joints}
 
     def ancestors(self, body: str) -> list[str]:
-        """The bodies from ``body`` up to the world, both included."""
+        """Returns the bodies from ``body`` up to the world, both included."""
         bodies = [body]
         while bodies[-1] != WORLD:
             bodies.append(self._joint_above[bodies[-1]].parent)
         return bodies
 
     def common(self, a: str, b: str) -> str:
-        """The body at which the ways from a and from b up to the world meet."""
+        """Returns the body at which the ways from a and from b up to the world meet."""
         up_b = self.ancestors(b)
         return next(body for body in self.ancestors(a) if body in up_b)
 
     def bodies_between(self, a: str, b: str) -> list[str]:
-        """The bodies on the path from a to b, both included."""
+        """Returns the bodies on the path from a to b, both included."""
         up_a, up_b, common = self.ancestors(a), self.ancestors(b), self.common(a, b)
         return up_a[: up_a.index(common) + 1] + up_b[: up_b.index(common)][::-1]
 
     def rigid_root(self, body: str) -> str:
-        """The first body on the way up that a joint moves, or the world."""
+        """Returns the first body on the way up, ``body`` included, that a joint moves relative to its parent, or else the world."""
         while body != WORLD and self._joint_above[body].index is None:
             body = self._joint_above[body].parent
         return body
 
     def path(self, frame: str, body: str) -> list[Factor]:
-        """The factors of X_FB from frame body F to body B."""
+        """Returns the factors of X_FB from frame body F to body B, in path order."""
         if (frame, body) in self._paths:
             return self._paths[frame, body]
         bodies = self.bodies_between(frame, body)
@@ -87,11 +90,11 @@ class Kinematics:
         return factors
 
     def chain(self, frame: str, body: str) -> list[int]:
-        """Position indices of the joints between F and B, in path order."""
+        """Returns the position indices of the joints between F and B, in path order."""
         return [f.index for f in self.path(frame, body) if f.index is not None]
 
     def numerators(self, frame: str, body: str, s: Array) -> Array:
-        """prod(1 + s_i^2) X_FB at the rows of s.
+        """Returns prod(1 + s_i^2) X_FB at the rows of s.
 
         Args:
             s: (N, n) points of tangent space.
@@ -109,24 +112,32 @@ class Kinematics:
         return np.broadcast_to(np.eye(4) if X is None else X, (len(s), 4, 4))
 
     def points(self, frame: str, body: str, vertices: Array, s: Array) -> Array:
-        """Positions in F, metres, of vertices (V, 3) of B at the rows of s: (N, V, 3)."""
+        """Returns where the vertices of body B are in F, in metres, at the rows of s.
+
+        Args:
+            vertices: (V, 3) metres in B.
+            s: (N, n) points of tangent space.
+
+        Returns:
+            (N, V, 3) metres in F.
+        """
         X = self.numerators(frame, body, s)
         return (vertices @ np.swapaxes(X[:, :3, :3], 1, 2) + X[:, None, :3, 3]) / X[:, 3, 3, None, None]
 
 
 def skew(u: Array) -> Array:
-    """[u], (3, 3), with [u] v = u x v."""
+    """Returns the matrix [u], (3, 3), with [u] v = u x v."""
     return np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
 
 
 def rotation(axis: Array, angle: float) -> Array:
-    """R(angle) about a unit axis, (3, 3) (Rodrigues)."""
+    """Returns the rotation R(angle) about a unit axis, (3, 3), by Rodrigues' formula; the angle is in radians."""
     K = skew(axis)
     return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
 
 
 def rigid_inverse(X: Array) -> Array:
-    """Inverse of a rigid transform, (4, 4)."""
+    """Returns the inverse of a rigid transform, (4, 4)."""
     inverse = np.eye(4)
     inverse[:3, :3] = X[:3, :3].T
     inverse[:3, 3] = -X[:3, :3].T @ X[:3, 3]
@@ -134,12 +145,14 @@ def rigid_inverse(X: Array) -> Array:
 
 
 def _homogeneous(R: Array, p: Array, scale: float) -> Array:
+    """Returns the matrix [R, p; 0, scale], (4, 4)."""
     X = np.zeros((4, 4))
     X[:3, :3], X[:3, 3], X[3, 3] = R, p, scale
     return X
 
 
 def _factor(joint: Joint, q_star: Array, inverse: bool) -> Factor:
+    """Returns the factor of a joint or, on the way up the tree, of its inverse."""
     left, right = joint.X_PF, rigid_inverse(joint.X_BM)
     if inverse:
         left, right = joint.X_BM, rigid_inverse(joint.X_PF)

@@ -1,45 +1,47 @@
-"""Verdicts. Every member says what it means; "almost solved" is never "solved"."""
+"""Outcomes and guarantees are defined here, and every member says what it means. "Almost solved" is never "solved"."""
 
 from enum import StrEnum
 
 
 class Outcome(StrEnum):
-    """What is known about one pair of bodies, or about a whole polytope, after a certification."""
+    """An outcome says what a certification found out about one pair of bodies, or about a whole polytope."""
 
     CERTIFIED = "certified"
     """A proof of separation on the whole polytope exists and has passed the verifier."""
     REFUTED = "refuted"
-    """A configuration inside the polytope is in collision; it is returned."""
+    """A configuration inside the polytope is in collision, and the result names it."""
     NOT_CERTIFIABLE = "not_certifiable"
-    """The program (11) has a dual proof that no certificate of this degree exists in this frame."""
+    """No certificate of the form of the program (11) exists, by a dual proof; a plane may separate the pair all the same."""
     INCONCLUSIVE = "inconclusive"
-    """A limit or numerical trouble stopped the search before either answer; the detail says which."""
+    """A limit or numerical trouble stopped the search before either answer was found; the detail says which."""
     ERROR = "error"
-    """The program failed to run; the detail says why."""
+    """The program could not be run; the detail says why."""
 
 
 class Stage(StrEnum):
-    """Which part of the certifier settled a pair."""
+    """The stage says which part of the certifier settled a pair."""
 
     SCREEN = "screen"
+    """A look at sampled configurations settled it, before any program was solved."""
     SOS = "sos"
+    """The sums-of-squares program (11) settled it, or a contact that was looked for after it."""
 
 
 class Guarantee(StrEnum):
-    """How much a statement about a region is worth (docs/algorithm.md)."""
+    """A guarantee says how much a statement about a region is worth (docs/algorithm.md)."""
 
     EXACT = "exact"
-    """Every pair's proof was verified in exact rational arithmetic."""
+    """The verifier has checked every pair's proof in exact rational arithmetic."""
     NUMERIC = "numeric"
-    """Floating-point residuals are under a stated tolerance."""
+    """The residuals, in floating point, are under a stated tolerance."""
     SAMPLED = "sampled"
-    """Collision-free with the stated probability, by sampling."""
+    """Sampling says that the region is free of collisions with the stated probability."""
     NONE = "none"
     """Nothing is claimed."""
 
 
 def combine(outcomes: "list[Outcome]") -> Outcome:
-    """The outcome of a polytope from the outcomes of its pairs: the worst news wins."""
+    """Returns the outcome of a polytope from the outcomes of its pairs: the worst of them."""
     for outcome in (Outcome.REFUTED, Outcome.NOT_CERTIFIABLE, Outcome.ERROR, Outcome.INCONCLUSIVE):
         if outcome in outcomes:
             return outcome

@@ -1,4 +1,4 @@
-"""The `ciris` command line and a small Python client for the service."""
+"""This package holds the `ciris` command line and a small Python client for the service."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["Client"]
 
 
 def __getattr__(name: str) -> Any:
-    """``Client`` is imported when it is asked for: ``ciris verify`` runs where httpx2 is not installed."""
+    """Imports ``Client`` when it is asked for, because ``ciris verify`` must run where httpx2 is not installed."""
     if name == "Client":
         from client.http import Client
 

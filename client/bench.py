@@ -1,4 +1,4 @@
-"""``ciris bench``: the measurements of the folder benchmarks, which is in a checkout of the repository only."""
+"""``ciris bench`` runs the measurements of the folder benchmarks, which exists only in a checkout of the repository."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from certifier.errors import CirisError
 
 CHECKOUT = Path(__file__).parents[1]
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-"""What has to stand in the environment before numpy is loaded for everything to run on one thread."""
+"""These variables must be in the environment before numpy is loaded, so that everything runs on one thread."""
 
 
 def bench(args: Namespace) -> NoReturn:
-    """Become ``python -m benchmarks`` on one thread.
+    """Replaces this process by ``python -m benchmarks`` on one thread.
 
     Raises:
         CirisError: ``no_benchmarks`` outside a checkout.

@@ -1,4 +1,4 @@
-"""The ``ciris`` command."""
+"""This module parses the arguments of the ``ciris`` command and runs it."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from certifier.errors import CirisError
 from client.output import NEGATIVE
 
 EPILOG = """exit status: 0 success; 1 a negative answer (not certified, a proof that does not hold, a point outside);
-2 bad input or no service; 130 interrupted. An error is one line on standard error. --json prints one JSON document
-on standard output, everything else goes to standard error.
+2 bad input or no service; 130 interrupted. An error is one line on standard error. With --json a command prints one
+JSON document on standard output; everything else goes to standard error.
 
 SCENE is the path of a scene file (.yaml), or the name or id of a scene that the service knows."""
 
@@ -28,7 +28,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one command; returns the exit status."""
+    """Runs one command and returns the exit status."""
     parsed = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
         return _command(parsed.run)(parsed)
@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _command(where: str) -> Callable[[argparse.Namespace], int]:
-    """The command at ``module:function``, imported now: checking a proof needs little of what the others do.
+    """Imports and returns the command at ``module:function``. It does so now because a check of a proof needs few of the modules.
 
     Raises:
         CirisError: not_installed.
@@ -66,7 +66,7 @@ def _fail(message: str, status: int) -> int:
 
 
 def _joined(arguments: Sequence[str]) -> list[str]:
-    """``--q -0.5,1`` as ``--q=-0.5,1``: argparse takes a list that begins with a minus for an option."""
+    """Joins ``--q -0.5,1`` to ``--q=-0.5,1``, because argparse takes a list that begins with a minus for an option."""
     joined: list[str] = []
     for argument in arguments:
         if joined and joined[-1] in ("--q", "--contain") and re.match(r"-[\d.]", argument):
@@ -89,34 +89,36 @@ def _parser() -> argparse.ArgumentParser:
     )
     verbs = _group(parser)
     remote = _Parser(add_help=False)
-    remote.add_argument("--url", help="the service; default: CIRIS_URL, or the stack that `ciris up` runs here")
+    remote.add_argument("--url", help="URL of the service; default: CIRIS_URL, or the service that `ciris up` runs here")
     json = _Parser(add_help=False)
     json.add_argument("--json", action="store_true", help="print one JSON document")
 
     up = verbs.add_parser("up", help="run the service on this machine until Ctrl-C")
-    up.add_argument("--port", type=int, help="port of the API; default: CIRIS_PORT or 8643, or any free one when that is taken")
+    up.add_argument("--port", type=int, help="port of the API; default: CIRIS_PORT or 8643, or any free port when that one is taken")
     up.add_argument("--data", metavar="DIR", help="data directory; default: CIRIS_DATA_DIR")
     up.set_defaults(run="client.commands:up")
 
-    key = _group(verbs.add_parser("key", help="make, list and revoke API keys, in the database of the service of this machine"))
+    key = _group(verbs.add_parser("key", help="make, list and revoke API keys, in the database of this machine's service"))
     database = _Parser(add_help=False)
-    database.add_argument("--data", metavar="DIR", help="data directory; default: CIRIS_DATA_DIR; CIRIS_DATABASE_URL wins")
-    made = key.add_parser("add", parents=[database], help="make a key and print it, once")
+    database.add_argument("--data", metavar="DIR", help="data directory; default: CIRIS_DATA_DIR; not used where CIRIS_DATABASE_URL is set")
+    made = key.add_parser("add", parents=[database], help="make a key and print it; it is shown only once")
     made.add_argument("name", metavar="NAME")
-    made.add_argument("--scope", choices=["read", "submit", "admin"], required=True, help="what it allows; each includes those before")
+    made.add_argument(
+        "--scope", choices=["read", "submit", "admin"], required=True, help="what the key allows; each scope includes those before it"
+    )
     made.set_defaults(run="client.commands:key", verb="add", words=lambda args: [args.name, f"--scope={args.scope}"])
-    listed = key.add_parser("ls", parents=[database, json], help="list the keys, without what is secret")
+    listed = key.add_parser("ls", parents=[database, json], help="list the keys, without their secrets")
     listed.set_defaults(run="client.commands:key", verb="ls", words=lambda args: ["--json"] if args.json else [])
-    revoked = key.add_parser("revoke", parents=[database], help="end a key within a second")
+    revoked = key.add_parser("revoke", parents=[database], help="revoke a key; the service refuses it within a second")
     revoked.add_argument("name", metavar="NAME")
     revoked.set_defaults(run="client.commands:key", verb="revoke", words=lambda args: [args.name])
 
     scene = _group(verbs.add_parser("scene", help="add, list and show scenes"))
-    add = scene.add_parser("add", parents=[remote, json], help="upload a scene file with all it refers to")
+    add = scene.add_parser("add", parents=[remote, json], help="upload a scene file and all files it refers to")
     add.add_argument("path", metavar="PATH.yaml")
     add.set_defaults(run="client.commands:scene_add")
     scene.add_parser("ls", parents=[remote, json], help="list scenes, newest first").set_defaults(run="client.commands:scene_ls")
-    show = scene.add_parser("show", parents=[remote, json], help="a scene's joints, warnings and pairs")
+    show = scene.add_parser("show", parents=[remote, json], help="show a scene's joints, warnings and pairs")
     show.add_argument("scene", metavar="ID")
     show.set_defaults(run="client.commands:scene_show")
 
@@ -126,65 +128,72 @@ def _parser() -> argparse.ArgumentParser:
         "--q",
         metavar='"0,0.3,..."',
         action="append",
-        help="seed: joint positions; default: q of the seed.yaml beside the scene file; given several times, one job a seed, all at once",
+        help="the seed: joint positions; default: q of the seed.yaml beside the scene file; "
+        "if given several times, the service grows one region a seed, all at once",
     )
     grow.add_argument(
         "--contain",
         metavar='"0,0.3,..."',
         action="append",
         default=[],
-        help="joint positions to contain as well; may be given several times",
+        help="joint positions that the region must contain as well; may be given several times",
     )
-    methods = "iris_np2 (default up to 8 joints) and iris_zo: Drake's IRIS; limits (default beyond): the joint limits; box: around the seed"
-    grow.add_argument("--method", help=f"where the first polytope, which is then cut until it is certified, comes from. {methods}")
-    grow.add_argument("--pushes", type=int, help="how often faces are pushed out again; default: the more, the smaller the arm")
+    methods = (
+        "iris_np2 (default up to 8 joints) and iris_zo use Drake's IRIS; limits (default beyond) takes the joint limits; "
+        "box takes a box around the seed"
+    )
+    grow.add_argument("--method", help=f"how the first polytope is found, which is then cut until it is certified: {methods}")
+    grow.add_argument("--pushes", type=int, help="how often the faces are pushed out again; default: more often for smaller arms")
     grow.add_argument("--rounds", type=int, help="rounds of the polytope step; default: a few for small arms, none for large ones")
-    grow.add_argument("--random-seed", type=int, help="seeds every random choice; default 0")
-    grow.add_argument("--out", metavar="FILE", help="where the proof goes; default: named after scene and proof, here")
-    grow.add_argument("--watch", action="store_true", help="a line for every pair as it is settled")
-    grow.add_argument("--local", action="store_true", help="in this process, without a service")
+    grow.add_argument("--random-seed", type=int, help="seed of every random choice; default 0")
+    grow.add_argument("--out", metavar="FILE", help="file for the proof; default: a file in this directory, named after scene and proof")
+    grow.add_argument("--watch", action="store_true", help="print a line for every pair as it is settled")
+    grow.add_argument("--local", action="store_true", help="grow in this process, without a service")
     grow.set_defaults(run="client.commands:grow")
 
-    certify = verbs.add_parser("certify", parents=[remote, json], help="one outcome per pair for a given polytope")
+    certify = verbs.add_parser("certify", parents=[remote, json], help="certify a given polytope: one outcome for each pair")
     certify.add_argument("scene", metavar="SCENE")
     certify.add_argument(
-        "--polytope", metavar="FILE.npz", required=True, help="C (m x n), d (m) and optionally center (n), in s; joint limits are added"
+        "--polytope",
+        metavar="FILE.npz",
+        required=True,
+        help="arrays C (m x n), d (m) and optionally center (n), in s; ciris adds the joint limits",
     )
-    certify.add_argument("--watch", action="store_true", help="a line for every pair as it is settled")
-    certify.add_argument("--local", action="store_true", help="in this process, without a service")
-    certify.add_argument("--backend", choices=["ciris", "drake"], default="ciris", help="drake: Drake's own program, a cross-check")
-    certify.add_argument("--solver", metavar="NAME", help="Drake's solver: clarabel (default), scs, csdp or mosek")
+    certify.add_argument("--watch", action="store_true", help="print a line for every pair as it is settled")
+    certify.add_argument("--local", action="store_true", help="certify in this process, without a service")
+    certify.add_argument("--backend", choices=["ciris", "drake"], default="ciris", help="drake asks Drake's own program, as a cross-check")
+    certify.add_argument("--solver", metavar="NAME", help="solver that Drake uses: clarabel (default), scs, csdp or mosek")
     certify.set_defaults(run="client.commands:certify")
 
-    verify = verbs.add_parser("verify", parents=[json], help="check a proof file offline; says what was proved")
+    verify = verbs.add_parser("verify", parents=[json], help="check a proof file offline and say what was proved")
     verify.add_argument("proof", metavar="PROOF")
     verify.set_defaults(run="client.verify:verify")
 
     region = _group(verbs.add_parser("region", help="list, show and export regions"))
     ls = region.add_parser("ls", parents=[remote, json], help="list regions, newest first")
-    ls.add_argument("--scene", help="only those of this scene")
+    ls.add_argument("--scene", help="list only the regions of this scene")
     ls.set_defaults(run="client.commands:region_ls")
-    show = region.add_parser("show", parents=[remote, json], help="a region's manifest")
+    show = region.add_parser("show", parents=[remote, json], help="show a region's manifest")
     show.add_argument("region", metavar="ID")
     show.set_defaults(run="client.commands:region_show")
-    export = region.add_parser("export", parents=[remote], help="a region as a file")
+    export = region.add_parser("export", parents=[remote], help="write a region to a file")
     export.add_argument("region", metavar="ID")
     export.add_argument("--format", choices=["json", "npz", "drake-yaml", "proof"], default="json")
-    export.add_argument("--out", metavar="FILE", help="default: standard output")
+    export.add_argument("--out", metavar="FILE", help="file to write; default: standard output")
     export.set_defaults(run="client.commands:region_export")
 
-    contains = verbs.add_parser("contains", parents=[remote, json], help="which certified regions hold a configuration")
+    contains = verbs.add_parser("contains", parents=[remote, json], help="say which certified regions contain a configuration")
     contains.add_argument("scene", metavar="SCENE")
     contains.add_argument("--q", metavar='"0,0.3,..."', required=True, action="append", help="joint positions; may be given several times")
     contains.set_defaults(run="client.commands:contains")
 
-    bench = verbs.add_parser("bench", help="measure, side by side with Drake: ciris bench BENCHMARK --help")
+    bench = verbs.add_parser("bench", help="measure ciris, and Drake beside it if asked; see ciris bench BENCHMARK --help")
     kinds = ["pairs", "scene", "growth", "agreement", "scaling", "service", "survey", "docs"]
     bench.add_argument("benchmark", choices=kinds)
     bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...")
     bench.set_defaults(run="client.bench:bench")
 
-    doctor = verbs.add_parser("doctor", parents=[remote, json], help="what is installed, what works, what the machine can do")
+    doctor = verbs.add_parser("doctor", parents=[remote, json], help="say what is installed, what works and what the machine can do")
     doctor.set_defaults(run="client.commands:doctor")
     return parser
 

@@ -1,9 +1,10 @@
-"""What the commands do. Each takes the parsed arguments and returns the exit status."""
+"""Each function here does what one command asks. It takes the parsed arguments and returns the exit status."""
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
 import sys
 from argparse import Namespace
 from pathlib import Path
@@ -20,14 +21,14 @@ OK, NO = 0, 1
 
 
 def up(args: Namespace) -> int:
-    """Becomes the supervisor of the embedded stack."""
+    """Replaces this process by the supervisor of the embedded stack."""
     options = [f"--{name}={value}" for name, value in (("port", args.port), ("data", args.data)) if value is not None]
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, "-m", "workers.stack", *options])
 
 
 def key(args: Namespace) -> int:
-    """Becomes the command that acts on the keys in the database."""
+    """Replaces this process by the command that acts on the keys in the database."""
     options = [] if args.data is None else [f"--data={args.data}"]
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, "-m", "db.keys", *options, args.verb, *args.words(args)])
@@ -95,6 +96,7 @@ def grow(args: Namespace) -> int:
     }
     if len(seeds) > 1:
         return _grow_many(args, seeds, options, screen)
+    check_writable(args.out)
     seed = seeds[0]
     if args.local:
         from client import local
@@ -115,7 +117,7 @@ def grow(args: Namespace) -> int:
 
 
 def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, Any], screen: Screen) -> int:
-    """One job a seed; the regions stay on the service."""
+    """Has the service run one job a seed. The regions stay on the service."""
     if args.local or args.out is not None:
         raise CirisError(
             "several_seeds", "several seeds need a service, which keeps their regions", field="--q", hint="leave --local and --out out"
@@ -141,9 +143,33 @@ def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, 
     return OK if len(volumes) == len(jobs) else NO
 
 
+def file_name(name: str) -> str:
+    """Returns a scene's name as part of a file's name: a name may hold slashes and dots, which must not lead elsewhere."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-") or "scene"
+
+
+def check_writable(out: str | None) -> None:
+    """Refuses, before a job takes minutes, a place that its proof cannot be written to.
+
+    Raises:
+        CirisError: not_writable.
+    """
+    path = Path(out or ".")
+    directory = path.parent if out else path
+    if path.is_dir() and out:
+        raise CirisError("not_writable", f"{out} is a directory", field="--out", hint="name a file")
+    if not directory.is_dir() or not os.access(directory, os.W_OK):
+        raise CirisError(
+            "not_writable", f"the proof cannot be written into {directory.absolute()}", field="--out", hint="name a file elsewhere"
+        )
+
+
 def save_proof(manifest: dict[str, Any], proof: bytes, out: str | None) -> Path:
-    """Writes the proof file, here unless told where; its name holds its digest, so the same proof is the same file."""
-    path = Path(out or f"{manifest['scene']['name']}-{hashlib.sha256(proof).hexdigest()[:8]}.proof")
+    """Writes the proof file and returns its path, which is in this directory unless the user named another one.
+
+    The file's name holds the proof's digest, so the same proof gives the same file.
+    """
+    path = Path(out or f"{file_name(manifest['scene']['name'])}-{hashlib.sha256(proof).hexdigest()[:8]}.proof")
     path.write_bytes(proof)
     return path
 
@@ -172,7 +198,7 @@ def certify(args: Namespace) -> int:
 
 
 def _drake(args: Namespace) -> str | None:
-    """The solver that Drake is to use; None when the certifier is ours."""
+    """Returns the name of the solver that Drake uses; None when our certifier is asked."""
     if args.backend != "drake":
         if args.solver is not None:
             raise CirisError("option", "only Drake takes a solver", field="--solver", hint="add --backend drake")

@@ -1,4 +1,7 @@
-"""``./start``: the embedded stack, the example job and its progress, the certified region, its proof verified, the dashboard's address."""
+"""``./start`` runs the embedded stack and the example job.
+
+It shows the job's progress and the certified region, verifies the proof, and prints the dashboard's address.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ from typing import Any
 import certifier
 from certifier.errors import CirisError
 from client import output, service
-from client.commands import save_proof
+from client.commands import file_name, save_proof
 from client.find import api_key, data_dir, running_stack
 from client.http import Client
 from client.inputs import seed_of
@@ -27,16 +30,17 @@ STOP_SECONDS = 30
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the demonstration; returns 0 only if the region was certified and its proof verified here."""
+    """Runs the demonstration. Returns 0 only if the region was certified and its proof was verified here."""
     parser = argparse.ArgumentParser(prog="./start", description="A certified collision-free region for a 7-joint arm in front of a shelf.")
     parser.add_argument("--once", action="store_true", help="end after the job")
     once = parser.parse_args(arguments).once
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with _stack() as url:
-            verified = _demonstrate(url)
+            verified, region = _demonstrate(url)
             if not once:
-                print(f"\nthe service keeps running; dashboard: {url}/   (Ctrl-C ends it)", flush=True)
+                print(f"\nlook at it: {url}/regions/{region}", flush=True)
+                print(f"the service keeps running; dashboard: {url}/   (Ctrl-C ends it)", flush=True)
                 signal.pause()
     except CirisError as error:
         print("error:", " ".join(str(error).split()), file=sys.stderr)
@@ -47,7 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0 if verified else 1
 
 
-def _demonstrate(url: str) -> bool:
+def _demonstrate(url: str) -> tuple[bool, str | None]:
+    """Returns whether the proof of the region was verified here, and the region's id on the service."""
     with Client(url, api_key()) as client:
         scene = client.add_scene(SCENE)
         print(f"ciris is up at {url} (data: {data_dir()})")
@@ -55,14 +60,12 @@ def _demonstrate(url: str) -> bool:
         print(f"scene {scene['name']}: {size}", flush=True)
         request = {"kind": "grow", "scene": scene["id"], "seed": {"q": seed_of(str(SCENE), None)}}
         grown = service.grow(client, request, Screen(), idempotency_key=_key(request))
-    path = save_proof(grown.manifest, grown.proof, str(data_dir() / f"{scene['name']}.proof"))
+    path = save_proof(grown.manifest, grown.proof, str(data_dir() / f"{file_name(scene['name'])}.proof"))
     print("\nevery pair of bodies:")
     output.print_pairs(grown.manifest["pairs"])
     print("\ncertified region:")
     output.print_region(grown.manifest, [("time", output.seconds(grown.seconds)), ("ended", grown.remark), ("proof", str(path))])
-    verified = _verified(grown.proof)
-    print(f"\nlook at it: {url}/regions/{grown.region}", flush=True)
-    return verified
+    return _verified(grown.proof), grown.region
 
 
 def _verified(proof: bytes) -> bool:
@@ -79,7 +82,7 @@ def _verified(proof: bytes) -> bool:
 
 
 def _key(request: dict[str, Any]) -> str:
-    """One key for this request and this code: a second run shows the region of the first."""
+    """Returns one key for this request and this code, so that a second run shows the region of the first."""
     code = hashlib.sha256(json.dumps(request, sort_keys=True).encode())
     root = Path(certifier.__file__).parent
     for file in sorted(root.rglob("*.py")):
@@ -89,7 +92,7 @@ def _key(request: dict[str, Any]) -> str:
 
 @contextmanager
 def _stack() -> Iterator[str]:
-    """The URL of the stack: the one that runs, or one that runs as long as this block."""
+    """Yields the URL of the stack: of the one that runs already, or of one that runs as long as this block."""
     running = running_stack(data_dir())
     if running is not None and _answers(running):
         yield running

@@ -1,4 +1,4 @@
-"""What is installed, which solvers work, what the machine can do."""
+"""``ciris doctor`` finds out what is installed, which solvers work and what the machine can do."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PACKAGES = ("drake", "python-flint", "numpy", "scipy", "numba", "fastapi", "cele
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at; ``good`` is False where something that is needed is missing."""
+    """A finding is one thing that was looked at. ``good`` is False where something that is needed is missing."""
 
     name: str
     text: str
@@ -26,7 +26,7 @@ class Finding:
 
 
 def examine(url: str | None) -> list[Finding]:
-    """Looks at everything, in an order for people."""
+    """Looks at everything, and returns the findings in an order for people."""
     return [
         Finding("python", f"{platform.python_version()} on {platform.platform()}", sys.version_info >= (3, 11)),
         Finding("machine", f"{_cores()} cores, {_memory_gib():.1f} GiB of memory"),
@@ -61,7 +61,7 @@ def _tried(name: str, look: Callable[[], str]) -> Finding:
 
 
 def _solvers() -> str:
-    """The convex and nonlinear solvers of this Drake that may be used, by trying the one that is needed."""
+    """Returns the names of the solvers that this Drake may use. It first tries Clarabel, which is needed."""
     from pydrake import solvers
 
     program = solvers.MathematicalProgram()

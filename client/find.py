@@ -1,4 +1,4 @@
-"""Where the service is (an address that was given, or the embedded stack of the data directory), and the key to it."""
+"""This module finds the service (by the address given, or as the embedded stack of the data directory) and the API key."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from certifier.errors import CirisError
 
 
 def data_dir() -> Path:
-    """The data directory of ``ciris up`` on this machine: CIRIS_DATA_DIR, or the user's data directory."""
+    """Returns the data directory of ``ciris up`` on this machine: CIRIS_DATA_DIR, or the user's data directory."""
     given = os.environ.get("CIRIS_DATA_DIR")
     if given:
         return Path(given).expanduser()
@@ -20,7 +20,7 @@ def data_dir() -> Path:
 
 
 def running_stack(data: Path) -> str | None:
-    """The URL that the stack of this data directory wrote down; None when none runs there."""
+    """Returns the URL that the stack of this data directory wrote down; None when no stack runs there."""
     try:
         return str(json.loads((data / "stack.json").read_text())["url"])
     except FileNotFoundError:
@@ -28,7 +28,7 @@ def running_stack(data: Path) -> str | None:
 
 
 def service_url(given: str | None) -> str:
-    """The service's URL: ``given``, CIRIS_URL, or the running stack's.
+    """Returns the service's URL: ``given``, or CIRIS_URL, or that of the running stack.
 
     Raises:
         CirisError: no_service.
@@ -40,7 +40,7 @@ def service_url(given: str | None) -> str:
 
 
 def api_key() -> str | None:
-    """The service's key: CIRIS_API_KEY, or the content of the file that CIRIS_API_KEY_FILE names; None where neither is set.
+    """Returns the API key: CIRIS_API_KEY, or the content of the file that CIRIS_API_KEY_FILE names; None where neither is set.
 
     Raises:
         CirisError: api_key, for something that cannot be a key.

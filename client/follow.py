@@ -1,4 +1,4 @@
-"""A job's events, told to people as they happen."""
+"""This module tells people a job's events as they happen."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ _STEPS = {"propose": "seeding", "step": "polytope step", "accept": "assembling a
 
 
 class Teller:
-    """Turns events into lines and one status line.
+    """A teller turns events into lines and one status line.
 
     Args:
-        watch: every pair gets a line of its own.
+        pairs: names of the scene's pairs, in the scene's order.
+        watch: True prints a line for every pair.
     """
 
     def __init__(self, screen: Screen, pairs: list[str], watch: bool) -> None:
@@ -24,7 +25,7 @@ class Teller:
         self._failure = ""
 
     def tell(self, event: Document) -> None:
-        """Says what the event means; kinds that it does not know are left out."""
+        """Says what the event means. It ignores kinds that it does not know."""
         teller = getattr(self, f"_tell_{event['kind']}", None)
         if teller is not None:
             teller(event["data"])
@@ -62,7 +63,7 @@ class Teller:
 
 
 def follow(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:
-    """Tells the job's events until it has ended; returns the ended job."""
+    """Tells the job's events until the job has ended, and returns the ended job."""
     pairs = [f"{pair['a']} - {pair['b']}" for pair in client.job_pairs(job_id, iteration=0)["pairs"]]
     teller = Teller(screen, pairs, watch)
     for event in client.events(job_id):

@@ -1,4 +1,7 @@
-"""The service over HTTP. Documents are the API's, as dicts; problems become :class:`certifier.errors.CirisError`."""
+"""This client speaks to the service over HTTP. It returns the API's documents as dicts.
+
+It raises the API's problems as :class:`certifier.errors.CirisError`.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+from urllib.parse import quote
 
 import httpx2
 
@@ -18,14 +22,14 @@ Document = dict[str, Any]
 
 TIMEOUT_S = 120.0
 QUIET_S = 60.0
-"""A stream that says nothing for this long, not even a ping, is taken up anew."""
+"""When a stream says nothing for this many seconds, not even a ping, the client opens it again."""
 
 PATIENCE = 5
-"""How often a request is repeated that the service was asked too often for."""
+"""The client repeats a request at most this often when the service answers that it was asked too often."""
 
 
 class _Patient(httpx2.HTTPTransport):
-    """Waits as long as the service asks for when it was asked too often, a few times."""
+    """Waits as long as the service demands when it was asked too often, then repeats the request, a few times."""
 
     def handle_request(self, request: httpx2.Request) -> httpx2.Response:
         for _ in range(PATIENCE):
@@ -39,7 +43,7 @@ class _Patient(httpx2.HTTPTransport):
 
 
 class Client:
-    """A connection to the service at ``url``. Every method raises CirisError: what the service said, or ``unreachable``.
+    """A client is a connection to the service at ``url``. Every method may raise CirisError: what the service said, or ``unreachable``.
 
     Args:
         key: an API key, for a service that asks for one.
@@ -62,53 +66,53 @@ class Client:
         self._http.close()
 
     def ready(self) -> Document:
-        """Whether the service can do its work: ``ready`` and ``checks``."""
+        """Returns whether the service can do its work: ``ready`` and ``checks``."""
         return self._send("GET", "/readyz", accepted=(503,)).json()
 
     def add_scene(self, path: str | Path) -> Document:
-        """Uploads a scene file with everything it refers to."""
+        """Uploads a scene file with everything it refers to, and returns the scene."""
         return self._json("POST", "/v1/scenes", files={"bundle": ("scene.zip", pack_bundle(path), "application/zip")})
 
     def scenes(self) -> list[Document]:
-        """Every scene, newest first."""
+        """Returns every scene, newest first."""
         return self._all("scenes")
 
     def scene(self, name: str) -> Document:
-        """A scene by id or name."""
-        return self._json("GET", f"/v1/scenes/{name}")
+        """Returns a scene by its id or name."""
+        return self._json("GET", f"/v1/scenes/{_segment(name)}")
 
     def lint(self, name: str) -> Document:
-        """A scene's warnings, substitutions and ignored pairs."""
-        return self._json("GET", f"/v1/scenes/{name}/lint")
+        """Returns a scene's warnings, substitutions and ignored pairs."""
+        return self._json("GET", f"/v1/scenes/{_segment(name)}/lint")
 
     def scene_pairs(self, name: str) -> list[Document]:
-        """A scene's pairs with the forecast of their cost."""
-        return self._json("GET", f"/v1/scenes/{name}/pairs")["pairs"]
+        """Returns a scene's pairs with the forecast of their cost."""
+        return self._json("GET", f"/v1/scenes/{_segment(name)}/pairs")["pairs"]
 
     def create_job(self, request: Document, idempotency_key: str | None = None) -> tuple[Document, bool]:
-        """A job, and whether it is new rather than made earlier under the same key."""
+        """Creates a job. Returns the job and True, or the job made earlier under the same key and False."""
         headers = {} if idempotency_key is None else {"Idempotency-Key": idempotency_key}
         response = self._send("POST", "/v1/jobs", json=request, headers=headers)
         return response.json(), response.status_code == httpx2.codes.CREATED
 
     def job(self, job_id: str) -> Document:
-        """A job as it is now."""
-        return self._json("GET", f"/v1/jobs/{job_id}")
+        """Returns a job as it is now."""
+        return self._json("GET", f"/v1/jobs/{_segment(job_id)}")
 
     def cancel(self, job_id: str) -> Document:
-        """Asks a job to end."""
-        return self._json("POST", f"/v1/jobs/{job_id}/cancel")
+        """Asks a job to end, and returns it."""
+        return self._json("POST", f"/v1/jobs/{_segment(job_id)}/cancel")
 
     def retry(self, job_id: str) -> Document:
-        """A new job like one that failed or was cancelled."""
-        return self._json("POST", f"/v1/jobs/{job_id}/retry")
+        """Creates a new job like one that failed or was cancelled, and returns it."""
+        return self._json("POST", f"/v1/jobs/{_segment(job_id)}/retry")
 
     def job_pairs(self, job_id: str, iteration: int | None = None) -> Document:
-        """A job's pair matrix, of all iterations or one."""
-        return self._json("GET", f"/v1/jobs/{job_id}/pairs", params={} if iteration is None else {"iteration": iteration})
+        """Returns a job's pair matrix, of all iterations or of one."""
+        return self._json("GET", f"/v1/jobs/{_segment(job_id)}/pairs", params={} if iteration is None else {"iteration": iteration})
 
     def events(self, job_id: str, after: int = 0) -> Iterator[Document]:
-        """The job's events, in order, until it has ended; an interrupted stream is taken up where it stopped."""
+        """Yields the job's events in order until the job has ended. An interrupted stream goes on where it stopped."""
         while True:
             try:
                 for event in self._stream(job_id, after):
@@ -120,8 +124,8 @@ class Client:
                 self.job(job_id)
 
     def _stream(self, job_id: str, after: int) -> Iterator[Document | None]:
-        """Events of one connection; None for the end of the job."""
-        url, timeout = f"/v1/jobs/{job_id}/events/stream", httpx2.Timeout(TIMEOUT_S, read=QUIET_S)
+        """Yields the events of one connection, and None when the job has ended."""
+        url, timeout = f"/v1/jobs/{_segment(job_id)}/events/stream", httpx2.Timeout(TIMEOUT_S, read=QUIET_S)
         try:
             with self._http.stream("GET", url, headers={"Last-Event-ID": str(after)}, timeout=timeout) as response:
                 if response.is_error:
@@ -138,35 +142,35 @@ class Client:
             raise self._unreachable(error) from None
 
     def regions(self, *, scene: str | None = None, job: str | None = None) -> list[Document]:
-        """Every region, newest first, of one scene or job if asked."""
+        """Returns every region, newest first, or those of one scene or job."""
         return self._all("regions", scene=scene, job=job)
 
     def region(self, region_id: str) -> Document:
-        """A region with its manifest."""
-        return self._json("GET", f"/v1/regions/{region_id}")
+        """Returns a region with its manifest."""
+        return self._json("GET", f"/v1/regions/{_segment(region_id)}")
 
     def proof(self, region_id: str) -> bytes:
-        """A region's proof file."""
-        return self._send("GET", f"/v1/regions/{region_id}/proof").content
+        """Returns a region's proof file."""
+        return self._send("GET", f"/v1/regions/{_segment(region_id)}/proof").content
 
     def verify(self, region_id: str) -> Document:
-        """The service's own check of a region's stored proof: whether it holds, and what it proves."""
-        return self._json("POST", f"/v1/regions/{region_id}/verify")
+        """Makes the service check a region's stored proof again. Returns whether it holds, and what it proves."""
+        return self._json("POST", f"/v1/regions/{_segment(region_id)}/verify")
 
     def pair_proof(self, job_id: str, iteration: int, pair: int) -> bytes:
-        """The proof of what became of one pair of a job's iteration, its scene in it."""
-        return self._send("GET", f"/v1/jobs/{job_id}/pairs/{pair}/proof", params={"iteration": iteration}).content
+        """Returns the proof of a pair's outcome in one iteration of a job, together with the scene."""
+        return self._send("GET", f"/v1/jobs/{_segment(job_id)}/pairs/{pair}/proof", params={"iteration": iteration}).content
 
     def export(self, region_id: str, format: str) -> bytes:
-        """A region as ``json``, ``npz`` or ``drake-yaml``."""
-        return self._send("GET", f"/v1/regions/{region_id}/export", params={"format": format}).content
+        """Returns a region as the bytes of a ``json``, ``npz`` or ``drake-yaml`` file."""
+        return self._send("GET", f"/v1/regions/{_segment(region_id)}/export", params={"format": format}).content
 
     def contains(self, scene: str, q: list[list[float]]) -> Document:
-        """Which regions of a scene hold each of these configurations."""
+        """Returns which regions of a scene contain each of these configurations."""
         return self._json("POST", "/v1/planning/contains", json={"scene": scene, "q": q})
 
     def _all(self, name: str, **filters: str | None) -> list[Document]:
-        """Every page of a list, one after the other."""
+        """Returns the entries of all pages of a list."""
         params = {key: value for key, value in filters.items() if value is not None}
         found: list[Document] = []
         while True:
@@ -190,6 +194,17 @@ class Client:
 
     def _unreachable(self, error: Exception) -> CirisError:
         return CirisError("unreachable", f"the service at {self.url} does not answer: {error}", hint="is `ciris up` running?")
+
+
+def _segment(name: str) -> str:
+    """Returns a name or an id as one segment of a URL's path.
+
+    Raises:
+        CirisError: not_found for what no name can be.
+    """
+    if not name.strip("."):
+        raise CirisError("not_found", f"{name!r} is no name and no id")
+    return quote(name, safe="")
 
 
 def _problem(response: httpx2.Response) -> CirisError:

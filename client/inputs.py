@@ -1,4 +1,4 @@
-"""What users type and point to, as numbers."""
+"""This module turns what users type and the files they name into numbers."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from certifier.errors import CirisError, RegionError
 from certifier.model import Array, Polytope
 
 SEED_FILE = "seed.yaml"
+_NPZ = "np.savez(FILE, C=C, d=d) writes one"
 _LIST = "joint positions, separated by commas"
 
 
 def configuration(text: str, field: str = "--q") -> list[float]:
-    """``"0, 0.3, -1.8"`` as numbers.
+    """Returns the numbers of a text such as ``"0, 0.3, -1.8"``.
 
     Raises:
         RegionError: bad_number, naming the place.
@@ -38,15 +39,16 @@ def configuration(text: str, field: str = "--q") -> list[float]:
 
 
 def is_scene_file(scene: str) -> bool:
-    """Whether the user means a file rather than a name or id that the service knows."""
+    """Says whether the user means a file, and not a name or id that the service knows."""
     return scene.endswith((".yaml", ".yml")) or "/" in scene
 
 
 def seed_of(scene: str, q: str | None) -> list[float]:
-    """The seed configuration: ``q``, or the ``q`` of the seed.yaml beside the scene file.
+    """Returns the seed configuration: ``q``, or the ``q`` of the seed.yaml beside the scene file.
 
     Raises:
-        CirisError: scene_not_found for a scene file that is not there; seed_missing, or what is wrong with it.
+        CirisError: scene_not_found for a scene file that does not exist; seed_missing; seed_file.
+        RegionError: bad_number.
     """
     if q is not None:
         return configuration(q)
@@ -64,7 +66,7 @@ def seed_of(scene: str, q: str | None) -> list[float]:
 
 @dataclass(frozen=True)
 class PolytopeFile:
-    """A polytope in s, without the joint limits, and optionally a point inside, (n,)."""
+    """Holds a polytope in s, without the joint limits, and optionally a point inside, (n,), in s."""
 
     polytope: Polytope
     center: Array | None
@@ -74,15 +76,15 @@ def polytope_file(path: str) -> PolytopeFile:
     """Reads an npz file with C, d and optionally center.
 
     Raises:
-        RegionError: polytope_file, or as :meth:`Polytope.given`.
+        RegionError: polytope_file, polytope_shape, or as :meth:`Polytope.given`.
     """
     try:
         with np.load(path, allow_pickle=False) as arrays:
             content = {name: np.asarray(arrays[name], dtype=float) for name in arrays.files if name in ("C", "d", "center")}
     except FileNotFoundError:
         raise RegionError("polytope_file", f"there is no file {path}", field="--polytope") from None
-    except (OSError, ValueError, TypeError, BadZipFile, EOFError) as error:
-        raise RegionError("polytope_file", f"{path} cannot be read as an npz file of numbers: {error}", field="--polytope") from None
+    except (OSError, ValueError, TypeError, BadZipFile, EOFError):
+        raise RegionError("polytope_file", f"{path} is no npz file of numbers", field="--polytope", hint=_NPZ) from None
     missing = {"C", "d"} - content.keys()
     if missing:
         raise RegionError("polytope_file", f"{path} has no array {' and no array '.join(sorted(missing))}", field="--polytope")

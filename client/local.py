@@ -1,4 +1,4 @@
-"""Growing and certifying in this process, without a service."""
+"""This module grows and certifies in this process, without a service."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from client.service import Grown
 
 
 def load(scene: str) -> Scene:
-    """The scene of a scene file.
+    """Returns the scene of a scene file.
 
     Raises:
         SceneError: scene_not_found for a name that only a service could know, or what is wrong with the file.
@@ -26,7 +26,7 @@ def load(scene: str) -> Scene:
 
 
 def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], screen: Screen) -> Grown:
-    """Grows a region here."""
+    """Grows a region in this process."""
     loaded = load(scene)
     from certifier.growth.options import GrowthOptions
     from certifier.jobs import local
@@ -38,7 +38,11 @@ def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], screen: Scre
 
 
 def certify(scene: str, given: PolytopeFile, screen: Screen, watch: bool, drake: str | None) -> dict[str, Any]:
-    """Certifies a polytope here, or asks Drake with the solver of that name; the document of ``ciris certify --json``."""
+    """Certifies a polytope in this process, and returns the document of ``ciris certify --json``.
+
+    Args:
+        drake: name of the solver with which Drake is asked instead; None asks our certifier.
+    """
     loaded = load(scene)
     progress = screen.line if watch else screen.status
     if drake is None:

@@ -1,4 +1,4 @@
-"""What people see: results on standard output, progress on standard error, one status line on a terminal."""
+"""This module prints what people see: results on standard output, progress on standard error, one status line on a terminal."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from typing import Any
 Row = Sequence[str]
 
 NEGATIVE = {"not_grown"}
-"""Codes of errors that are answers: the input was fine, and the answer is no."""
+"""These errors are answers: the input was fine, and the answer is no."""
 
 
 class Screen:
-    """Progress on standard error: lines that stay, and on a terminal one line that is overwritten."""
+    """A screen shows progress on standard error: lines that stay, and on a terminal one line that is overwritten."""
 
     def __init__(self) -> None:
         self._terminal = sys.stderr.isatty()
         self._status = False
 
     def line(self, text: str) -> None:
-        """A line that stays."""
+        """Prints a line that stays."""
         self.clear()
         print(text, file=sys.stderr, flush=True)
 
     def status(self, text: str) -> None:
-        """The present state of affairs; shown on a terminal only."""
+        """Shows the present state in the status line. It does so on a terminal only."""
         if self._terminal:
             width = shutil.get_terminal_size().columns - 1
             print(f"\r\x1b[2K{text[:width]}", end="", file=sys.stderr, flush=True)
@@ -41,13 +41,13 @@ class Screen:
 
 
 def print_json(document: Any) -> None:
-    """One JSON document on standard output."""
+    """Prints one JSON document on standard output."""
     json.dump(document, sys.stdout, indent=1, allow_nan=False)
     print()
 
 
 def print_table(header: Row, rows: Iterable[Row], right: str = "") -> None:
-    """Columns aligned; those whose header is in ``right`` (space-separated) to the right."""
+    """Prints aligned columns. Those whose header is in ``right`` (space-separated) are aligned to the right."""
     lines = [tuple(header), *map(tuple, rows)]
     widths = [max(len(line[i]) for line in lines) for i in range(len(header))]
     flush = [name in right.split() for name in header]
@@ -57,7 +57,7 @@ def print_table(header: Row, rows: Iterable[Row], right: str = "") -> None:
 
 
 def print_facts(facts: Iterable[tuple[str, str]]) -> None:
-    """Names and values, two columns."""
+    """Prints names and values in two columns."""
     rows = list(facts)
     width = max(len(name) for name, _ in rows)
     for name, value in rows:
@@ -65,24 +65,24 @@ def print_facts(facts: Iterable[tuple[str, str]]) -> None:
 
 
 def plain(outcome: str | None) -> str:
-    """``not_certifiable`` -> ``not certifiable``."""
+    """Returns an outcome for people: ``not_certifiable`` -> ``not certifiable``."""
     return "-" if outcome is None else outcome.replace("_", " ")
 
 
 def seconds(value: float | None) -> str:
-    """A duration for people."""
+    """Returns a duration, in seconds, as a text for people."""
     if value is None:
         return "-"
     return f"{value:.2f} s" if value < 10 else f"{value:.0f} s" if value < 600 else f"{value / 60:.0f} min"
 
 
 def metres(value: float | None) -> str:
-    """A distance for people."""
+    """Returns a distance, in metres, as a text for people, in millimetres."""
     return "-" if value is None else f"{1000 * value:.3g} mm"
 
 
 def print_pairs(pairs: Iterable[dict[str, Any]]) -> None:
-    """One line for each pair of a ``certify`` document or a manifest, failures last."""
+    """Prints one line for each pair of a ``certify`` document or a manifest, failures last."""
     ordered = sorted(pairs, key=lambda pair: pair["outcome"] != "certified")
     timed = any("stage" in pair for pair in ordered)
     rows = [
@@ -93,7 +93,7 @@ def print_pairs(pairs: Iterable[dict[str, Any]]) -> None:
 
 
 def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()) -> None:
-    """A region's manifest in a few lines."""
+    """Prints a region's manifest in a few lines."""
     volume, pairs, space = manifest["volume"], manifest["pairs"], manifest["space"]
     limits = 2 * len(space["joints"])
     faces = len(manifest["halfspace_offsets"])

@@ -1,4 +1,4 @@
-"""Growing and certifying on the service."""
+"""This module has the service grow and certify."""
 
 from __future__ import annotations
 
@@ -18,9 +18,12 @@ from client.output import NEGATIVE, Screen
 
 @dataclass(frozen=True)
 class Grown:
-    """A region that a job has grown.
+    """Describes a region that a job has grown.
 
     Attributes:
+        manifest: the region's manifest.
+        proof: the bytes of its proof file.
+        seconds: how long the job took.
         region: its id on the service; None when it was grown in this process.
         remark: why growing ended.
     """
@@ -33,14 +36,14 @@ class Grown:
 
 
 def known_scene(client: Client, scene: str) -> Document:
-    """The scene of a scene file, uploaded, or of a name or id that the service knows."""
+    """Returns the scene of a scene file, which it uploads, or the scene with a name or id that the service knows."""
     return client.add_scene(scene) if is_scene_file(scene) else client.scene(scene)
 
 
 def grow(client: Client, request: Document, screen: Screen, watch: bool = False, idempotency_key: str | None = None) -> Grown:
-    """Has the service grow a region and waits for it.
+    """Makes the service grow a region, and waits for it.
 
-    Under an idempotency key the job made earlier serves again, or its retry where it ended without a region.
+    Under an idempotency key it takes the job made earlier, or a retry of that job where it ended without a region.
 
     Raises:
         CirisError: why there is no region.
@@ -58,7 +61,7 @@ def grow(client: Client, request: Document, screen: Screen, watch: bool = False,
 
 
 def grow_many(client: Client, requests: Sequence[Document], screen: Screen, watch: bool = False) -> list[Document]:
-    """Has the service grow regions, all at once, and waits for them; the ended jobs, with a region or without."""
+    """Makes the service grow regions, all at once, and waits for them. Returns the ended jobs, with a region or without."""
     jobs = [client.create_job(request)[0]["id"] for request in requests]
     for job in jobs:
         screen.line(f"job {job}: {client.url}/jobs/{job}")
@@ -66,7 +69,7 @@ def grow_many(client: Client, requests: Sequence[Document], screen: Screen, watc
 
 
 def certify(client: Client, scene: Document, given: PolytopeFile, screen: Screen, watch: bool = False) -> Document:
-    """Has the service certify a polytope; the document of ``ciris certify --json``.
+    """Makes the service certify a polytope, and returns the document of ``ciris certify --json``.
 
     Raises:
         CirisError: the polytope was refused, or the job was cancelled.
@@ -101,7 +104,7 @@ def _wait(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:
 
 
 def _error(job: Document) -> CirisError:
-    """Why an ended job has no result."""
+    """Returns the error that says why an ended job has no result."""
     if job["error"]:
         return CirisError.from_document(job["error"])
     return CirisError(f"job_{job['state']}", job["reason"] or f"the job is {job['state']}")

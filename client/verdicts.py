@@ -1,4 +1,4 @@
-"""The document of ``ciris certify --json``, whoever has certified."""
+"""This module makes the document of ``ciris certify --json``, whether the service, this process or Drake has certified."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ _RESULT = ("outcome", "margin", "seconds", "stage", "witness_q", "detail")
 def document(
     name: str, scene_hash: str, outcome: Outcome, guarantee: Guarantee, seconds: float, pairs: Sequence[dict[str, Any]]
 ) -> dict[str, Any]:
-    """One outcome for each pair, with stable keys.
+    """Returns the document: one outcome for each pair, with stable keys.
 
     Args:
         guarantee: of the whole polytope.
-        pairs: of each its ``a`` and ``b``, ``outcome``, ``margin``, ``seconds``, ``stage``, ``witness_q`` and ``detail``.
+        pairs: each with ``a`` and ``b``, ``outcome``, ``margin``, ``seconds``, ``stage``, ``witness_q`` and ``detail``.
     """
     return {
         "scene": {"name": name, "hash": scene_hash},

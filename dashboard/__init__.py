@@ -1,1 +1,1 @@
-"""The dashboard: templates and static files; api/pages.py serves them."""
+"""The dashboard is made of templates and static files; api/pages.py serves them."""

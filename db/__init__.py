@@ -1,1 +1,1 @@
-"""The database: tables, sessions, state tables, migrations and one module of queries for each aggregate."""
+"""This is the database: tables, sessions, state tables, migrations and one module of queries for each aggregate."""

@@ -1,4 +1,4 @@
-"""Events: what happened to a job, numbered 1, 2, 3 ... without gaps, in the order in which it was committed."""
+"""Events say what happened to a job. Their numbers are 1, 2, 3 ... without gaps, in the order in which they were committed."""
 
 from __future__ import annotations
 
@@ -12,16 +12,21 @@ from db.models import EventRow, JobRow
 
 
 def emit(session: Session, job: JobRow, kind: str, data: dict[str, Any]) -> None:
-    """Adds the job's next event; the caller holds the job's lock.
+    """Adds the job's next event. The caller holds the job's lock.
 
-    Kinds: ``job`` (state, outcome, reason), ``iteration`` (index, label, state, pairs), ``pairs`` (iteration, pairs: index, state, stage,
-    margin, seconds), ``step`` (kind, state, seconds), ``region`` (region_id, iteration, guarantee, ellipsoid_volume), ``lost`` (worker,
-    reason, and iteration with pairs, or step: they are open again).
+    The kinds of event, and what their data holds:
+
+    - ``job``: state, outcome, reason;
+    - ``iteration``: index, label, state, pairs;
+    - ``pairs``: iteration, and pairs (each with index, state, stage, margin, seconds);
+    - ``step``: kind, state, seconds;
+    - ``region``: region_id, iteration, guarantee, ellipsoid_volume;
+    - ``lost``: worker, reason, and either iteration and pairs or step, which are open again.
     """
     job.event_seq += 1
     session.add(EventRow(job_id=job.id, seq=job.event_seq, kind=kind, data=data))
 
 
 def since(session: Session, job_id: str, seq: int = 0, limit: int = 500) -> Sequence[EventRow]:
-    """The job's events after number ``seq``, in order."""
+    """Returns the job's events after number ``seq``, in order, at most ``limit`` of them."""
     return session.scalars(select(EventRow).where(EventRow.job_id == job_id, EventRow.seq > seq).order_by(EventRow.seq).limit(limit)).all()

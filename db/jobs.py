@@ -1,4 +1,4 @@
-"""Jobs: idempotent creation, lists, cancelling, ending. Every transaction that changes anything of a job begins with :func:`lock`."""
+"""This module creates, lists, cancels and ends jobs. Every transaction that changes anything of a job begins with :func:`lock`."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def create(
     retry_of: str | None = None,
     attempt: int = 1,
 ) -> tuple[JobRow, bool]:
-    """A new queued job and True, or the job that was made under the same idempotency key and False.
+    """Creates a queued job and returns it with True, or returns the job made under the same idempotency key with False.
 
-    Commit, then send ``coordinate`` for it; if that fails, the sweeper sends it later.
+    The caller commits and then sends ``coordinate`` for the job. If sending fails, the sweeper sends it later.
 
     Raises:
         CirisError: idempotency_conflict, when the key was used for a different request; quota_exceeded, when the API key has as
@@ -72,7 +72,10 @@ def create(
 
 
 def _check_quota(session: Session, key_id: str | None) -> None:
-    """Refuses the job just added when its key has too many. Requests at the same moment may each be the last that fits."""
+    """Refuses the job just added when its API key has too many unfinished jobs.
+
+    Several requests at the same moment may each count as the last job that fits, so a key can exceed its limit a little.
+    """
     limit = settings().max_jobs_per_key
     unfinished_jobs = session.scalar(select(func.count()).where(_of_key(key_id), JobRow.state.in_(unfinished(JOB)))) or 0
     if unfinished_jobs > limit:
@@ -85,9 +88,9 @@ def _of_key(key_id: str | None) -> ColumnElement[bool]:
 
 
 def retry(session: Session, job_id: str, key_id: str | None = None) -> JobRow:
-    """A new job with the same scene, options, webhook and time to its deadline as one that failed or was cancelled.
+    """Creates a job with the same scene, options, webhook and time to its deadline as one that failed or was cancelled.
 
-    A job is retried once: doing it again returns the same new job.
+    A job is retried once: another call returns the same new job.
 
     Raises:
         CirisError: job_not_found, or job_not_retryable when it has not ended or has succeeded.
@@ -113,7 +116,7 @@ def retry(session: Session, job_id: str, key_id: str | None = None) -> JobRow:
 
 
 def get(session: Session, job_id: str) -> JobRow:
-    """The job with this id.
+    """Returns the job with this id.
 
     Raises:
         CirisError: job_not_found.
@@ -122,7 +125,9 @@ def get(session: Session, job_id: str) -> JobRow:
 
 
 def lock(session: Session, job_id: str) -> JobRow:
-    """The job with this id, as it is now, locked until the transaction ends (SQLite's writing transactions exclude each other anyway).
+    """Returns the job with this id as it is now, locked until the transaction ends.
+
+    SQLite needs no lock: its writing transactions exclude each other.
 
     Raises:
         CirisError: job_not_found.
@@ -145,7 +150,7 @@ def page(
     after: str | None = None,
     limit: int = 50,
 ) -> Page[JobRow]:
-    """One page of the jobs that fit the filters.
+    """Returns one page of the jobs that match the filters.
 
     Raises:
         CirisError: cursor.
@@ -156,9 +161,9 @@ def page(
 
 
 def cancel(session: Session, job_id: str) -> JobRow:
-    """Cancels a queued job at once; a running one becomes ``cancelling``, and ``coordinate`` (to be sent after the commit) ends it.
+    """Cancels a queued job at once. A running one becomes ``cancelling``; the caller sends ``coordinate`` after the commit, which ends it.
 
-    Cancelling a job that has ended, or is being cancelled, changes nothing.
+    Nothing changes when the job has ended or is being cancelled already.
     """
     job = lock(session, job_id)
     if job.state == JobState.QUEUED:
@@ -169,13 +174,20 @@ def cancel(session: Session, job_id: str) -> JobRow:
 
 
 def start(session: Session, job: JobRow, served: float = 0.0) -> None:
-    """Moves a queued job to running, as if it had been served like those that run already; the caller holds its lock."""
+    """Moves a queued job to running. The caller holds its lock.
+
+    Args:
+        served: what the job counts as served so far, as :func:`db.work.served_by_now` says.
+    """
     if transition(session, JobRow, JobState.RUNNING, JobRow.id == job.id, started_at=utcnow(), served=served):
         events.emit(session, job, "job", {"state": JobState.RUNNING})
 
 
 def charge(session: Session, job: JobRow, seconds: float) -> None:
-    """Counts work as done for the job: each key has the same share of the workers, divided among its running jobs by 2^priority."""
+    """Counts seconds of work as done for the job. Each API key has the same share of the workers.
+
+    The running jobs of a key divide that share in proportion to 2^priority.
+    """
     running = session.scalars(select(JobRow.priority).where(_of_key(job.key_id), JobRow.state == JobState.RUNNING))
     job.served += seconds * sum(2.0 ** (priority - job.priority) for priority in running)
 
@@ -183,20 +195,23 @@ def charge(session: Session, job: JobRow, seconds: float) -> None:
 def finish(
     session: Session, job: JobRow, state: JobState, *, reason: str, outcome: str | None = None, error: dict[str, Any] | None = None
 ) -> None:
-    """Ends a job; the caller holds its lock and has seen to its work."""
+    """Ends a job. The caller holds its lock and has settled or stopped its work."""
     if transition(session, JobRow, state, JobRow.id == job.id, outcome=outcome, reason=reason, error=error, finished_at=utcnow()):
         events.emit(session, job, "job", {"state": state, "outcome": outcome, "reason": reason, "region_id": job.region_id})
 
 
 def is_coordinated(job: JobRow, now: datetime) -> bool:
-    """Whether somebody is computing the job's next transition. A coordination that takes too long does not count."""
+    """Says whether somebody is computing the job's next transition. A coordination that takes too long does not count."""
     if job.coordinator is None or job.coordinator_until is None or job.coordinator_until < now:
         return False
     return leases.is_alive(job.coordinator) is not False
 
 
 def awaiting_coordination(session: Session, now: datetime) -> list[str]:
-    """Unfinished jobs for which a coordination is due: nobody coordinates them, and no pair or step is being waited for (or no longer)."""
+    """Returns the ids of the unfinished jobs for which a coordination is due and that nobody coordinates.
+
+    A coordination is due when the job is being cancelled, when its deadline has passed, or when it waits for no pair and no step.
+    """
     pair = exists().where(PairRow.job_id == JobRow.id, PairRow.state.in_(unfinished(PAIR)))
     step = exists().where(StepRow.job_id == JobRow.id, StepRow.state.in_(unfinished(STEP)), StepRow.kind != StepKind.ACCEPT)
     due = or_(JobRow.state == JobState.CANCELLING, JobRow.deadline_at <= now, ~pair & ~step)

@@ -1,6 +1,6 @@
-"""API keys: made and revoked here, or with ``python -m db.keys`` (which is what ``ciris key`` runs).
+"""This module makes and revokes API keys. ``ciris key`` runs it as ``python -m db.keys``.
 
-A key is ``ciris_<id>_<secret>`` with 256 random bits of secret, so that a fast hash is enough to keep: there is nothing to guess.
+A key is ``ciris_<id>_<secret>`` with 256 random bits of secret. Nobody can guess it, so a fast hash of it is safe to store.
 """
 
 from __future__ import annotations
@@ -33,23 +33,23 @@ _NAME = re.compile(r"\w[\w.@-]{0,63}")
 
 
 class Scope(StrEnum):
-    """What a key allows; each scope includes those before it."""
+    """A scope says what a key allows. Each scope includes those before it."""
 
     READ = "read"
-    """Look at scenes, jobs and regions, ask about configurations."""
+    """The key may look at scenes, jobs and regions, and ask about configurations."""
     SUBMIT = "submit"
-    """Upload scenes; create, cancel and retry jobs."""
+    """The key may upload scenes, and create, cancel and retry jobs."""
     ADMIN = "admin"
-    """Delete regions."""
+    """The key may delete regions."""
 
     def includes(self, other: Scope) -> bool:
-        """Whether a key of this scope may do what needs the other."""
+        """Says whether a key of this scope may do what needs the other scope."""
         order = list(Scope)
         return order.index(self) >= order.index(other)
 
 
 def add(session: Session, name: str, scope: Scope) -> str:
-    """Makes a key and returns it. It cannot be had a second time.
+    """Makes a key and returns it. Only this call ever shows it.
 
     Raises:
         CirisError: key_name, for a name that cannot be used or is in use.
@@ -65,7 +65,7 @@ def add(session: Session, name: str, scope: Scope) -> str:
 
 
 def revoke(session: Session, name: str) -> None:
-    """Ends a key at once.
+    """Revokes the key of this name. A running API refuses it within a second.
 
     Raises:
         CirisError: key_not_found.
@@ -78,18 +78,18 @@ def revoke(session: Session, name: str) -> None:
 
 
 def newest(session: Session) -> Sequence[ApiKeyRow]:
-    """Every key, newest first; the revoked ones too."""
+    """Returns every key, the newest first, the revoked ones too."""
     return session.scalars(select(ApiKeyRow).order_by(ApiKeyRow.created_at.desc(), ApiKeyRow.id)).all()
 
 
 def exist(session: Session) -> bool:
-    """Whether a key was ever made. Revoking the last one therefore locks the service instead of opening it."""
+    """Says whether a key was ever made. So revoking the last key locks the service instead of opening it."""
     return session.scalar(select(ApiKeyRow.id).limit(1)) is not None
 
 
 @dataclass(frozen=True)
 class Key:
-    """A key that was made; ``digest`` is the SHA-256 of it."""
+    """Describes a key that was made; ``digest`` is its SHA-256."""
 
     id: str
     name: str
@@ -100,17 +100,17 @@ class Key:
 
 @dataclass(frozen=True)
 class Ring:
-    """Every key that was made, by its id, as of one moment."""
+    """A ring holds every key that was made, by its id, as of one moment."""
 
     keys: dict[str, Key]
 
     def misses(self, key: str) -> bool:
-        """Whether this could be a key that was made after that moment: it looks like one, and has an id of its own."""
+        """Says whether this could be a key that was made after that moment: it has the form of a key, and an id that the ring lacks."""
         parts = _KEY.fullmatch(key)
         return parts is not None and parts[1] not in self.keys
 
     def check(self, key: str) -> Key | None:
-        """What is known of a valid key; None for anything else."""
+        """Returns what is known of a valid key; None for anything else."""
         parts = _KEY.fullmatch(key)
         known = self.keys.get(parts[1]) if parts else None
         if known is None or known.revoked or not hmac.compare_digest(known.digest, _digest(key)):
@@ -119,14 +119,14 @@ class Ring:
 
 
 def ring(session: Session) -> Ring:
-    """The keys as they are now."""
+    """Returns the keys as they are now."""
     columns = (ApiKeyRow.id, ApiKeyRow.name, ApiKeyRow.digest, ApiKeyRow.scope, ApiKeyRow.revoked_at.is_not(None))
     rows = session.execute(select(*columns))
     return Ring({id: Key(id, name, digest, Scope(scope), revoked) for id, name, digest, scope, revoked in rows})
 
 
 def check_bind(settings: Settings) -> None:
-    """Refuses to serve an address that others can reach while no key was made.
+    """Refuses to serve an address that others can reach while no key was ever made.
 
     Raises:
         CirisError: no_keys, or no_database when the database cannot tell.
@@ -156,7 +156,7 @@ def _digest(key: str) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """``ciris key``: acts on the database of the settings, migrated if need be."""
+    """Runs ``ciris key`` on the database that the settings name. It migrates the database first if that is needed."""
     parser = argparse.ArgumentParser(prog="ciris key", description="The API keys of the service whose database the settings name.")
     parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
     verbs = parser.add_subparsers(dest="verb", required=True)
@@ -182,7 +182,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(session: Session, given: argparse.Namespace) -> list[str]:
-    """Does what was asked; the lines to print once it is committed."""
+    """Does what the user asked, and returns the lines to print once it is committed."""
     match given.verb:
         case "add":
             return [add(session, given.name, given.scope)]
@@ -195,7 +195,7 @@ def _run(session: Session, given: argparse.Namespace) -> list[str]:
 
 
 def _described(row: ApiKeyRow) -> dict[str, str | None]:
-    """What may be shown of a key."""
+    """Returns what may be shown of a key."""
     created_at = row.created_at.isoformat(timespec="seconds")
     revoked_at = None if row.revoked_at is None else row.revoked_at.isoformat(timespec="seconds")
     return {"name": row.name, "scope": row.scope, "id": row.id, "created_at": created_at, "revoked_at": revoked_at}

@@ -1,7 +1,7 @@
-"""Leases: one holder at a time for a row of work, for a limited time, however often its message is delivered.
+"""A lease gives a row of work to one holder at a time, for a limited time, however often the row's message is delivered.
 
-A holder renews its lease while it works. A lease is over when its holder is seen to be gone, which can be seen on the same host,
-or else when it ran out.
+A holder renews its lease while it works. A lease ends when its holder is seen to be gone, which only processes of the same host can
+see, or else when it runs out.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ OPEN, RUNNING = PairState.OPEN.value, PairState.RUNNING.value
 """Pairs and steps share these two states."""
 
 LOOK_SECONDS = 0.5
-"""Pause between a holder's looks whether its work is still wanted. Two that say no end it."""
+"""A holder checks each time this many seconds have passed whether its work is still wanted. Two checks in a row that say no end it."""
 
 
 def this_worker() -> str:
-    """This process, as ``host:pid:start``; the start tells it from a later process with the same number."""
+    """Returns the name of this process, ``host:pid:start``. The start time tells it from a later process with the same number."""
     return _name(os.getpid())
 
 
 def is_alive(worker: str | None) -> bool | None:
-    """Whether that worker lives; None when it is not of this host, so that nobody here can tell."""
+    """Says whether that worker lives; None when it is on another host, where this process cannot look."""
     host, pid, started = (worker or "::").rsplit(":", 2)
     return _started(int(pid)) == started if host == _host() else None
 
@@ -56,7 +56,10 @@ def _name(pid: int) -> str:
 
 @cache
 def _host() -> str:
-    """This host's name with a mark of where its process numbers hold: containers and clones of a machine may share the name."""
+    """Returns this host's name with a mark of the place where its process numbers are valid.
+
+    Containers and clones of a machine may share the host's name, but not the mark.
+    """
     try:
         place = Path("/proc/sys/kernel/random/boot_id").read_text() + os.readlink("/proc/self/ns/pid")
     except OSError:
@@ -65,7 +68,7 @@ def _host() -> str:
 
 
 def _started(pid: int) -> str | None:
-    """When the process began, in the kernel's ticks ("alive" where there is no /proc); None when it is gone."""
+    """Returns when the process began, in the kernel's ticks ("alive" where there is no /proc); None when it is gone."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
         return None if fields[0] in "ZX" else fields[19]
@@ -81,7 +84,7 @@ def _started(pid: int) -> str | None:
 
 
 def take(session: Session, model: type[PairRow] | type[StepRow], ids: Sequence[int], *, seconds: float) -> str:
-    """Claims open rows (the caller holds their job's lock) and counts the attempt. Returns the lease's token."""
+    """Claims open rows, counts the attempt, and returns the lease's token. The caller holds the lock of their job."""
     token = str(uuid4())
     transition(
         session,
@@ -98,16 +101,16 @@ def take(session: Session, model: type[PairRow] | type[StepRow], ids: Sequence[i
 
 
 def held(model: type[Row], token: str | BindParameter[str]) -> ColumnElement[bool]:
-    """Condition: the row is still held under this token."""
+    """Returns the condition that a row is still held under this token."""
     return (model.lease_token == token) & (model.state == RUNNING)
 
 
 @contextmanager
 def kept(database: Database, model: type[Row], token: str, seconds: float, job_states: Collection[str]) -> Iterator[None]:
-    """Renews the lease while the block runs, and kills this process when the block goes on though its work is not wanted any more.
+    """Renews the lease while the block runs. It kills this process when the work is not wanted any more.
 
-    It is wanted while some row is held under the token and the job is in one of ``job_states``. The block may be deep in native
-    code, which only a signal that cannot be caught ends; its results could not be saved anyway.
+    The work is wanted while some row is held under the token and the job is in one of ``job_states``. The block may be deep in native
+    code, which only a signal that cannot be caught can end. The killed process could not have saved its results anyway.
     """
     done = threading.Event()
 
@@ -142,7 +145,7 @@ def _is_wanted(database: Database, model: type[Row], token: str, job_states: Col
 
 @cache
 def _wanted(model: type[Row]) -> Select[int]:
-    """What is held under a token, of a job in one of some states; built once, because it is asked so often."""
+    """Returns the query for rows held under a token, of a job in one of some states. It is built once, because it runs so often."""
     in_time = JobRow.state.in_(bindparam("job_states", expanding=True))
     return select(model.id).join(JobRow, JobRow.id == model.job_id).where(held(model, bindparam("token")), in_time).limit(1)
 
@@ -154,7 +157,11 @@ def _renew(database: Database, model: type[Row], token: str, seconds: float) -> 
 
 @dataclass(frozen=True)
 class Lost:
-    """A lease that is over, and why; ``alone`` when the holder died and the process that had forked it lives."""
+    """A lost lease is over before its work was done, and ``reason`` says why.
+
+    Attributes:
+        alone: True when the holder died and the process that had forked it lives.
+    """
 
     job_id: str
     token: str
@@ -164,7 +171,7 @@ class Lost:
 
 
 def lost(session: Session, model: type[Row], *, by_time: bool) -> list[Lost]:
-    """The leases whose holder is gone or, with ``by_time``, that ran out."""
+    """Returns the leases whose holder is gone and, with ``by_time``, those that ran out."""
     now = utcnow()
     found = {}
     for row in session.scalars(select(model).where(model.state == RUNNING)):
@@ -181,12 +188,15 @@ def lost(session: Session, model: type[Row], *, by_time: bool) -> list[Lost]:
 
 
 def release(session: Session, model: type[Row], lost: Lost) -> list[Row]:
-    """Opens the rows of a lost lease and returns them; whoever held them can save nothing any more."""
+    """Opens the rows of a lost lease and returns them. Whoever held them can save nothing any more."""
     ids = list(session.scalars(select(model.id).where(held(model, lost.token))))
     transition(session, model, OPEN, held(model, lost.token), deaths=model.deaths + int(lost.alone))
     return list(session.scalars(select(model).where(model.id.in_(ids), model.state == OPEN)))
 
 
 def is_poison(deaths: int, attempt: int, limit: int) -> bool:
-    """Whether the ``attempt``-th beginning of a row is one too many: it killed its process, or there are no ends in sight."""
+    """Says whether a row must not be begun for the ``attempt``-th time.
+
+    It must not when it has killed its process ``limit`` times, or when ``attempt`` exceeds 10 ``limit``: then no end is in sight.
+    """
     return deaths >= limit or attempt > 10 * limit

@@ -1,8 +1,9 @@
-"""The log of every process of the service: one JSON object a line on standard error, with the job and pair that it is about.
+"""Every process of the service logs one JSON object a line on standard error, with the job and pair that the line is about.
 
-What is bound with ``structlog.contextvars.bound_contextvars(job=...)`` stands in every line until the block ends, whichever library
-writes it; libraries and our own code use the standard library's loggers. Secrets do not get into log calls; should one get into the
-text of an error all the same, it is blotted out here.
+What is bound with ``structlog.contextvars.bound_contextvars(job=...)`` is in every line until the block ends, whichever library writes
+the line. Libraries and our own code use the standard library's loggers.
+
+Our code never logs secrets. This module also blots out those that get into the text of an error.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ _SECRETS = (
     (re.compile(r"(\w://[^\s/:@]*:)[^\s/@]+@"), r"\1***@"),
 )
 REQUEST_FIELDS = ("method", "path", "status", "seconds", "client", "key")
-"""What the line of a request has in its ``extra``."""
+"""The line of a request has these fields in its ``extra``."""
 
 
 def configure(process: str) -> None:
     """Sets this process up to log.
 
     Args:
-        process: its name in every line.
+        process: name of the process, shown in every line.
     """
 
     def named(_logger: object, _method: str, event: EventDict) -> EventDict:
@@ -55,7 +56,7 @@ def configure(process: str) -> None:
     handler.setFormatter(formatter)
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
     logging.captureWarnings(True)
-    logging.getLogger("alembic").setLevel(logging.WARNING)  # it tells of every migration
+    logging.getLogger("alembic").setLevel(logging.WARNING)  # below WARNING it logs every migration
 
 
 def _render(_logger: object, _method: str, event: EventDict) -> str:

@@ -1,4 +1,7 @@
-"""Bringing a database to a version of the schema; ``python -m db.migrate`` brings the one of the settings to the newest."""
+"""This module brings a database to a version of the schema.
+
+``python -m db.migrate`` brings the database of the settings to the newest version.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +20,15 @@ from db.models import Base
 from db.session import Database
 from db.settings import settings
 
-_ADVISORY_LOCK = 0x43495249  # "CIRI": whoever migrates a PostgreSQL database holds it
+_ADVISORY_LOCK = 0x43495249  # "CIRI" in ASCII; who migrates a PostgreSQL database holds this lock
 
 
 @contextmanager
 def connection_for_migrations(url: str) -> Iterator[Connection]:
-    """A connection in a transaction that excludes other migrations.
+    """Opens a connection in a transaction that excludes other migrations.
 
-    SQLite's foreign keys are off in it: changing a table there means to make it anew and to drop the old one, which would delete
-    the rows of other tables that refer to it.
+    On SQLite foreign keys are off in it. There, a migration changes a table by making a new one and dropping the old one; with foreign
+    keys on, that would delete the rows of other tables that refer to it.
     """
     database = Database(url)
     if database.sqlite:
@@ -40,19 +43,19 @@ def connection_for_migrations(url: str) -> Iterator[Connection]:
 
 
 def upgrade(url: str, revision: str = "head") -> None:
-    """Migrates up to ``revision``; nothing happens when the database is there already."""
+    """Migrates up to ``revision``. Nothing happens when the database is there already."""
     with connection_for_migrations(url) as connection:
         command.upgrade(_config(connection), revision)
 
 
 def downgrade(url: str, revision: str) -> None:
-    """Migrates down to ``revision``; ``base`` is the empty database."""
+    """Migrates down to ``revision``. ``base`` is the empty database."""
     with connection_for_migrations(url) as connection:
         command.downgrade(_config(connection), revision)
 
 
 def drift(url: str) -> list[Any]:
-    """What differs between the database and the models; empty when nothing does."""
+    """Returns what differs between the database and the models; empty when nothing does."""
     with connection_for_migrations(url) as connection:
         return list(compare_metadata(MigrationContext.configure(connection), Base.metadata))
 

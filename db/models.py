@@ -1,4 +1,4 @@
-"""The tables. The database is the truth about every job; messages carry only ids."""
+"""These are the tables. The database is the truth about every job; messages carry only ids."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Base(DeclarativeBase):
 
 
 class SceneRow(Base):
-    """A scene, immutable. ``id`` is the first 16 hexadecimal digits of ``hash``, or all of it where those are taken."""
+    """A scene never changes. ``id`` is the first 16 hexadecimal digits of ``hash``, or all of it where those are taken."""
 
     __tablename__ = "scenes"
 
@@ -43,28 +43,28 @@ class SceneRow(Base):
     name: Mapped[str]
     hash: Mapped[str] = mapped_column(String(64), unique=True)
     document: Mapped[Document]
-    """certifier.model.Scene.to_document()"""
+    """The document that certifier.model.Scene.to_document() returns."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
 
 
 class Leased:
-    """What a worker must claim before it works on it: one holder at a time, for a limited time, a limited number of times."""
+    """A worker claims such a row before it works on it. It has one holder at a time, for a limited time, a limited number of times."""
 
     attempts: Mapped[int] = mapped_column(default=0)
-    """How often it was begun."""
+    """How often a worker began the row."""
     deaths: Mapped[int] = mapped_column(default=0)
-    """How often the process that held it died alone, so that it may be to blame."""
+    """How often the process that held the row died alone, so that the row may be the cause."""
     worker: Mapped[str | None]
-    """Who holds or last held it: ``host:pid:start``."""
+    """The worker that holds the row, or held it last: ``host:pid:start``."""
     parent: Mapped[str | None]
-    """The process that had forked that one, likewise."""
+    """The process that forked this worker, in the same form."""
     lease_token: Mapped[str | None] = mapped_column(String(36))
-    """Proof of being the holder; new with every claim."""
+    """Whoever knows the token is the holder. Every claim makes a new one."""
     lease_until: Mapped[datetime | None]
 
 
 class ApiKeyRow(Base):
-    """A key that lets its holder in. The key itself is shown once and not kept."""
+    """A key lets its holder in. The key itself is shown once and not stored."""
 
     __tablename__ = "api_keys"
 
@@ -74,13 +74,13 @@ class ApiKeyRow(Base):
     digest: Mapped[str] = mapped_column(String(64))
     """SHA-256 of the key."""
     scope: Mapped[str] = mapped_column(String(16))
-    """Scope."""
+    """A value of db.keys.Scope."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
     revoked_at: Mapped[datetime | None]
 
 
 class JobRow(Base):
-    """One request to grow a region or to certify a polytope."""
+    """A job is one request to grow a region or to certify a polytope."""
 
     __tablename__ = "jobs"
     __table_args__ = (Index(None, "state"), Index(None, "created_at", "id"))
@@ -88,44 +88,46 @@ class JobRow(Base):
 
     id: Mapped[str] = mapped_column(String(36), primary_key=True)
     kind: Mapped[str] = mapped_column(String(16))
-    """JobKind."""
+    """A value of JobKind."""
     scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), index=True)
     state: Mapped[str] = mapped_column(String(16), default=states.JobState.QUEUED)
     outcome: Mapped[str | None] = mapped_column(String(16))
-    """certifier.outcome.Outcome, once the job has ended."""
+    """A value of certifier.outcome.Outcome, once the job has ended."""
     reason: Mapped[str | None]
-    """Why it ended, a sentence."""
+    """A sentence that says why the job ended."""
     error: Mapped[Document | None]
-    """CirisError.to_document() when it failed."""
+    """What CirisError.to_document() returned, when the job failed."""
     options: Mapped[Document]
-    """certifier.growth.options.GrowthOptions.to_document()"""
+    """What certifier.growth.options.GrowthOptions.to_document() returned."""
     growth: Mapped[Document | None] = mapped_column(deferred=True)
-    """certifier.growth.state.GrowthState.to_document() after the last transition."""
+    """What certifier.growth.state.GrowthState.to_document() returned after the last transition."""
     action: Mapped[Document | None] = mapped_column(deferred=True)
-    """Which action this state waits for: its kind, of a certification its iteration, of the end its outcome and reason. The rest of it
-    stands in the iteration and its pairs, or in the step."""
+    """The action that the job waits for: its kind, the iteration of a certification, the outcome and reason of an end.
+
+    The rest of the action is in the iteration and its pairs, or in the step.
+    """
     idempotency_key: Mapped[str | None] = mapped_column(String(255), unique=True)
     request_digest: Mapped[str | None] = mapped_column(String(64))
-    """SHA-256 of the request, to tell a repetition from a different request under the same key."""
+    """SHA-256 of the request. It tells a repetition from a different request under the same key."""
     key_id: Mapped[str | None] = mapped_column(ForeignKey("api_keys.id"), index=True)
-    """Whose job it is; None where the service asks for no key."""
+    """Id of the API key whose job it is; None where the service asks for no key."""
     priority: Mapped[int] = mapped_column(default=0)
-    """Each step doubles the job's share of its key's work."""
+    """Each step up doubles the job's share of its key's work."""
     served: Mapped[float] = mapped_column(default=0.0)
-    """Seconds of work that it was given, divided by its share; whoever has the least goes next (db.work)."""
+    """Seconds of work that the job was given, divided by its share. The job with the least goes next (db.work)."""
     retry_of: Mapped[str | None] = mapped_column(ForeignKey("jobs.id"))
     attempt: Mapped[int] = mapped_column(default=1)
     """1, or one more than the attempt of ``retry_of``."""
     region_id: Mapped[str | None] = mapped_column(String(36))
-    """The last region accepted."""
+    """Id of the last region accepted."""
     event_seq: Mapped[int] = mapped_column(default=0)
     """``seq`` of the last event."""
     turn: Mapped[int] = mapped_column(default=0)
-    """How many transitions of the growth have been saved; a coordinator saves only onto the turn it started from."""
+    """How many transitions of the growth have been saved. A coordinator saves only onto the turn it started from."""
     coordinator: Mapped[str | None]
-    """Who is computing the next transition (``host:pid:start``) ..."""
+    """The process that is computing the next transition (``host:pid:start``)."""
     coordinator_until: Mapped[datetime | None]
-    """... and until when that is believed."""
+    """Until this time that process is believed to be at work."""
     coordinator_attempts: Mapped[int] = mapped_column(default=0)
     """How often the next transition was begun."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
@@ -135,7 +137,7 @@ class JobRow(Base):
 
 
 class IterationRow(Base):
-    """A polytope whose pairs are certified together."""
+    """An iteration is a polytope whose pairs are certified together."""
 
     __tablename__ = "iterations"
     transitions: ClassVar[states.Table] = states.ITERATION
@@ -143,14 +145,14 @@ class IterationRow(Base):
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
     index: Mapped[int] = mapped_column(primary_key=True)
     label: Mapped[str]
-    """What this polytope is, for people."""
+    """Says to people what this polytope is."""
     arrays: Mapped[Arrays]
-    """C (m, n), d (m,) with the joint limits, and center (n,) where one was given."""
+    """C (m, n), d (m,) with the joint limits, and center (n,) where one was given; in s."""
     faces: Mapped[int]
-    """m."""
+    """Number of faces, m."""
     state: Mapped[str] = mapped_column(String(16), default=states.IterationState.RUNNING)
     hard: Mapped[list[int]]
-    """Pairs for which nothing less than all faces is tried."""
+    """Indices of the pairs for which nothing less than all faces is tried."""
     failures: Mapped[int | None]
     """How many failures end the iteration; None when none does."""
     reuse: Mapped[Document]
@@ -161,7 +163,7 @@ class IterationRow(Base):
 
 
 class PairRow(Leased, Base):
-    """One pair of geometries on one iteration's polytope."""
+    """This row holds one pair of geometries on the polytope of one iteration, and its result."""
 
     __tablename__ = "pairs"
     __table_args__ = (
@@ -175,24 +177,24 @@ class PairRow(Leased, Base):
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"))
     iteration: Mapped[int]
     pair_index: Mapped[int]
-    """Position in Scene.pairs."""
+    """The pair's position in Scene.pairs."""
     a: Mapped[str]
     b: Mapped[str]
     state: Mapped[str] = mapped_column(String(16), default=states.PairState.OPEN)
     forecast_seconds: Mapped[float] = mapped_column(default=0.0)
     stage: Mapped[str | None] = mapped_column(String(16))
-    """certifier.outcome.Stage"""
+    """A value of certifier.outcome.Stage."""
     margin: Mapped[float | None]
     seconds: Mapped[float | None]
     detail: Mapped[str | None]
     witness_s: Mapped[list[float] | None] = mapped_column(JSON(none_as_null=True))
     weakness: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
-    """certifier.pair.result.Weakness.to_document()"""
+    """What certifier.pair.result.Weakness.to_document() returned."""
     proof_digest: Mapped[str | None] = mapped_column(ForeignKey("proofs.digest"))
 
 
 class StepRow(Leased, Base):
-    """A piece of a job that is not a pair: seeding, the polytope step, accepting a region."""
+    """A step is a piece of a job that is not a pair: seeding, the polytope step, or accepting a region."""
 
     __tablename__ = "steps"
     __table_args__ = (UniqueConstraint("job_id", "turn", "kind"), Index(None, "state", "lease_until"), Index(None, "job_id", "state"))
@@ -201,21 +203,21 @@ class StepRow(Leased, Base):
     id: Mapped[int] = mapped_column(primary_key=True)
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"))
     turn: Mapped[int]
-    """The job's turn that asked for it."""
+    """The job's turn that asked for the step."""
     kind: Mapped[str] = mapped_column(String(16))
-    """StepKind."""
+    """A value of StepKind."""
     state: Mapped[str] = mapped_column(String(16), default=states.StepState.OPEN)
     input: Mapped[Document]
-    """What it works on: the action, or the accepted polytope."""
+    """What the step works on: the action, or the accepted polytope."""
     due_at: Mapped[datetime] = mapped_column(default=utcnow)
-    """Not to be begun before."""
+    """A worker must not begin the step before this time."""
     report: Mapped[Document | None]
-    """What it found, or the CirisError document of why it failed."""
+    """What the step found, or the CirisError document that says why it failed."""
     seconds: Mapped[float | None]
 
 
 class ProofRow(Base):
-    """A proof file, addressed by its content."""
+    """This row holds a proof file, addressed by its content."""
 
     __tablename__ = "proofs"
 
@@ -226,7 +228,7 @@ class ProofRow(Base):
 
 
 class RegionRow(Base):
-    """A polytope all of whose pairs are certified, with the proof of it."""
+    """A region is a polytope all of whose pairs are certified. ``proof_digest`` names the proof of this."""
 
     __tablename__ = "regions"
     __table_args__ = (UniqueConstraint("job_id", "iteration"),)
@@ -236,19 +238,19 @@ class RegionRow(Base):
     scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), index=True)
     iteration: Mapped[int]
     guarantee: Mapped[str] = mapped_column(String(16))
-    """certifier.outcome.Guarantee"""
+    """A value of certifier.outcome.Guarantee."""
     manifest: Mapped[Document]
     arrays: Mapped[Arrays]
     """C (m, n), d (m,) with the joint limits, in s."""
     faces: Mapped[int]
-    """m."""
+    """Number of faces, m."""
     proof_digest: Mapped[str] = mapped_column(ForeignKey("proofs.digest"))
     ellipsoid_volume: Mapped[float]
     created_at: Mapped[datetime] = mapped_column(default=utcnow, index=True)
 
 
 class EventRow(Base):
-    """What happened to a job, in order."""
+    """An event says what happened to a job."""
 
     __tablename__ = "events"
     __table_args__ = (UniqueConstraint("job_id", "seq"),)
@@ -256,14 +258,14 @@ class EventRow(Base):
     id: Mapped[int] = mapped_column(primary_key=True)
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"))
     seq: Mapped[int]
-    """1, 2, 3 ... within the job."""
+    """The event's number within the job: 1, 2, 3 ..."""
     kind: Mapped[str] = mapped_column(String(32))
     data: Mapped[Document]
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
 
 
 class WebhookRow(Base):
-    """Whom to tell when a job has ended."""
+    """A webhook names the receiver to call when a job has ended."""
 
     __tablename__ = "webhooks"
     __table_args__ = (Index(None, "state", "next_at"),)
@@ -273,11 +275,11 @@ class WebhookRow(Base):
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), unique=True)
     url: Mapped[str]
     secret: Mapped[str]
-    """``whsec_`` and the base64 of the bytes that sign."""
+    """``whsec_`` and the base64 of the bytes that sign the message."""
     state: Mapped[str] = mapped_column(String(16), default=states.WebhookState.WAITING)
     attempts: Mapped[int] = mapped_column(default=0)
     """How often the receiver was called."""
     next_at: Mapped[datetime] = mapped_column(default=utcnow)
-    """Not to be called before."""
+    """The receiver is not called before this time."""
     error: Mapped[str | None]
     """Why the last attempt failed."""

@@ -1,7 +1,7 @@
-"""Lists, newest first, one page at a time.
+"""Lists come one page at a time, the newest row first.
 
-A cursor holds the place of the last row of its page, not the row: it stays good when that row is deleted, and no row that is there
-all the while is left out or shown twice.
+A cursor holds the place of the last row of its page, not the row itself. So it stays valid when that row is deleted. No row that
+exists all the while is left out or shown twice.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ Row = TypeVar("Row", JobRow, RegionRow, SceneRow)
 
 @dataclass(frozen=True)
 class Page(Generic[Row]):
-    """Rows, newest first, and what to pass as ``after`` for the next page (None on the last)."""
+    """A page holds rows, newest first, and what to pass as ``after`` for the next page (None on the last)."""
 
     rows: Sequence[Row]
     next: str | None
 
 
 def page(session: Session, model: type[Row], query: Select[Row], after: str | None, limit: int) -> Page[Row]:
-    """One page of the rows that the query finds.
+    """Returns one page of the rows that the query finds.
 
     Raises:
         CirisError: cursor, when ``after`` did not come from a page.

@@ -1,7 +1,7 @@
-"""Iterations and their pairs: made together, claimed in batches, saved with their proofs, ended early by the first failure.
+"""This module makes iterations with their pairs, claims pairs in batches, and saves them with their proofs.
 
-The order in which an iteration's pairs were added is the order in which they are claimed, and the failure that counts is the first in
-that order, not the first in time: what a job comes to depends neither on how many workers there are nor on what befalls them.
+Pairs are claimed in the order in which they were added to their iteration. The first failures in this order, not the first in time,
+end the iteration early. So the result of a job depends neither on the number of workers nor on what happens to them.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FAILED = frozenset(PairState) - UNFINISHED - {PairState.CERTIFIED, PairState.SKI
 
 @dataclass(frozen=True)
 class NewPair:
-    """A pair to certify: its position in Scene.pairs, the names of its geometries, the seconds it is expected to take."""
+    """Describes a pair to certify: its position in Scene.pairs, the names of its geometries, and the seconds it is expected to take."""
 
     index: int
     a: str
@@ -37,7 +37,7 @@ class NewPair:
 
 @dataclass(frozen=True)
 class Claimed:
-    """A pair to certify now; ``attempt`` counts from 1, ``deaths`` is how often it may have killed its process."""
+    """Names a pair to certify now. ``attempt`` counts from 1; ``deaths`` is how often the pair may have killed its process."""
 
     index: int
     attempt: int
@@ -46,7 +46,7 @@ class Claimed:
 
 @dataclass(frozen=True)
 class Claim:
-    """Pairs of one iteration, held under one token."""
+    """A claim holds pairs of one iteration under one token."""
 
     token: str
     job_id: str
@@ -57,10 +57,10 @@ class Claim:
 
 @dataclass(frozen=True)
 class Saved:
-    """What saving changed.
+    """Says what saving changed.
 
     Attributes:
-        held: False when no pair of the claim is held any more; results of pairs that were not held were dropped.
+        held: False when no pair of the claim is held any more. Results of pairs that were not held were dropped.
         finished: True for the one saving after which the iteration has no open or running pair.
     """
 
@@ -82,7 +82,7 @@ def add_iteration(
     hard: Sequence[int],
     failures: int | None,
 ) -> None:
-    """Adds an iteration and its pairs; one without pairs is certified at once. The caller holds the job's lock."""
+    """Adds an iteration and its pairs. An iteration without pairs is certified at once. The caller holds the job's lock."""
     certified = {} if pairs else {"state": IterationState.CERTIFIED, "finished_at": utcnow()}
     session.add(
         IterationRow(
@@ -116,7 +116,11 @@ def add_iteration(
 
 
 def batch(pairs: Iterable[tuple[int, float]], seconds: float) -> list[int]:
-    """The first of (pair index, forecast in seconds), in their order, that come to at most ``seconds``, or the first alone."""
+    """Returns the indices of the first pairs, in the order given, whose forecasts sum to at most ``seconds``; at least one.
+
+    Args:
+        pairs: (pair index, forecast in seconds).
+    """
     chosen: list[int] = []
     filled = 0.0
     for index, forecast in pairs:
@@ -128,9 +132,9 @@ def batch(pairs: Iterable[tuple[int, float]], seconds: float) -> list[int]:
 
 
 def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds: float) -> Claim | None:
-    """Claims the next batch of the job's open pairs, or alone one that may have killed its process.
+    """Claims the next batch of the job's open pairs. A pair that may have killed its process is claimed alone, after the others.
 
-    None when no pair is open. The caller holds the job's lock.
+    It returns None when no pair is open. The caller holds the job's lock.
     """
     columns = (PairRow.id, PairRow.iteration, PairRow.pair_index, PairRow.forecast_seconds, PairRow.attempts, PairRow.deaths)
     is_open = (PairRow.job_id == job.id, PairRow.state == PairState.OPEN)
@@ -147,9 +151,12 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
 
 
 def save(session: Session, claim: Claim, results: Mapping[int, PairResult]) -> Saved:
-    """Saves results, pair index -> result, with their proofs, in one transaction, if they are still held.
+    """Saves the results of pairs that are still held, with their proofs, in one transaction.
 
-    Enough failures skip the pairs after them; whoever holds one of those stops (leases.kept).
+    When enough pairs have failed, it skips the unfinished pairs after them. A worker that holds one of those is stopped (leases.kept).
+
+    Args:
+        results: pair index -> result.
     """
     job = jobs.lock(session, claim.job_id)
     columns = (PairRow.id, PairRow.pair_index, PairRow.state, PairRow.lease_token)
@@ -178,12 +185,12 @@ def save(session: Session, claim: Claim, results: Mapping[int, PairResult]) -> S
 
 
 def skip(session: Session, job_id: str, *which: ColumnElement[bool]) -> None:
-    """Skips the job's unfinished pairs, all or those that fit the conditions."""
+    """Skips the job's unfinished pairs: all of them, or those that match the conditions."""
     transition(session, PairRow, PairState.SKIPPED, PairRow.job_id == job_id, PairRow.state.in_(UNFINISHED), *which)
 
 
 def _finish_iteration(session: Session, job: JobRow, index: int, label: str, states: Collection[str]) -> bool:
-    """Settles an iteration whose pairs are all in these states; True for the one call that does."""
+    """Settles an iteration whose pairs are all in these states. Returns True for the one call that does it."""
     state = IterationState.CERTIFIED if set(states) <= {PairState.CERTIFIED} else IterationState.FAILED
     if not transition(session, IterationRow, state, *_iteration(job.id, index), finished_at=utcnow()):
         return False
@@ -192,12 +199,15 @@ def _finish_iteration(session: Session, job: JobRow, index: int, label: str, sta
 
 
 def skip_iterations(session: Session, job_id: str) -> None:
-    """Ends the job's running iterations as skipped; their pairs are seen to by :func:`skip`."""
+    """Ends the job's running iterations as skipped. :func:`skip` takes care of their pairs."""
     transition(session, IterationRow, IterationState.SKIPPED, IterationRow.job_id == job_id, finished_at=utcnow())
 
 
 def reached(session: Session, iteration: IterationRow) -> Sequence[PairRow]:
-    """The settled pairs of an iteration in their order; up to the failure that ended it, though others were settled too."""
+    """Returns the settled pairs of an iteration, in the order of claiming, up to the failure that ended it.
+
+    Pairs after that failure are left out, even if they were settled too.
+    """
     rows = session.scalars(_pairs(iteration.job_id, iteration.index).where(PairRow.state != PairState.SKIPPED).order_by(PairRow.id)).all()
     places = [place for place, row in enumerate(rows, start=1) if row.state != PairState.CERTIFIED]
     if iteration.failures is not None and len(places) >= iteration.failures:
@@ -206,41 +216,44 @@ def reached(session: Session, iteration: IterationRow) -> Sequence[PairRow]:
 
 
 def order(session: Session, iteration: IterationRow) -> list[int]:
-    """The indices of an iteration's pairs, in the order in which they are claimed."""
+    """Returns the indices of an iteration's pairs, in the order in which they are claimed."""
     mine = (PairRow.job_id == iteration.job_id, PairRow.iteration == iteration.index)
     return list(session.scalars(select(PairRow.pair_index).where(*mine).order_by(PairRow.id)))
 
 
 def of_iteration(session: Session, job_id: str, iteration: int) -> Sequence[PairRow]:
-    """The pairs of one iteration, in the order of the scene's pairs."""
+    """Returns the pairs of one iteration, in the order of the scene's pairs."""
     return session.scalars(_pairs(job_id, iteration).order_by(PairRow.pair_index)).all()
 
 
 def of_job(session: Session, job_id: str) -> Sequence[PairRow]:
-    """The job's pair matrix: every pair of every iteration, in order."""
+    """Returns the job's pair matrix: every pair of every iteration, in order."""
     return session.scalars(select(PairRow).where(PairRow.job_id == job_id).order_by(PairRow.iteration, PairRow.pair_index)).all()
 
 
 def iterations(session: Session, job_id: str) -> Sequence[IterationRow]:
-    """The job's iterations, in order, without their arrays."""
+    """Returns the job's iterations, in order, without their arrays."""
     query = select(IterationRow).where(IterationRow.job_id == job_id).order_by(IterationRow.index)
     return session.scalars(query.options(defer(IterationRow.arrays, raiseload=True))).all()
 
 
 def seconds(session: Session, job_id: str) -> float:
-    """What the job's pairs took, together."""
+    """Returns the seconds that all pairs of the job took together."""
     return session.scalar(select(func.sum(PairRow.seconds)).where(PairRow.job_id == job_id)) or 0.0
 
 
 def expected_seconds(session: Session, job_id: str, iteration: int) -> dict[int, float]:
-    """Pair index -> what the pair took in that iteration or, where it was not settled, was expected to; empty without that iteration."""
+    """Returns pair index -> seconds: what the pair took in that iteration, or its forecast where it was not settled.
+
+    The result is empty when there is no such iteration.
+    """
     expected = func.coalesce(PairRow.seconds, PairRow.forecast_seconds).label("expected")
     mine = (PairRow.job_id == job_id, PairRow.iteration == iteration)
     return {row.pair_index: row.expected for row in session.execute(select(PairRow.pair_index, expected).where(*mine))}
 
 
 def proving(session: Session, job_id: str, iteration_of: Mapping[int, int]) -> dict[int, PairRow]:
-    """Pair index -> the certified row of the iteration that holds its proof; rows that do not exist are absent."""
+    """Returns pair index -> the certified row of the iteration that holds the pair's proof. Missing rows are left out."""
     rows = session.scalars(
         select(PairRow).where(
             PairRow.job_id == job_id,
@@ -260,7 +273,7 @@ def _pairs(job_id: str, iteration: int) -> Select[PairRow]:
 
 
 def state_of(result: PairResult) -> PairState:
-    """The state of a settled pair is its outcome."""
+    """Returns the state of a settled pair, which is its outcome."""
     return PairState(result.outcome.value)
 
 

@@ -1,4 +1,4 @@
-"""Proof files, addressed by the SHA-256 of their content: the same proof is stored once, whoever found it."""
+"""Proof files are addressed by the SHA-256 of their content. The same proof is stored once, whoever found it."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from db.session import insert_new
 
 
 def put(session: Session, files: Collection[bytes]) -> dict[bytes, str]:
-    """Stores proofs, unless they are there, and returns the digest of each."""
+    """Stores proofs that are not stored yet, and returns the digest of each."""
     digests = {data: hashlib.sha256(data).hexdigest() for data in files}
     insert_new(session, ProofRow, [{"digest": digest, "data": data} for data, digest in digests.items()])
     return digests
 
 
 def get(session: Session, digest: str) -> bytes:
-    """The proof with this digest.
+    """Returns the proof with this digest.
 
     Raises:
         CirisError: proof_not_found.

@@ -1,4 +1,4 @@
-"""Regions: certified polytopes, stored as they are reached."""
+"""Regions are certified polytopes. They are stored as a job reaches them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _UNREAD = defer(RegionRow.manifest, raiseload=True), defer(RegionRow.arrays, rai
 
 
 def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any], proof: bytes) -> RegionRow:
-    """Stores a region whose proof has been verified; the caller holds the job's lock."""
+    """Stores a region whose proof has been verified. The caller holds the job's lock."""
     volume = manifest["volume"]["ellipsoid"]
     d = np.array(manifest["halfspace_offsets"])
     region = RegionRow(
@@ -46,7 +46,7 @@ def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any],
 
 
 def get(session: Session, region_id: str) -> RegionRow:
-    """The region with this id.
+    """Returns the region with this id.
 
     Raises:
         CirisError: region_not_found.
@@ -60,7 +60,7 @@ def get(session: Session, region_id: str) -> RegionRow:
 def page(
     session: Session, *, scene_id: str | None = None, job_id: str | None = None, after: str | None = None, limit: int = 100
 ) -> Page[RegionRow]:
-    """One page of the regions, without their manifests and arrays: of one scene, of one job, or all.
+    """Returns one page of the regions of one scene, of one job, or of all, without their manifests and arrays.
 
     Raises:
         CirisError: cursor.
@@ -71,13 +71,13 @@ def page(
 
 
 def of_job(session: Session, job_id: str) -> Sequence[RegionRow]:
-    """The job's regions, in the order of their iterations, without their manifests and arrays."""
+    """Returns the job's regions, in the order of their iterations, without their manifests and arrays."""
     return session.scalars(select(RegionRow).where(RegionRow.job_id == job_id).order_by(RegionRow.iteration).options(*_UNREAD)).all()
 
 
 @dataclass(frozen=True)
 class StoredPolytope:
-    """A region's half-spaces in s: C (m, n), d (m,), joint limits included."""
+    """Holds a region's half-spaces in s: C (m, n), d (m,), joint limits included."""
 
     id: str
     guarantee: str
@@ -86,14 +86,14 @@ class StoredPolytope:
 
 
 def polytopes(session: Session, scene_id: str) -> list[StoredPolytope]:
-    """The half-spaces of every region of a scene, without their manifests."""
+    """Returns the half-spaces of every region of a scene, without the manifests."""
     query = select(RegionRow.id, RegionRow.guarantee, RegionRow.arrays).where(RegionRow.scene_id == scene_id)
     rows = session.execute(query.order_by(RegionRow.created_at, RegionRow.id))
     return [StoredPolytope(row.id, row.guarantee, row.arrays["C"], row.arrays["d"]) for row in rows]
 
 
 def delete(session: Session, region_id: str) -> None:
-    """Deletes a region and its proof file; its job then names its latest region that is left, if any.
+    """Deletes a region, and its proof file unless another region has it. The job then names its latest remaining region, if any.
 
     Raises:
         CirisError: region_not_found.

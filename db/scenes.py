@@ -1,4 +1,4 @@
-"""Scenes: immutable, stored once for each content hash."""
+"""Scenes never change. Each is stored once for its content hash."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ID_LENGTH = 16
 
 
 def add(session: Session, scene: Scene) -> SceneRow:
-    """The row of this scene, made now if no scene has the same content. The name of the first one stays."""
+    """Returns the row of this scene. It makes the row if no scene has the same content; otherwise the first name stays."""
     for name in (scene.hash[:ID_LENGTH], scene.hash):
         insert_new(session, SceneRow, [{"id": name, "name": scene.name, "hash": scene.hash, "document": scene.to_document()}])
         row = session.scalar(select(SceneRow).where(SceneRow.hash == scene.hash))
@@ -28,7 +28,9 @@ def add(session: Session, scene: Scene) -> SceneRow:
 
 
 def find(session: Session, name: str) -> str:
-    """The id of the scene with this id, or else of the newest one with this name. Its document is not read, which may be long.
+    """Returns the id of the scene with this id, or else of the newest scene with this name.
+
+    It does not read the scene's document, which may be long.
 
     Raises:
         SceneError: scene_not_found.
@@ -42,9 +44,9 @@ def find(session: Session, name: str) -> str:
 
 @lru_cache(maxsize=16)
 def load(database: Database, scene_id: str) -> Scene:
-    """The scene with this id, ready for use. A scene never changes and takes long to read, so a process keeps the last few.
+    """Returns the scene with this id, ready for use. A scene never changes and takes long to read, so a process keeps the last few.
 
-    Not to be called in a session: it takes its own.
+    Call it outside of any session: it opens its own.
 
     Raises:
         SceneError: scene_not_found.
@@ -54,7 +56,7 @@ def load(database: Database, scene_id: str) -> Scene:
 
 
 def get(session: Session, name: str) -> SceneRow:
-    """The scene that :func:`find` finds.
+    """Returns the row of the scene that :func:`find` finds.
 
     Raises:
         SceneError: scene_not_found.
@@ -63,7 +65,7 @@ def get(session: Session, name: str) -> SceneRow:
 
 
 def page(session: Session, after: str | None = None, limit: int = 100) -> Page[SceneRow]:
-    """One page of the scenes.
+    """Returns one page of the scenes.
 
     Raises:
         CirisError: cursor.

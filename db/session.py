@@ -1,11 +1,13 @@
-"""Engines and transactions on SQLite and PostgreSQL.
+"""This module opens connections and transactions on SQLite and PostgreSQL.
 
-SQLite runs in WAL mode, and a transaction that will write begins with ``BEGIN IMMEDIATE``: one that begins by reading and writes
-later would fail, or lose an update, whenever another process wrote in between. Who waits for another process' write looks again ever
-more seldom, so the writers of one process share one connection: they queue for that instead. A committed transaction outlives the
-process; with ``synchronous=NORMAL`` a power cut may take back the last ones, never leave half of one.
+SQLite runs in WAL mode. A transaction that will write begins with ``BEGIN IMMEDIATE``. If it began by reading and wrote later, it
+would fail, or lose an update, whenever another process wrote in between.
 
-PostgreSQL gives every statement its own view of the database unless told otherwise, so there reading needs no transaction, and no
+While another process writes on SQLite, a writer looks again and again, at longer and longer intervals. So the writers of one
+process share one connection, and queue for it instead. A committed transaction survives the end of the process. With
+``synchronous=NORMAL`` a power cut may take back the last transactions, but never leaves half of one.
+
+PostgreSQL gives every statement its own view of the database unless told otherwise. So reading there needs no transaction, and no
 messages that begin and end one.
 """
 
@@ -28,15 +30,17 @@ from sqlalchemy.orm import DeclarativeBase, Session
 from db.settings import settings
 
 CONNECTIONS = 10
-"""The most that one process has. They are opened when needed, and kept: opening one costs more than most of what it is used for."""
+"""One process has at most this many connections. It opens them when needed and keeps them, because opening one costs more than
+most of what it is used for.
+"""
 BUSY_SECONDS = 30.0
-"""How long one waits for a connection, or a writer for another one (SQLite)."""
+"""A caller waits at most this long for a connection, and a writer at most this long for another writer (SQLite)."""
 IDLE_SECONDS = 1.0
-"""A connection to PostgreSQL that was not used for so long is tried before it is: the server may have been restarted."""
+"""A connection to PostgreSQL that was idle for this many seconds is tested before it is used: the server may have been restarted."""
 SILENCE_SECONDS = 20
-"""A PostgreSQL server or client that says nothing for so long is believed gone, and with the client its locks."""
+"""A PostgreSQL server or client that says nothing for this many seconds is believed gone. A client's locks end with it."""
 UNAVAILABLE = (OperationalError, InterfaceError, TimeoutError)
-"""What is raised when the database cannot be reached, or not in time."""
+"""These are raised when the database cannot be reached, or not in time."""
 _LINK = {
     "connect_timeout": 5,
     "keepalives_idle": SILENCE_SECONDS // 4,
@@ -47,7 +51,7 @@ _LINK = {
 
 
 class Database:
-    """One database: its engines for reading and for writing, and the two kinds of transaction."""
+    """Holds one database: its engines for reading and for writing, and the two kinds of transaction."""
 
     def __init__(self, url: str) -> None:
         parsed = make_url(url)
@@ -56,13 +60,13 @@ class Database:
 
     @contextmanager
     def read(self) -> Iterator[Session]:
-        """A session that only reads; rows stay usable after it."""
+        """Opens a session that only reads. Its rows stay usable after it."""
         with Session(self.reader, expire_on_commit=False) as session:
             yield session
 
     @contextmanager
     def write(self) -> Iterator[Session]:
-        """A transaction that may write: committed at the end, rolled back when an exception leaves the block."""
+        """Opens a transaction that may write. It commits at the end, and rolls back when an exception leaves the block."""
         with Session(self.writer, expire_on_commit=False) as session, session.begin():
             yield session
 
@@ -72,7 +76,7 @@ class Database:
 
 
 def insert_new(session: Session, model: type[DeclarativeBase], rows: list[dict[str, Any]]) -> int:
-    """Inserts rows, except those that a unique constraint says are there already; tells how many it inserted."""
+    """Inserts rows, except those that exist already by a unique constraint. Returns how many it inserted."""
     if not rows:
         return 0
     dialect = {"sqlite": sqlite, "postgresql": postgresql}[session.get_bind().dialect.name]
@@ -82,7 +86,7 @@ def insert_new(session: Session, model: type[DeclarativeBase], rows: list[dict[s
 
 @cache
 def database() -> Database:
-    """The database of the settings, one for the process (a forked child must ``database.cache_clear()`` first)."""
+    """Returns the database of the settings, one for the process. A forked child must call ``database.cache_clear()`` first."""
     return Database(settings().database)
 
 
@@ -124,7 +128,7 @@ def _begin_sqlite(begin: str, connection: Connection) -> None:
 
 
 def _configure_postgresql(connection: Any, record: Any) -> None:
-    """Has the server end a transaction whose client is gone or hangs, so that it locks nobody out."""
+    """Makes the server end a transaction whose client is gone or hangs, so that its locks do not last."""
     with connection.cursor() as cursor:
         cursor.execute(f"SET idle_in_transaction_session_timeout = '{SILENCE_SECONDS}s'")
     connection.commit()
@@ -136,7 +140,7 @@ def _note_use(_connection: Any, record: Any) -> None:
 
 
 def _try_if_idle(dialect: Dialect, connection: Any, record: Any, _proxy: Any) -> None:
-    """Has the pool replace a connection that was idle and is dead.
+    """Makes the pool replace a connection that was idle and is dead.
 
     Raises:
         DisconnectionError: to tell the pool so.

@@ -1,7 +1,7 @@
-"""The states of jobs, pairs, steps, iterations and webhooks, their legal transitions as data, and the one function that makes them.
+"""This module holds the states of jobs, pairs, steps, iterations and webhooks, and their legal transitions as data.
 
-A transition is a conditional update: it changes the rows that are in a state from which the new one may be reached, and
-tells how many those were. Two processes that race for the same transition therefore never both win.
+:func:`transition` is the one function that changes a state. It is a conditional update: it changes only rows in a state from which
+the new one may be reached, and returns how many those were. So of two processes that race for one transition only one wins.
 """
 
 from __future__ import annotations
@@ -19,33 +19,33 @@ if TYPE_CHECKING:
 
 class JobState(StrEnum):
     QUEUED = "queued"
-    """Committed; no coordinator has looked at it yet."""
+    """The job is committed, but no coordinator has looked at it yet."""
     RUNNING = "running"
-    """Has work open or running, or is about to be given some."""
+    """The job has work that is open or running, or soon will have some."""
     CANCELLING = "cancelling"
-    """Someone asked to cancel it; its work is being stopped."""
+    """Someone asked to cancel the job; its work is being stopped."""
     SUCCEEDED = "succeeded"
-    """Has its answer: a certified region (grow), a verdict for the polytope (certify)."""
+    """The job has its answer: a certified region (grow), or a verdict for the polytope (certify)."""
     FAILED = "failed"
-    """Ended without an answer; ``error`` says why. Regions certified before remain."""
+    """The job ended without an answer; ``error`` says why. Regions certified before remain."""
     CANCELLED = "cancelled"
-    """Ended by request. Regions certified before remain."""
+    """The job ended by request. Regions certified before remain."""
 
 
 class JobKind(StrEnum):
     GROW = "grow"
-    """From a seed to a certified polytope, as large as the options allow."""
+    """The job grows a certified polytope from a seed, as large as the options allow."""
     CERTIFY = "certify"
-    """One verdict per pair for a given polytope."""
+    """The job finds one verdict for each pair on a given polytope."""
 
 
 class PairState(StrEnum):
     OPEN = "open"
-    """To be certified; nobody is at it."""
+    """The pair is to be certified; no worker has claimed it."""
     RUNNING = "running"
-    """Claimed by a worker until ``lease_until``."""
+    """A worker has claimed the pair, until ``lease_until``."""
     CERTIFIED = "certified"
-    """Has a verified proof (``proof_digest``)."""
+    """The pair has a verified proof (``proof_digest``)."""
     REFUTED = "refuted"
     """A configuration in collision is known (``witness_s``)."""
     NOT_CERTIFIABLE = "not_certifiable"
@@ -55,49 +55,49 @@ class PairState(StrEnum):
     ERROR = "error"
     """The program failed, or its worker died too often; ``detail`` says why."""
     SKIPPED = "skipped"
-    """Not needed any more: another pair failed first, or the job ended."""
+    """The pair is not needed any more: another pair failed first, or the job ended."""
 
 
 class StepState(StrEnum):
     OPEN = "open"
-    """To be done; nobody is at it."""
+    """The step is to be done; no worker has claimed it."""
     RUNNING = "running"
-    """Claimed by a worker until ``lease_until``."""
+    """A worker has claimed the step, until ``lease_until``."""
     DONE = "done"
-    """Has its report."""
+    """The step has its report."""
     FAILED = "failed"
-    """``report`` says why; for an ``accept`` the region's proof was refused and the region is not served."""
+    """The step failed; ``report`` says why. After a failed ``accept`` the region is not served: its proof was refused."""
     SKIPPED = "skipped"
-    """Not needed any more: the job ended, or (``accept``) a later region was accepted."""
+    """The step is not needed any more: the job ended, or (``accept``) a later region was accepted."""
 
 
 class StepKind(StrEnum):
     PROPOSE = "propose"
-    """Seeding: a polytope around the seed, not yet certified."""
+    """Seeding: the step finds a polytope around the seed, not yet certified."""
     STEP = "step"
     """The polytope step (12) of the alternation."""
     ACCEPT = "accept"
-    """Assembling, verifying and storing the region of a certified polytope."""
+    """The step assembles, verifies and stores the region of a certified polytope."""
 
 
 class IterationState(StrEnum):
     RUNNING = "running"
-    """Some of its pairs are open or running."""
+    """Some pairs of the iteration are open or running."""
     CERTIFIED = "certified"
     """Every pair has a verified proof."""
     FAILED = "failed"
     """At least one pair was not certified."""
     SKIPPED = "skipped"
-    """The job ended first."""
+    """The job ended before the iteration did."""
 
 
 class WebhookState(StrEnum):
     WAITING = "waiting"
-    """The job has not ended, or its end has not been received yet."""
+    """The job has not ended, or the receiver has not confirmed its end yet."""
     DELIVERED = "delivered"
     """The receiver has answered with a status of success."""
     FAILED = "failed"
-    """Given up; ``error`` says why."""
+    """The service has given up; ``error`` says why."""
 
 
 Table = Mapping[str, frozenset[str]]
@@ -147,12 +147,12 @@ WEBHOOK: Table = _table(
 
 
 def sources(table: Table, target: str) -> frozenset[str]:
-    """The states from which ``target`` may be reached in one transition."""
+    """Returns the states from which ``target`` may be reached in one transition."""
     return frozenset(state for state, targets in table.items() if target in targets)
 
 
 def unfinished(table: Table) -> frozenset[str]:
-    """The states that some transition leaves."""
+    """Returns the states that some transition leaves."""
     return frozenset(state for state, targets in table.items() if targets)
 
 
@@ -163,7 +163,7 @@ def transition(
     *where: ColumnElement[bool],
     **values: Any,
 ) -> int:
-    """Moves the rows of ``model`` that match ``where`` to ``target``, as far as the model's table allows it.
+    """Moves the rows of ``model`` that match ``where`` to ``target``, if the model's table allows it.
 
     Args:
         values: further columns to set on the rows that move.

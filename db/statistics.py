@@ -1,4 +1,4 @@
-"""How much there is of everything, for monitoring."""
+"""This module counts the rows of the database, for monitoring."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from db.states import JobState, PairState, StepKind, WebhookState
 
 @dataclass(frozen=True)
 class Statistics:
-    """Rows of the database, by state; states that nothing is in count zero.
+    """Holds the number of rows by state. A state that no row is in counts zero.
 
     Attributes:
-        pair_seconds: time spent on pairs by the state that it led to, summed.
-        step_seconds: time spent on steps by kind, summed.
+        pair_seconds: seconds spent on pairs, summed by the state that resulted.
+        step_seconds: seconds spent on steps, summed by kind.
     """
 
     jobs: dict[str, int]
@@ -29,7 +29,7 @@ class Statistics:
 
 
 def collect(session: Session) -> Statistics:
-    """The statistics as of now."""
+    """Returns the statistics as of now."""
     jobs = dict(session.execute(select(JobRow.state, func.count()).group_by(JobRow.state)).all())
     pairs = session.execute(select(PairRow.state, func.count(), func.sum(PairRow.seconds)).group_by(PairRow.state)).all()
     steps = dict(session.execute(select(StepRow.kind, func.sum(StepRow.seconds)).group_by(StepRow.kind)).all())

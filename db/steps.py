@@ -1,4 +1,4 @@
-"""Steps: the pieces of a job that are not pairs (seeding, the polytope step, accepting a region)."""
+"""Steps are the pieces of a job that are not pairs: seeding, the polytope step, accepting a region."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ UNFINISHED = unfinished(STEP)
 
 @dataclass(frozen=True)
 class Claim:
-    """A step held under a token, with what is needed to do it; ``attempt`` and ``deaths`` as for db.pairs.Claimed."""
+    """A claim holds a step under a token, with what is needed to do it. ``attempt`` and ``deaths`` are as in db.pairs.Claimed."""
 
     token: str
     step_id: int
@@ -33,7 +33,7 @@ class Claim:
 
 
 def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any], due_at: datetime | None = None) -> StepRow:
-    """Adds a step of the job's present turn, due now unless told otherwise; the caller holds the job's lock."""
+    """Adds a step of the job's present turn. It is due now unless ``due_at`` says otherwise. The caller holds the job's lock."""
     step = StepRow(job_id=job.id, turn=job.turn, kind=kind, input=input, due_at=due_at or utcnow())
     session.add(step)
     session.flush()
@@ -42,7 +42,7 @@ def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any], du
 
 
 def claim(session: Session, job: JobRow, kinds: Collection[StepKind], *, lease_seconds: float) -> Claim | None:
-    """Claims the job's latest step of these kinds that is open and due; None when there is none. The caller holds the job's lock."""
+    """Claims the job's latest step of these kinds that is open and due; returns None without one. The caller holds the job's lock."""
     query = select(StepRow).where(StepRow.job_id == job.id, is_due(StepRow, utcnow()), StepRow.kind.in_(kinds))
     step = session.scalar(query.order_by(StepRow.turn.desc()).limit(1))
     if step is None:
@@ -53,9 +53,9 @@ def claim(session: Session, job: JobRow, kinds: Collection[StepKind], *, lease_s
 
 
 def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any], seconds: float) -> bool:
-    """Ends the step with its report, if it is still held; the caller holds the job's lock.
+    """Ends the step with its report if it is still held, and says whether it was. The caller holds the job's lock.
 
-    A region that was accepted takes the place of those certified before it that nobody has begun to accept.
+    A region that was accepted replaces those certified before it that nobody has begun to accept.
     """
     held = (StepRow.id == claim.step_id, leases.held(StepRow, claim.token))
     if not transition(session, StepRow, state, *held, report=report, seconds=seconds, lease_until=None):
@@ -71,33 +71,33 @@ def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any
 
 
 def is_due(step: type[StepRow], now: datetime | BindParameter[datetime]) -> ColumnElement[bool]:
-    """Condition: the step is open and may be begun."""
+    """Returns the condition that the step is open and may be begun."""
     return (step.state == StepState.OPEN) & (step.due_at <= now)
 
 
 def hasten(session: Session, job_id: str) -> bool:
-    """Makes the job's open steps due now; False when they are already."""
+    """Makes the job's open steps due now. Returns False when they are due already."""
     now = utcnow()
     late = update(StepRow).where(StepRow.job_id == job_id, StepRow.state == StepState.OPEN, StepRow.due_at > now).values(due_at=now)
     return bool(cast("CursorResult[Any]", session.execute(late)).rowcount)
 
 
 def skip(session: Session, job_id: str) -> None:
-    """Skips the job's unfinished steps, except that certified polytopes are still accepted."""
+    """Skips the job's unfinished steps, but not those that accept certified polytopes."""
     where = (StepRow.job_id == job_id, StepRow.kind != StepKind.ACCEPT, StepRow.state.in_(UNFINISHED))
     transition(session, StepRow, StepState.SKIPPED, *where)
 
 
 def of_turn(session: Session, job: JobRow, kind: StepKind) -> StepRow | None:
-    """The step of this kind that the job's present turn asked for."""
+    """Returns the step of this kind that the job's present turn asked for."""
     return session.scalar(select(StepRow).where(StepRow.job_id == job.id, StepRow.turn == job.turn, StepRow.kind == kind))
 
 
 def of_job(session: Session, job_id: str) -> Sequence[StepRow]:
-    """The job's steps, in order."""
+    """Returns the job's steps, in order."""
     return session.scalars(select(StepRow).where(StepRow.job_id == job_id).order_by(StepRow.turn, StepRow.id)).all()
 
 
 def accepted(session: Session, job_id: str) -> list[StepRow]:
-    """The job's steps that accept a region, in order, whatever came of them."""
+    """Returns the job's steps that accept a region, in order, whatever their result."""
     return [step for step in of_job(session, job_id) if step.kind == StepKind.ACCEPT]

@@ -1,4 +1,4 @@
-"""Column types: times that keep their zone, and named arrays."""
+"""These are column types: times with their zone, and named arrays."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ Arrays = dict[str, NDArray[np.float64]]
 
 
 def utcnow() -> datetime:
-    """The time now, with its zone."""
+    """Returns the time now, with its zone."""
     return datetime.now(UTC)
 
 
 class Utc(TypeDecorator[datetime]):
-    """A time with its zone. Databases without zones (SQLite) hold it in UTC."""
+    """This column holds a time with its zone. Databases without zones (SQLite) store it in UTC."""
 
     impl = DateTime(timezone=True)
     cache_ok = True
@@ -33,7 +33,7 @@ class Utc(TypeDecorator[datetime]):
 
 
 class Npz(TypeDecorator[Arrays]):
-    """Named arrays of doubles, kept as the bytes of an npz file."""
+    """This column holds named arrays of doubles, stored as the bytes of an npz file."""
 
     impl = LargeBinary
     cache_ok = True

@@ -1,4 +1,4 @@
-"""Webhooks: whom to tell when a job has ended, how often that was tried, and when to try again."""
+"""A webhook says whom to tell when a job has ended, how often the service tried, and when it tries again."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ from db.models import JobRow, WebhookRow
 from db.states import JOB, WebhookState, transition, unfinished
 
 BACKOFF_SECONDS = (10, 60, 300, 1800, 7200, 21600)
-"""Pauses after each attempt that failed but the last."""
+"""The service pauses this many seconds after each failed attempt but the last."""
 
 
 @dataclass(frozen=True)
 class Delivery:
-    """One attempt at telling a receiver about the end of a job."""
+    """A delivery is one attempt to tell a receiver that a job has ended."""
 
     webhook: WebhookRow
     job: JobRow
 
 
 def add(session: Session, job_id: str, url: str, secret: str) -> None:
-    """Has somebody told when the job has ended."""
+    """Adds a webhook: the receiver at ``url`` is told when the job has ended."""
     session.add(WebhookRow(id=str(uuid4()), job_id=job_id, url=url, secret=secret))
 
 
 def copy(session: Session, job_id: str, other_id: str) -> None:
-    """Has whoever is told about the job told about the other one too."""
+    """Adds to the other job the webhook of this job, if it has one."""
     row = session.scalar(select(WebhookRow).where(WebhookRow.job_id == job_id))
     if row is not None:
         add(session, other_id, row.url, row.secret)
 
 
 def of_job(session: Session, job_id: str) -> WebhookRow:
-    """The job's webhook.
+    """Returns the job's webhook.
 
     Raises:
         CirisError: webhook_not_found.
@@ -51,9 +51,9 @@ def of_job(session: Session, job_id: str) -> WebhookRow:
 
 
 def claim(session: Session, now: datetime, limit: int = 50) -> Sequence[Delivery]:
-    """The deliveries that are due, each counted as an attempt: nobody else gets it until its pause is over.
+    """Claims the deliveries that are due, and counts each as an attempt. Nobody else gets it until its pause is over.
 
-    Whoever claims and dies has used up an attempt; what had its last attempt without an answer is given up.
+    A worker that claims a delivery and dies has used up an attempt. A webhook whose last attempt got no answer is given up.
     """
     due = (WebhookRow.state == WebhookState.WAITING, WebhookRow.next_at <= now)
     query = select(WebhookRow, JobRow).join(JobRow, JobRow.id == WebhookRow.job_id).where(*due, JobRow.state.not_in(unfinished(JOB)))
@@ -70,12 +70,12 @@ def claim(session: Session, now: datetime, limit: int = 50) -> Sequence[Delivery
 
 
 def delivered(session: Session, webhook_id: str) -> None:
-    """The receiver has taken it."""
+    """Notes that the receiver has taken the message."""
     transition(session, WebhookRow, WebhookState.DELIVERED, WebhookRow.id == webhook_id, error=None)
 
 
 def failed(session: Session, webhook_id: str, error: str) -> None:
-    """The attempt failed; the last one ends the matter."""
+    """Notes that the attempt failed. After the last attempt the webhook is given up."""
     row = session.get_one(WebhookRow, webhook_id)
     row.error = error
     if row.attempts > len(BACKOFF_SECONDS):

@@ -1,10 +1,12 @@
-"""What the workers do next: a fair order over API keys and jobs, in which none starves.
+"""This module decides what the workers do next: a fair order over API keys and jobs, in which every job gets its turn.
 
-Messages to the solvers only say that there is work; which, is decided here when one of them is free. Every key has the same share of
-the workers, however many jobs it has, and within a key a job's share doubles with each step of its priority. ``jobs.served`` counts the
-seconds that a job was given, divided by its share; the job with the least goes next (stride scheduling: Waldspurger, Weihl 1995).
+A message to the solvers only says that there is work. Which work it is, this module decides when a solver is free. Every key has the
+same share of the workers, however many jobs it has. Within a key, each step of priority doubles a job's share.
 
-The questions are built once, with the time and the job left open: that takes longer than asking them.
+``jobs.served`` counts the seconds that a job was given, divided by its share. The job with the least goes next (stride scheduling:
+Waldspurger, Weihl 1995).
+
+The queries are built once, with the time and the job as parameters, because building one takes longer than running it.
 """
 
 from __future__ import annotations
@@ -20,18 +22,18 @@ from db.states import JobState, PairState, StepKind, StepState
 from db.types import Utc, utcnow
 
 URGENT = (StepKind.PROPOSE, StepKind.STEP)
-"""The job waits for these; for accepting a region it does not."""
+"""The job waits for these steps. It does not wait for the acceptance of a region."""
 
 
 def next_job(session: Session) -> str | None:
-    """The job for which something is to be done next; None when nothing is to be done."""
+    """Returns the id of the job whose work is done next; None when there is no work."""
     return session.scalar(_next_job(), {"now": utcnow()})
 
 
 def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds: float) -> pairs.Claim | steps.Claim | None:
-    """Claims a piece of the job's work: a step that it waits for, else pairs, else the latest region to accept, one at a time.
+    """Claims one piece of the job's work: a step that the job waits for, else pairs, else the latest region to accept.
 
-    None when others were faster.
+    A job accepts one region at a time. The function returns None when other workers were faster.
     """
     job = jobs.lock(session, job_id)
     claimed: pairs.Claim | steps.Claim | None = None
@@ -44,7 +46,7 @@ def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds:
 
 
 def served_by_now(session: Session) -> float:
-    """What a job that starts now counts as having been served: no advantage over those that wait for work, nor a debt."""
+    """Returns what a job that starts now counts as served, so that it is neither ahead of those that wait for work nor behind them."""
     waiting = session.scalar(_least_served(), {"now": utcnow()})
     if waiting is None:
         waiting = session.scalar(select(func.max(JobRow.served)).where(JobRow.state == JobState.RUNNING))
@@ -70,14 +72,14 @@ def _has_region_now() -> Select[str]:
 
 
 def _has_work() -> ColumnElement[bool]:
-    """Condition: :func:`claim` would find something."""
+    """Returns the condition that :func:`claim` would find work."""
     pair = exists().where(PairRow.job_id == JobRow.id, PairRow.state == PairState.OPEN)
     step = exists().where(StepRow.job_id == JobRow.id, steps.is_due(StepRow, _NOW), StepRow.kind.in_(URGENT))
     return or_(and_(JobRow.state == JobState.RUNNING, or_(pair, step)), _has_region())
 
 
 def _has_region() -> ColumnElement[bool]:
-    """Condition: the job has a region to accept and nobody is accepting one of its regions."""
+    """Returns the condition that the job has a region to accept and nobody is accepting one of its regions."""
     step, other = aliased(StepRow), aliased(StepRow)
     waits = exists().where(step.job_id == JobRow.id, step.kind == StepKind.ACCEPT, steps.is_due(step, _NOW))
     accepting = exists().where(other.job_id == JobRow.id, other.kind == StepKind.ACCEPT, other.state == StepState.RUNNING)

@@ -1,1 +1,1 @@
-"""What certified regions are good for: which of them hold a configuration, and how far inside."""
+"""This package uses certified regions: it finds which of them contain a configuration, and how far inside it is."""

@@ -1,4 +1,7 @@
-"""Which regions {s : C s <= d} hold which points, and by how much: every face of every region in one matrix product."""
+"""This module finds which regions {s : C s <= d} contain which points, and by how much.
+
+It computes all faces of all regions in one matrix product.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from certifier.model import Array, Polytope, Scene
 
 @dataclass(frozen=True)
 class Membership:
-    """Answer for k points and r regions.
+    """Holds the answer for k points and r regions.
 
     Attributes:
         inside: (k, r) True where the point satisfies every inequality of the region.
@@ -26,7 +29,7 @@ class Membership:
 
 
 class MembershipIndex:
-    """The faces of r >= 0 regions of an n-joint scene, stacked."""
+    """Holds the faces of r >= 0 regions of an n-joint scene, stacked."""
 
     def __init__(self, polytopes: Sequence[Polytope], n: int) -> None:
         self._count = len(polytopes)
@@ -37,7 +40,7 @@ class MembershipIndex:
         self._norms = np.where(norms > 0, norms, 1.0)
 
     def locate(self, s: Array) -> Membership:
-        """Membership of the points s, (k, n); a row with a value that is not finite is outside of everything."""
+        """Returns the membership of the points s, (k, n). A row with a value that is not finite is outside of every region."""
         k = len(s)
         if not self._count:
             return Membership(np.zeros((k, 0), dtype=bool), np.zeros((k, 0)))
@@ -49,9 +52,9 @@ class MembershipIndex:
 
 
 def to_s(scene: Scene, q: Array) -> Array:
-    """Tangent-space coordinates of configurations q, (k, n); a row of NaN where a joint is outside its limits.
+    """Returns the tangent-space coordinates (k, n) of configurations q (k, n), with a row of NaN where a joint is outside its limits.
 
-    s has period 2 pi in a revolute joint: without the check, a configuration a full turn away would pass for one inside.
+    s has period 2 pi in a revolute joint, so without this check a configuration a full turn away would count as inside.
     """
     within = ((q >= scene.q_lower) & (q <= scene.q_upper)).all(axis=1, keepdims=True)
     return np.where(within, scene.to_s(q), np.nan)

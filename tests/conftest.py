@@ -10,7 +10,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUM
 
 from hypothesis import settings  # noqa: E402
 
-settings.register_profile("ciris", deadline=None, derandomize="CI" in os.environ)
+settings.register_profile("ciris", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("ciris")
 
-pytest_plugins = ["tests.services"]
+pytest_plugins = ["tests.services", "tests.skips"]

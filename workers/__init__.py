@@ -1,1 +1,1 @@
-"""Celery workers: certifying pairs in parallel, coordinating jobs, sweeping up; and the embedded stack that runs all of it."""
+"""Celery workers certify pairs in parallel, coordinate jobs and sweep up. The embedded stack runs all of it on one machine."""

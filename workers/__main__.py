@@ -1,7 +1,7 @@
-"""``python -m workers control`` or ``python -m workers solve``: one Celery worker, with the settings of the environment.
+"""``python -m workers control`` or ``python -m workers solve`` runs one Celery worker, with the settings of the environment.
 
 The control worker coordinates jobs in threads, runs the sweeper and delivers webhooks. The solve worker runs
-``CIRIS_SOLVE_PROCESSES`` processes, each of which computes in one thread: the pairs are what is parallel.
+``CIRIS_SOLVE_PROCESSES`` processes. Each computes in one thread, because the pairs already run in parallel.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m workers", description="A Celery worker of ciris.")
     parser.add_argument("queue", choices=["control", "solve"])
     queue = parser.parse_args().queue
-    os.environ.update(ONE_THREAD)  # before numpy is imported
+    os.environ.update(ONE_THREAD)  # must come before numpy is imported
 
     from celery.signals import setup_logging, worker_process_init, worker_ready
 

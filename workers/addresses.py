@@ -1,4 +1,4 @@
-"""Which addresses the service may call on a stranger's behalf."""
+"""This module decides which addresses the service may call when a user names them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _TRANSLATED = (ip_network("64:ff9b::/96"), ip_network("64:ff9b:1::/48"))
 
 
 def is_public(address: str) -> bool:
-    """Whether this is an address of the internet. An IPv6 address that stands for an IPv4 one is not believed to be."""
+    """Says whether this is an address of the public internet. An IPv6 address that stands for an IPv4 address counts as not public."""
     ip = ip_address(address.partition("%")[0])
     if isinstance(ip, IPv6Address) and (ip.ipv4_mapped or ip.sixtofour or ip.teredo or any(ip in network for network in _TRANSLATED)):
         return False
@@ -19,7 +19,7 @@ def is_public(address: str) -> bool:
 
 
 def resolve(host: str, port: int, *, private: bool) -> str:
-    """An address of the host, to connect to as it stands: asking again could give another answer.
+    """Returns an address of the host. The caller must connect to this address: another look-up could give another answer.
 
     Args:
         private: accept addresses that are not public.

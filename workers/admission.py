@@ -1,4 +1,4 @@
-"""Whether a job can fit at all, by the forecast of its pairs, before anything is computed."""
+"""Before anything is computed, this module decides from the forecast of a job's pairs whether the job can fit at all."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from db.settings import Settings
 
 
 def check(costs: Sequence[PairCost], limits: Settings, seconds_left: float | None) -> None:
-    """Refuses a job with a pair that needs more memory or time than there is. What is refused could only have failed later.
+    """Refuses a job with a pair that needs more memory or time than there is. Such a job could only fail later.
 
     Args:
-        seconds_left: until the job's deadline; None without one.
+        seconds_left: seconds until the job's deadline; None without one.
 
     Raises:
         CirisError: does_not_fit, naming the worst pair.

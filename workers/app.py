@@ -1,8 +1,10 @@
-"""The Celery application: built once from the settings, and the senders of its messages.
+"""This module builds the Celery application from the settings, and sends its messages.
 
-A message to the control worker names a job; one to the solvers only says that there is work, and whoever takes it asks the database
-which (db.work). Messages are sent after the transaction that they announce. They may come twice, late or never: what is to be done
-stands in the database, claims are conditional, and the sweeper sends again what was lost.
+A message to the control worker names a job. A message to the solvers only says that there is work; a solver that takes it asks the
+database which work (db.work).
+
+A message is sent after the transaction that it announces. It may come twice, late or never: the database says what is to be done,
+claims are conditional, and the sweeper sends again what was lost.
 """
 
 from __future__ import annotations
@@ -24,17 +26,17 @@ CONTROL, SOLVE = "control", "solve"
 COORDINATE, WORK = "ciris.coordinate", "ciris.work"
 
 SILENCE_SECONDS = 10
-"""A Redis that says nothing for so long is believed gone, and the connection is made anew."""
+"""A Redis that says nothing for this many seconds is believed gone, and a new connection is opened."""
 GRACE_SECONDS = 30
-"""How much later than the step's own limit, which ends it with an error, the worker kills its process."""
+"""A step ends itself with an error at its own limit. The worker kills its process this many seconds after that limit."""
 
 SENDING = {"max_retries": 1, "interval_start": 0, "interval_step": 0}
-"""Whoever sends does not wait for Redis to come back: the sweeper sends again."""
+"""A sender does not wait until Redis comes back: the sweeper sends again."""
 
 
 @cache
 def celery_app() -> Celery:
-    """The application, one for the process."""
+    """Returns the application, one for the process."""
     app = Celery("ciris", broker=settings().redis_url, set_as_current=True)
     app.conf.update(
         task_queues=[Queue(CONTROL), Queue(SOLVE)],
@@ -43,7 +45,7 @@ def celery_app() -> Celery:
         task_serializer="json",
         accept_content=["json"],
         task_ignore_result=True,
-        # A task is done when its results are in the database: a worker that dies gives its message back at once.
+        # A task is done when its results are in the database, so a worker that dies gives its message back at once.
         task_acks_late=True,
         task_reject_on_worker_lost=True,
         worker_prefetch_multiplier=1,
@@ -65,12 +67,12 @@ def celery_app() -> Celery:
 
 
 def send_coordinate(job_id: str) -> bool:
-    """Asks for a coordination of the job; False when Redis cannot be reached (the sweeper asks again)."""
+    """Asks for a coordination of the job. Returns False when Redis cannot be reached; the sweeper then asks again."""
     return _send(COORDINATE, [[job_id]])
 
 
 def send_work(count: int = 1) -> bool:
-    """Wakes so many solvers, each of whom wakes another while something is left; False as for :func:`send_coordinate`."""
+    """Wakes ``count`` solvers. Each of them wakes another while work is left. It returns False when Redis cannot be reached."""
     return _send(WORK, [[]] * count)
 
 
@@ -87,7 +89,7 @@ def _send(name: str, calls: Sequence[Sequence[object]]) -> bool:
 
 
 def waiting(queue: str) -> int:
-    """How many messages wait in a queue.
+    """Returns how many messages wait in a queue.
 
     Raises:
         kombu.exceptions.OperationalError: Redis cannot be reached.

@@ -1,7 +1,7 @@
-"""What happens next in a job, as pure functions: from what the database holds to what it shall hold.
+"""These pure functions decide what happens next in a job: from what the database holds they compute what it shall hold.
 
-:mod:`certifier.growth.machine` decides about the mathematics (which polytope is certified next); this module turns its actions into rows
-and the rows' outcomes into its reports, and says how a job ends. Nothing here reads or writes anything.
+:mod:`certifier.growth.machine` decides about the mathematics, such as which polytope is certified next. This module turns the outcomes
+of rows into the machine's reports, and says how a job ends. Nothing here reads or writes anything.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from db.states import JobKind, JobState, StepKind, StepState
 
 
 def next_transition(scene: Scene, options: dict[str, Any], state: dict[str, Any] | None, report: Report | None) -> Transition:
-    """The first transition of a job (no state yet), or the one that follows a report.
+    """Returns the first transition of a job, which has no state yet, or the transition that follows a report.
 
     Raises:
         CirisError: as :meth:`GrowthOptions.from_document`, :meth:`GrowthState.from_document` and :func:`begin`.
@@ -36,7 +36,7 @@ def next_transition(scene: Scene, options: dict[str, Any], state: dict[str, Any]
 
 
 def step_report(kind: StepKind, state: StepState, report: dict[str, Any]) -> Report:
-    """The report of a seeding or a polytope step from its row."""
+    """Returns the report of a seeding or a polytope step from its row."""
     if state == StepState.FAILED:
         return Failed(CirisError.from_document(report))
     return Proposal.from_document(report) if kind == StepKind.PROPOSE else Stepped.from_document(report)
@@ -44,7 +44,7 @@ def step_report(kind: StepKind, state: StepState, report: dict[str, Any]) -> Rep
 
 @dataclass(frozen=True)
 class Ending:
-    """How a job ends."""
+    """Says how a job ends."""
 
     state: JobState
     outcome: Outcome
@@ -53,10 +53,12 @@ class Ending:
 
 
 def ending(kind: str, outcome: Outcome, reason: str, error: dict[str, Any] | None) -> Ending:
-    """How a job ends whose growth has finished.
+    """Returns how a job ends whose growth has finished.
 
-    A ``certify`` job succeeds with any verdict, a ``grow`` job only with a certified region; ``error`` is what went wrong on the way,
-    if something did.
+    A ``certify`` job succeeds with any verdict, a ``grow`` job only with a certified region.
+
+    Args:
+        error: what went wrong during the job, if something did.
     """
     if outcome == Outcome.CERTIFIED or (kind == JobKind.CERTIFY and outcome != Outcome.ERROR):
         return Ending(JobState.SUCCEEDED, outcome, reason)

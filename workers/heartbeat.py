@@ -1,4 +1,4 @@
-"""A sign of life for health checks: a file that a worker touches for as long as its event loop turns and it is connected to Redis."""
+"""A worker touches a file for health checks while its event loop runs and it is connected to Redis."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SECONDS = 10.0
 
 
 class Heartbeat(StartStopStep):
-    """Step of a Celery worker's start."""
+    """This is a step of a Celery worker's start. It starts the heartbeat."""
 
     requires = ("celery.worker.components:Timer",)
 

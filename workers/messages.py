@@ -1,4 +1,4 @@
-"""How a Celery worker treats its messages."""
+"""This module makes a Celery worker reconnect when it could not acknowledge a message."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from celery.worker.request import Request
 
 
 class Acknowledged(Request):
-    """A message whose acknowledgement must arrive: when it does not, the connection to Redis is made anew.
+    """The acknowledgement of this message must arrive. If it does not, the worker opens a new connection to Redis.
 
-    Celery by itself only logs the failure and goes on to count the message as one that is worked on. With as many of those as there
-    are processes, which one outage of Redis can make, the worker would wait for ever and take no more.
+    By default Celery only logs the failure, and counts the message as one that is still worked on. One outage of Redis can leave as many
+    such messages as there are processes. Then the worker would wait for ever and take no more messages.
     """
 
     def __init__(self, *args: Any, **options: Any) -> None:

@@ -1,4 +1,4 @@
-"""Certifying a batch of claimed pairs and saving what came of them with the proofs. The worker may die halfway without harm."""
+"""This module certifies a batch of claimed pairs, and saves their results with the proofs. The worker may die halfway without harm."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ log = logging.getLogger(__name__)
 
 LOST = "its process died {deaths} times (killed, crashed, out of memory or over the time limit) in {attempts} attempts at"
 SAVE_SECONDS = 0.5
-"""Results are saved together until this much time has gone into them."""
+"""Results are saved together once this much time has passed since the last saving."""
 
 
 def certify_pairs(claim: pairs.Claim) -> bool:
-    """Certifies and saves the claimed pairs, for as long as any is held; whether that finished the iteration."""
+    """Certifies and saves the claimed pairs while any of them is held. Says whether that finished the iteration."""
     bound = bound_contextvars(job=claim.job_id, iteration=claim.iteration)
     with bound, leases.kept(database(), PairRow, claim.token, settings().lease_seconds, [JobState.RUNNING]):
         return _certify_and_save(claim)
 
 
 def _certify_and_save(claim: pairs.Claim) -> bool:
-    """Whether that finished the iteration."""
+    """Certifies the claimed pairs and saves their results now and then. Says whether that finished the iteration."""
     results: dict[int, PairResult] = {}
     since = time.monotonic()
     for place, pair in enumerate(claim.pairs, start=1):
@@ -75,7 +75,10 @@ def _error(error: CirisError, start: float) -> PairResult:
 
 @lru_cache(maxsize=2)
 def _certification(scene_id: str, job_id: str, iteration: int) -> tuple[Certification, list[int]]:
-    """What the pairs of an iteration share, and which are hard; its polytope never changes, so the last two are kept."""
+    """Returns what the pairs of an iteration share, and which pairs are hard.
+
+    An iteration's polytope never changes, so the process keeps the last two.
+    """
 
     def read() -> tuple[Arrays, list[int], int]:
         with database().read() as session:

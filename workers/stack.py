@@ -1,7 +1,12 @@
-"""The embedded stack of ``ciris up``: queue, API and workers as supervised child processes on one machine.
+"""The embedded stack of ``ciris up`` runs the queue, the API and the workers as supervised child processes on one machine.
 
-Data directory: ``ciris.sqlite3`` (unless a database is given), ``queue/`` (the queue's append-only file), ``queue.sock``,
-``logs/``, ``stack.json`` (where the API is, while the stack runs) and ``stack.lock`` (held while it runs).
+Its data directory holds:
+
+- ``ciris.sqlite3``, unless a database is given;
+- ``queue/``, the queue's append-only file, and ``queue.sock``;
+- ``logs/``;
+- ``stack.json``, which says where the API is while the stack runs;
+- ``stack.lock``, which the stack holds while it runs.
 """
 
 from __future__ import annotations
@@ -34,24 +39,24 @@ from workers.processes import die_with_parent, give_way, queue_server_command, q
 log = logging.getLogger(__name__)
 
 QUEUE = "queue"
-"""Stopped last, so that the workers can give their messages back."""
+"""The queue is stopped last, so that the workers can give their messages back."""
 SOCKET = "queue.sock"
 MAX_SOCKET_PATH = 100
 POLL_SECONDS = 0.2
 MAX_BACKOFF_SECONDS = 30.0
 HEALTHY_SECONDS = 30.0
-"""A child that has run this long is started anew without waiting when it dies."""
+"""A child that has run for this many seconds is started again without waiting when it dies."""
 START_SECONDS = 60.0
 STOP_SECONDS = 8.0
 
 
 @dataclass
 class Child:
-    """One supervised process, in a session of its own, so that Ctrl-C reaches only the supervisor.
+    """Holds one supervised process. It has a session of its own, so that Ctrl-C reaches only the supervisor.
 
     Attributes:
-        background: it computes; on a busy machine the others answer first.
-        own: variables of its environment alone.
+        background: True for a child that computes; on a busy machine the other children answer first.
+        own: environment variables of this child alone.
     """
 
     name: str
@@ -77,7 +82,7 @@ class Child:
         self.started = time.monotonic()
 
     def _prepare(self) -> None:
-        """In the child, before it becomes its program."""
+        """Runs in the child before it becomes its program."""
         die_with_parent(self.stop_signal)
         if self.background:
             give_way()
@@ -87,7 +92,7 @@ class Child:
         return self.process is None or self.process.poll() is not None
 
     def wait_longer(self) -> bool:
-        """Whether it is too early to start the dead child again; the waits double while it keeps dying young."""
+        """Says whether it is too early to start the dead child again. The waits double while it keeps dying young."""
         ran = time.monotonic() - self.started
         if self.process is not None:
             log.warning("%s ended with status %s", self.name, self.process.returncode)
@@ -112,17 +117,20 @@ class Child:
 
 
 def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[str], None] = lambda url: None) -> None:
-    """Runs the stack until SIGINT or SIGTERM; must be called in the main thread.
+    """Runs the stack until SIGINT or SIGTERM. It must be called in the main thread.
 
     Args:
-        port: the API's port; None takes the setting's, or any free one when that is taken.
-        ready: called once with the API's URL, when it answers.
+        port: the API's port; None takes the setting's port, or any free one when that is taken.
+        ready: called once with the API's URL, when the API answers.
 
     Raises:
-        CirisError: stack_running, port_taken, no_keys, or stack_failed when the API does not come up.
+        CirisError: data_directory, stack_running, port_taken, no_keys, or stack_failed when the API does not come up.
     """
     data = settings.data_dir.expanduser().absolute()
-    (data / "logs").mkdir(parents=True, exist_ok=True)
+    try:
+        (data / "logs").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CirisError("data_directory", f"{data} cannot be made: {error.strerror}", field="--data") from None
     with _only_one(data), _stop_signals() as stopping, _socket_directory(data) as sockets, _reserved_port(settings, port) as bound:
         host = f"[{settings.host}]" if settings.family == socket.AF_INET6 else settings.host
         url = f"http://{host}:{bound}"
@@ -144,7 +152,7 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
 
 
 def _children(settings: Settings, data: Path, queue_socket: Path) -> list[Child]:
-    """The processes, in the order of starting."""
+    """Returns the child processes, in the order of starting."""
     children = [
         Child("control", [sys.executable, "-m", "workers", "control"], signal.SIGQUIT),
         Child("solve", [sys.executable, "-m", "workers", "solve"], signal.SIGQUIT, background=True),
@@ -194,7 +202,7 @@ def _describe(data: Path, url: str, children: list[Child]) -> None:
 
 
 def _wait_until_healthy(url: str, stopping: Callable[[], bool], data: Path) -> bool:
-    """True once the API answers, False when the stack is to stop before."""
+    """Waits until the API answers, and returns True then; False when the stack is to stop before."""
     until = time.monotonic() + START_SECONDS
     while not stopping():
         try:
@@ -209,9 +217,12 @@ def _wait_until_healthy(url: str, stopping: Callable[[], bool], data: Path) -> b
 
 @contextmanager
 def _reserved_port(settings: Settings, asked: int | None) -> Iterator[int]:
-    """A port that no other program gets while the block runs: bound here without listening, and open to our API processes."""
+    """Reserves a port that no other program gets while the block runs.
+
+    This process binds it without listening, and our API processes may bind it too.
+    """
     with socket.socket(settings.family) as holder:
-        holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # the last stack's connections may linger
+        holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # connections of the last stack may still linger
         for port in (asked,) if asked is not None else (settings.port, 0):
             with suppress(OSError, OverflowError):
                 holder.bind((settings.host, port))
@@ -227,7 +238,7 @@ def _reserved_port(settings: Settings, asked: int | None) -> Iterator[int]:
 
 @contextmanager
 def _socket_directory(data: Path) -> Iterator[Path]:
-    """Where the queue's socket is: the data directory, or a directory of its own where that path would be too long for a socket."""
+    """Yields the directory of the queue's socket: the data directory, or a temporary one where that path is too long for a socket."""
     if len(os.fsencode(data / SOCKET)) < MAX_SOCKET_PATH:
         yield data
     else:
@@ -237,7 +248,7 @@ def _socket_directory(data: Path) -> Iterator[Path]:
 
 @contextmanager
 def _only_one(data: Path) -> Iterator[None]:
-    """Holds the data directory's lock."""
+    """Holds the data directory's lock while the block runs."""
     with (data / "stack.lock").open("w") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -250,7 +261,7 @@ def _only_one(data: Path) -> Iterator[None]:
 
 @contextmanager
 def _stop_signals() -> Iterator[Callable[[], bool]]:
-    """Turns SIGINT and SIGTERM into a question that can be asked: shall we stop?"""
+    """Catches SIGINT and SIGTERM while the block runs. Yields a function that says whether one has arrived, so that the stack must stop."""
     received: list[int] = []
 
     def note(number: int, _frame: FrameType | None) -> None:
@@ -265,7 +276,7 @@ def _stop_signals() -> Iterator[Callable[[], bool]]:
 
 
 def main() -> None:
-    """``python -m workers.stack``: the stack with the settings of the environment; says where it is, then runs until it is told to stop."""
+    """Runs ``python -m workers.stack``: the stack with the settings of the environment, until it is told to stop."""
     parser = argparse.ArgumentParser(prog="python -m workers.stack", description="Runs ciris on this machine until Ctrl-C.")
     parser.add_argument("--port", type=int, help="the API's port; default: CIRIS_PORT, or any free one when that is taken")
     parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")

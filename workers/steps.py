@@ -1,4 +1,4 @@
-"""Doing a claimed step: seeding, the polytope step, accepting a region. The worker may die halfway without harm."""
+"""This module does a claimed step: seeding, the polytope step, or accepting a region. The worker may die halfway without harm."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ SEEDING = "certifier.seeding.propose:propose_in_child"
 
 @dataclass(frozen=True)
 class Done:
-    """What a step found, and what else to save with it (in the same transaction)."""
+    """Says what a step found, and what else to save with it in the same transaction."""
 
     report: dict[str, Any]
     save: Callable[[Session, JobRow], None] = lambda session, job: None
 
 
 def carry_out(claim: steps.Claim) -> bool:
-    """Does a claimed step and saves what came of it; False when it was not held any more."""
+    """Does a claimed step and saves its result. Returns False when the step was not held any more."""
     wanted = [JobState.RUNNING, JobState.CANCELLING] if claim.kind == StepKind.ACCEPT else [JobState.RUNNING]
     start = time.perf_counter()
     bound = bound_contextvars(job=claim.job_id, step=claim.kind.value)
@@ -58,7 +58,7 @@ def carry_out(claim: steps.Claim) -> bool:
             state, done = StepState.FAILED, Done(problem.to_document())
         saved = persistently(lambda: _save(claim, state, done, time.perf_counter() - start))
     if saved and claim.kind == StepKind.ACCEPT and state == StepState.FAILED:
-        send_work()  # a region certified earlier may be had instead
+        send_work()  # a region that was certified earlier may be accepted instead
     return saved
 
 
@@ -86,14 +86,14 @@ def _do(claim: steps.Claim) -> Done:
 
 
 def _propose(scene: Scene, claim: steps.Claim) -> Done:
-    """Seeds in a process of its own: Drake may abort the process, hang, or want too much memory, and that fails the step, nothing else."""
+    """Seeds in a separate process. If Drake aborts that process, hangs or wants too much memory, only the step fails."""
     limits, payload = settings(), {"scene": scene.to_document(), "seed": claim.input["seed"]}
     timeout, memory = limits.time_limit_seconds, limits.child_memory_bytes
     return Done(run_in_child(SEEDING, payload, timeout_s=timeout, memory_bytes=memory))
 
 
 def _step(scene: Scene, claim: steps.Claim) -> Done:
-    """The polytope step on an accepted polytope with its proofs."""
+    """Does the polytope step on an accepted polytope with its proofs."""
     iteration = claim.input["iteration"]
 
     def read() -> tuple[Polytope, dict[int, bytes]]:
@@ -106,7 +106,7 @@ def _step(scene: Scene, claim: steps.Claim) -> Done:
 
 
 def _accept(scene: Scene, claim: steps.Claim) -> Done:
-    """Assembles and verifies the proof of a region; what the verifier refuses is raised as its ProofError and never stored."""
+    """Assembles and verifies the proof of a region. If the verifier refuses it, its ProofError is raised and nothing is stored."""
     accepted = claim.input
 
     def read() -> tuple[Candidate, dict[int, bytes], dict[str, Any]]:
@@ -133,13 +133,16 @@ def _accept(scene: Scene, claim: steps.Claim) -> Done:
 
 
 def _polytope(session: Session, job_id: str, iteration: int) -> tuple[Polytope, Array | None]:
-    """The polytope of an iteration, joint limits included, and the point inside that came with it."""
+    """Returns the polytope of an iteration, joint limits included, and the interior point that came with it, if any."""
     arrays = session.get_one(IterationRow, (job_id, iteration)).arrays
     return Polytope(arrays["C"], arrays["d"]), arrays.get("center")
 
 
 def _proofs(session: Session, job_id: str, iteration_of: Mapping[str, int]) -> dict[int, bytes]:
-    """Pair index -> proof file, from the iterations that hold them, in the order given: the last digits of a sum depend on its order."""
+    """Returns pair index -> proof file, from the iterations that hold the proofs.
+
+    The order is the one given, because the last digits of a sum depend on it.
+    """
     rows = pairs.proving(session, job_id, {int(index): iteration for index, iteration in iteration_of.items()})
     return {index: proofs.get(session, rows[index].proof_digest or "") for index in map(int, iteration_of)}
 

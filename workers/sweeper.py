@@ -1,6 +1,6 @@
-"""The sweeper: finds work that was lost with a worker, a message or Redis itself, and sends it again.
+"""The sweeper finds work that was lost with a worker, a message or Redis itself, and sends it again.
 
-It runs beside the control worker. Several of them, or one that is late, do no harm.
+It runs beside the control worker. Several sweepers, or one that is late, do no harm.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ def run(stop: threading.Event) -> None:
 
 
 class Holders:
-    """Whether the holders of leases have had the time to renew them: not while the database is away or this machine sleeps."""
+    """Tracks whether the holders of leases had the time to renew them. They had not while the database was away or this machine slept."""
 
     def __init__(self) -> None:
         self._since = self._last = utcnow()
 
     def could_renew(self, now: datetime) -> bool:
-        """Whether what ran out by ``now`` ran out because nobody renewed it. To be asked in every round."""
+        """Says whether a lease that ran out by ``now`` ran out because its holder did not renew it. Every round must ask this."""
         lease = timedelta(seconds=settings().lease_seconds)
         if now - self._last > lease / 2:
             self._since = now
@@ -56,7 +56,7 @@ class Holders:
 
 
 def sweep(*, by_time: bool = True) -> None:
-    """One round: frees what lost workers held, sends again what no message stands for any more, asks for due coordinations."""
+    """Does one round: it frees what lost workers held, wakes a solver when work has no message, and asks for due coordinations."""
     release_lost(by_time=by_time)
     with database().read() as session:
         due = jobs.awaiting_coordination(session, utcnow())
@@ -68,7 +68,7 @@ def sweep(*, by_time: bool = True) -> None:
 
 
 def release_lost(*, by_time: bool) -> None:
-    """Opens what is held by workers that died or, with ``by_time``, did not renew their leases; the jobs' events say why."""
+    """Opens the rows of workers that died or, with ``by_time``, did not renew their leases. The jobs' events say why."""
     _release_lost(PairRow, by_time)
     _release_lost(StepRow, by_time)
 

@@ -1,4 +1,7 @@
-"""The tasks by name: thin, nothing out. A worker registers those of the queue that it serves and imports only what they need."""
+"""This module registers the thin Celery tasks by name. They return nothing.
+
+A worker registers the tasks of the queue that it serves, and imports only what they need.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from workers.messages import Acknowledged
 
 
 def register(app: Celery, queue: str) -> None:
-    """Registers the tasks of one queue, importing their code now (before the worker forks)."""
+    """Registers the tasks of one queue. It imports their code now, before the worker forks."""
     if queue == CONTROL:
         from workers.turns import coordinate
 
@@ -28,7 +31,7 @@ def register(app: Celery, queue: str) -> None:
     @app.task(name=WORK, bind=True, Request=Acknowledged)
     def _work(self: Task) -> None:
         if self.request.delivery_info.get("redelivered"):
-            release_lost(by_time=False)  # whoever had this message has died
+            release_lost(by_time=False)  # the worker that had this message has died
         piece = work()
         if piece is not None and piece.settles:
             coordinate(piece.job_id)

@@ -1,4 +1,4 @@
-"""Writing transactions: with what is to be sent once they are committed, and such as must not be lost."""
+"""This module opens writing transactions: those after whose commit something is sent, and those that must not be lost."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ RETRY_SECONDS = 1.0
 
 @contextmanager
 def writing() -> Iterator[tuple[Session, Afterwards]]:
-    """A writing transaction and a list of calls to make after its commit; they are dropped when it is rolled back."""
+    """Opens a writing transaction, with a list of calls to make after its commit. After a rollback the calls are not made."""
     afterwards: Afterwards = []
     with database().write() as session:
         yield session, afterwards
@@ -30,7 +30,7 @@ def writing() -> Iterator[tuple[Session, Afterwards]]:
 
 
 def persistently(save: Callable[[], Saved]) -> Saved:
-    """What ``save()`` returns, which is tried again for as long as the database is away: what it saves may have taken an hour."""
+    """Calls ``save()`` again and again while the database is away, and returns its result: what it saves may have taken an hour."""
     while True:
         try:
             return save()

@@ -1,7 +1,7 @@
-"""Coordinating a job: load what is known, let the coordinator decide, save the decision, send the work.
+"""Coordinating a job means: load what is known, let the coordinator decide, save the decision, send the work.
 
-Any number of coordinations of one job may be asked for at once. One computes (it stands in ``jobs.coordinator``), its decision is
-saved only onto the turn that it started from, and the others find nothing to do.
+Any number of coordinations of one job may be asked for at once. One of them computes (``jobs.coordinator`` names it), and its decision
+is saved only onto the turn from which it started. The others find nothing to do.
 """
 
 from __future__ import annotations
@@ -36,14 +36,17 @@ from workers.transaction import Afterwards, persistently, writing
 log = logging.getLogger(__name__)
 
 ACCEPT_SECONDS = 20.0
-"""How long a certified polytope waits for a larger one before it is made a region, which takes as long as verifying all its proofs."""
+"""A certified polytope waits this many seconds for a larger one before it becomes a region.
+
+Making it a region takes as long as verifying all its proofs.
+"""
 COORDINATION_SECONDS = 60.0
-"""A coordinator that has not answered after this time is believed dead."""
+"""A coordinator that has not answered after this many seconds is believed dead."""
 
 
 @dataclass(frozen=True)
 class Turn:
-    """What a coordinator starts from."""
+    """Holds what a coordinator starts from."""
 
     job_id: str
     number: int
@@ -55,7 +58,7 @@ class Turn:
 
 
 def coordinate(job_id: str) -> None:
-    """Takes the job as far as it goes without waiting for a worker. Harmless however often and whenever it is called."""
+    """Takes the job as far as it goes without waiting for a worker. It does no harm to call it too often or at any time."""
     goes_on = True
     while goes_on and (turn := _begin(job_id)) is not None:
         try:
@@ -84,7 +87,7 @@ def _forecast(scene_id: str) -> list[PairCost]:
 
 
 def _begin(job_id: str) -> Turn | None:
-    """Ends the job if it is to end; else claims its next turn. None when there is nothing to decide."""
+    """Ends the job if it is to end, or else claims its next turn. Returns None when there is nothing to decide."""
     with writing() as (session, afterwards):
         job = jobs.lock(session, job_id)
         if job.state not in unfinished(JOB):
@@ -110,7 +113,7 @@ def _begin(job_id: str) -> Turn | None:
 
 
 def _report(session: Session, job: JobRow) -> Report | None:
-    """The report on the job's present action; None while that is unfinished."""
+    """Returns the report on the job's present action; None while the action is unfinished."""
     action = job.action or {}
     if action["kind"] == Certify.kind:
         iteration = session.get_one(IterationRow, (job.id, action["iteration"]))
@@ -122,7 +125,7 @@ def _report(session: Session, job: JobRow) -> Report | None:
 
 
 def _outcomes(session: Session, iteration: IterationRow) -> Outcomes:
-    """The report on a certification that has ended, from its rows."""
+    """Returns the report on a certification that has ended, from its rows."""
     action = Certify(
         iteration=iteration.index,
         label=iteration.label,
@@ -139,7 +142,10 @@ def _outcomes(session: Session, iteration: IterationRow) -> Outcomes:
 
 
 def _save(turn: Turn, transition: Transition) -> bool:
-    """Saves a transition and the work it asks for, unless the job has moved on; whether there is more to decide before work is done."""
+    """Saves a transition and the work it asks for, unless the job has moved on.
+
+    It returns True when something may have to be decided before any work is done.
+    """
     with writing() as (session, afterwards):
         job = jobs.lock(session, turn.job_id)
         if job.turn != turn.number or job.state not in (JobState.QUEUED, JobState.RUNNING):
@@ -178,7 +184,7 @@ def _add_step(session: Session, job: JobRow, kind: StepKind, work_on: dict[str, 
 
 
 def _add_acceptance(session: Session, job: JobRow, candidate: Candidate) -> None:
-    """What the candidate's iteration does not hold is the step's input."""
+    """Adds the step that accepts a region. Its input is what the candidate's iteration does not hold."""
     work_on = {
         "iteration": candidate.iteration,
         "seed": None if candidate.seed is None else candidate.seed.tolist(),
@@ -190,7 +196,7 @@ def _add_acceptance(session: Session, job: JobRow, candidate: Candidate) -> None
 
 def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: Afterwards) -> None:
     costs = _forecast(job.scene_id)
-    # A pair takes about as long as the last time, which the forecast by its size alone may be far from.
+    # A pair takes about as long as the last time. The forecast by its size alone may be far from that.
     expected = pairs.expected_seconds(session, job.id, action.iteration - 1)
     new = [pairs.NewPair(i, costs[i].a, costs[i].b, expected.get(i, costs[i].seconds)) for i in action.pairs]
     pairs.add_iteration(
@@ -206,13 +212,13 @@ def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: A
         hard=action.hard,
         failures=action.failures,
     )
-    # Each solver that finds something wakes the next; where there is much, so many begin at once.
+    # Each solver that finds work wakes the next one. Where there is much work, this many solvers begin at once.
     pieces = math.ceil(sum(pair.forecast_seconds for pair in new) / settings().batch_seconds)
     afterwards.append(partial(send_work, min(max(pieces, 1), settings().solve_processes)))
 
 
 def _give_up(turn: Turn, error: CirisError) -> bool:
-    """Lets the job end with this error, which is to be decided next."""
+    """Ends the job's growth with this error. It returns True, because the end of the job is to be decided next."""
     with database().write() as session:
         job = jobs.lock(session, turn.job_id)
         if job.turn == turn.number and job.state in (JobState.QUEUED, JobState.RUNNING):
@@ -222,7 +228,7 @@ def _give_up(turn: Turn, error: CirisError) -> bool:
 
 
 def _finish_growth(session: Session, job: JobRow, finish: Finish) -> None:
-    """Stops the job's work, except that regions reached are still accepted; does nothing when the growth has finished already."""
+    """Stops the job's work, but lets certified regions still be accepted. It does nothing when the growth has finished already."""
     if job.action is not None and job.action["kind"] == "finish":
         return
     jobs.start(session, job)

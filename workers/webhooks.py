@@ -1,7 +1,7 @@
-"""Telling receivers that a job has ended: signed as Standard Webhooks (standardwebhooks.com) has it, until they say that they know.
+"""This module tells receivers that a job has ended, until they answer with success or the last attempt fails.
 
-It runs beside the sweeper. A delivery may come twice, with the same ``webhook-id``; it never leaves for an address that is not public
-unless the settings allow that, and redirects are not followed.
+It signs the messages as Standard Webhooks (standardwebhooks.com) describes, and runs beside the sweeper. A delivery may come twice,
+with the same ``webhook-id``. It goes only to public addresses unless the settings allow others, and follows no redirects.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 
 AT_ONCE = 8
 SECONDS = 15.0
-"""A receiver that has not answered within this time has failed, however slowly it is still talking."""
+"""A receiver that has not answered within this many seconds has failed, even if it is still sending."""
 
 
 def run(stop: threading.Event) -> None:
@@ -47,7 +47,7 @@ def run(stop: threading.Event) -> None:
 
 
 def deliver_due() -> None:
-    """One round: every delivery that is due, a few at once."""
+    """Does one round: it attempts every delivery that is due, a few at once."""
     with database().write() as session:
         due = webhooks.claim(session, utcnow())
     if due:
@@ -88,14 +88,14 @@ def _body(job: JobRow) -> bytes:
 
 
 def signature(secret: str, webhook_id: str, timestamp: int, body: bytes) -> str:
-    """The value of ``webhook-signature``: HMAC-SHA256 over ``id.timestamp.body`` under the bytes that the secret stands for."""
+    """Returns the value of ``webhook-signature``: HMAC-SHA256 of ``id.timestamp.body``. The key is the bytes that the secret encodes."""
     key = base64.b64decode(secret.removeprefix("whsec_"))
     signed = hmac.new(key, f"{webhook_id}.{timestamp}.".encode() + body, hashlib.sha256)
     return f"v1,{base64.b64encode(signed.digest()).decode()}"
 
 
 def _post(url: SplitResult, webhook_id: str, secret: str, body: bytes) -> int:
-    """Posts the body; the status of the answer."""
+    """Posts the body, and returns the status of the answer."""
     timestamp = int(time.time())
     headers = {
         "Content-Type": "application/json",
@@ -116,7 +116,7 @@ def _post(url: SplitResult, webhook_id: str, secret: str, body: bytes) -> int:
 
 
 class _Pinned(HTTPConnection):
-    """A connection to the address that was checked, under the name that was given."""
+    """Connects to the address that was checked, under the name that was given."""
 
     def __init__(self, url: SplitResult) -> None:
         self._tls = url.scheme == "https"

@@ -1,1 +1,1 @@
-"""The routes, one module for each kind of thing. A route's function name is its OpenAPI operation id."""
+"""This package holds the routes, one module for each kind of thing. The name of a route's function is its OpenAPI operation id."""

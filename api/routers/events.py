@@ -1,4 +1,4 @@
-"""A job's events, as a list and as a stream of server-sent events that can be resumed."""
+"""A client reads a job's events as a list, or as a stream of server-sent events that it can resume."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from api.schemas.jobs import Event, EventList
 from db import events, jobs
 from db.session import Database
 
-After = Annotated[int, Query(ge=0, le=MAX_INT, description="Only events with a larger number.")]
+After = Annotated[int, Query(ge=0, le=MAX_INT, description="Return only events with a larger number than this.")]
 POLL_SECONDS = 0.3
 PAGE = 500
 
@@ -31,14 +31,14 @@ def list_job_events(
     after: After = 0,
     limit: Annotated[int, Query(ge=1, le=1000)] = PAGE,
 ) -> EventList:
-    """What happened to the job, in order."""
+    """Returns what happened to the job, in order."""
     with db.read() as session:
         jobs.get(session, job_id)
         return EventList(events=[Event.of(row) for row in events.since(session, job_id, after, limit)])
 
 
 def _existing(job_id: str, db: Db) -> str:
-    """The id, once it is known that the job exists: a stream that has begun cannot answer 404 any more."""
+    """Returns the id if the job exists. This comes before the stream begins, because a stream cannot answer 404 any more."""
     with db.read() as session:
         return jobs.get(session, job_id).id
 
@@ -49,10 +49,13 @@ async def stream_job_events(
     db: Db,
     after: After = 0,
     last_event_id: Annotated[
-        int | None, Header(ge=0, le=MAX_INT, description="Where an interrupted stream goes on; beats `after`.")
+        int | None, Header(ge=0, le=MAX_INT, description="The stream goes on after this number; used instead of `after`.")
     ] = None,
 ) -> AsyncIterator[ServerSentEvent]:
-    """The job's events as they happen; the last one is called `end`, then the stream closes."""
+    """Streams the job's events as they happen.
+
+    The last event is called `end`. After it the stream closes.
+    """
     seq = after if last_event_id is None else last_event_id
     while True:
         page, ended = await run_in_threadpool(_next_page, db, job_id, seq)
@@ -67,7 +70,7 @@ async def stream_job_events(
 
 
 def _next_page(db: Database, job_id: str, seq: int) -> tuple[list[Event], bool]:
-    """The next events and whether the job had ended by then, in one transaction: an ended job gets no more events."""
+    """Returns the next events, and whether the job had ended by then. Both come from one transaction: an ended job gets no more events."""
     with db.read() as session:
         job = jobs.get(session, job_id)
         return [Event.of(row) for row in events.since(session, job_id, seq, PAGE)], not job.transitions[job.state]

@@ -1,6 +1,7 @@
-"""Jobs: idempotent creation, lists, cancelling, retrying, the pair matrix and the growth curve.
+"""These routes create, list, cancel and retry jobs, and show their pair matrix and their growth curve.
 
-Messages are sent after the commit and after the answer: the row is what was promised, and a Redis that is down must not hold up anybody.
+A message to the workers is sent after the commit and after the answer. The row is what the service has promised, and no client
+waits for a Redis that is down.
 """
 
 from __future__ import annotations
@@ -44,7 +45,11 @@ from db.types import utcnow
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ], route_class=ReadingRoute)
 
 
-@router.post("", status_code=status.HTTP_201_CREATED, responses={200: {"model": Job, "description": "Made earlier under the same key."}})
+@router.post(
+    "",
+    status_code=status.HTTP_201_CREATED,
+    responses={200: {"model": Job, "description": "The job was made earlier with the same Idempotency-Key."}},
+)
 def create_job(
     body: NewJob,
     caller: Submitter,
@@ -54,7 +59,10 @@ def create_job(
     announcements: Announcements,
     idempotency_key: Annotated[str | None, Header(min_length=1, max_length=200)] = None,
 ) -> Job:
-    """Start growing a region, or certifying a polytope. The same request under the same Idempotency-Key is the same job."""
+    """Starts a job that grows a region or certifies a polytope.
+
+    A repetition of the request with the same Idempotency-Key returns the same job. Another request with that key is refused (409).
+    """
     with db.read() as session:
         scene_id = scenes.find(session, body.scene)
     options = _options(body, scenes.load(db, scene_id))
@@ -83,7 +91,7 @@ def create_job(
 
 
 def _options(body: GrowRequest | CertifyRequest, scene: Scene) -> dict[str, Any]:
-    """The document of certifier.growth.options.GrowthOptions that the request asks for, its numbers checked against the scene."""
+    """Returns the document of certifier.growth.options.GrowthOptions that the request asks for, its numbers checked against the scene."""
     if isinstance(body, GrowRequest):
         return {"kind": "grow", "seed": checks.seed(scene, body.seed).to_document(), **body.options.model_dump()}
     checks.polytope(scene, body.polytope)
@@ -104,7 +112,7 @@ def list_jobs(
     after: Cursor = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
 ) -> JobPage:
-    """Jobs, newest first."""
+    """Lists the jobs, newest first."""
     with db.read() as session:
         scene_id = scenes.find(session, scene) if scene else None
         page = jobs.page(session, state=state, kind=kind, scene_id=scene_id, after=after, limit=limit)
@@ -113,14 +121,17 @@ def list_jobs(
 
 @router.get("/{job_id}")
 def get_job(job_id: str, db: Db) -> Job:
-    """One job as it is now."""
+    """Returns one job as it is now."""
     with db.read() as session:
         return Job.of(jobs.get(session, job_id))
 
 
 @router.post("/{job_id}/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
 def cancel_job(job_id: str, db: Db, background: BackgroundTasks, announcements: Announcements) -> Job:
-    """Ask a job to end; regions certified before remain. Nothing happens to a job that has ended."""
+    """Asks a job to end. Regions that were certified before remain.
+
+    Nothing happens to a job that has ended.
+    """
     with db.write() as session:
         job = jobs.cancel(session, job_id)
     background.add_task(announcements.announce, job_id)
@@ -129,7 +140,10 @@ def cancel_job(job_id: str, db: Db, background: BackgroundTasks, announcements: 
 
 @router.post("/{job_id}/retry", status_code=status.HTTP_201_CREATED)
 def retry_job(job_id: str, caller: Submitter, db: Db, response: Response, background: BackgroundTasks, announcements: Announcements) -> Job:
-    """A new job like one that failed or was cancelled; asking again gives the same new job."""
+    """Creates a new job like one that failed or was cancelled.
+
+    A repetition of the request returns the same new job.
+    """
     with db.write() as session:
         job = jobs.retry(session, job_id, caller.key_id)
     background.add_task(announcements.announce, job.id)
@@ -139,14 +153,14 @@ def retry_job(job_id: str, caller: Submitter, db: Db, response: Response, backgr
 
 @router.get("/{job_id}/webhook")
 def get_job_webhook(job_id: str, db: Db) -> Webhook:
-    """Whether the end of the job has been told to the receiver that the request named."""
+    """Returns the job's webhook: whether its receiver has been told that the job has ended."""
     with db.read() as session:
         return Webhook.of(webhooks.of_job(session, jobs.get(session, job_id).id))
 
 
 @router.get("/{job_id}/pairs")
 def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge=0, le=MAX_INT)] = None) -> PairMatrix:
-    """The pair matrix: what became of every pair on every iteration's polytope, or on one of them."""
+    """Returns the pair matrix: the result of every pair on the polytope of every iteration, or of the given one."""
     with db.read() as session:
         job = jobs.get(session, job_id)
         rows = pairs.of_job(session, job_id) if iteration is None else pairs.of_iteration(session, job_id, iteration)
@@ -161,7 +175,10 @@ def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge
 
 @router.get("/{job_id}/pairs/{pair}/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
 def download_pair_proof(job_id: str, pair: int, iteration: Annotated[int, Query(ge=0, le=MAX_INT)], db: Db) -> Response:
-    """The proof of what became of a pair, its scene in it: certified, refuted or not certifiable; `ciris verify` checks it offline."""
+    """Returns the proof of a pair's outcome (certified, refuted or not certifiable), together with the scene.
+
+    `ciris verify` checks the file offline.
+    """
     with db.read() as session:
         job = jobs.get(session, job_id)
         row = next((row for row in pairs.of_iteration(session, job_id, iteration) if row.pair_index == pair), None)
@@ -202,7 +219,7 @@ def _cell(scene: Scene, row: PairRow) -> PairCell:
 
 @router.get("/{job_id}/growth")
 def get_job_growth(job_id: str, db: Db) -> GrowthCurve:
-    """The regions certified on the way, with their volumes."""
+    """Returns the regions that were certified during the job, with their volumes."""
     with db.read() as session:
         job = jobs.get(session, job_id)
         rows = regions.of_job(session, job_id)

@@ -1,4 +1,4 @@
-"""Questions that planners ask about certified regions."""
+"""Planners ask these questions about certified regions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ]
 
 @router.post("/contains")
 def contains(body: ContainsRequest, db: Db) -> ContainsResponse:
-    """Which certified regions of the scene hold each of these points, and how deep inside they are."""
+    """Returns, for each point, the certified regions of the scene that contain it, and how deep inside it is."""
     with db.read() as session:
         scene_id = scenes.find(session, body.scene)
         stored = regions.polytopes(session, scene_id)

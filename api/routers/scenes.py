@@ -1,4 +1,4 @@
-"""Scenes: a bundle goes in, what was understood of it comes out."""
+"""A client uploads a scene as a bundle, and reads what the service understood of it."""
 
 from __future__ import annotations
 
@@ -23,12 +23,15 @@ router = APIRouter(prefix="/v1/scenes", tags=["scenes"], dependencies=[READ], ro
 
 @router.post("", dependencies=[SUBMIT], status_code=status.HTTP_201_CREATED)
 async def create_scene(
-    bundle: Annotated[UploadFile, File(description="A zip with the scene file and every file it refers to.")],
+    bundle: Annotated[UploadFile, File(description="A zip that holds the scene file and every file it refers to.")],
     db: Db,
     children: Children,
     response: Response,
 ) -> SceneDetail:
-    """Upload a scene. It is parsed in a process that may die without harm; the same content is the same scene."""
+    """Uploads a scene.
+
+    A separate process reads it, so a bad file cannot harm the service. The same content is the same scene.
+    """
     row = await children.run(_add_scene, db, bundle.file)
     response.headers["Location"] = f"/v1/scenes/{row.id}"
     return SceneDetail.of(row)
@@ -42,7 +45,7 @@ def _add_scene(db: Database, file: BinaryIO) -> SceneRow:
 
 @router.get("")
 def list_scenes(db: Db, after: Cursor = None, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> ScenePage:
-    """Scenes, newest first."""
+    """Lists the scenes, newest first."""
     with db.read() as session:
         page = scenes.page(session, after, limit)
     return ScenePage(scenes=[SceneSummary.of(row) for row in page.rows], next=page.next)
@@ -50,14 +53,14 @@ def list_scenes(db: Db, after: Cursor = None, limit: Annotated[int, Query(ge=1, 
 
 @router.get("/{scene_id}")
 def get_scene(scene_id: str, db: Db) -> SceneDetail:
-    """One scene, by id or by name (the newest of that name)."""
+    """Returns one scene, by its id or by its name. Of several scenes with one name it returns the newest."""
     with db.read() as session:
         return SceneDetail.of(scenes.get(session, scene_id))
 
 
 @router.get("/{scene_id}/pairs")
 def get_scene_pairs(scene_id: str, db: Db) -> ScenePairs:
-    """The pairs to certify, with the reference frame chosen for each and a forecast of its cost."""
+    """Returns the pairs to certify, with the reference frame chosen for each pair and a forecast of its cost."""
     with db.read() as session:
         scene_id = scenes.find(session, scene_id)
     scene = scenes.load(db, scene_id)
@@ -71,7 +74,7 @@ def get_scene_pairs(scene_id: str, db: Db) -> ScenePairs:
 
 @router.get("/{scene_id}/lint")
 def get_scene_lint(scene_id: str, db: Db) -> LintReport:
-    """What a reader should know before trusting a certificate for the scene."""
+    """Returns what a reader should know about the scene before trusting a certificate for it."""
     with db.read() as session:
         document = scenes.get(session, scene_id).document
     return LintReport(

@@ -1,4 +1,4 @@
-"""Whether the service is there and can do its work."""
+"""These routes say whether the service runs and can do its work."""
 
 from __future__ import annotations
 
@@ -20,13 +20,16 @@ router = APIRouter(tags=["service"])
 
 @router.get("/healthz")
 async def get_health() -> Health:
-    """The process answers."""
+    """Answers whenever the process runs."""
     return Health()
 
 
-@router.get("/readyz", responses={503: {"model": Readiness, "description": "Something that the service needs is missing."}})
+@router.get("/readyz", responses={503: {"model": Readiness, "description": "The service cannot reach something that it needs."}})
 def get_readiness(db: Db, response: Response) -> Readiness:
-    """Whether the database and the queue can be reached. Without the queue jobs are accepted and wait."""
+    """Says whether the service can reach the database and the queue.
+
+    Without the queue the service still accepts jobs, but they wait.
+    """
     checks = {"database": _database(db), "queue": _queue()}
     ready = set(checks.values()) == {"ok"}
     if not ready:
@@ -38,7 +41,7 @@ def get_readiness(db: Db, response: Response) -> Readiness:
     "/metrics", dependencies=[READ], response_class=Response, responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}}
 )
 def get_metrics(request: Request, db: Db) -> Response:
-    """Jobs, pairs, queue lengths and requests in Prometheus' text format."""
+    """Returns the numbers of jobs, pairs, waiting messages and requests, in Prometheus' text format."""
     try:
         messages = {queue: waiting(queue) for queue in (CONTROL, SOLVE)}
     except (OperationalError, RedisError):

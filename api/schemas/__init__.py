@@ -1,1 +1,1 @@
-"""Requests and responses. Requests refuse unknown fields and numbers that are not finite; responses are built from database rows."""
+"""These models describe requests and responses. Requests refuse unknown fields and numbers that are not finite."""

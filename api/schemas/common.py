@@ -1,4 +1,4 @@
-"""What requests have in common."""
+"""This module holds what requests and responses have in common."""
 
 from __future__ import annotations
 
@@ -10,28 +10,30 @@ from pydantic import BaseModel, ConfigDict, Field
 from certifier.growth.options import WHOLE_NUMBERS
 
 MAX_INT = 2**31 - 1
-"""Of the databases' integers."""
+"""The largest integer that the databases can store in a column."""
 
 Real = Annotated[float, Field(allow_inf_nan=False)]
 Vector = Annotated[list[Real], Field(min_length=1, max_length=64)]
 RandomSeed = Annotated[
-    int, Field(ge=WHOLE_NUMBERS["random_seed"][0], le=WHOLE_NUMBERS["random_seed"][1], description="Seeds every random choice.")
+    int, Field(ge=WHOLE_NUMBERS["random_seed"][0], le=WHOLE_NUMBERS["random_seed"][1], description="Seed of every random choice.")
 ]
-SceneName = Annotated[str, Field(min_length=1, max_length=255, pattern=r"^[^\x00]+$", description="A scene's id, or its name.")]
+SceneName = Annotated[str, Field(min_length=1, max_length=255, pattern=r"^[^\x00]+$", description="The id or the name of a scene.")]
 Document = dict[str, Any]
 
 Rows = Annotated[list[Vector], Field(max_length=2000)]
-Cursor = Annotated[str | None, Query(max_length=200, description="`next` of the page before.")]
+Cursor = Annotated[
+    str | None, Query(max_length=200, description="The value of `next` from the page before; leave it out for the first page.")
+]
 Offsets = Annotated[list[Real], Field(max_length=2000)]
 
 
 class Request(BaseModel):
-    """Base of everything that clients send."""
+    """All requests derive from this model: it refuses unknown fields and numbers that are not finite."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 class Page(BaseModel):
-    """Base of every list that comes in pages."""
+    """All lists that come in pages derive from this model."""
 
-    next: str | None = Field(description="Pass as `after` for the next page; null on the last.")
+    next: str | None = Field(description="Pass this as `after` to get the next page; null on the last page.")

@@ -1,4 +1,4 @@
-"""Jobs, their events, iterations and pairs."""
+"""These models describe jobs, their events, iterations and pairs."""
 
 from __future__ import annotations
 
@@ -20,66 +20,80 @@ DEFAULTS = GrowthOptions()
 
 
 def _whole(option: str, description: str) -> Any:
-    """Of a growth option that is a whole number."""
+    """Returns the field of a growth option that is a whole number within its bounds."""
     least, greatest = WHOLE_NUMBERS[option]
     return Field(ge=least, le=greatest, description=description)
 
 
 class GrowOptions(Request):
-    """How far to go."""
+    """Says how to grow the region: how the first polytope contracts, how far the region is pushed out, and when growing stops."""
 
     contraction: Annotated[
-        Literal["targeted", "uniform"], Field(description="Faces where pairs fail, or every face moved in by as much.")
+        Literal["targeted", "uniform"],
+        Field(description="`targeted` adds faces where pairs fail; `uniform` moves every face inwards by the same amount."),
     ] = "targeted"
     contractions: Annotated[
         int | None,
         _whole(
             "contractions",
-            "Targeted contractions, each cutting in another way; the largest region counts. "
-            "Default: 2 for arms of at most six joints between two bodies, else 1.",
+            "Number of targeted contractions. Each begins to cut at another distance; the largest region counts. "
+            "Default: 2 for arms with at most six joints between two bodies, else 1.",
         ),
     ] = None
-    bisection_steps: Annotated[int, _whole("bisection_steps", "Certifications spent on uniform contraction after its two ends.")] = (
+    bisection_steps: Annotated[int, _whole("bisection_steps", "Steps of uniform contraction's bisection, one certification each.")] = (
         DEFAULTS.bisection_steps
     )
     max_rounds: Annotated[
         int | None,
-        _whole("max_rounds", "Rounds of the polytope step; default: 3 for arms of at most four joints between two bodies, else 0."),
+        _whole("max_rounds", "Most rounds of the polytope step. Default: 3 for arms with at most four joints between two bodies, else 0."),
     ] = None
     pushes: Annotated[
         int | None,
         _whole(
-            "pushes", "How often the faces are pushed out after the contractions; default: 10 for such arms, 2 up to six joints, else 0."
+            "pushes",
+            "How often the faces are pushed out after the contractions. "
+            "Default: 10 for arms with at most four joints between two bodies, 2 for at most six, else 0.",
         ),
     ] = None
     tolerance: Annotated[
-        Real, Field(gt=0, lt=LARGEST_TOLERANCE, description="Growth of the ellipsoid's volume under which the alternation stops.")
+        Real,
+        Field(gt=0, lt=LARGEST_TOLERANCE, description="Relative growth of the ellipsoid's volume that is still worth a push or a round."),
     ] = DEFAULTS.tolerance
-    backoff: Annotated[int, _whole("backoff", "How often a step that fails to certify is halved.")] = DEFAULTS.backoff
+    backoff: Annotated[int, _whole("backoff", "How often a polytope step that fails to certify is halved.")] = DEFAULTS.backoff
     random_seed: RandomSeed = DEFAULTS.random_seed
 
 
 class Seed(Request):
-    """Where growing begins, and how the first polytope is found; what is left out has the certifier's default."""
+    """Says where growing begins and how the first polytope is found. An option that is left out has the certifier's default."""
 
-    method: Method | None = Field(None, description="Default: `iris_np2` up to 8 joints, `limits` beyond.")
-    q: Vector | None = Field(None, description="Joint positions, radians or metres, in position order; for every method but `polytope`.")
-    contain: Rows | None = Field(None, description="More joint positions that the region has to contain, as where it meets another one.")
-    C: Rows | None = Field(None, description="Faces of the first polytope, in s; for the method `polytope`.")
+    method: Method | None = Field(None, description="How the first polytope is found. Default: `iris_np2` up to 8 joints, `limits` beyond.")
+    q: Vector | None = Field(
+        None, description="The seed: joint positions in radians or metres, in position order. Every method but `polytope` needs it."
+    )
+    contain: Rows | None = Field(
+        None, description="More configurations (joint positions) that the region must contain, such as where it meets another region."
+    )
+    C: Rows | None = Field(None, description="(m, n), the first polytope {s : C s <= d}, one row a face, in s; for the method `polytope`.")
     d: Offsets | None = None
-    center: Vector | None = Field(None, description="A point inside that polytope, in s.")
-    half_width: Real | None = Field(None, description="Half the side of the `box`, in s.")
-    epsilon: Real | None = Field(None, description="Fraction of the volume that IRIS may leave in collision.")
-    delta: Real | None = Field(None, description="Probability with which IRIS may be wrong about that.")
-    max_iterations: int | None = Field(None, description="IRIS' alternations between faces and ellipsoid.")
-    max_iterations_separating_planes: int | None = Field(None, description="IRIS' rounds of adding faces within each.")
+    center: Vector | None = Field(None, description="(n,), a point inside that polytope, in s.")
+    half_width: Real | None = Field(None, description="Half the edge length of the first polytope, in s; for the method `box`.")
+    epsilon: Real | None = Field(None, description="Largest fraction of the volume that IRIS may leave in collision.")
+    delta: Real | None = Field(None, description="Probability with which IRIS may be wrong about `epsilon`.")
+    max_iterations: int | None = Field(None, description="Number of IRIS' alternations between faces and ellipsoid.")
+    max_iterations_separating_planes: int | None = Field(
+        None, description="Number of rounds in which IRIS adds faces, within each alternation."
+    )
     tolerance: Real | None = Field(None, description="IRIS ends when the ellipsoid's volume grows by less than this fraction.")
-    margin: Real | None = Field(None, description="Distance in s at which IRIS' faces stay clear of the collisions found.")
-    random_seed: int | None = Field(None, description="Seeds IRIS.")
+    margin: Real | None = Field(None, description="Distance in s that IRIS' faces keep from the collisions found.")
+    random_seed: int | None = Field(None, description="Seed of IRIS' random choices.")
 
 
 class WebhookRequest(Request):
-    """Whom to tell when the job has ended: a POST, signed as Standard Webhooks has it, repeated until it is answered with success."""
+    """Asks the service to call this receiver with a POST when the job has ended.
+
+    The message is signed as Standard Webhooks describes. The service repeats it until the receiver answers with success, or until the last
+    attempt has failed.
+    """
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -87,10 +101,10 @@ class WebhookRequest(Request):
         }
     )
 
-    url: str = Field(max_length=2000, pattern=r"^https?://", description="http:// or https://, of a public address.")
+    url: str = Field(max_length=2000, pattern=r"^https?://", description="URL to call, http:// or https://, at a public address.")
     secret: str = Field(
         pattern=r"^whsec_[A-Za-z0-9+/]{32,88}={0,2}$",
-        description="`whsec_` and the base64 of 24 to 64 random bytes, with which the message is signed. It is not shown again.",
+        description="`whsec_` and the base64 of 24 to 64 random bytes. The service signs the message with them and never shows them again.",
     )
 
     @field_validator("secret")
@@ -102,16 +116,18 @@ class WebhookRequest(Request):
 
 
 class JobRequest(Request):
-    """What every job has."""
+    """Holds what the requests for both kinds of job have in common."""
 
     scene: SceneName
-    priority: int = Field(0, ge=-3, le=3, description="Each step doubles the job's share of the work done for its key.")
-    deadline_seconds: Real | None = Field(None, gt=0, le=30 * 86400, description="The job ends after this long, with what it has by then.")
+    priority: int = Field(0, ge=-3, le=3, description="Each step up doubles the job's share of the work for its API key.")
+    deadline_seconds: Real | None = Field(
+        None, gt=0, le=30 * 86400, description="The job ends this many seconds after its creation, with the regions it has by then."
+    )
     webhook: WebhookRequest | None = None
 
 
 class GrowRequest(JobRequest):
-    """Grow a certified region around a configuration."""
+    """Asks for a certified region that grows around a configuration."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"kind": "grow", "scene": "iiwa-shelf", "seed": {"q": [0, 0.3, 0, -1.8, 0, 0.9, 0]}}]}
@@ -123,15 +139,15 @@ class GrowRequest(JobRequest):
 
 
 class PolytopeBody(Request):
-    """{s : C s <= d}; the joint limits are always added."""
+    """Describes the polytope {s : C s <= d}. The service always adds the joint limits."""
 
-    C: Rows = Field(description="(m, n), one row a face, in s with the joints in position order.")
+    C: Rows = Field(description="(m, n), one row a face, in s, with the joints in position order.")
     d: Offsets
-    center: Vector | None = Field(None, description="An interior point; found when it is not given.")
+    center: Vector | None = Field(None, description="(n,), an interior point, in s; the service finds one if none is given.")
 
 
 class CertifyRequest(JobRequest):
-    """One outcome per pair for a given polytope."""
+    """Asks for one outcome for each pair on a given polytope."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"kind": "certify", "scene": "planar-2dof", "polytope": {"C": [[1, 0], [-1, 0]], "d": [0.1, 0.1]}}]}
@@ -146,18 +162,18 @@ NewJob = Annotated[GrowRequest | CertifyRequest, Field(discriminator="kind")]
 
 
 class Job(BaseModel):
-    """A job as it is now."""
+    """Describes a job as it is now."""
 
     id: str
     kind: JobKind
-    scene: str = Field(description="The scene's id.")
+    scene: str = Field(description="Id of the scene.")
     state: JobState
-    outcome: Outcome | None = Field(description="About the polytope asked for, once the job has ended.")
-    reason: str | None = Field(description="Why it ended, a sentence.")
-    error: Document | None = Field(description="What was wrong (code, message, field, hint) when it failed.")
+    outcome: Outcome | None = Field(description="Outcome for the polytope asked for; null before the job ends.")
+    reason: str | None = Field(description="A sentence that says why the job ended.")
+    error: Document | None = Field(description="What was wrong (code, message, field, hint) when the job failed.")
     options: Document
     priority: int
-    region: str | None = Field(description="The id of the last region certified.")
+    region: str | None = Field(description="Id of the last certified region.")
     retry_of: str | None
     attempt: int
     created_at: datetime
@@ -190,18 +206,18 @@ class Job(BaseModel):
 
 
 class JobPage(Page):
-    """Jobs, newest first."""
+    """Holds one page of jobs, newest first."""
 
     jobs: list[Job]
 
 
 class Webhook(BaseModel):
-    """Whether the end of the job has been told."""
+    """Says whether the receiver has been told that the job has ended."""
 
     url: str
     state: WebhookState
     attempts: int
-    next_at: datetime = Field(description="Not tried before.")
+    next_at: datetime = Field(description="The service does not try before this time.")
     error: str | None = Field(description="Why the last attempt failed.")
 
     @classmethod
@@ -210,10 +226,10 @@ class Webhook(BaseModel):
 
 
 class Event(BaseModel):
-    """Something that happened to a job."""
+    """Describes something that happened to a job."""
 
-    seq: int = Field(description="1, 2, 3 ... within the job; the event's id in the stream.")
-    kind: str = Field(description="job, iteration, pairs, step, region or lost.")
+    seq: int = Field(description="Number of the event within the job: 1, 2, 3 ... It is the event's id in the stream.")
+    kind: str = Field(description="One of job, iteration, pairs, step, region, lost.")
     data: Document
     created_at: datetime
 
@@ -223,26 +239,26 @@ class Event(BaseModel):
 
 
 class EventList(BaseModel):
-    """Events in order."""
+    """Holds events in order."""
 
     events: list[Event]
 
 
 class Iteration(BaseModel):
-    """A polytope whose pairs were certified together."""
+    """Describes a polytope whose pairs were certified together."""
 
     index: int
     label: str
     state: IterationState
-    faces: int = Field(description="Rows of C, joint limits included.")
+    faces: int = Field(description="Number of rows of C, joint limits included.")
     ellipsoid_volume: float | None
-    reused: dict[int, int] = Field(description="Pair index to the earlier iteration whose proof serves here too.")
+    reused: dict[int, int] = Field(description="Maps a pair's index to the earlier iteration whose proof serves here too.")
     started_at: datetime
     finished_at: datetime | None
 
 
 class PairCell(BaseModel):
-    """One pair on one iteration's polytope."""
+    """Describes the result of one pair on the polytope of one iteration."""
 
     iteration: int
     pair: int
@@ -252,12 +268,15 @@ class PairCell(BaseModel):
     seconds: float | None
     detail: str | None
     worker: str | None
-    witness_q: list[float] | None = Field(description="A configuration in collision, when refuted.")
-    proof: str | None = Field(description="SHA-256 of the pair's proof.")
+    witness_q: list[float] | None = Field(description="A configuration (joint positions) at which the pair collides; null unless refuted.")
+    proof: str | None = Field(description="SHA-256 of the pair's proof file.")
 
 
 class PairMatrix(BaseModel):
-    """Pairs by iterations; a pair without a cell in an iteration is reused there or was not reached."""
+    """Holds the results of all pairs in all iterations.
+
+    A pair without a cell in an iteration was reused there from an earlier iteration, or was not reached.
+    """
 
     pairs: list[PairInfo]
     iterations: list[Iteration]
@@ -265,15 +284,15 @@ class PairMatrix(BaseModel):
 
 
 class GrowthPoint(BaseModel):
-    """A certified region on the way."""
+    """Describes a region that was certified during the job."""
 
     iteration: int
     region: str
     ellipsoid_volume: float
-    seconds: float = Field(description="Since the job started.")
+    seconds: float = Field(description="Seconds from the job's start to the region.")
 
 
 class GrowthCurve(BaseModel):
-    """The volume of the certified region over time."""
+    """Holds the volume of the certified region over time."""
 
     points: list[GrowthPoint]

@@ -1,4 +1,4 @@
-"""Regions and the questions that planners ask about them."""
+"""These models describe regions and the questions that planners ask about them."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ MAX_POINTS = 10_000
 
 
 class RegionSummary(BaseModel):
-    """A certified region in a list."""
+    """Describes a certified region in a list."""
 
     id: str
     job: str
     scene: str
     iteration: int
     guarantee: Guarantee
-    faces: int = Field(description="Rows of C, joint limits included.")
+    faces: int = Field(description="Number of rows of C, joint limits included.")
     ellipsoid_volume: float
     proof: str = Field(description="SHA-256 of the proof file.")
     created_at: datetime
@@ -43,13 +43,13 @@ class RegionSummary(BaseModel):
 
 
 class RegionPage(Page):
-    """Regions, newest first."""
+    """Holds one page of regions, newest first."""
 
     regions: list[RegionSummary]
 
 
 class RegionDetail(RegionSummary):
-    """A certified region with its manifest."""
+    """Describes a certified region, with its manifest."""
 
     manifest: Document
 
@@ -59,24 +59,28 @@ class RegionDetail(RegionSummary):
 
 
 class Verification(BaseModel):
-    """What the verifier says of a region's stored proof."""
+    """Says whether a region's stored proof holds, and what it proves."""
 
     region: str
     holds: bool
-    statement: list[str] = Field([], description="What was proved, in plain words; empty when the proof does not hold.")
+    statement: list[str] = Field([], description="What was proved, in plain words, line by line; empty when the proof does not hold.")
     guarantee: Guarantee = Guarantee.NONE
-    error: Document | None = Field(None, description="Why the proof does not hold: code, message, field, hint.")
+    error: Document | None = Field(None, description="Why the proof does not hold: code, message, field, hint; null when it holds.")
     seconds: float
 
 
 class ContainsRequest(Request):
-    """Points to look up: either joint positions `q` or tangent-space coordinates `s`."""
+    """Asks about points. The request gives either joint positions `q` or tangent-space coordinates `s`."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "iiwa-shelf", "q": [[0, 0.3, 0, -1.8, 0, 0.9, 0]]}]})
 
     scene: SceneName
-    q: list[Vector] | None = Field(None, min_length=1, max_length=MAX_POINTS, description="Joint positions, radians or metres.")
-    s: list[Vector] | None = Field(None, min_length=1, max_length=MAX_POINTS, description="Tangent-space coordinates.")
+    q: list[Vector] | None = Field(
+        None, min_length=1, max_length=MAX_POINTS, description="(k, n), joint positions in radians or metres, one row a point."
+    )
+    s: list[Vector] | None = Field(
+        None, min_length=1, max_length=MAX_POINTS, description="(k, n), tangent-space coordinates s, one row a point."
+    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
@@ -86,7 +90,7 @@ class ContainsRequest(Request):
 
 
 class Hit(BaseModel):
-    """A region that holds the point."""
+    """Names a region that contains the point."""
 
     region: str
     margin: float = Field(description="Distance in s from the point to the region's nearest face.")
@@ -94,16 +98,16 @@ class Hit(BaseModel):
 
 
 class Containment(BaseModel):
-    """The answer for one point."""
+    """Answers for one point."""
 
     inside: bool
-    regions: list[Hit] = Field(description="The regions that hold the point, deepest first.")
+    regions: list[Hit] = Field(description="The regions that contain the point, the one with the largest margin first.")
     margin: float | None = Field(description="The largest margin over all regions, negative outside; null where there is none.")
 
 
 class ContainsResponse(BaseModel):
-    """One answer for each point, in order."""
+    """Holds one answer for each point, in order."""
 
     scene: str
-    regions: int = Field(description="How many regions were looked at.")
+    regions: int = Field(description="Number of regions that were looked at.")
     points: list[Containment]

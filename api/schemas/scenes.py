@@ -1,4 +1,4 @@
-"""Scenes, their pairs and what to know about them."""
+"""These models describe scenes, their pairs and what to know about them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from db.models import SceneRow
 
 
 class SceneSummary(BaseModel):
-    """A scene in a list."""
+    """Describes a scene in a list."""
 
     id: str
     name: str
-    hash: str = Field(description="SHA-256 over everything that a proof depends on.")
+    hash: str = Field(description="SHA-256 of everything in the scene that a proof depends on.")
     joints: int = Field(description="Number of joint positions.")
     geometries: int
     pairs: int
@@ -40,13 +40,13 @@ class SceneSummary(BaseModel):
 
 
 class ScenePage(Page):
-    """Scenes, newest first."""
+    """Holds one page of scenes, newest first."""
 
     scenes: list[SceneSummary]
 
 
 class JointInfo(BaseModel):
-    """A joint with a position, in radians or metres."""
+    """Describes a joint that has a position, in radians or metres."""
 
     name: str
     kind: JointKind
@@ -56,7 +56,7 @@ class JointInfo(BaseModel):
 
 
 class SceneDetail(SceneSummary):
-    """A scene with its joints, in position order."""
+    """Describes a scene with its joints, in position order."""
 
     positions: list[JointInfo]
     bodies: list[str]
@@ -81,7 +81,7 @@ class SceneDetail(SceneSummary):
 
 
 class PairInfo(BaseModel):
-    """Two geometries that must not touch."""
+    """Names two geometries that must not touch."""
 
     index: int
     a: str
@@ -89,29 +89,34 @@ class PairInfo(BaseModel):
 
 
 class PairForecast(PairInfo):
-    """A pair with what its program will cost; side `a` and side `b` each have a chain, a Gram matrix and a space of polynomials."""
+    """Describes a pair and what its program will cost.
+
+    Each side, `a` and `b`, has a chain of joints, a Gram matrix and a space of polynomials.
+    """
 
     frame: str = Field(description="The body in whose frame the separating plane is expressed.")
-    chain_a: list[str] = Field(description="Joints between the frame and `a`.")
+    chain_a: list[str] = Field(description="Names of the joints between the frame and `a`.")
     chain_b: list[str]
-    gram_a: int = Field(description="Rows of the Gram matrices, 2^k for k joints in the chain.")
+    gram_a: int = Field(description="Number of rows of the side's Gram matrices: 2^k for k joints in its chain.")
     gram_b: int
-    joints: int = Field(description="How many joints the plane tried first moves with: all of both chains, or 0 for one at rest.")
-    N_a: int = Field(description="Dimension of the space of polynomials.")
+    joints: int = Field(
+        description="Number of joints with which the first plane tried moves: all of both chains, or 0 for a plane at rest."
+    )
+    N_a: int = Field(description="Dimension of the side's space of polynomials.")
     N_b: int
-    rationals: int = Field(description="Polynomial identities: one for each vertex of both bodies.")
-    seconds: float = Field(description="Roughly, on one thread.")
-    memory_bytes: int = Field(description="Of the largest program that may be tried for the pair.")
+    rationals: int = Field(description="Number of polynomial identities: one for each vertex of both bodies.")
+    seconds: float = Field(description="Rough time to certify the pair, in seconds, on one thread.")
+    memory_bytes: int = Field(description="Memory, in bytes, of the largest program that may be tried for the pair.")
 
 
 class ScenePairs(BaseModel):
-    """The pairs that a certification goes through."""
+    """Holds the pairs that a certification goes through."""
 
     pairs: list[PairForecast]
 
 
 class Substitution(BaseModel):
-    """A shape that was replaced by one around it."""
+    """Describes a shape that was replaced by a larger one around it."""
 
     geometry: str
     substitution: str
@@ -119,7 +124,7 @@ class Substitution(BaseModel):
 
 
 class IgnoredPair(BaseModel):
-    """Two geometries that are not certified, and why."""
+    """Names two geometries that are not certified, and says why."""
 
     a: str
     b: str
@@ -127,7 +132,7 @@ class IgnoredPair(BaseModel):
 
 
 class LintReport(BaseModel):
-    """What a reader should know about the scene before trusting a certificate for it."""
+    """Says what a reader should know about the scene before trusting a certificate for it."""
 
     warnings: list[str]
     substitutions: list[Substitution]

@@ -1,4 +1,4 @@
-"""The service itself."""
+"""These models describe the service itself."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from pydantic import BaseModel
 
 
 class Health(BaseModel):
-    """The process answers."""
+    """Says that the process answers."""
 
     status: Literal["ok"] = "ok"
 
 
 class Readiness(BaseModel):
-    """Whether the service can do its work; a check is `ok` or says what is wrong."""
+    """Says whether the service can do its work. A check is `ok` or says what is wrong."""
 
     ready: bool
     checks: dict[str, str]

@@ -1,1 +1,1 @@
-"""Weighted sums of squares as cones, and the interior-point methods over them."""
+"""Weighted sums of squares are treated here as cones, with the interior-point methods over them."""

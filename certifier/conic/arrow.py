@@ -1,13 +1,17 @@
-"""Barrier method for programs whose cones are coupled by few unknowns: an arrow.
+"""A barrier method solves programs whose cones are coupled by few unknowns, so that Newton's system has the shape of an arrow.
 
     minimise  f(y) + sum_r F*_r(constant_r + local_r z_p + coupled_r y) + sum_p b_p(z_p)    over y, z_1, z_2, ...
 
-for rationals r in groups p. F* is the barrier of the cone K_r that is conjugate to the barrier F of its dual cone (certifier.conic.cone):
-F*(s) = max over x of -s'x - F(x), with gradient -x and Hessian H(x)^-1, where x is found by Newton's method from the last one; f is a
-weighted objective with a barrier of y, b_p a barrier of z_p. Newton's method in (y, z): in its system every z_p meets y alone, so a group
-is eliminated as soon as its rationals have been added up. A rational is formed, factored, added and forgotten; what is kept of it is its x
-and, as far as a fixed amount of memory goes, its factor. Every iterate is feasible.
-Papp and Yildiz (2019) for the cones, Nesterov and Nemirovskii (1994) for the method.
+for rationals r in groups p. f is a weighted objective with a barrier of y, and b_p is a barrier of z_p.
+
+F* is the barrier of the cone K_r. It is conjugate to the barrier F of the dual cone of K_r (certifier.conic.cone):
+F*(s) = max over x of -s'x - F(x), with gradient -x and Hessian H(x)^-1. Newton's method finds x, starting from the last one.
+
+The outer Newton's method is in (y, z). In its system every z_p meets y alone, so a group is eliminated as soon as its rationals have been
+added up. A rational is formed, factored, added and forgotten. What is kept of it is its x and, as far as a fixed amount of memory goes,
+its factor. Every iterate is feasible.
+
+The cones are from Papp and Yildiz (2019), the method is from Nesterov and Nemirovskii (1994).
 """
 
 from __future__ import annotations
@@ -23,22 +27,22 @@ from certifier.conic.cone import Cone, Factor, conjugate, inverse_cholesky, rela
 from certifier.model import Array
 
 CENTRED = 0.3
-"""A rational's x is good enough this close to the centre, in the norm of its Hessian; the Newton step from there is used as well."""
+"""A rational's x is good enough this close to the maximiser, in the norm of its Hessian; the Newton step from there is used as well."""
 MAX_CENTRING = 200
-"""Newton steps for one rational, after which it is taken to be outside its cone."""
+"""After this many Newton steps a rational is taken to be outside its cone."""
 BOUNDARY = 0.9
-"""Share of the way to the nearest boundary that a step may go."""
+"""A step may go this share of the way to the nearest boundary."""
 MAX_ITERATIONS = 80
 MAX_HALVINGS = 8
 FACTOR_BYTES = 128 * 2**20
-"""Factors that are kept for the second pass of an iteration; what does not fit is formed again."""
+"""Factors are kept for the second pass of an iteration up to this many bytes; what does not fit is formed again."""
 
 Term = Callable[[Array], tuple[float, Array, Array]]
-"""A convex function: value, inf outside its domain, gradient (k,) and Hessian (k, k)."""
+"""A term is a convex function: it returns its value, inf outside its domain, its gradient (k,) and its Hessian (k, k)."""
 
 
 class Rationals(Protocol):
-    """R points of one cone, as functions of z and y.
+    """Rationals are R points of one cone, as functions of z and y.
 
     Attributes:
         start: (N,) a point inside the dual cone, where the search for x begins.
@@ -50,19 +54,19 @@ class Rationals(Protocol):
     coupled: Array
 
     def __len__(self) -> int:
-        """R."""
+        """Returns R."""
 
     def columns(self) -> tuple[Array, Array, Array]:
-        """constant (R, N), local (R, N, p), coupled (R, N, q)."""
+        """Returns constant (R, N), local (R, N, p) and coupled (R, N, q)."""
 
 
 @dataclass(frozen=True)
 class Group:
-    """Rationals that share the unknowns z.
+    """A group consists of the rationals that share the unknowns z.
 
     Attributes:
         start: (p,) z at the start.
-        barrier: of z.
+        barrier: the barrier b_p of z.
     """
 
     blocks: Sequence[Rationals]
@@ -72,7 +76,7 @@ class Group:
 
 @dataclass(frozen=True)
 class _Eliminated:
-    """A group's share of Newton's system: z_p's step is -(gradient + matrix dy[index])."""
+    """Keeps a group's share of Newton's system: the step of z_p is -(gradient + matrix dy[index])."""
 
     index: Array
     gradient: Array
@@ -80,11 +84,11 @@ class _Eliminated:
 
 
 class Arrow:
-    """Iterates and their system.
+    """Holds the iterates of the method and their Newton system.
 
     Args:
         y: (k,) start of the coupled unknowns.
-        tick: called with the iteration's number after every group of every pass; what it raises ends the method.
+        tick: called with the iteration's number after every group of every pass; an exception that it raises ends the method.
 
     Raises:
         np.linalg.LinAlgError: the start is not inside some cone.
@@ -98,11 +102,11 @@ class Arrow:
         self._accumulate()
 
     def reach(self, dy: Array) -> float:
-        """How far y may move along dy, z fixed, before some cone is known to end."""
+        """Returns how far y may move along dy, with z fixed, before some cone is known to end."""
         return self._limits(dy, [np.zeros_like(z) for z in self.z])[0]
 
     def shift(self, dy: Array) -> None:
-        """y + dy, which must be feasible.
+        """Moves y by dy; the new y must be feasible.
 
         Raises:
             np.linalg.LinAlgError: it is not.
@@ -111,9 +115,9 @@ class Arrow:
         self._accumulate()
 
     def minimise(self, f: Term, tolerance: float) -> float:
-        """Newton's method until the function is within about ``tolerance`` of its minimum; the last decrement.
+        """Runs Newton's method until the function is within about ``tolerance`` of its minimum, and returns the last decrement.
 
-        Ends early, at a feasible point, after MAX_ITERATIONS or when rounding stops all progress.
+        The method ends early, at a feasible point, after MAX_ITERATIONS or when rounding stops all progress.
         """
         decrement = np.inf
         while self.iterations < MAX_ITERATIONS:
@@ -163,7 +167,7 @@ class Arrow:
             self.tick(self.iterations)
 
     def _direction(self, f: Term) -> tuple[Array, list[Array], float]:
-        """Newton's step in y and z, and its decrement."""
+        """Returns Newton's step in y and in z, and its decrement."""
         _, g, H = f(self.y)
         gradient = g + self._gradient
         solved = cho_solve(cho_factor(H + self._matrix), gradient)
@@ -172,7 +176,7 @@ class Arrow:
         return dy, dz, float(np.sqrt(gradient @ solved + self._square))
 
     def _limits(self, dy: Array, dz: list[Array]) -> tuple[float, list[list[Array]]]:
-        """The longest step that explicit Gram matrices show to be feasible, and how every x follows a step of length 1.
+        """Returns the longest step that explicit Gram matrices show to be feasible, and how every x follows a step of length 1.
 
         With v = H(x)^-1 ds, the point s + a ds has the Gram matrices Q + a Q Lambda(v) Q.
         """
@@ -196,7 +200,7 @@ class Arrow:
         return longest, moves
 
     def _step(self, f: Term, dy: Array, dz: list[Array]) -> bool:
-        """A step along the direction that lowers the function; False when none was found, nothing moved."""
+        """Takes a step along the direction that lowers the function; returns False when no such step was found and nothing has moved."""
         longest, moves = self._limits(dy, dz)
         y, z, xs = self.y, self.z, [list(row) for row in self._x]
         before = f(y)[0] + self._value
@@ -219,5 +223,5 @@ class Arrow:
         return False
 
     def _inside(self, f: Term, y: Array, z: list[Array]) -> bool:
-        """Whether y and every z_p are in the domains of their barriers."""
+        """Returns whether y and every z_p are in the domains of their barriers."""
         return bool(np.isfinite(f(y)[0])) and all(np.isfinite(group.barrier(z_p)[0]) for group, z_p in zip(self.groups, z, strict=True))

@@ -1,12 +1,13 @@
-"""Weighted sums of squares in the sampled basis: one cone for all rationals of one side of a pair.
+"""Weighted sums of squares form a cone in the sampled basis: one cone serves all rationals of one side of a pair.
 
     K = { v : v(u) = sum_j g_j(u) rho(u)' Q_j rho(u), Q_j psd },   g_j(u) = gA_j(u_A) + sum_l e_jl u_l,   g_0 = 1
     dual cone: x with Lambda_j(x) = sum_i (g_j x)_i rho_i rho_i' psd for every j
     barrier F(x) = -sum_j log det Lambda_j(x), Hessian with weights Q_j = Lambda_j^-1 in :meth:`Cone.schur`.
 
-Because rho_i rho_i' has rank one, the Schur complement is a sum of Hadamard products
-H = sum_j (g_j g_j') o (rho Q_j rho') o (rho S_j rho'), formed over the chain's points only (basis.py) and expanded by the
+Because rho_i rho_i' has rank one, the Schur complement is a sum of Hadamard products,
+H = sum_j (g_j g_j') o (rho Q_j rho') o (rho S_j rho'). It is formed over the chain's points only (basis.py) and expanded by the
 slopes e_jl (Papp and Yildiz 2019; Loefberg and Parrilo 2004).
+
 Shapes: R rationals, K weights, L functions, N_A chain points, M = 3^k of them the grid, o outside joints, N = N_A + o M.
 """
 
@@ -24,14 +25,14 @@ from certifier.conic.kernels import adjoint, cholesky_inverse, line_search, schu
 from certifier.model import Array
 
 SMALL = 48
-"""Unknowns up to which the call of a triangular solver takes longer than a compiled loop."""
+"""Up to this many unknowns, the call of a triangular solver takes longer than a compiled loop."""
 MAX_NEWTON = 12
 NEWTON_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Weights g_j that multiply sums of squares of the same functions.
+    """The weights g_j multiply sums of squares of the same functions.
 
     Attributes:
         rho: (N_A, L) values of the functions at the chain's points.
@@ -45,27 +46,27 @@ class Weights:
 
     @cached_property
     def products(self) -> Array:
-        """(N_A, L^2) the products rho_i rho_i'."""
+        """Returns the products rho_i rho_i', (N_A, L^2)."""
         return (self.rho[:, :, None] * self.rho[:, None, :]).reshape(len(self.rho), -1)
 
     @cached_property
     def transposed(self) -> Array:
-        """The same, (L^2, N_A)."""
+        """Returns the same products as (L^2, N_A)."""
         return np.ascontiguousarray(self.products.T)
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """(K, L, L), of a rational's Gram matrices."""
+        """Returns the shape of a rational's Gram matrices, (K, L, L)."""
         K, L = len(self.values), self.rho.shape[1]
         return K, L, L
 
 
 class Cone:
-    """The cone of one side.
+    """The cone belongs to one side of a pair.
 
     Args:
         grid: M, how many leading points carry the outside joints.
-        parts: the weights, one part for every set of functions; the first weight is 1 for a pair's side. Gram matrices are lists over
+        parts: the weights, one part for every set of functions; for a pair's side the first weight is 1. Gram matrices are lists over
             the parts.
     """
 
@@ -76,8 +77,16 @@ class Cone:
 
     @classmethod
     def of_faces(cls, basis: Basis, constant: Array, chain: Array, outside: Array) -> Cone:
-        """The cone of 1, the faces g_j = constant_j + chain_j' u_A + outside_j' u_out, (m,), (m, k), (m, o), and, for every chain
-        coordinate that may not have degree 3, of 1 - u_i^2 with the functions without u_i."""
+        """Returns the cone of 1, of the faces, and of the ranges of those chain coordinates that may not have degree 3.
+
+        The faces are g_j = constant_j + chain_j' u_A + outside_j' u_out. The range of a coordinate counts by 1 - u_i^2 with the functions
+        without u_i.
+
+        Args:
+            constant: (m,) value of every face at u = 0.
+            chain: (m, k) slopes in the chain's coordinates.
+            outside: (m, o) slopes in the outside coordinates.
+        """
         weights = np.concatenate([np.ones((1, len(basis.points))), constant[:, None] + chain @ basis.points.T])
         slopes = np.concatenate([np.zeros((1, outside.shape[1])), outside])
         still, functions = np.zeros((1, outside.shape[1])), subsets(basis.k)
@@ -90,23 +99,26 @@ class Cone:
 
     @property
     def degree(self) -> int:
-        """Barrier parameter of one rational."""
+        """Returns the barrier parameter of one rational."""
         return sum(K * L for K, L, _ in (part.shape for part in self.parts))
 
     def adjoint(self, x: Array) -> list[Array]:
-        """Lambda_j(x): (R, N) -> (R, K, L, L) for every part."""
+        """Returns Lambda_j(x): (R, N) -> (R, K, L, L) for every part."""
         x = np.ascontiguousarray(x)
         return [adjoint(p.values, p.slopes, self.grid, p.products, x).reshape(len(x), *p.shape) for p in self.parts]
 
     def values(self, Q: Sequence[Array]) -> Array:
-        """Coordinates of sum_j g_j rho' Q_j rho: (R, K, L, L) for every part -> (R, N)."""
+        """Returns the coordinates of sum_j g_j rho' Q_j rho: (R, K, L, L) for every part -> (R, N)."""
         total = np.zeros((len(Q[0]), self.N))
         for part, matrices in zip(self.parts, Q, strict=True):
             total += values(part.values, part.slopes, self.grid, part.transposed, matrices.reshape(-1, part.products.shape[1]))
         return total
 
     def schur(self, Q: Sequence[Array], S: Sequence[Array]) -> Array:
-        """H of x -> values(Q Lambda(x) S), symmetrised: (R, K, L, L) for every part, twice -> (R, N, N), lower triangles only."""
+        """Returns the matrix H of x -> values(Q Lambda(x) S), symmetrised, of which only the lower triangles are filled.
+
+        Q and S are (R, K, L, L) for every part, and H is (R, N, N).
+        """
         H = np.zeros((len(Q[0]), self.N, self.N))
         for part, left, right in zip(self.parts, Q, S, strict=True):
             schur(part.rho, part.values, part.slopes, self.grid, left, right, H)
@@ -114,7 +126,7 @@ class Cone:
 
 
 class Factor:
-    """Cholesky factors U'U of a stack of Schur complements (R, N, N), given by their lower triangles and overwritten.
+    """Holds the Cholesky factors U'U of a stack of Schur complements (R, N, N), which are given by their lower triangles and overwritten.
 
     Raises:
         np.linalg.LinAlgError: a matrix is not numerically positive definite.
@@ -130,11 +142,11 @@ class Factor:
             self._upper.append(upper)
 
     def forward(self, right: Array) -> Array:
-        """U'^-1 right: (R, N, p) -> (R, N, p)."""
+        """Returns U'^-1 right: (R, N, p) -> (R, N, p)."""
         return self._triangular(right, 0)
 
     def backward(self, right: Array) -> Array:
-        """U^-1 right: (R, N, p) -> (R, N, p)."""
+        """Returns U^-1 right: (R, N, p) -> (R, N, p)."""
         return self._triangular(right, 1)
 
     def _triangular(self, right: Array, transposed: int) -> Array:
@@ -148,12 +160,12 @@ class Factor:
         return solution
 
     def solve(self, right: Array) -> Array:
-        """(U'U)^-1 right: (R, N, p) -> (R, N, p)."""
+        """Returns (U'U)^-1 right: (R, N, p) -> (R, N, p)."""
         return self.backward(self.forward(right))
 
 
 def inverse_cholesky(X: Array) -> Array:
-    """Inverses of the lower Cholesky factors of positive definite matrices, (..., L, L).
+    """Returns the inverses of the lower Cholesky factors of positive definite matrices, (..., L, L).
 
     Raises:
         np.linalg.LinAlgError: a matrix is not positive definite.
@@ -166,24 +178,27 @@ def inverse_cholesky(X: Array) -> Array:
 
 
 def symmetrise(X: Array) -> Array:
-    """(X + X')/2 over the last two axes."""
+    """Returns (X + X')/2 over the last two axes."""
     return 0.5 * (X + np.swapaxes(X, -1, -2))
 
 
 def relative_eigenvalues(inverse_chol: Sequence[Array], D: Sequence[Array]) -> Array:
-    """Eigenvalues of all L^-1 D L^-T of a rational, (R, degree), from (R, K, L, L) for every part."""
+    """Returns the eigenvalues of all L^-1 D L^-T of a rational, (R, degree), from (R, K, L, L) for every part."""
     found = [np.linalg.eigvalsh(Li @ d @ np.swapaxes(Li, -1, -2)) for Li, d in zip(inverse_chol, D, strict=True)]
     return np.concatenate([part.reshape(len(part), -1) for part in found], axis=1)
 
 
 @dataclass(frozen=True)
 class Conjugate:
-    """Where -grad F(x_r) = s_r, for R points s_r inside the cone: F*(s) = max over x of -s'x - F(x), with gradient -x and Hessian H(x)^-1.
+    """Holds the points x_r at which -grad F(x_r) = s_r, for R points s_r inside the cone.
+
+    They attain the maximum in F*(s) = max over x of -s'x - F(x), which has the gradient -x and the Hessian H(x)^-1.
 
     Attributes:
         x: (R, N), near the maximisers.
         Q: Lambda(x)^-1, (R, K, L, L) for every part.
-        step: (R, N) Newton's next step, not taken; decrement: (R,) its length in the metric of the Hessian.
+        step: (R, N) Newton's next step, not taken.
+        decrement: (R,) length of that step in the metric of the Hessian.
         factor: Cholesky factors of the Hessians at x.
         value: (R,) F*(s) to second order in the step.
     """
@@ -197,9 +212,10 @@ class Conjugate:
 
 
 def conjugate(cone: Cone, s: Array, start: Array, tolerance: float, max_iterations: int) -> Conjugate:
-    """Newton's method with exact line search, (R, N) points s from (R, N) interior points of the dual cone.
+    """Runs Newton's method with exact line search for (R, N) points s, from (R, N) interior points of the dual cone.
 
-    It ends when all decrements are under the tolerance, or with the iterations; for an s outside the cone they do not fall.
+    It ends when all decrements are under the tolerance or when the iterations are used up. For an s outside the cone the decrements do not
+    fall.
 
     Raises:
         np.linalg.LinAlgError: a point is seen to be outside the cone, or the cone is numerically degenerate.
@@ -226,19 +242,21 @@ def conjugate(cone: Cone, s: Array, start: Array, tolerance: float, max_iteratio
 
 
 class Centre:
-    """An interior point x of the dual cone whose polynomial w = -grad F(x) resembles ``unit``: some of Newton's method towards it.
+    """The centre is an interior point x of the dual cone whose polynomial w = -grad F(x) resembles ``unit``.
 
-    Any interior point would do; the nearer w is to the unit in which the margin is wanted, the better the margin. On wide polytopes the
-    way is long, and the rest of it not worth the time.
+    Newton's method goes some of the way towards ``unit``. Any interior point would do, but the nearer w is to the unit in which the margin
+    is wanted, the better the margin. On wide polytopes the way is long, and the rest of it is not worth the time.
 
     Args:
-        unit: (N,) an interior polynomial of the cone; start: (N,) an interior point of the dual cone.
+        unit: (N,) an interior polynomial of the cone.
+        start: (N,) an interior point of the dual cone.
 
     Attributes:
-        x: (N,) the point; w: (N,) = values(Q).
+        x: (N,) the point.
+        w: (N,) its polynomial, values(Q).
         Q: Lambda(x)^-1, (1, K, L, L) for every part.
         factor: Cholesky factor of the Hessian H at x.
-        unit_Q: like Q, with values(unit_Q) = unit, the smallest in the metric of x.
+        unit_Q: like Q, with values(unit_Q) = unit; of all such matrices the smallest in the metric of x.
 
     Raises:
         np.linalg.LinAlgError: the cone is numerically degenerate.
@@ -251,5 +269,5 @@ class Centre:
         self.unit_Q = [Q @ Z @ Q for Q, Z in zip(self.Q, cone.adjoint(self.solve(unit[None])), strict=True)]
 
     def solve(self, v: Array) -> Array:
-        """H^-1 v, (R, N) -> (R, N)."""
+        """Returns H^-1 v, (R, N) -> (R, N)."""
         return self.factor.solve(v.T[None])[0].T

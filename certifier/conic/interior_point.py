@@ -1,17 +1,21 @@
-"""Primal-dual path-following method for the pair program (HKM direction, Mehrotra predictor-corrector).
+"""A primal-dual path-following method solves the pair program, with the HKM direction and Mehrotra's predictor-corrector.
 
     maximise t  over y = (z, t), Q :   A_r z - t w_r = sum_j g_j rho' Q_rj rho  for every rational r,   a'z = 1,   Q_rj psd
     dual:       minimise lam over x :  sum_r A_r' x_r = lam a,   sum_r w_r' x_r = 1,   Lambda_j(x_r) psd
 
-A weak-duality pair: t <= lam. The normalisation is a = sum_r A_r' x_w with x_w the centre of the cone for w, an interior point of
-the dual cone: every certificate has a'z > 0 and can be scaled to meet it. t > 0 with the residual absorbed is a certificate; a dual
-point with lam < 0 proves that no certificate of this form exists. Both are looked for in every iteration; the first one ends the search.
+These two are a weak-duality pair: t <= lam. The normalisation is a = sum_r A_r' x_w, where x_w is the centre of the cone for w, an
+interior point of the dual cone. So every certificate has a'z > 0 and can be scaled to meet it.
 
-Start: with H the Hessian at x_w and B_r = [A_r, -w_r], let y minimise sum_r |B_r y|^2 in the metric H^-1 subject to a'y = 1, so that
-sum_r B_r' H^-1 B_r y is a multiple of a. For T large enough z, t - T and Q_r = T Q_w + Q_w Lambda(H^-1 B_r y) Q_w are primal feasible,
-x_r ~ x_w - H^-1 B_r y / T is dual feasible, and Q_r Lambda(x_r) = T I to first order: the start is close to the central path, and an
-easy pair is certified by it alone.
-Helmberg, Rendl, Vanderbei, Wolkowicz (1996); Kojima, Shindoh, Hara (1997); Mehrotra (1992). Symbols as in certifier.conic.cone.
+A point with t > 0 whose residual can be absorbed is a certificate. A dual point with lam < 0 proves that no certificate of this form
+exists. The method looks for both in every iteration, and the first one found ends the search.
+
+Start: let H be the Hessian at x_w and B_r = [A_r, -w_r]. Let y minimise sum_r |B_r y|^2 in the metric H^-1 subject to a'y = 1, so that
+sum_r B_r' H^-1 B_r y is a multiple of a. For T large enough, z, t - T and Q_r = T Q_w + Q_w Lambda(H^-1 B_r y) Q_w are primal feasible,
+x_r ~ x_w - H^-1 B_r y / T is dual feasible, and Q_r Lambda(x_r) = T I to first order. So the start is close to the central path, and it
+alone certifies an easy pair.
+
+Sources: Helmberg, Rendl, Vanderbei, Wolkowicz (1996); Kojima, Shindoh, Hara (1997); Mehrotra (1992). Symbols are as in
+certifier.conic.cone.
 """
 
 from __future__ import annotations
@@ -30,30 +34,30 @@ from certifier.model import Array
 DUAL_TOLERANCE = 1e-9
 GAP_TOLERANCE = 1e-9
 START_SPREAD = 0.8
-"""Relative deviation from the central path that the start may have."""
+"""The start may deviate from the central path by this much, relatively."""
 RIDGE = 1e-13
-"""Relative ridge of the normal equations: plane coefficients that no rational depends on have no column."""
+"""The normal equations get this relative ridge, because some plane coefficients may have no column: no rational depends on them."""
 STEP_TOLERANCE = 1e-3
 
 
 class Status(StrEnum):
-    """How the method ended."""
+    """The status says how the method ended."""
 
     FEASIBLE = "feasible"
-    """t > 0, every Q psd, the identities hold to rounding."""
+    """A point was found with t > 0 and every Q psd, at which the identities hold to rounding."""
     INFEASIBLE = "infeasible"
     """A dual feasible point with lam < 0 was found."""
     BOUNDARY = "boundary"
-    """The optimal margin is zero to working accuracy: neither answer can be had."""
+    """The optimal margin is zero to working accuracy, so neither answer can be had."""
     ITERATION_LIMIT = "iteration_limit"
     """The iteration limit was reached first."""
     NUMERICAL = "numerical"
-    """A factorisation failed before either answer."""
+    """A factorisation failed before either answer was found."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """R rationals that share a cone.
+    """A block consists of R rationals that share a cone.
 
     Attributes:
         cone: the cone of all R.
@@ -68,7 +72,14 @@ class Block:
 
 @dataclass(frozen=True)
 class Solution:
-    """What the method ended with; Q, x are lists over blocks, of (R, K, L, L) for every part of the cone and of (R, N)."""
+    """Holds what the method ended with.
+
+    Attributes:
+        y: (p,) the unknowns (z, t).
+        lam: the dual objective.
+        Q: a list over blocks of lists over the parts of the cone, of (R, K, L, L).
+        x: a list over blocks, of (R, N).
+    """
 
     status: Status
     y: Array
@@ -83,10 +94,11 @@ class Solution:
 
 
 def solve(blocks: list[Block], max_iterations: int = 60, gap: float = np.inf) -> Solution:
-    """Solve the program over ``blocks``.
+    """Solves the program over ``blocks``.
 
     Args:
-        gap: a certificate is taken once the gap is below this multiple of its margin: inf for the first one, 1 for one near the middle.
+        gap: a certificate is taken once the gap is below this multiple of its margin. inf takes the first certificate, 1 takes one near
+            the middle of the central path.
     """
     method = _PathFollowing(blocks, gap)
     status, iteration = None, 0
@@ -102,7 +114,7 @@ def solve(blocks: list[Block], max_iterations: int = 60, gap: float = np.inf) ->
 
 
 class _PathFollowing:
-    """The iteration; Gram matrices and their duals are lists over the parts of all blocks' cones, one after the other."""
+    """Carries out the iteration; Gram matrices and their duals are lists over the parts of all blocks' cones, one after the other."""
 
     def __init__(self, blocks: list[Block], gap: float) -> None:
         self.gap = gap
@@ -125,7 +137,7 @@ class _PathFollowing:
         self.lam = float(self.a @ self._moments())
 
     def _least_deviation(self) -> Array:
-        """The y with a'y = 1 whose B_r y are smallest in the metric of the centres."""
+        """Returns the y with a'y = 1 whose B_r y are smallest in the metric of the centres."""
         images = [b.centre.factor.forward(np.moveaxis(b.columns, 0, 1).reshape(1, b.cone.N, -1)).reshape(-1, self.p) for b in self.blocks]
         y = np.linalg.solve(_ridged(np.sum([image.T @ image for image in images], axis=0)), self.a)
         return y / (self.a @ y)
@@ -141,11 +153,11 @@ class _PathFollowing:
         return [b.cone.values(part) for b, part in zip(self.blocks, self._by_block(Q), strict=True)]
 
     def _moments(self) -> Array:
-        """sum_r B_r' x_r, (p,)."""
+        """Returns sum_r B_r' x_r, (p,)."""
         return np.sum([np.einsum("rnp,rn->p", b.columns, x) for b, x in zip(self.blocks, self.x, strict=True)], axis=0)
 
     def settles(self) -> bool:
-        """Whether the present point is a certificate, however wide the gap; if so, it is the solution."""
+        """Returns whether the present point is a certificate, however wide the gap; if so, it becomes the solution."""
         self.gap = np.inf
         return self.y[-1] > 0 and self._settle(self.y, self.Q)
 
@@ -153,7 +165,7 @@ class _PathFollowing:
         return Solution(status, self.y, self.lam, self._by_block(self.Q), self.x, iterations)
 
     def iterate(self) -> Status | None:
-        """Test for an answer, then take one predictor-corrector step."""
+        """Tests for an answer, then takes one predictor-corrector step."""
         blocks = self.blocks
         primal = [b.columns @ self.y - v for b, v in zip(blocks, self._values(self.Q), strict=True)]
         dual = self.target + self.lam * self.a - self._moments()
@@ -181,7 +193,7 @@ class _PathFollowing:
         lu = lu_factor(border, check_finite=False)
 
         def direction(centres: list[Array]) -> tuple[Array, float, list[Array], list[Array], list[Array]]:
-            """Newton step for Q Z = centre: values(dQ) - B dy = primal, dZ = Lambda(dx)."""
+            """Returns the Newton step for Q Z = centre: values(dQ) - B dy = primal, dZ = Lambda(dx)."""
             forwards, right = [], np.zeros(self.p)
             for value, r, factor, image in zip(self._values(centres), primal, factors, images, strict=True):
                 v = factor.forward((value - r)[:, :, None])
@@ -217,10 +229,10 @@ class _PathFollowing:
         return None
 
     def _settle(self, y: Array, Q: list[Array]) -> bool:
-        """Whether (y, Q) with t > 0 is a certificate once its residuals are absorbed; if so, it is the solution.
+        """Returns whether (y, Q) with t > 0 is a certificate once its residuals are absorbed; if so, it becomes the solution.
 
-        Q + t Q_w + dQ with values(dQ) = residual is a Gram matrix of A_r z itself; half of the largest multiple of the unit that
-        leaves it psd becomes the margin.
+        Q + t Q_w + dQ with values(dQ) = residual is a Gram matrix of A_r z itself. The margin becomes half of the largest multiple of the
+        unit that leaves this matrix psd.
         """
         z = np.append(y[:-1], 0.0)
         if self._inner(Q, self.Z) > self.gap * y[-1]:
@@ -252,7 +264,7 @@ class _PathFollowing:
     def _steps(
         inverse_chol_Q: list[Array], inverse_chol_Z: list[Array], dQ: list[Array], dZ: list[Array], fraction: float
     ) -> tuple[float, float]:
-        """The fractions of the longest primal and dual steps that stay psd, at most 1."""
+        """Returns the given fraction of the longest primal and dual steps that stay psd, at most 1 each."""
         step_Q = min(_longest(Li, d) for Li, d in zip(inverse_chol_Q, dQ, strict=True))
         step_Z = min(_longest(Li, d) for Li, d in zip(inverse_chol_Z, dZ, strict=True))
         return min(1.0, fraction * step_Q), min(1.0, fraction * step_Z)
@@ -264,12 +276,15 @@ def _ridged(M: Array) -> Array:
 
 
 def _correction(block: Block, v: Array) -> list[Array]:
-    """The smallest dQ in the metric of the centre with values(dQ) = v, (R, N) -> (R, K, L, L) for every part: Q_w Lambda(H^-1 v) Q_w."""
+    """Returns the smallest dQ in the metric of the centre with values(dQ) = v, which is Q_w Lambda(H^-1 v) Q_w.
+
+    v is (R, N), and dQ is (R, K, L, L) for every part.
+    """
     return [Q @ Z @ Q for Q, Z in zip(block.centre.Q, block.cone.adjoint(block.centre.solve(v)), strict=True)]
 
 
 def _preimage(block: Block, v: Array) -> list[tuple[Array, Array]]:
-    """That dQ, and its eigenvalues relative to Q_w, for every part."""
+    """Returns the dQ of :func:`_correction` and its eigenvalues relative to Q_w, for every part."""
     found = []
     for Q, inner in zip(block.centre.Q, block.cone.adjoint(block.centre.solve(v)), strict=True):
         chol = np.linalg.cholesky(Q)
@@ -278,7 +293,7 @@ def _preimage(block: Block, v: Array) -> list[tuple[Array, Array]]:
 
 
 def _longest(inverse_chol: Array, direction: Array) -> float:
-    """Largest a with L L' + a D psd, over a stack."""
+    """Returns the largest a with L L' + a D psd, over a stack."""
     L = direction.shape[-1]
     lowest = lowest_relative_eigenvalue(inverse_chol.reshape(-1, L, L), direction.reshape(-1, L, L), STEP_TOLERANCE)
     return np.inf if lowest >= 0 else -1 / lowest

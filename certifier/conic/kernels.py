@@ -1,6 +1,7 @@
-"""Compiled loops over stacks of small symmetric matrices, and the Schur complement of certifier.conic.cone.
+"""Compiled loops run here over stacks of small symmetric matrices and form the Schur complement of certifier.conic.cone.
 
-LAPACK spends most of a 16 x 16 factorisation on the call; here a whole stack is one call. One thread, no allocation inside loops.
+LAPACK spends most of a 16 x 16 factorisation on the call; here a whole stack is one call. The loops use one thread and allocate nothing
+inside.
 """
 
 from __future__ import annotations
@@ -11,12 +12,16 @@ from numba import njit
 from certifier.model import Array
 
 _ROWS = 27
-"""Rows of a tile of the Schur complement: a tile and its two factors stay in the second-level cache up to k = 4."""
+"""A tile of the Schur complement has this many rows; the tile and its two factors stay in the second-level cache up to k = 4."""
 
 
 @njit(cache=True, fastmath=True)
 def cholesky_inverse(X: Array, inverse: Array) -> bool:
-    """Inverses of the lower Cholesky factors of a stack, (S, L, L); False at the first matrix that is not positive definite."""
+    """Computes the inverses of the lower Cholesky factors of a stack, (S, L, L).
+
+    Returns:
+        False at the first matrix that is not positive definite.
+    """
     S, L = X.shape[0], X.shape[1]
     factor = np.empty((L, L))
     for s in range(S):
@@ -45,7 +50,7 @@ def cholesky_inverse(X: Array, inverse: Array) -> bool:
 
 @njit(cache=True)
 def substitute(lower: Array, X: Array, transposed: bool) -> None:
-    """Solves L Y = X, or L' Y = X, for a stack of lower triangles, (R, N, N) and (R, N, p), in place."""
+    """Solves L Y = X, or L' Y = X, in place for a stack of lower triangles, (R, N, N) and (R, N, p)."""
     R, N, p = X.shape
     for r in range(R):
         L, x = lower[r], X[r]
@@ -66,10 +71,10 @@ def substitute(lower: Array, X: Array, transposed: bool) -> None:
 
 @njit(cache=True, fastmath=True)
 def lowest_relative_eigenvalue(inverse: Array, D: Array, tolerance: float) -> float:
-    """Least eigenvalue over a stack of L^-1 D L^-T, to a relative tolerance, never above the true one by more.
+    """Returns the least eigenvalue over a stack of L^-1 D L^-T, to a relative tolerance; it is never above the true one by more than that.
 
-    Householder tridiagonalisation, then bisection on Sturm sequences; a matrix is skipped as soon as it is known to lie above the
-    least found so far.
+    The method is Householder tridiagonalisation, then bisection on Sturm sequences. A matrix is skipped as soon as it is known to lie above
+    the least eigenvalue found so far.
     """
     S, L = D.shape[0], D.shape[1]
     T = np.empty((L, L))
@@ -145,7 +150,10 @@ def lowest_relative_eigenvalue(inverse: Array, D: Array, tolerance: float) -> fl
 
 @njit(cache=True)
 def adjoint(weights: Array, slopes: Array, grid: int, products: Array, x: Array) -> Array:
-    """Lambda_j(x), (R K, L^2), as certifier.conic.cone has it; x (R, N), products (N_A, L^2) of rho."""
+    """Returns Lambda_j(x), (R K, L^2), as certifier.conic.cone has it.
+
+    x is (R, N), and products is (N_A, L^2), those of rho.
+    """
     R, (K, NA) = len(x), weights.shape
     scaled = np.empty((R * K, NA))
     for r in range(R):
@@ -163,7 +171,10 @@ def adjoint(weights: Array, slopes: Array, grid: int, products: Array, x: Array)
 
 @njit(cache=True)
 def values(weights: Array, slopes: Array, grid: int, products: Array, Q: Array) -> Array:
-    """Coordinates of sum_j g_j rho' Q_j rho, (R, N), as certifier.conic.cone has it; Q (R K, L^2), products (L^2, N_A) of rho."""
+    """Returns the coordinates of sum_j g_j rho' Q_j rho, (R, N), as certifier.conic.cone has it.
+
+    Q is (R K, L^2), and products is (L^2, N_A), those of rho.
+    """
     K, NA = weights.shape
     R, squares = len(Q) // K, np.dot(Q, products)
     sums = np.zeros((R, NA + slopes.shape[1] * grid))
@@ -182,7 +193,7 @@ def values(weights: Array, slopes: Array, grid: int, products: Array, Q: Array) 
 
 @njit(cache=True)
 def line_search(eigenvalues: Array, slope: Array) -> Array:
-    """The minimisers a, (R,), of a slope_r - sum_i log(1 + a eigenvalue_ri), by safeguarded Newton from 0."""
+    """Returns the minimisers a, (R,), of a slope_r - sum_i log(1 + a eigenvalue_ri), by safeguarded Newton's method from 0."""
     lengths = np.empty(len(slope))
     for r in range(len(slope)):
         lowest, a, following = eigenvalues[r].min(), 0.0, 0.0
@@ -205,7 +216,7 @@ def line_search(eigenvalues: Array, slope: Array) -> Array:
 
 @njit(cache=True)
 def _count_below(diagonal: Array, off: Array, x: float) -> int:
-    """1 if the tridiagonal matrix has an eigenvalue below x, else 0 (Sturm)."""
+    """Returns 1 if the tridiagonal matrix has an eigenvalue below x, else 0 (Sturm)."""
     if x == np.inf:
         return 1
     pivot = 1.0
@@ -226,7 +237,7 @@ def schur(rho: Array, weights: Array, slopes: Array, grid: int, Q: Array, S: Arr
     rho_t = np.ascontiguousarray(rho.T)
     for r in range(R):
         for first in range(0, NA, _ROWS):
-            # Tiles of grid rows need every column (for the blocks of the outside joints), the others the lower triangle.
+            # Tiles of grid rows need every column, for the blocks of the outside joints; the other tiles need the lower triangle.
             last = min(first + _ROWS, NA)
             width = NA if first < grid and outside > 0 else last
             columns = np.ascontiguousarray(rho_t[:, :width])

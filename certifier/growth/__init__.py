@@ -1,1 +1,1 @@
-"""How a region grows: a state machine that decides what is computed next and computes nothing heavy itself."""
+"""Growing a region is decided here: a state machine says what is computed next, and computes nothing heavy itself."""

@@ -1,7 +1,7 @@
-"""What growing a region asks for and is told, between :mod:`certifier.growth.machine`, which decides, and whoever carries it out.
+"""Actions are what growing a region asks for, and reports are what it is told.
 
-What is reported is a Proposal (:mod:`certifier.seeding.proposal`), Outcomes, what a step has Stepped to (:mod:`certifier.step.stepped`),
-or that the action Failed.
+:mod:`certifier.growth.machine` decides on the actions, and others carry them out. A report is a Proposal
+(:mod:`certifier.seeding.proposal`), Outcomes, what a step has Stepped to (:mod:`certifier.step.stepped`), or that the action Failed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from certifier.step.stepped import Stepped
 
 @dataclass(frozen=True)
 class Propose:
-    """Run :func:`certifier.seeding.propose.propose` with the options of this document; report a Proposal or Failed."""
+    """Asks for :func:`certifier.seeding.propose.propose` with the options of this document; the report is a Proposal or Failed."""
 
     kind: ClassVar[str] = "propose"
     seed: dict[str, Any]
@@ -28,17 +28,18 @@ class Propose:
 
 @dataclass(frozen=True, eq=False)
 class Certify:
-    """Certify these pairs on a polytope; report their Outcomes.
+    """Asks to certify these pairs on a polytope; the report is their Outcomes.
 
     Attributes:
         iteration: number of this certification within the job, from 0.
         label: what it is for: ``given``, ``contract``, ``push`` or ``round``.
-        polytope: joint limits included.
-        center: interior point, (n,); None for the Chebyshev centre.
-        pairs: indices into ``scene.pairs`` to certify, most likely failures first.
+        polytope: its rows include the joint limits.
+        center: (n,) interior point; None for the Chebyshev centre.
+        pairs: indices into ``scene.pairs`` to certify, those most likely to fail first.
         reuse: pair index -> earlier iteration whose proof, on a superset, serves here too.
         hard: pairs that failed on a larger polytope; nothing less than all faces is tried for them.
-        failures: end after this many, in the order of ``pairs`` (B.3); pairs not reached are reported as absent. None for all pairs.
+        failures: end after this many failures, in the order of ``pairs`` (B.3); pairs not reached are left out of the report. None to
+            certify all pairs.
     """
 
     kind: ClassVar[str] = "certify"
@@ -54,10 +55,10 @@ class Certify:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Run the polytope step (12) on the best region's polytope with its proofs; report Stepped or Failed.
+    """Asks for the polytope step (12) on the best region's polytope with its proofs; the report is Stepped or Failed.
 
     Attributes:
-        iteration: the one whose polytope it is.
+        iteration: the one that completed the polytope.
         contain: (k, n) points that stay inside.
     """
 
@@ -69,7 +70,12 @@ class Step:
 
 @dataclass(frozen=True)
 class Finish:
-    """Nothing is left to do; the outcome is about the polytope asked for, the reason is a sentence."""
+    """Says that nothing is left to do.
+
+    Attributes:
+        outcome: about the polytope that was asked for.
+        reason: a sentence.
+    """
 
     kind: ClassVar[str] = "finish"
     outcome: Outcome
@@ -81,7 +87,7 @@ Action = Propose | Certify | Step | Finish
 
 @dataclass(frozen=True, eq=False)
 class Outcomes:
-    """The outcome of each pair of a certification that was reached; reused pairs are left out.
+    """Reports the outcome of each pair that a certification reached; reused pairs are left out.
 
     Attributes:
         weaknesses: pair index -> where it fails; pairs of which nothing is known are left out.
@@ -93,18 +99,18 @@ class Outcomes:
 
     @property
     def failures(self) -> list[int]:
-        """The pairs that are not certified, in the order in which they were reached."""
+        """Returns the pairs that are not certified, in the order in which they were reached."""
         return [index for index, outcome in self.outcomes.items() if outcome is not Outcome.CERTIFIED]
 
     @property
     def complete(self) -> bool:
-        """Whether every pair is certified."""
+        """Returns whether every pair is certified."""
         return not self.failures and len(self.outcomes) == len(self.action.pairs)
 
 
 @dataclass(frozen=True)
 class Failed:
-    """The action could not be carried out."""
+    """Reports that the action could not be carried out."""
 
     error: CirisError
 
@@ -114,12 +120,13 @@ Report = Proposal | Outcomes | Stepped | Failed
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A polytope all of whose pairs are certified: to be accepted as a region now.
+    """A candidate is a polytope all of whose pairs are certified; it is to be accepted as a region now.
 
     Attributes:
         iteration: the one that completed it.
-        center: a point inside; seed: the one that the region was grown around, None for a given polytope.
-        ellipsoid_volume: of the largest ellipsoid inside; None for a given polytope, which is measured against nothing.
+        center: (n,) a point inside.
+        seed: (n,) the point in s that the region was grown around; None for a given polytope.
+        ellipsoid_volume: volume of the largest ellipsoid inside; None for a given polytope, which is not compared with any other.
         proofs: pair index -> iteration that holds its proof.
     """
 
@@ -133,7 +140,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Transition:
-    """The state to store, the action to carry out, and a region to accept first if there is one."""
+    """A transition holds the state to store, the action to carry out, and a region to accept first if there is one."""
 
     state: GrowthState
     action: Action

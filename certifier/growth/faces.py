@@ -1,16 +1,18 @@
-"""Targeted contraction: faces that cut away where the program (11) of a pair fails, and little else.
+"""Targeted contraction adds faces that cut away where the program (11) of a pair fails, and little else.
 
-A pair that is not certifiable comes with the means of its dual point's pseudo-moments, where no plane of this degree works, and with the
-derivatives of the program's optimum for the joints' ranges. The polytope is measured by an ellipsoid about its analytic centre, a
-distance in it being seen from the hull of the centre and the points to keep.
+A pair that is not certifiable comes with the means of its dual point's pseudo-moments, where no plane of this degree works. It also
+comes with the derivatives of the program's optimum with respect to the joints' ranges.
+
+The polytope is measured by an ellipsoid about its analytic centre. Distances in it are taken from the hull of the centre and the points
+to keep.
 
     a mean farther than ``near``     -> a face between it and the hull
     all means nearer                 -> the pair fails because it turns too far: the joint where that helps most gets a shorter
                                         range, all its joints do when that has not helped for long
     a collision                      -> a face, wherever it is
 
-Faces have normals in the joints between the two bodies only: the other joints do not move the one relative to the other. Where only planes
-at rest were tried the program knows the joints' ranges alone, and faces have normals in one joint.
+Faces have normals in the joints between the two bodies only, because the other joints do not move one body relative to the other. Where
+only planes at rest were tried, the program knows the joints' ranges alone, and a face has its normal in one joint.
 """
 
 from __future__ import annotations
@@ -25,22 +27,25 @@ from certifier.pair.result import Weakness
 from certifier.polytopes.polytope import bounds, drop_redundant
 
 BACKOFF, BACKOFF_GROWTH, LARGEST_BACKOFF = 0.2, 1.2, 0.6
-"""How far a face moves from the mean towards the hull, more each time the same pair fails, as a part of the distance."""
+"""A face moves from the mean towards the hull by a part of the distance.
+
+That part is BACKOFF at first. It is multiplied by BACKOFF_GROWTH each time the same pair fails, up to LARGEST_BACKOFF.
+"""
 SHORTER = 0.6
-"""What is left of a joint's range."""
+"""This share of a joint's range is left on either side of the centre."""
 PATIENCE = 12
-"""Attempts after which all of a pair's joints are shortened at once."""
+"""After this many attempts all of a pair's joints are shortened at once."""
 KEPT_SLACK = 0.05
-"""Part of a joint's range that stays free around the points to keep."""
+"""This part of a joint's range stays free around the points to keep."""
 SMALLEST_RANGE = 1e-6
 NEAR_RANGES = 0.5
-"""Share of the distance at which a mean gets a face, where a face is a shorter range on one side."""
+"""Where a face is a shorter range on one side, a mean gets a face from this share of the distance ``near`` on."""
 _HULL_WEIGHT = 1e3
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A pair that is not certified on the polytope.
+    """A failure is a pair that is not certified on the polytope.
 
     Attributes:
         joints: position indices of the joints between its bodies.
@@ -56,17 +61,22 @@ class Failure:
 
 @dataclass(frozen=True)
 class Measure:
-    """The ellipsoid {center + shape v : |v| <= 1}."""
+    """A measure is the ellipsoid {center + shape v : |v| <= 1}, where covariance = shape shape'.
+
+    Attributes:
+        center: (n,).
+        covariance: (n, n).
+    """
 
     center: Array
     covariance: Array
 
 
 def measure(polytope: Polytope, start: Array) -> Measure:
-    """The analytic centre and sqrt(2) times Dikin's ellipsoid there, which is the inscribed one for a box.
+    """Returns the analytic centre with sqrt(2) times Dikin's ellipsoid there, which for a box is the inscribed ellipsoid.
 
     Args:
-        start: (n,) strictly inside.
+        start: (n,) a point strictly inside.
     """
     C, d, s = polytope.C, polytope.d, start
     for _ in range(200):
@@ -82,12 +92,12 @@ def measure(polytope: Polytope, start: Array) -> Measure:
 
 
 def contract(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, failures: list[Failure], near: float) -> Polytope | None:
-    """The polytope with faces added for every failure, redundant faces dropped.
+    """Returns the polytope with faces added for every failure, without redundant faces.
 
     Args:
         polytope: its last 2n rows are the joint limits; so are the result's.
         keep: (k, n) points that stay inside.
-        near: distance in the ellipsoid; at 1 it does not notice a face.
+        near: distance in the ellipsoid from which on a mean gets a face; a face at distance 1 does not cut the ellipsoid.
 
     Returns:
         None when a joint's range would become too short to go on.
@@ -112,7 +122,7 @@ def contract(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, 
 
 
 def _face(ellipsoid: Measure, keep: Array, failure: Failure, near: float) -> tuple[Array, Array] | None:
-    """A face before the farthest mean; None when all are near and none is a collision."""
+    """Returns a face before the farthest mean; None when all means are near and none is a collision."""
     if not len(failure.weakness.points):
         return None
     joints = list(failure.joints)
@@ -139,7 +149,10 @@ def _face(ellipsoid: Measure, keep: Array, failure: Failure, near: float) -> tup
 
 
 def _shorter_range(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, failure: Failure) -> tuple[Array, Array] | None:
-    """Two faces about the centre that shorten the range of the joint that turns far and where that helps."""
+    """Returns two faces for each joint to shorten, one on either side of the centre; None when a range is too short already.
+
+    The joint to shorten is the one that turns far and where a shorter range helps. After PATIENCE attempts it is all of the pair's joints.
+    """
     lower, upper = bounds(polytope)
     center = ellipsoid.center
     joints = [_worst_joint(scene, polytope, failure)] if failure.attempts < PATIENCE else list(failure.joints)
@@ -154,7 +167,7 @@ def _shorter_range(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: A
 
 
 def _worst_joint(scene: Scene, polytope: Polytope, failure: Failure) -> int:
-    """The joint of the pair that turns far and where a shorter range helps."""
+    """Returns the joint of the pair that turns far and where a shorter range helps."""
     lower, upper = bounds(polytope)
     turn = np.where(scene.revolute, 2 * (np.arctan(upper) - np.arctan(lower)), upper - lower)
     gain = turn * failure.weakness.pull if len(failure.weakness.points) else turn

@@ -1,8 +1,9 @@
-"""Growing a region as a pure state machine: propose, contract until certified, push the faces out again, alternate (11) with (12).
+"""A region is grown by a pure state machine: propose, contract until certified, push the faces out again, alternate (11) with (12).
 
-Appendix B.4 and Algorithm 1 of C-IRIS. :func:`begin` and :func:`advance` decide what to do next and compute nothing heavy:
-whoever drives them (the service's coordinator, or :mod:`certifier.jobs.local`) carries out the action and reports back. This module
-says what follows what; its neighbours know how each phase goes.
+It follows appendix B.4 and Algorithm 1 of C-IRIS. :func:`begin` and :func:`advance` decide what to do next and compute nothing heavy.
+Whoever drives them (the service's coordinator, or :mod:`certifier.jobs.local`) carries out the action and reports back.
+
+This module says what follows what. Its neighbours know how each phase goes.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from certifier.step.stepped import Stepped
 
 
 def begin(scene: Scene, options: GrowthOptions) -> Transition:
-    """The first action of a job.
+    """Returns the first action of a job.
 
     Raises:
         RegionError: a ``certify`` job without C and d, or with the wrong number of columns.
@@ -46,7 +47,7 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
 
 
 def advance(scene: Scene, state: GrowthState, report: Report) -> Transition:
-    """What follows a report; the state is the one of the last transition and is not changed."""
+    """Returns what follows a report; the state is the one of the last transition and is not changed."""
     if isinstance(report, Outcomes):
         return _certified(scene, state, report)
     if isinstance(report, Proposal):
@@ -100,7 +101,7 @@ def _candidate(state: GrowthState, report: Outcomes, volume: float | None) -> Ca
 
 
 def _after(scene: Scene, state: GrowthState, start: Start, report: Outcomes, accepted: bool) -> Transition:
-    """What follows a certification: more of the same phase, or else the next one."""
+    """Returns what follows a certification: more of the same phase, or else the next phase."""
     label = report.action.label
     if label == "round":
         return after_round(scene, _suspecting(state, report), start, accepted)
@@ -125,19 +126,19 @@ def _after_contraction(scene: Scene, state: GrowthState, start: Start, report: O
             reason = f"not even a small region around the seed can be certified: {pair.a} and {pair.b} are too close there"
             return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
     elif state.reach > 1 and not state.cuts.attempts:
-        # Pushed out from a given polytope, and nothing had to be cut: it goes on outwards.
+        # The given polytope was pushed out and nothing had to be cut, so its faces go on outwards.
         return _push_or_step(scene, state, start, further(state))
-    _, near = starts[-1]  # of the last contraction, begun or not, for the pushes
+    _, near = starts[-1]  # The pushes use that of the last contraction, begun or not.
     return next_contraction(scene, state, start) or _push_or_step(scene, replace(state, near=near), start)
 
 
 def _push_or_step(scene: Scene, state: GrowthState, start: Start, reach: float | None = None) -> Transition:
-    """The next push, or the alternation when there were enough."""
+    """Returns the next push, or the alternation when there were enough pushes."""
     push = next_push(scene, state, start) if reach is None else next_push(scene, state, start, reach)
     return push or next_round(scene, state, start)
 
 
 def _suspecting(state: GrowthState, report: Outcomes) -> GrowthState:
-    """The pairs that failed now come first the next time."""
+    """Returns the state in which the pairs that failed now come first the next time."""
     failures = report.failures
     return replace(state, suspects=(*failures, *(i for i in state.suspects if i not in failures)))

@@ -1,4 +1,4 @@
-"""What a growth job may be asked for."""
+"""The options say what a growth job may be asked for."""
 
 from __future__ import annotations
 
@@ -13,9 +13,13 @@ EFFORT = (
     (6, {"contractions": 2, "pushes": 2, "max_rounds": 0}),
     (math.inf, {"contractions": 1, "pushes": 0, "max_rounds": 0}),
 )
-"""Defaults, by the most joints that any pair has between its bodies: for seconds, a minute, or the first region, itself a minute."""
+"""The defaults depend on the most joints that any pair has between its bodies.
+
+With up to 4 joints growing then takes seconds, and with up to 6 a minute. With more joints it ends at the first region, which itself
+takes a minute.
+"""
 NEAR = (1.0, 0.6, 0.3)
-"""Of the contractions, one after the other: from how near on a pair's failure calls for a shorter range and not for a face."""
+"""For each contraction in turn: a pair's failure calls for a shorter range, and not for a face, when it is nearer than this."""
 
 
 WHOLE_NUMBERS = {
@@ -26,21 +30,21 @@ WHOLE_NUMBERS = {
     "backoff": (0, 20),
     "random_seed": (0, 2**63 - 1),
 }
-"""Option -> its least and its greatest value."""
+"""Maps an option to its least and its greatest value."""
 LARGEST_TOLERANCE = 10.0
 """A tolerance lies between 0 and this."""
 
 
 @dataclass(frozen=True)
 class GrowthOptions:
-    """What a job asks for.
+    """The options say what a job asks for.
 
     Attributes:
         kind: ``grow`` a region from a seed, or ``certify`` a given polytope as it is.
         seed: the document of :class:`certifier.seeding.propose.SeedOptions`; for ``certify`` its ``C``, ``d`` and optional ``center``.
         contraction: ``targeted`` or ``uniform``.
         contractions: how many targeted contractions of the proposal are tried; each is given up when it is smaller than the best so far.
-            None, of this and the two that follow it, is what pays: see EFFORT.
+            None, for this and for ``pushes`` and ``max_rounds``, takes the default that pays: see EFFORT.
         bisection_steps: certifications spent on uniform contraction after the two ends are known.
         pushes: how often the faces are pushed out after the contractions; each push that fails is followed by a shorter one.
         max_rounds: rounds of the polytope step (12) after the pushes.
@@ -61,15 +65,15 @@ class GrowthOptions:
     random_seed: int = 0
 
     def to_document(self) -> dict[str, Any]:
-        """The options as JSON-able data."""
+        """Returns the options as JSON-able data."""
         return asdict(self)
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> GrowthOptions:
-        """Inverse of :meth:`to_document`.
+        """Does the inverse of :meth:`to_document`.
 
         Raises:
-            RegionError: an unknown or out-of-range option; the error names it.
+            RegionError: an option is unknown or out of range; the error names it.
         """
         known = {f.name for f in fields(cls)}
         for name in document:

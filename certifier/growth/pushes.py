@@ -1,5 +1,7 @@
-"""Pushes: all faces of the best region move out from its centre, within the proposal or the joint limits, and targeted faces
-contract the result. A push counts when the inscribed ellipsoid has grown."""
+"""A push moves all faces of the best region out from its centre and lets targeted faces contract the result.
+
+The faces stay within the proposal or the joint limits. A push counts when the inscribed ellipsoid has grown.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +14,15 @@ from certifier.growth.trials import effort, is_worth_it
 from certifier.model import Scene
 
 PUSH, SMALLEST_PUSH = 1.5, 0.1
-"""Factor by which faces are pushed out at first; the least growth tried."""
+"""PUSH is the factor by which faces are pushed out at first. A factor below 1 + SMALLEST_PUSH is not tried."""
 
 
 def next_push(scene: Scene, state: GrowthState, start: Start, reach: float = PUSH) -> Transition | None:
-    """Begins the next push of the best region that may come to more, as far as that or less far; None when there were enough."""
+    """Begins the next push of the best region that may come to more; returns None when there were enough.
+
+    Args:
+        reach: factor by which the faces move out; smaller factors follow where it promises nothing.
+    """
     best, rows = state.best, scene.polytope([], []) if start.given else start.rows
     assert best is not None
     while state.pushes < effort(scene, state, "pushes") and reach - 1 >= SMALLEST_PUSH:
@@ -29,10 +35,10 @@ def next_push(scene: Scene, state: GrowthState, start: Start, reach: float = PUS
 
 
 def further(state: GrowthState) -> float:
-    """How far to push after a push that came through: twice as far when nothing had to be cut."""
+    """Returns how far to push after a push that came through: PUSH, or twice as far as the last time when nothing had to be cut."""
     return PUSH if state.cuts.attempts else 1 + 2 * (state.reach - 1)
 
 
 def less(reach: float) -> float:
-    """How far to push after a push that far came to nothing."""
+    """Returns how far to push after a push as far as ``reach`` came to nothing."""
     return 1 + (reach - 1) / 2

@@ -1,4 +1,4 @@
-"""Rounds of the alternation (C-IRIS, Algorithm 1): a polytope step (12), certified by (11), and halved while that fails."""
+"""A round of the alternation (C-IRIS, Algorithm 1) is a polytope step (12) that is certified by (11), and halved while that fails."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from certifier.step.stepped import Stepped
 
 
 def next_round(scene: Scene, state: GrowthState, start: Start) -> Transition:
-    """The next step from the best region, or the end."""
+    """Returns the next step from the best region, or the end."""
     best, rounds = state.best, state.rounds
     assert best is not None
     if rounds >= effort(scene, state, "max_rounds"):
@@ -22,7 +22,7 @@ def next_round(scene: Scene, state: GrowthState, start: Start) -> Transition:
 
 
 def certify_step(scene: Scene, state: GrowthState, stepped: Stepped) -> Transition:
-    """Certifies all of a step."""
+    """Asks to certify the polytope that a step has come to."""
     assert state.best is not None
     round_ = Round(stepped.base, state.best.center, stepped.polytope, stepped.center, stepped.growth)
     return certify(scene, replace(state, round=round_), "round", stepped.polytope, stepped.center)

@@ -1,4 +1,7 @@
-"""What the growth of a region knows between two actions; JSON-able, so that a job can be resumed from its rows alone."""
+"""The state is what the growth of a region knows between two actions.
+
+It is JSON-able, so that a job can be resumed from its database rows alone.
+"""
 
 from __future__ import annotations
 
@@ -14,11 +17,11 @@ from certifier.model import Array, Polytope
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """What growing starts from.
+    """Holds the proposal that growing starts from.
 
     Attributes:
         rows: the proposal's faces, then the joint limits, all scaled to |c| = 1.
-        seed: (n,) in s.
+        seed: (n,) the seed in s.
         keep: (k, n) points that stay inside, the first of them well inside.
         given: the proposal is a box or a polytope of the user's; beyond it nothing is known.
     """
@@ -31,7 +34,7 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Best:
-    """The largest certified polytope so far.
+    """Holds the largest certified polytope so far.
 
     Attributes:
         iteration: the one that completed it.
@@ -46,7 +49,7 @@ class Best:
 
 @dataclass(frozen=True)
 class Cuts:
-    """A targeted contraction or a push, under way.
+    """The cuts say how far a targeted contraction or a push that is under way has come.
 
     Attributes:
         holds: pair index -> iteration whose proof, on a larger polytope, holds on the present one.
@@ -59,14 +62,15 @@ class Cuts:
 
 @dataclass(frozen=True, eq=False)
 class Bisection:
-    """A uniform contraction, under way: delta = (1 - scale) times the radius of the largest ball.
+    """A bisection is a uniform contraction that is under way, with delta = (1 - scale) times the radius of the largest ball.
 
     Attributes:
-        center, radius: of that ball.
+        center, radius: of the largest ball; center is (n,).
         steps: certifications left.
         scale: of the present trial.
-        holds: pair index -> an iteration that certified it, and that one's scale.
-        certified, failed: the largest scale that was certified, the last one that was not; None before there is one.
+        holds: pair index -> an iteration that certified it, and the scale of that iteration.
+        certified: the largest scale that was certified; None before there is one.
+        failed: the last scale that was not certified; None before there is one.
     """
 
     center: Array
@@ -80,11 +84,11 @@ class Bisection:
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """A polytope step, being certified.
+    """A round is a polytope step that is being certified.
 
     Attributes:
-        base, base_center, target, target_center: the step goes from one to the other, row for row.
-        growth: of the inscribed ellipsoid's volume, relative, if all of the step is certified.
+        base, base_center, target, target_center: the step goes from base to target, row for row, and from one centre to the other.
+        growth: relative growth of the inscribed ellipsoid's volume, if all of the step is certified.
         halvings: how often the step was halved.
     """
 
@@ -98,14 +102,14 @@ class Round:
 
 @dataclass(frozen=True, eq=False)
 class GrowthState:
-    """The state of certifier.growth.machine.
+    """Holds all that certifier.growth.machine knows between two actions.
 
     Attributes:
         next: number of the next iteration.
         suspects: pairs that failed last, to be certified first.
         contractions, pushes, rounds: how many of each were begun.
-        near: of the contraction under way: from how near on a failure calls for a shorter range.
-        reach: of the contraction or push under way: how far the faces were pushed out first.
+        near: for the contraction under way: a failure nearer than this calls for a shorter range.
+        reach: for the contraction or push under way: how far the faces were pushed out first.
     """
 
     options: GrowthOptions
@@ -123,7 +127,7 @@ class GrowthState:
     round: Round | None = None
 
     def to_document(self) -> dict[str, Any]:
-        """The state as JSON-able data, without the options."""
+        """Returns the state as JSON-able data, without the options."""
         return {
             "next": self.next,
             "best": None if self.best is None else _document(self.best),
@@ -141,10 +145,10 @@ class GrowthState:
 
     @classmethod
     def from_document(cls, document: dict[str, Any], options: GrowthOptions) -> GrowthState:
-        """Inverse of :meth:`to_document`.
+        """Does the inverse of :meth:`to_document`.
 
         Raises:
-            CirisError: ``other_version`` for a state of another version of this program.
+            CirisError: ``other_version`` when another version of this program stored the state.
         """
         try:
             cuts = document["cuts"]
@@ -176,7 +180,7 @@ def _plain(value: Any) -> Any:
 
 
 def _part(kind: type[Any], document: dict[str, Any] | None) -> Any:
-    """A part of the state from its document; polytopes are mappings with C and d, arrays are lists."""
+    """Makes a part of the state from its document, in which polytopes are mappings with C and d and arrays are lists."""
     return None if document is None else kind(**{name: _value(name, value) for name, value in document.items()})
 
 
@@ -189,5 +193,5 @@ def _value(name: str, value: Any) -> Any:
 
 
 def _by_pair(document: dict[str, Any]) -> dict[int, Any]:
-    """Keys of a JSON object are text."""
+    """Turns the keys of a JSON object, which are text, back into pair indices."""
     return {int(pair): value for pair, value in document.items()}

@@ -1,7 +1,7 @@
-"""Targeted contraction: faces are added where pairs fail (:mod:`certifier.growth.faces`) until every pair is certified.
+"""Targeted contraction adds faces where pairs fail (:mod:`certifier.growth.faces`) until every pair is certified.
 
-What was certified stays so, since the polytope only shrinks. The contraction of a proposal is tried a few times with another balance
-between faces and shorter ranges; the largest region counts.
+What was certified stays so, since the polytope only shrinks. The contraction of a proposal is tried a few times, each time with another
+balance between faces and shorter ranges, and the largest region counts.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from certifier.pair.result import Weakness
 from certifier.polytopes.polytope import drop_redundant
 
 MAX_ATTEMPTS = 60
-"""Faces added for one pair before a contraction gives up."""
+"""A contraction gives up after faces were added this many times for one pair."""
 FAILURES = 2
-"""Pairs for which faces are added at once, so that two workers can look for them."""
+"""Faces are added for this many pairs at once, so that two workers can look for such pairs."""
 FAR = 8.0
-"""Factor by which the faces of a given polytope are pushed out from the seed before anything is certified."""
+"""The faces of a given polytope are pushed out from the seed by this factor before anything is certified."""
 
 
 def next_contraction(scene: Scene, state: GrowthState, start: Start) -> Transition | None:
-    """Begins the next contraction of the proposal that may come to more than the best region; None when there were enough."""
+    """Begins the next contraction of the proposal that may come to more than the best region; returns None when there were enough."""
     starts = contraction_starts(scene, state, start)
     for tried in range(state.contractions, len(starts)):
         reach, near = starts[tried]
@@ -42,16 +42,22 @@ def next_contraction(scene: Scene, state: GrowthState, start: Start) -> Transiti
 
 
 def contraction_starts(scene: Scene, state: GrowthState, start: Start) -> list[tuple[float, float]]:
-    """Where contractions start: how far the proposal's faces are pushed out first, and one of NEAR.
+    """Returns where contractions start: how far the proposal's faces are pushed out first, and one of NEAR.
 
-    What IRIS cut off collides, but beyond a given polytope nothing is known: the first contraction begins far outside of it.
+    What IRIS cut off collides, but beyond a given polytope nothing is known. So there the first contraction begins far outside.
     """
     starts = [(1.0, near) for near in NEAR[: effort(scene, state, "contractions")]]
     return [(FAR, NEAR[0]), *starts] if start.given and effort(scene, state, "pushes") else starts
 
 
 def pushed(scene: Scene, polytope: Polytope, center: Array, reach: float, within: Polytope) -> Polytope:
-    """The faces of a polytope with the joint limits farther from the centre by that factor, within another polytope with them."""
+    """Returns a polytope with its faces farther from the centre by the factor ``reach``, within another polytope.
+
+    Args:
+        polytope: its last 2n rows are the joint limits, which do not move.
+        center: (n,) the point that the faces move away from.
+        within: a polytope that the result stays inside; its last 2n rows are the joint limits, and so are the result's.
+    """
     limits = 2 * scene.n
     C, d = polytope.C[:-limits], polytope.d[:-limits]
     moved = Polytope(np.concatenate([C, within.C]), np.concatenate([C @ center + reach * (d - C @ center), within.d]))
@@ -60,14 +66,18 @@ def pushed(scene: Scene, polytope: Polytope, center: Array, reach: float, within
 
 
 def trim(scene: Scene, state: GrowthState, start: Start, label: str, polytope: Polytope) -> Transition:
-    """Certifies what the cuts have come to; a pair certified on a larger polytope is certified on this one."""
+    """Asks to certify what the cuts have come to; a pair certified on a larger polytope is certified on this one."""
     cuts, center = state.cuts, measure(polytope, start.keep[0]).center
     hard = sorted(index for index in cuts.attempts if index not in cuts.holds)
     return certify(scene, state, label, polytope, center, reuse=dict(cuts.holds), hard=hard, failures=FAILURES)
 
 
 def cut(scene: Scene, state: GrowthState, start: Start, report: Outcomes) -> Transition | None:
-    """Adds faces for the pairs that failed and goes on; None when that leads nowhere, or to nothing larger than the best region."""
+    """Adds faces for the pairs that failed and goes on.
+
+    Returns:
+        None when that leads nowhere, or to nothing larger than the best region.
+    """
     action, attempts = report.action, dict(state.cuts.attempts)
     certified = {i: action.iteration for i, outcome in report.outcomes.items() if outcome is Outcome.CERTIFIED}
     found = []

@@ -1,4 +1,4 @@
-"""Trials: polytopes that are certified next, whatever they are for, and what decides about the order of their pairs."""
+"""A trial is a polytope that is certified next, whatever it is for. The order of its pairs is decided here."""
 
 from __future__ import annotations
 
@@ -24,7 +24,10 @@ def certify(
     hard: Sequence[int] = (),
     failures: int | None = 1,
 ) -> Transition:
-    """Certify a polytope: the pairs that failed last first, then those with few joints between them, which are cheap and fail early."""
+    """Asks to certify a polytope.
+
+    The pairs that failed last come first, then those with few joints between them, which are cheap and fail early.
+    """
     reuse = reuse or {}
     suspects = [i for i in state.suspects if i not in reuse]
     others = [i for i in _by_joints(scene) if i not in reuse and i not in set(suspects)]
@@ -33,7 +36,7 @@ def certify(
 
 
 def is_worth_it(state: GrowthState, polytope: Polytope) -> bool:
-    """Whether certifying the polytope would be progress."""
+    """Returns whether certifying the polytope would be progress."""
     if state.best is None:
         return True
     least = state.best.ellipsoid_volume * (1 + state.options.tolerance)
@@ -41,13 +44,13 @@ def is_worth_it(state: GrowthState, polytope: Polytope) -> bool:
 
 
 def joints_between(scene: Scene, index: int) -> tuple[int, ...]:
-    """Position indices of the joints between the bodies of pair ``scene.pairs[index]``, ascending."""
+    """Returns the position indices of the joints between the bodies of pair ``scene.pairs[index]``, ascending."""
     a, b = (scene.geometry(name).body for name in (scene.pairs[index].a, scene.pairs[index].b))
     return tuple(sorted(Kinematics.of(scene).chain(a, b)))
 
 
 def effort(scene: Scene, state: GrowthState, option: str) -> int:
-    """The option of this name: what was asked for, or what pays in scenes with chains as long as this one's."""
+    """Returns the option of this name: what was asked for, or what pays in scenes with chains as long as this one's."""
     given = getattr(state.options, option)
     if given is not None:
         return int(given)

@@ -1,5 +1,7 @@
-"""Uniform contraction (C-IRIS B.4): the largest {C s <= d - delta} that certifies, by bisection; it keeps its Chebyshev centre
-and shrinks to it."""
+"""Uniform contraction (C-IRIS B.4) looks for the largest {C s <= d - delta} that certifies, by bisection.
+
+The polytope keeps its Chebyshev centre and shrinks to it.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +15,11 @@ from certifier.model import Scene
 from certifier.outcome import Outcome, combine
 
 SMALLEST_SCALE = 1e-3
-"""The last trial, relative to the proposal."""
+"""No trial is smaller than this, relative to the proposal; where this trial fails, growing ends."""
 
 
 def shrink(scene: Scene, state: GrowthState, start: Start, bisection: Bisection) -> Transition:
-    """Certifies the bisection's trial."""
+    """Asks to certify the bisection's trial."""
     offsets = start.rows.d - (1 - bisection.scale) * bisection.radius
     reuse = {index: iteration for index, (iteration, scale) in bisection.holds.items() if scale >= bisection.scale}
     trial = scene.polytope(start.rows.C, offsets)
@@ -25,7 +27,13 @@ def shrink(scene: Scene, state: GrowthState, start: Start, bisection: Bisection)
 
 
 def bisect(scene: Scene, state: GrowthState, start: Start, report: Outcomes) -> Transition | None:
-    """The next trial, between (in the logarithm) one that was certified and one that was not; None when there were enough."""
+    """Returns the next trial: its scale lies in the logarithm between one that was certified and one that was not.
+
+    Where the smallest trial fails, the job is finished instead.
+
+    Returns:
+        None when no further trial is needed.
+    """
     bisection, iteration = state.bisection, report.action.iteration
     assert bisection is not None
     scale, holds = bisection.scale, dict(bisection.holds)

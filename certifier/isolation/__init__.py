@@ -1,1 +1,1 @@
-"""Functions run in child processes that may die, hang or take too much memory without harm."""
+"""Functions run here in child processes, which may die, hang or take too much memory without harm."""

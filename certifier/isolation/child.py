@@ -1,10 +1,10 @@
-"""Run one function in a process that may die, hang or swallow memory without harming the caller.
+"""One function runs in a child process, which may die, hang or take too much memory without harming the caller.
 
 Loading Drake takes longer than most of what is then asked of it. So a nursery (:mod:`certifier.isolation.nursery`) loads a module once
-and forks a child for every call of one of its functions; it is kept for the next call, and sees nothing of what the children read.
+and forks a child for every call of one of its functions. It is kept for the next call, and it sees nothing of what the children read.
 
-Arguments and results travel as JSON; NumPy arrays in it as ``{"__array__": ..., "dtype": ...}``. Whatever native code prints goes to a
-log, whose tail explains a death.
+Arguments and results travel as JSON, in which NumPy arrays are ``{"__array__": ..., "dtype": ..., "shape": ...}``. Whatever native code
+prints goes to a log, whose tail explains a death.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from certifier.errors import CirisError, RegionError, SceneError
 
 ERRORS = {cls.__name__: cls for cls in (CirisError, SceneError, RegionError)}
 STATUS = struct.Struct("i")
-"""How a child ended, before its answer: 0, an exit status, or a signal with a minus."""
+"""This says how a child ended, before its answer: 0, an exit status, or a signal with a minus."""
 _TAIL_BYTES = 2000
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes: int, directory: Path | None = None) -> Any:
-    """``function(payload)`` computed by a child process that is killed when it takes too long or outlives this process.
+    """Returns ``function(payload)``, computed by a child process that is killed when it takes too long or outlives this process.
 
     Args:
         function: ``"package.module:name"``.
         payload: JSON-able data; NumPy arrays are allowed anywhere in it, as in the result.
         timeout_s: wall-clock limit in seconds.
-        memory_bytes: limit of the child's address space.
+        memory_bytes: limit of the child's address space in bytes.
         directory: the child's working directory; None for this process's own.
 
     Raises:
@@ -73,11 +73,11 @@ def prepare(function: str) -> None:
 
 
 class _Nursery:
-    """A process that has loaded a module, and the connection to it."""
+    """Holds a process that has loaded a module, and the connection to it."""
 
     def __init__(self, module: str) -> None:
         self._connection, theirs = Pipe()
-        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
         root = str(Path(__file__).resolve().parents[2])
         path = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
         with theirs:
@@ -92,11 +92,13 @@ class _Nursery:
             )
 
     def ask(self, request: bytes, timeout_s: float) -> tuple[int, bytes]:
-        """How the child ended, and its answer. Whatever is raised, the nursery is killed before.
+        """Returns how the child ended, and its answer.
+
+        The nursery is killed before any error is raised.
 
         Raises:
             TimeoutError: the child has not ended in time.
-            EOFError, ConnectionError: the nursery itself has.
+            EOFError, ConnectionError: the nursery itself has ended.
         """
         self._log.seek(0)
         self._log.truncate()
@@ -118,7 +120,7 @@ class _Nursery:
         self._connection.close()
 
     def tail(self) -> str:
-        """The last lines of the log in one, without the frames of a traceback, after a colon; empty for an empty log."""
+        """Returns the last lines of the log as one line after a colon, without the frames of a traceback; empty for an empty log."""
         self._log.seek(max(0, self._log.seek(0, os.SEEK_END) - _TAIL_BYTES))
         lines = self._log.read().decode(errors="replace").splitlines()
         text = " ".join(line.strip() for line in lines if line.strip() and not line.startswith((" ", "Traceback")))
@@ -126,7 +128,7 @@ class _Nursery:
 
 
 _idle: dict[str, _Nursery] = {}
-"""Module -> the nursery that waits for the next call; one each, however many were needed at once."""
+"""Maps a module to the nursery that waits for its next call; one is kept for each module, however many were needed at once."""
 os.register_at_fork(after_in_child=_idle.clear)
 
 
@@ -144,10 +146,10 @@ def _death(status: int, tail: str, memory_bytes: int) -> CirisError:
 
 
 def encode(value: Any) -> bytes:
-    """JSON with NumPy arrays.
+    """Returns a value as JSON with NumPy arrays.
 
     Raises:
-        TypeError: something else cannot be JSON.
+        TypeError: something in the value cannot be JSON.
     """
 
     def array(x: Any) -> Any:
@@ -161,7 +163,7 @@ def encode(value: Any) -> bytes:
 
 
 def decode(document: dict[str, Any]) -> Any:
-    """The ``object_hook`` that makes arrays again of what :func:`encode` made of them."""
+    """Makes arrays again of what :func:`encode` made of them; it is an ``object_hook``."""
     if "__array__" in document:
         return np.array(document["__array__"], dtype=document["dtype"]).reshape(document["shape"])
     return document

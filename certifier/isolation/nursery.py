@@ -1,7 +1,7 @@
-"""``python -m certifier.isolation.nursery MODULE FD``: loads a module once and forks a child for every call of one of its functions.
+"""``python -m certifier.isolation.nursery MODULE FD`` loads a module once and forks a child for every call of one of its functions.
 
-A module's ``warm_up()`` is called once, to load what is otherwise loaded by the first call. The calls come over the connection FD from
-certifier.isolation.child. A nursery ends when that is closed, and its child with it.
+If the module has a function ``warm_up()``, it is called once, to load what the first call would otherwise load. The calls come over the
+connection FD from certifier.isolation.child. When that connection is closed, the nursery ends, and its child with it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from certifier.isolation.child import ERRORS, STATUS, decode, encode
 
 _PR_SET_PDEATHSIG = 1
 _MOST_WRITTEN = 2**28
-"""Bytes of its answer, and of any file that a child may write, its log among them."""
+"""A child may write this many bytes of its answer, and of any file, its log among them."""
 _CHUNK = 2**16
 
 
@@ -38,7 +38,7 @@ def main() -> None:
 
 
 def _call(module: ModuleType, connection: Connection, request: bytes) -> bytes:
-    """How a child ended that was given the request, and its answer.
+    """Forks a child for the request, and returns how the child ended and its answer.
 
     Raises:
         EOFError: whoever asked is gone, and so is the child.
@@ -53,7 +53,7 @@ def _call(module: ModuleType, connection: Connection, request: bytes) -> bytes:
     os.close(writing)
     answer, gone = bytearray(), False
     while len(answer) <= _MOST_WRITTEN:
-        gone = connection in wait([reading, connection])  # who asked says nothing before there is an answer
+        gone = connection in wait([reading, connection])  # whoever asked says nothing before there is an answer
         chunk = b"" if gone else os.read(reading, _CHUNK)
         if not chunk:
             break
@@ -68,7 +68,7 @@ def _call(module: ModuleType, connection: Connection, request: bytes) -> bytes:
 
 
 def _answer(module: ModuleType, request: bytes, writing: int, nursery: int) -> int:
-    """Answers a call in the child; its exit status."""
+    """Answers a call in the child, and returns the child's exit status."""
     try:
         call = json.loads(request, object_hook=decode)
         _confine(call["memory_bytes"], nursery)
@@ -89,7 +89,7 @@ def _answer(module: ModuleType, request: bytes, writing: int, nursery: int) -> i
 
 
 def _confine(memory_bytes: int, nursery: int) -> None:
-    """Limits what this process may take, has it write no core file, and die with the nursery."""
+    """Limits what this process may take, lets it write no core file, and makes it die with the nursery."""
     resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
     resource.setrlimit(resource.RLIMIT_FSIZE, (_MOST_WRITTEN, _MOST_WRITTEN))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

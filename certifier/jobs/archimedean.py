@@ -1,4 +1,4 @@
-"""The Archimedean property of a bounded polytope, constructively (C-IRIS, appendix A)."""
+"""The Archimedean property of a bounded polytope is proved here by constructing its certificate (C-IRIS, appendix A)."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from certifier.proof.region import Archimedean
 
 
 def archimedean(polytope: Polytope) -> Archimedean:
-    """The constant N and the multipliers of :class:`Archimedean`, which says what they prove.
+    """Returns the constant N and the multipliers of :class:`Archimedean`, which says what they prove.
 
-    N is the smallest the box allows, max over P of (l + u)'s less sum l_i u_i, rounded up. The multipliers hold in exact
-    arithmetic: ``certifier.verify.archimedean.check_archimedean`` tells.
+    N is the smallest constant that the box [l, u] allows, rounded up: the maximum over P of (l + u)'s, less sum l_i u_i.
+    The multipliers hold in exact arithmetic; ``certifier.verify.archimedean.check_archimedean`` checks that they do.
 
     Raises:
         RegionError: ``polytope_without_limits`` when an axis is not bounded by single rows, or as ``polytope.chebyshev_center``.

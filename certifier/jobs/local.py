@@ -1,4 +1,4 @@
-"""Jobs carried out in this process, without the service: the state machine of certifier.growth.machine driven by plain calls."""
+"""Jobs are carried out in this process, without the service: plain calls drive the state machine of certifier.growth.machine."""
 
 from __future__ import annotations
 
@@ -26,7 +26,13 @@ Progress = Callable[[str], None]
 
 @dataclass
 class _Run:
-    """Results of a job so far: iteration -> pair index -> result, the seconds of the seeding, and the last candidate."""
+    """Keeps what a job has come to so far.
+
+    Attributes:
+        results: iteration -> pair index -> result.
+        seeding_seconds: how long the seeding took.
+        candidate: the last accepted candidate; None before there is one.
+    """
 
     scene: Scene
     seed: int
@@ -67,10 +73,10 @@ class _Run:
 
 
 def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: None) -> Region:
-    """Grow a certified region in this process.
+    """Grows a certified region in this process.
 
     Raises:
-        CirisError: no region could be certified; code ``not_grown``, or the error of the seeding.
+        CirisError: no region could be certified; the code is ``not_grown`` or that of the seeding's error.
     """
     start = time.perf_counter()
     run = _Run(scene, options.random_seed, progress)
@@ -103,7 +109,7 @@ def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: No
 
 
 def certify(scene: Scene, polytope: Polytope, center: Array | None = None, progress: Progress = lambda _: None) -> Verdict:
-    """Certify every pair on a polytope and the joint limits.
+    """Certifies every pair on a polytope and the joint limits.
 
     Raises:
         RegionError: the polytope is malformed, empty or unbounded.

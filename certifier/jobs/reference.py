@@ -1,7 +1,7 @@
-"""Program (11) by other hands: Drake's CspaceFreePolytope with a convex solver of one's choice, for cross-checks.
+"""Drake's CspaceFreePolytope solves program (11) here with a convex solver of one's choice, as a cross-check.
 
-The same planes, affine in s, and the same multipliers, but Drake chooses the reference frame, keeps every face, and treats balls by another
-relaxation. What comes back is a solver's word in floating point: never more than :attr:`Guarantee.NUMERIC`.
+The planes, affine in s, and the multipliers are the same as ours. But Drake chooses the reference frame, keeps every face, and treats
+balls by another relaxation. The answer is a solver's word in floating point, so it is never worth more than :attr:`Guarantee.NUMERIC`.
 """
 
 from __future__ import annotations
@@ -36,21 +36,21 @@ from certifier.scene.drake_model import build_diagram, geometry_name
 
 
 class Solver(StrEnum):
-    """A convex solver that Drake can hand the program to."""
+    """A solver is a convex solver that Drake can hand the program to."""
 
     CLARABEL = "clarabel"
-    """Interior point, open."""
+    """This is an open interior-point solver."""
     SCS = "scs"
-    """First order, open; low accuracy."""
+    """This is an open first-order solver of low accuracy."""
     CSDP = "csdp"
-    """Interior point, open; splits every free variable in two."""
+    """This is an open interior-point solver, which splits every free variable in two."""
     MOSEK = "mosek"
-    """Interior point, needs a licence."""
+    """This is an interior-point solver, which needs a licence."""
 
 
 @dataclass(frozen=True)
 class _Answers:
-    """How one solver is called and what it says when it means yes or no; anything else it says is neither."""
+    """Says how one solver is called and which of its words mean yes and no; any other word means neither."""
 
     make: Callable[[], SolverInterface]
     status: str
@@ -67,19 +67,19 @@ _SOLVERS = {
 
 
 def available() -> list[Solver]:
-    """The solvers that this Drake has and that are licensed."""
+    """Returns the solvers that this Drake has and that are licensed."""
     return [name for name, answers in _SOLVERS.items() if answers.make().available() and answers.make().enabled()]
 
 
 @dataclass(frozen=True)
 class ReferenceResult:
-    """What Drake and the solver say about one pair.
+    """Holds what Drake and the solver say about one pair.
 
     Attributes:
         outcome: certified, not_certifiable or inconclusive.
-        status: the solver's name, how Drake says that it ended, and its own word for it.
-        frame: the body whose frame Drake expressed the plane in.
-        build_seconds, solve_seconds: processor time of making and of solving the program.
+        status: the solver's name, how Drake says that it ended, and the solver's own word for it.
+        frame: the body in whose frame Drake expressed the plane.
+        build_seconds, solve_seconds: processor time that making and solving the program took.
     """
 
     outcome: Outcome
@@ -90,7 +90,7 @@ class ReferenceResult:
 
 
 class Reference:
-    """Drake's pair programs for one scene.
+    """Makes and solves Drake's pair programs for one scene.
 
     Args:
         solver: the name of a :class:`Solver`, one of :func:`available`.
@@ -119,7 +119,7 @@ class Reference:
         self._order = self._joint_order()
 
     def certify(self, index: int, C: Array, d: Array) -> ReferenceResult:
-        """Ask for planes, affine in s, that separate pair ``scene.pairs[index]`` on {C s <= d} within the joint limits."""
+        """Asks for planes, affine in s, that separate pair ``scene.pairs[index]`` on {C s <= d} within the joint limits."""
         pair = self.scene.pairs[index]
         first, second = sorted((self._ids[pair.a], self._ids[pair.b]), key=lambda i: i.get_value())
         start = time.process_time()
@@ -133,9 +133,12 @@ class Reference:
         return ReferenceResult(outcome, status, frame, built - start, solved - built)
 
     def alternate(self, C: Array, d: Array, max_rounds: int, tolerance: float) -> list[tuple[Array, Array]]:
-        """Drake's bilinear alternation between (11) and (12) from {C s <= d}; the polytope of every round, without the joint limits.
+        """Runs Drake's bilinear alternation between (11) and (12) from {C s <= d}.
 
-        Empty when not even the first could be certified. Ends when the ellipsoid's volume grows by less than ``tolerance``.
+        The alternation ends when the ellipsoid's volume grows by less than ``tolerance``.
+
+        Returns:
+            The polytope of every round, without the joint limits; none when not even the first polytope could be certified.
         """
         options = CspaceFreePolytope.BilinearAlternationOptions()
         options.max_iter, options.convergence_tol = max_rounds, tolerance
@@ -146,7 +149,10 @@ class Reference:
         return [(result.C()[:, ours], result.d()) for result in found]
 
     def _outcome(self, result: MathematicalProgramResult) -> tuple[Outcome, str]:
-        """The outcome and the words for it. Drake takes "almost solved" for success, so the solver's own word counts as well."""
+        """Returns the outcome and the words for it.
+
+        Drake takes "almost solved" for success, so the solver's own word counts as well.
+        """
         found = result.get_solution_result()
         word = getattr(result.get_solver_details(), self._answers.status)
         status = f"{self._solver}: {found.name.removeprefix('k')} ({word})"
@@ -157,14 +163,17 @@ class Reference:
         return Outcome.INCONCLUSIVE, status
 
     def _joint_order(self) -> list[int]:
-        """Our position index of every entry of Drake's s, which on a branched tree it numbers otherwise than those of q."""
+        """Returns our position index of every entry of Drake's s.
+
+        On a branched tree Drake numbers the entries of s otherwise than those of q.
+        """
         s = np.linspace(-0.5, 0.5, self.scene.n)
         theirs = RationalForwardKinematics(self._diagram.plant()).ComputeSValue(self.scene.to_q(s), self.scene.q_star)
         return [int(np.abs(s - value).argmin()) for value in theirs]
 
 
 def certify(scene: Scene, polytope: Polytope, solver: str, progress: Progress = lambda _: None) -> Verdict:
-    """Every pair on a polytope and the joint limits by Drake.
+    """Lets Drake certify every pair on a polytope and the joint limits.
 
     Raises:
         CirisError: as :class:`Reference`.

@@ -1,4 +1,4 @@
-"""A certified region: its proof file and its manifest (docs/architecture.md, "Manifest")."""
+"""A certified region gets its proof file and its manifest here (docs/architecture.md, "Manifest")."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from certifier.verify.region import RegionStatement, verify_region
 
 @dataclass(frozen=True)
 class Region:
-    """A region whose proof has been verified.
+    """A region is a polytope whose proof has been verified.
 
     Attributes:
-        manifest: JSON-able, without ``seconds`` and the proof's path, which are the caller's.
+        manifest: JSON-able; the caller adds ``seconds`` and the proof's path.
         proof: the portable proof file.
-        statement: what the verifier says it proves.
+        statement: what the verifier says that the proof proves.
     """
 
     manifest: dict[str, Any]
@@ -35,11 +35,11 @@ class Region:
 
 
 def certified_region(scene: Scene, candidate: Candidate, proofs: dict[int, bytes], provenance: dict[str, Any]) -> Region:
-    """Assemble a region from its pairs' proofs, verify the whole, and describe it.
+    """Assembles a region from its pairs' proofs, verifies the whole, and describes it.
 
     Args:
-        proofs: pair index -> proof file, for every pair of the scene; one that covers several pairs stands at each of them.
-        provenance: options, versions, growth curve, and seconds: altogether, of the seeding, of all pairs.
+        proofs: pair index -> proof file, for every pair of the scene; a proof that covers several pairs stands at each of them.
+        provenance: options, versions, growth curve, and the seconds of the whole job, of the seeding and of all pairs.
 
     Raises:
         ProofError: the proof does not hold; nothing may be served as certified then.
@@ -86,12 +86,12 @@ def certified_region(scene: Scene, candidate: Candidate, proofs: dict[int, bytes
 
 
 def growth_point(iteration: int, seconds: float, ellipsoid_volume: float | None) -> dict[str, Any]:
-    """A point of the manifest's growth curve: an iteration that came to a region ``seconds`` after the job began."""
+    """Returns a point of the manifest's growth curve: an iteration that came to a region ``seconds`` after the job began."""
     return {"iteration": iteration, "seconds": seconds, "ellipsoid_volume": ellipsoid_volume}
 
 
 def versions(scene: Scene) -> dict[str, Any]:
-    """Versions that a region's provenance names."""
+    """Returns the versions that a region's provenance names."""
 
     def of(package: str) -> str | None:
         try:
@@ -103,7 +103,10 @@ def versions(scene: Scene) -> dict[str, Any]:
 
 
 def _implied(polytope: Polytope, proofs: tuple[PairProof, ...]) -> Implied:
-    """The grounds' faces that are not, or no longer, faces of the region; a joint limit may have the normal of one that went."""
+    """Returns the faces of the proofs' polytopes that are not, or no longer, faces of the region, with their bounds and multipliers.
+
+    A face that is gone may share its normal with a joint limit, so offsets are compared as well.
+    """
     own: dict[bytes, float] = {}
     for c, d in zip(polytope.C + 0.0, polytope.d, strict=True):
         own[c.tobytes()] = min(d, own.get(c.tobytes(), np.inf))

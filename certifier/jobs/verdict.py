@@ -1,4 +1,4 @@
-"""What a certification of a given polytope has come to."""
+"""A verdict says what the certification of a given polytope has come to."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from certifier.pair.result import PairResult
 
 @dataclass(frozen=True)
 class Verdict:
-    """The results of all pairs of a scene on one polytope.
+    """A verdict holds the results of all pairs of a scene on one polytope.
 
     Attributes:
         results: pair index -> its result.
         worth: what it is worth that every pair is certified.
-        seconds: what it took altogether.
+        seconds: how long the certification took altogether.
     """
 
     results: dict[int, PairResult]
@@ -24,10 +24,10 @@ class Verdict:
 
     @property
     def outcome(self) -> Outcome:
-        """The worst of the pairs' outcomes."""
+        """Returns the worst of the pairs' outcomes."""
         return combine([result.outcome for result in self.results.values()])
 
     @property
     def guarantee(self) -> Guarantee:
-        """Of the polytope: nothing unless every pair is certified."""
+        """Returns the guarantee of the polytope, which is NONE unless every pair is certified."""
         return self.worth if self.outcome is Outcome.CERTIFIED else Guarantee.NONE

@@ -1,1 +1,1 @@
-"""The pair program (11): one pair of bodies certified on one polytope."""
+"""The pair program (11) certifies one pair of bodies on one polytope."""

@@ -1,9 +1,10 @@
-"""Broad phase: boxes around several geometries of one link, so that one program settles many pairs.
+"""The broad phase puts boxes around several geometries of one link, so that one program settles many pairs.
 
-Every rigid part of the scene has a tree of boxes along its axes, down to single geometries. For a pair, the two trees are descended
-together from their roots; where the boxes are clearly apart at the samples the program is tried for them, and what it proves covers all
-pairs between their geometries. Far obstacles are settled by the hundred this way, near ones one by one. What is tried for a pair does not
-depend on which pairs were asked for before.
+Every rigid part of the scene has a tree of boxes along its axes, down to single geometries. For a pair, the search goes down the two
+trees together from their roots. Where two boxes are clearly apart at the samples, the program is tried for them, and what it proves
+covers all pairs between their geometries. So obstacles that are far away are settled by the hundred, and near ones one by one.
+
+What is tried for a pair does not depend on which pairs were asked for before.
 """
 
 from __future__ import annotations
@@ -29,26 +30,26 @@ R = TypeVar("R")
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A volume and what it is divided into; a leaf is a geometry as it is."""
+    """A node is a volume and the nodes that it is divided into; a leaf is one geometry as it is."""
 
     volume: Volume
     children: tuple[Node, ...]
 
     def child(self, name: str) -> Node:
-        """The child that holds this geometry."""
+        """Returns the child that holds this geometry."""
         return next(child for child in self.children if name in child.volume.geometries)
 
     @property
     def extent(self) -> float:
-        """Length of the diagonal, metres; 0 for a leaf, which cannot be divided."""
+        """Returns the length of the box's diagonal in metres; 0 for a leaf, which cannot be divided."""
         return float(np.linalg.norm(np.ptp(self.volume.vertices, axis=0))) if self.children else 0.0
 
 
 class BroadPhase(Generic[R]):
-    """The trees of one scene, and what has been tried with them.
+    """Searches the trees of one scene and remembers what has been tried with them.
 
     Args:
-        attempt: the result for two volumes, or None when they are better divided.
+        attempt: gives the result for two volumes, or None when it is better to divide them.
     """
 
     def __init__(self, kinematics: Kinematics, attempt: Callable[[Volumes], R | None]) -> None:
@@ -57,7 +58,7 @@ class BroadPhase(Generic[R]):
         self._tried: dict[tuple[Node, Node], R | None] = {}
 
     def find(self, pair: Pair) -> R | None:
-        """The result for the largest volumes that have one and hold the pair; None when it has to be settled by itself."""
+        """Returns the result for the largest volumes that have one and hold the pair; None when the pair has to be settled by itself."""
         ((_, a), first), ((_, b), second) = sorted(((self._root[name], name) for name in (pair.a, pair.b)), key=lambda root: root[0][0])
         while a.children or b.children:
             if (a, b) not in self._tried:
@@ -71,7 +72,7 @@ class BroadPhase(Generic[R]):
         return None
 
     def _worth_it(self, a: Node, b: Node) -> bool:
-        """Whether the volumes stand for several pairs, or for one with fewer vertices."""
+        """Returns whether the volumes stand for several pairs, or for one pair with fewer vertices."""
         others = set(b.volume.geometries)
         pairs = sum(len(self._partners[name] & others) for name in a.volume.geometries)
         return pairs > 1 or max(len(a.volume.geometries), len(b.volume.geometries)) == 1
@@ -79,7 +80,7 @@ class BroadPhase(Generic[R]):
 
 @lru_cache(maxsize=8)
 def _trees(kinematics: Kinematics) -> tuple[dict[str, set[str]], dict[str, tuple[int, Node]]]:
-    """Of every geometry: those that it makes a pair with; the number and the root of its tree."""
+    """Returns two mappings by a geometry's name: the geometries that it makes a pair with; the number and the root of its tree."""
     partners: dict[str, set[str]] = {}
     for pair in kinematics.scene.pairs:
         partners.setdefault(pair.a, set()).add(pair.b)
@@ -95,6 +96,7 @@ def _trees(kinematics: Kinematics) -> tuple[dict[str, set[str]], dict[str, tuple
 
 
 def _tree(kinematics: Kinematics, body: str, geometries: list[Geometry]) -> Node:
+    """Returns the root of the tree over the geometries of one rigid part, with boxes in the frame of ``body``."""
     vertices = [kinematics.points(body, g.body, g.vertices, np.zeros((1, kinematics.scene.n)))[0] for g in geometries]
     lower = np.array([v.min(axis=0) - g.radius for v, g in zip(vertices, geometries, strict=True)])
     upper = np.array([v.max(axis=0) + g.radius for v, g in zip(vertices, geometries, strict=True)])
@@ -113,7 +115,7 @@ def _tree(kinematics: Kinematics, body: str, geometries: list[Geometry]) -> Node
 
 
 def _box(body: str, names: list[str], lower: Array, upper: Array) -> Volume:
-    """The corners of a box a little larger, for the rounding of the frames between welded bodies."""
+    """Returns the corners of the box, made a little larger for the rounding of the frames between welded bodies."""
     slack = ROUNDING * (1 + np.abs(lower) + np.abs(upper))
     corners = np.array(list(itertools.product(*zip(lower - slack, upper + slack, strict=True))))
     return Volume(tuple(names), body, corners, 0.0)

@@ -1,8 +1,9 @@
-"""Certification of a polytope, pair by pair: screens, the program (11), the proof and its verification.
+"""A polytope is certified pair by pair: by screens, by the program (11), and by a proof that the verifier has checked.
 
+What was found                                       -> the outcome and what comes with it
 centre or a sample in contact, verified              -> refuted, with the configuration
 program (11) feasible, proof verified exactly        -> certified, with the proof
-program (11) infeasible, dual proof verified         -> not_certifiable, with the proof and the points where no plane of this degree works
+program (11) infeasible, dual proof verified         -> not_certifiable, with the proof and the points where none of this degree works
 planes at rest infeasible, (11) too dear             -> inconclusive, with those points all the same
 anything else                                        -> inconclusive, with the reason
 """
@@ -37,20 +38,21 @@ from certifier.verify.pair import PairCheck, check_ground
 from certifier.verify.witness import check_witness
 
 FEW_ITERATIONS = 4
-"""Volumes of several geometries that are settled at all are settled at once."""
+"""Volumes of several geometries get this many iterations; those that can be settled at all are settled within them."""
 CONE_SAMPLES = 300
 MIDDLE = 1.0
-"""Gap of a certificate near the middle, relative to its margin."""
+"""A certificate near the middle of the central path has a gap of at most this multiple of its margin."""
 
 
 class Certification:
-    """Everything the pairs of one polytope share: faces, box, samples, cones.
+    """Holds everything that the pairs of one polytope share: faces, box, samples, cones.
 
     Args:
-        polytope: joint limits included.
-        center: (n,) interior point; default the Chebyshev centre.
+        polytope: its rows include the joint limits.
+        center: (n,) interior point; default: the Chebyshev centre.
         seed: seeds the samples.
-        box: a box around P, to use its faces before P's and in place of those of the smallest one: what they prove holds on all of it.
+        box: a box around P. Its faces are used before P's, and in place of those of P's smallest box: what they prove holds on all of
+            this box.
 
     Raises:
         RegionError: the polytope is empty or unbounded, or the centre is not inside.
@@ -76,10 +78,12 @@ class Certification:
         self._broad_phase = BroadPhase(self._kinematics, self._together)
 
     def certify(self, index: int, max_iterations: int = 60, every_face: bool = False) -> PairResult:
-        """Certify pair ``scene.pairs[index]``, alone or with others that the same proof covers; the first of them takes the time.
+        """Certifies pair ``scene.pairs[index]``, alone or with others that the same proof covers.
+
+        Where a proof covers several pairs, its time counts for the first of them that is asked for.
 
         Args:
-            every_face: begin with all of P's faces in the joints of the pair's path, which saves time where less is known to fail.
+            every_face: begin with all of P's faces in the joints of the pair's path; this saves time where fewer faces are known to fail.
         """
         start, pair = time.perf_counter(), self.scene.pairs[index]
         found = None if every_face else self._broad_phase.find(pair)
@@ -87,7 +91,10 @@ class Certification:
         return replace(result, seconds=time.perf_counter() - start)
 
     def _together(self, volumes: Volumes) -> PairResult | None:
-        """One proof for all pairs of two volumes, if they are clearly apart and it takes no more than the first faces."""
+        """Returns one result for all pairs of two volumes, or None.
+
+        The volumes must be clearly apart, and the first faces must suffice.
+        """
         frame = frames_to_try(self._kinematics, volumes)[0]
         if not self.screen.apart(volumes, frame):
             return None
@@ -124,11 +131,11 @@ class Certification:
         detail = f"{solution.status.value} after {solution.iterations} iterations"
         if frame.at_rest:
             memory = choose_frame(self._kinematics, volumes).memory(volumes)
-            detail = f"no plane at rest in the frame of {frame.body}; one that moves would need {memory / 2**30:.1f} GiB ({detail})"
+            detail = f"found no plane at rest in the frame of {frame.body}; one that moves would need {memory / 2**30:.1f} GiB ({detail})"
         return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=detail, weakness=weakness)
 
     def _solve(self, volumes: Volumes, frame: Frame, max_iterations: int, every_face: bool) -> tuple[Sides, list[Block], Solution]:
-        """The program with the faces that matter.
+        """Solves the program with the faces that matter.
 
         Raises:
             np.linalg.LinAlgError: a cone of P itself is numerically degenerate.
@@ -138,7 +145,7 @@ class Certification:
             sides = self._sides(frame, faces)
             try:
                 blocks = build(sides, volumes, frame)
-                # Multipliers of P's own faces are what the polytope step holds fixed: they should come from the middle.
+                # The polytope step holds the multipliers of P's own faces fixed, so they should come from the middle of the central path.
                 solution = solve(blocks, max_iterations, MIDDLE if self._whole and faces != first else np.inf)
             except np.linalg.LinAlgError:
                 if faces == self._choice.every or frame.at_rest:
@@ -157,7 +164,7 @@ class Certification:
         return self._known[key]
 
     def _prove(self, volumes: Volumes, frame: Frame, sides: Sides, solution: Solution) -> PairResult:
-        """The proof in as few bits as hold."""
+        """Makes the proof in as few bits as hold, and verifies it."""
         failure = ""
         for kind in BITS:
             proof, check = pair_proof(sides, volumes, frame, self.ground, solution, kind), self._check
@@ -185,10 +192,10 @@ class Certification:
             statement = verify_dual(proof)
         except (ProofError, np.linalg.LinAlgError) as error:
             return PairResult(Outcome.INCONCLUSIVE, Stage.SOS, detail=f"the dual proof found does not hold: {error}")
-        detail = f"no plane affine in s, in the frame of {statement.frame}"
+        detail = f"no certificate of this degree with a plane affine in s, in the frame of {statement.frame}"
         return PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, detail=detail, proof=proof.to_bytes())
 
 
 def certify_pair(scene: Scene, index: int, polytope: Polytope, center: Array | None = None, seed: int = 0) -> PairResult:
-    """Certify one pair on one polytope; :class:`Certification` shares the preparation between pairs."""
+    """Certifies one pair on one polytope; use :class:`Certification` to share the preparation between pairs."""
     return Certification(scene, polytope, center, seed).certify(index)

@@ -1,4 +1,4 @@
-"""Closest points of two convex hulls, in floating point: the start of the pair program and the refutation of a configuration."""
+"""The closest points of two convex hulls are found in floating point, for the contacts of screens and the gaps of the broad phase."""
 
 from __future__ import annotations
 
@@ -10,15 +10,20 @@ from scipy.optimize import nnls
 from certifier.model import Array
 
 _WEIGHT = 1e4
-"""Weight of the convexity rows of the least-squares problem; distances are accurate to about 1 / weight^2 of the size."""
+"""The convexity rows of the least-squares problem have this weight; distances are accurate to about 1 / weight^2 of the size."""
 
 
 @dataclass(frozen=True)
 class Closest:
-    """Nearest points p_a, p_b (3,) of conv(A) and conv(B), their distance, and the gap that the direction between them proves.
+    """Holds nearest points of conv(A) and conv(B), their distance, and the gap that the direction between them proves.
 
-    ``gap`` = min over A of n'v - max over B of n'v for the unit n from p_b to p_a: a lower bound of the distance whatever
-    the accuracy of the points, negative when n separates nothing. ``weights`` are the convex weights of either's vertices, not normalised.
+    Attributes:
+        p_a, p_b: (3,) the points, in the frame of A and B.
+        distance: between them, in the unit of A and B.
+        normal: (3,) the unit vector n from p_b to p_a; 0 where the distance is 0.
+        gap: min over A of n'v - max over B of n'v. This is a lower bound of the distance however inaccurate the points are, and it is
+            negative when n separates nothing.
+        weights: convex weights of the vertices of A and of B, not normalised.
     """
 
     p_a: Array
@@ -30,7 +35,7 @@ class Closest:
 
 
 def closest(A: Array, B: Array) -> Closest:
-    """Closest points of the hulls of A (v, 3) and B (w, 3), by nonnegative least squares over the convex weights."""
+    """Returns the closest points of the hulls of A (v, 3) and B (w, 3), by nonnegative least squares over the convex weights."""
     center = B.mean(axis=0)
     scale = max(float(np.abs(A - center).max()), float(np.abs(B - center).max()), 1e-12)
     a, b = (A - center) / scale, (B - center) / scale
@@ -46,9 +51,16 @@ def closest(A: Array, B: Array) -> Closest:
 
 
 def first_within(A: Array, B: Array, reach: float) -> tuple[int, Closest] | None:
-    """The first of S configurations at which the hulls of A (S, v, 3) and B (S, w, 3) are not shown to be farther apart than ``reach``.
+    """Returns the first configuration at which two hulls are not shown to be farther apart than ``reach``, with its closest points.
 
-    Most directions that keep bodies apart at one configuration do so at most of the others.
+    Most directions that keep bodies apart at one configuration do so at most of the others. So each direction that is found is tried on
+    all configurations that are left.
+
+    Args:
+        A, B: (S, v, 3) and (S, w, 3) vertices at S configurations.
+
+    Returns:
+        The index of the configuration and the closest points there; None when the hulls are farther apart everywhere.
     """
     left = np.arange(len(A))
     while len(left):

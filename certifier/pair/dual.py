@@ -1,8 +1,10 @@
-"""Dual proofs from the solver's dual points (certifier.verify.dual says what they prove).
+"""Dual proofs are made here from the solver's dual points (certifier.verify.dual says what they prove, and what not).
 
-The solver ends with sum_r A_r'x_r = lam a, lam < 0, a a multiple of sum_r A_r'x_w, x_w the centre: an interior point of the dual cone. So
-x_r + mu x_w, mu > 0, is in the interior too, and its sum vanishes to rounding. What is left of it is made to vanish by changing a few
-moments; pivoted QR factorisations choose equations that are independent and moments that meet them well.
+The solver ends with sum_r A_r'x_r = lam a and lam < 0. Here a is a multiple of sum_r A_r'x_w, and x_w is the centre, an interior
+point of the dual cone. So x_r + mu x_w with mu > 0 is in the interior too, and its sum vanishes to rounding.
+
+What is left of the sum is made to vanish by changing a few moments. Pivoted QR factorisations choose equations that are independent
+and moments that meet them well.
 """
 
 from __future__ import annotations
@@ -20,14 +22,15 @@ from certifier.verify.moments import monomials, table
 
 RANK_TOLERANCE = 1e-9
 TRACE_SHARE = 1e-7
-"""Part of its size that Yaa is made smaller by, so that rounding does not make it too large."""
+"""Yaa is made smaller by this part of the trace of Y, so that rounding does not make it too large."""
 
 
 def dual_proof(sides: Sides, pair: Pair, frame: Frame, ground: Ground, blocks: list[Block], x: list[Array]) -> DualProof:
-    """The proof from a dual point x of the pair's program; whether it holds, the verifier says.
+    """Makes the proof from a dual point x of the pair's program; the verifier says whether it holds.
 
     Args:
-        blocks, x: the program (certifier.pair.program.build) and the solver's x, a list over the blocks of (R, N).
+        blocks: the program (certifier.pair.program.build).
+        x: the solver's x, a list over the blocks of (R, N).
     """
     scene, n = sides.kinematics.scene, sides.kinematics.scene.n
     centres: Array = np.sum([np.einsum("rnp,n->p", b.columns, b.centre.x) for b in blocks], axis=0)[:-1]
@@ -55,7 +58,11 @@ def dual_proof(sides: Sides, pair: Pair, frame: Frame, ground: Ground, blocks: l
 
 
 def _moments(sides: Sides, chain: tuple[int, ...], x: Array) -> Array:
-    """Values on the monomials, (R, N), of functionals x in the sampled basis, (R, N'), joints that are not in play being at the centre."""
+    """Returns the values of functionals on the monomials, (R, N), the joints that are not in play being at the centre.
+
+    Args:
+        x: (R, N') the functionals in the sampled basis.
+    """
     space, outside = sides.space(chain), sides.outside(chain)
     exponents = monomials(chain, sides.kinematics.scene.n)
     inside = np.prod(space.points[:, None, :] ** exponents[None, :, list(chain)], axis=2)
@@ -72,7 +79,7 @@ def _moments(sides: Sides, chain: tuple[int, ...], x: Array) -> Array:
 
 
 def _equations(sides: Sides, pair: Pair, frame: Frame, moments: list[Array]) -> tuple[Array, np.ndarray]:
-    """What every moment adds to R, (moments, 4 (n + 1)), and which moment it is: side, vertex, monomial."""
+    """Returns what every moment adds to R, (moments, 4 (n + 1)), and which moment it is: (moments, 3) side, vertex, monomial."""
     scene, n = sides.kinematics.scene, sides.kinematics.scene.n
     rows, where = [], []
     for side, (name, chain, held) in enumerate(zip((pair.a, pair.b), (frame.chain_a, frame.chain_b), moments, strict=True)):
@@ -93,7 +100,7 @@ def _equations(sides: Sides, pair: Pair, frame: Frame, moments: list[Array]) -> 
 
 
 def _independent(A: Array) -> tuple[np.ndarray, np.ndarray]:
-    """Columns of A, (rows, K), that are independent, and as many rows in which they are, well-conditioned."""
+    """Returns columns of A, (rows, K), that are independent, and as many rows in which these columns are independent, well-conditioned."""
     columns = A / np.maximum(np.linalg.norm(A, axis=0), np.finfo(float).tiny)
     _, R, order = qr(columns, mode="economic", pivoting=True)
     diagonal = np.abs(np.diag(R))
@@ -103,7 +110,10 @@ def _independent(A: Array) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _lifted(bb: Array, sides: Sides) -> Array:
-    """Ybb of all joints, (n + 1, n + 1), from that of the joints in play, the others at the centre; their diagonal is free up to Ybb_00."""
+    """Returns Ybb of all joints, (n + 1, n + 1), from Ybb of the joints in play.
+
+    The other joints are at the centre; their diagonal is free up to Ybb_00.
+    """
     n, at = len(sides.u_c), [0, *(1 + i for i in sides.joints)]
     lift = np.zeros((n + 1, len(at)))
     lift[1:, 0] = sides.u_c

@@ -1,6 +1,6 @@
-"""Which faces a pair's program uses: few first, more as the dual point asks for them.
+"""The faces that a pair's program uses are chosen here: few first, and more as the dual point asks for them.
 
-Every face costs time in each iteration, and faces in other joints than those between the bodies bring these joints into play.
+Every face costs time in each iteration. Faces in other joints than those between the bodies bring these joints into play.
 """
 
 from __future__ import annotations
@@ -13,16 +13,18 @@ from certifier.pair.frames import Frame
 from certifier.pair.program import Sides
 
 FACES_AT_A_TIME = 16
-"""A polytope with many faces is first replaced by its box; then this many faces are added at a time, as the dual asks for them."""
+"""A polytope with many faces is first replaced by its box; then the dual point asks for faces, and this many are added at a time."""
 DEAR_JOINTS = 10.0
-"""Few faces that couple the path's joints with others are all tried at once, unless the other joints make the program dearer by this."""
+"""Few faces that couple the path's joints with others are tried all at once, unless the others make the program dearer by this factor."""
 
 
 class FaceChoice:
-    """The choice on one polytope, whose m faces, then 1 + u_i, then 1 - u_i of its box, are numbered as in a proof.
+    """Chooses faces on one polytope.
+
+    Faces are numbered as in a proof: first the polytope's m faces, then 1 + u_i and then 1 - u_i of its box.
 
     Args:
-        faces: without those that are redundant.
+        faces: P's faces, without those that are redundant.
         box_first: begin with the box's faces, whatever P's are.
     """
 
@@ -32,8 +34,12 @@ class FaceChoice:
         self.every = tuple(range(len(faces.d)))
 
     def first(self, frame: Frame, every_face: bool = False) -> tuple[int, ...]:
-        """The faces to begin with: P's in the joints that the plane moves with, and its box's where those may not bound them; unless it
-        has to be every face, its box's alone where P has many. Where P has few and they couple those joints with others, all of them."""
+        """Returns the faces to begin with.
+
+        They are P's faces in the joints that the plane moves with, and the box's faces where P's may not bound those joints.
+        Where P has many such faces, or the box comes first, the box's faces are used alone, unless ``every_face`` is set.
+        Where P has few faces and some couple those joints with others, all of P's faces are used, unless the other joints are dear.
+        """
         (m, n), joints = self._faces.C.shape, list(frame.joints)
         box = [(m + n * (sign > 0) + i, i, sign) for sign in (-1, 1) for i in joints]
         others = self._moved.copy()
@@ -51,16 +57,16 @@ class FaceChoice:
         return (*own.tolist(), *needed)
 
     def joints(self, frame: Frame, faces: tuple[int, ...]) -> tuple[int, ...]:
-        """The joints in play, ascending: those that the plane moves with and those of the faces."""
+        """Returns the joints in play, ascending: those that the plane moves with and those of the faces."""
         joints = set(frame.joints)
         for j in faces:
             joints |= set(np.flatnonzero(self._moved[j]).tolist()) if j < len(self.every) else set()
         return tuple(sorted(joints))
 
     def more(self, frame: Frame, sides: Sides, solution: Solution) -> tuple[int, ...]:
-        """The faces to go on with after a program on a superset of P had no solution; the same ones when it had none on P either.
+        """Returns the faces to go on with after a program on a superset of P had no solution; the same ones when P itself has none either.
 
-        The dual point shows infeasibility for every face j with Lambda_j(x) psd; the faces where it is not are worth having.
+        The dual point shows infeasibility for every face j with Lambda_j(x) psd. The faces where Lambda_j(x) is not psd are worth adding.
         """
         unused = tuple(j for j in self.every if j not in sides.faces)
         if not unused or frame.at_rest:
@@ -74,6 +80,6 @@ class FaceChoice:
             lowest = np.minimum(lowest, (np.linalg.eigvalsh(Z[:, 1:])[:, :, 0] / mass).min(axis=0))
         wanted = [i for i in np.argsort(lowest) if lowest[i] < 0]
         inside = [i for i in wanted if not np.delete(self._moved[unused[i]], sides.joints).any()]
-        # Where most faces are used already, it is not worth being choosy.
+        # Where most faces are used already, choosing among the rest does not pay.
         most = 2 * (len(sides.faces) + FACES_AT_A_TIME) > len(self.every) + 2 * len(frame.joints)
         return (*sides.faces, *(unused[i] for i in (inside or wanted)[: None if most else FACES_AT_A_TIME]))

@@ -1,9 +1,13 @@
-"""What certifying each pair will cost, before it is done: dimensions, memory and a time that orders and batches the work.
+"""The cost of certifying each pair is forecast here: dimensions, memory, and a time by which the work is ordered and batched.
 
-The time is a sum of what grows with the pair's size: :func:`terms`, each with its seconds in ``SECONDS``. They were fitted, nonnegative and
-by relative error, to the mean processor time, verification included, of every size class (joints the plane moves with, N and vertices of A
-and of B) among the certified pairs of the catalogue's scenes, each alone: ``ciris bench survey`` measures and fits again. Pairs that are
-refuted take less, those that need a second program, or faces in joints that are not between their bodies, take more.
+The time is a sum of :func:`terms` that grow with the pair's size, each multiplied by its seconds in ``SECONDS``.
+
+The seconds are a nonnegative fit by relative error, and ``ciris bench survey`` measures and fits again. What was fitted is the mean
+processor time, verification included, of every size class among the certified pairs of the catalogue's scenes, each pair alone. A size
+class is given by the joints that the plane moves with and by N and the vertices of A and of B.
+
+Pairs that are refuted take less time. Pairs that need a second program take more, and so do those that need faces in joints that are
+not between their bodies.
 """
 
 from __future__ import annotations
@@ -17,22 +21,22 @@ from certifier.model import Array, Scene, Volume
 from certifier.pair.frames import frames_to_try
 
 SECONDS = np.array([1.8e-2, 3.4e-6, 7.6e-6, 1.2e-10])
-"""Of the terms, on one thread of a 2.5 GHz core (docs/benchmarks.md)."""
+"""One unit of each term takes this many seconds, on one thread of a 2.5 GHz core (docs/benchmarks.md)."""
 
 
 @dataclass(frozen=True)
 class PairCost:
-    """Forecast for one pair: of what is tried first for it.
+    """Holds the forecast for one pair, for what is tried first for it.
 
     Attributes:
         frame: body of the reference frame.
         chain_a, chain_b: position indices of the joints from the frame to either body.
         gram_a, gram_b: rows of the Gram matrices, 2^k.
-        joints: how many the plane moves with; 0 for a plane at rest.
+        joints: how many joints the plane moves with; 0 for a plane at rest.
         N_a, N_b: dimensions of the polynomial spaces (B.2).
-        rationals: vertices of both bodies.
-        seconds: on one thread of a 2.5 GHz core, roughly.
-        memory_bytes: of the solver's factors and tables, for whatever may be tried.
+        rationals: number of vertices of both bodies together.
+        seconds: time on one thread of a 2.5 GHz core, roughly.
+        memory_bytes: size of the solver's factors and tables, for whatever may be tried.
     """
 
     a: str
@@ -51,7 +55,7 @@ class PairCost:
 
 
 def forecast(scene: Scene) -> list[PairCost]:
-    """One forecast for every pair of the scene, in the order of ``scene.pairs``."""
+    """Returns one forecast for every pair of the scene, in the order of ``scene.pairs``."""
     kinematics = Kinematics.of(scene)
     costs = []
     for pair in scene.pairs:
@@ -83,8 +87,10 @@ def forecast(scene: Scene) -> list[PairCost]:
 
 
 def terms(joints: int, vertices: list[int], N: list[int]) -> Array:
-    """What the time of a pair is a sum of, (4,): the pair; the corners of P's box in the joints that the plane moves with, at which the
-    verifier bounds the normal; the coefficients of the rationals; their factorisations.
+    """Returns the terms that the time of a pair is a sum of, (4,).
+
+    They are 1 for the pair itself; the corners of P's box in the joints that the plane moves with, at which the verifier bounds the normal;
+    the coefficients of the rationals; and the factorisations of the rationals.
     """
     coefficients, factors = np.array(vertices) @ np.power.outer(np.array(N, dtype=float), [1, 3])
     return np.array([1.0, 2.0**joints, coefficients, factors])

@@ -1,4 +1,4 @@
-"""Proofs from the solver's Gram matrices (certifier.proof.pair says what they consist of)."""
+"""Proofs are made here from the solver's Gram matrices (certifier.proof.pair says what proofs consist of)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from certifier.proof.pair import Ground, PairProof, Side
 
 
 def pair_proof(sides: Sides, volumes: tuple[Volume, Volume], frame: Frame, ground: Ground, solution: Solution, kind: str) -> PairProof:
-    """The proof of a feasible point; whether it holds once it is rounded, the verifier says.
+    """Makes the proof of a feasible point; the verifier says whether it holds once it is rounded.
 
     Args:
-        kind: of the Gram factors' numbers, as in BITS.
+        kind: type of the Gram factors' numbers, one of BITS.
 
     Raises:
         np.linalg.LinAlgError: a Gram matrix is not positive definite.
@@ -43,14 +43,22 @@ def pair_proof(sides: Sides, volumes: tuple[Volume, Volume], frame: Frame, groun
 
 
 def _factor(Q: Array, members: np.ndarray) -> Array:
-    """Cholesky factors in plain monomials of Gram matrices in the functions of basis.rho with these members."""
+    """Returns Cholesky factors in plain monomials of Gram matrices in the functions of basis.rho.
+
+    Args:
+        members: which coordinates each function is a product of, as in basis.subsets.
+    """
     return np.linalg.cholesky(Q) * np.sqrt(3.0) ** members.sum(axis=1)[:, None]
 
 
 def _of_range(factor: Array, place: int, whole: np.ndarray) -> Array:
-    """Factors for 1 + u_i and 1 - u_i, (V, 2, L, L), that come to 1 - u_i^2 times squares of the functions without u_i, (V, L/2, L/2).
+    """Returns factors for the faces 1 + u_i and 1 - u_i, (V, 2, L, L), that together give 1 - u_i^2 times the given squares.
 
     (1 - u^2) q^2 = (1 + u) ((1 - u) q)^2 / 2 + (1 - u) ((1 + u) q)^2 / 2.
+
+    Args:
+        factor: (V, L/2, L/2) factors of the squares of the functions without u_i.
+        place: where u_i is among the chain's coordinates.
     """
     without, with_ = np.flatnonzero(whole[:, place] == 0), np.flatnonzero(whole[:, place] == 1)
     found = np.zeros((len(factor), 2, len(whole), len(whole)))

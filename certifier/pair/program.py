@@ -1,13 +1,14 @@
-"""The pair program (11) of C-IRIS for two bodies conv(V_A) + ball(r_A) and conv(V_B) + ball(r_B), as data of interior_point.
+"""The pair program (11) of C-IRIS for two bodies conv(V_A) + ball(r_A) and conv(V_B) + ball(r_B) is built here as data of interior_point.
 
-In the frame F, with u = (s - mid)/half the coordinates of P's bounding box, the plane is a(u)'x + b(u) = 0,
-[a; b] = Z [1; u - u_c], u the joints in play alone, and with p_v, den the numerator and the denominator of vertex v,
+In the frame F the plane is a(u)'x + b(u) = 0. Here u = (s - mid)/half are the coordinates of P's bounding box, and
+[a; b] = Z [1; u - u_c] with u the joints in play alone. With p_v and den the numerator and the denominator of vertex v, the program asks
 
-    a'p_v + b den - (r_A kappa + t) den   in K_A for v in V_A,     -(a'p_v + b den) - (r_B kappa + t) den   in K_B for v in V_B,
+    a'p_v + b den - (r_A kappa + t) den   in K_A for v in V_A,     -(a'p_v + b den) - (r_B kappa + t) den   in K_B for v in V_B.
 
-K_A, K_B the weighted sums of squares over P's faces in the joints in play (conic.cone). A joint between F and the body that is not in
-play keeps degree 2, and its range counts by the weight 1 - u_i^2 = (1 + u_i)(1 - u_i)^2/2 + (1 - u_i)(1 + u_i)^2/2. Where a radius is
-positive, |a| <= kappa on the box by
+K_A and K_B are the weighted sums of squares over P's faces in the joints in play (conic.cone). A joint between F and the body that is
+not in play keeps degree 2. Its range counts by the weight 1 - u_i^2 = (1 + u_i)(1 - u_i)^2/2 + (1 - u_i)(1 + u_i)^2/2.
+
+Where a radius is positive, the program also demands |a| <= kappa on the box, by
 
     [ kappa I   A1                                     ]
     [ A1'       kappa E00 - sum_i tau_i (E00 - E_ii)   ]  psd,   tau >= 0,   a(u) = A1 [1; u]
@@ -30,13 +31,15 @@ from certifier.pair.frames import Frame
 
 
 class Sides:
-    """The cones of all chains on one polytope for the same joints in play and the same faces, made on demand and shared by the pairs.
+    """Makes the cones of all chains on one polytope, for the same joints in play and the same faces, and shares them between the pairs.
 
     Args:
         polytope: P's faces, (m, n); P must be bounded.
-        joints: those in play, ascending: the plane moves with them.
+        box: the box around P whose coordinates are u.
+        joints: those in play, ascending; the plane moves with them.
         faces: which faces the cones use, in the joints in play alone, numbered as in :class:`certifier.proof.pair.PairProof`.
-        center: (n,) interior point of P; samples: (S, n) points inside P, S > 2^k for the longest chain.
+        center: (n,) interior point of P.
+        samples: (S, n) points inside P, with S > 2^k for the longest chain.
     """
 
     def __init__(
@@ -61,20 +64,20 @@ class Sides:
 
     @cached_property
     def norm_blocks(self) -> list[Block]:
-        """Those that bound |a|, for all pairs where a radius is positive."""
+        """Returns the blocks that bound |a|, which serve all pairs where a radius is positive."""
         return _norm_blocks(len(self.joints), self.u_c[list(self.joints)])
 
     @property
     def scales(self) -> Array:
-        """(f + 1,) what 1 and the faces used were divided by to be 1 at the centre."""
+        """Returns what 1 and the used faces were divided by to be 1 at the centre, (f + 1,)."""
         return np.concatenate([[1.0], self._slack[list(self.faces)]])
 
     def space(self, chain: tuple[int, ...]) -> Basis:
-        """The chain's polynomials."""
+        """Returns the basis of the chain's polynomials."""
         return basis(len(chain), tuple(place for place, joint in enumerate(chain) if joint in self.joints))
 
     def cone_of(self, chain: tuple[int, ...], faces: tuple[int, ...]) -> Cone:
-        """The chain's cone for 1 and any faces, those joints that are neither in play nor on the chain at the centre."""
+        """Returns the chain's cone for 1 and any faces; joints that are neither in play nor on the chain are at the centre."""
         inside, outside, chosen = list(chain), self.outside(chain), list(faces)
         slopes = self._slopes[chosen]
         rest = [i for i in range(len(self.u_c)) if i not in inside + outside]
@@ -82,18 +85,18 @@ class Sides:
         return Cone.of_faces(self.space(chain), constant, slopes[:, inside], slopes[:, outside])
 
     def points(self, chain: tuple[int, ...]) -> Array:
-        """(N_A, n) points u of the chain's basis, 0 outside the chain."""
+        """Returns the points u of the chain's basis, (N_A, n), which are 0 outside the chain."""
         space = self.space(chain)
         u = np.zeros((len(space.points), self.kinematics.scene.n))
         u[:, list(chain)] = space.points
         return u
 
     def outside(self, chain: tuple[int, ...]) -> list[int]:
-        """Joints in play that are not on the chain, in the order of the cone's outside coordinates."""
+        """Returns the joints in play that are not on the chain, in the order of the cone's outside coordinates."""
         return [i for i in self.joints if i not in chain]
 
     def cone(self, chain: tuple[int, ...]) -> tuple[Cone, Centre]:
-        """The chain's cone and its centre near den.
+        """Returns the chain's cone and its centre near den.
 
         Raises:
             np.linalg.LinAlgError: the cone is numerically degenerate.
@@ -106,14 +109,17 @@ class Sides:
             unit = np.zeros(cone.N)
             unit[: len(s)] = _denominator(s, revolute)
             functional, grid = space.functional(self._u[:, inside])
-            # Towards the centre the denominator counts alike everywhere; so it does at the start.
+            # Towards the centre the denominator counts alike everywhere; these weights make it do so at the start as well.
             mass = 1 / _denominator(self.box.mid[inside] + self.box.half[inside] * self._u[:, inside], revolute)
             start = np.concatenate([mass @ functional, *((mass * self._u[:, i]) @ grid for i in outside)])
             self._centres[chain] = cone, Centre(cone, unit, start)
         return self._centres[chain]
 
     def means(self, chain: tuple[int, ...], x: Array) -> tuple[Array, Array]:
-        """Means of s under pseudo-moments x, (R, N) -> (R, n), the other joints at the centre, and masses x(1), (R,)."""
+        """Returns the means of s under pseudo-moments x, (R, N) -> (R, n), and the masses x(1), (R,).
+
+        The joints that are neither on the chain nor in play are at the centre.
+        """
         space, inside, outside = self.space(chain), list(chain), self.outside(chain)
         first, rest = x[:, : len(space.points)], x[:, len(space.points) :].reshape(len(x), len(outside), space.grid)
         mass = first.sum(axis=1)
@@ -124,15 +130,16 @@ class Sides:
 
 
 def _denominator(s: Array, revolute: Array) -> Array:
-    """prod (1 + s_i^2) over revolute joints, (S, k) -> (S,)."""
+    """Returns prod (1 + s_i^2) over the revolute joints, (S, k) -> (S,)."""
     product: Array = np.prod(np.where(revolute, 1 + s**2, 1.0), axis=1)
     return product
 
 
 def build(sides: Sides, volumes: tuple[Volume, Volume], frame: Frame) -> list[Block]:
-    """The program of two volumes: blocks in the order side A, side B, [LMI, tau], over y = (Z row-major, [kappa, tau], t).
+    """Builds the program of two volumes: the blocks of side A, of side B and, where a radius is positive, of the LMI and of tau.
 
-    Z is (4, j + 1), tau (j,) for j joints in play.
+    The unknowns are y = (Z row-major, [kappa, tau], t), where Z is (4, j + 1) and tau (j,) for j joints in play. The brackets hold what is
+    there only where a radius is positive.
 
     Raises:
         np.linalg.LinAlgError: a cone is numerically degenerate.
@@ -165,12 +172,12 @@ def build(sides: Sides, volumes: tuple[Volume, Volume], frame: Frame) -> list[Bl
 
 
 def _columns(n: int, rounded: bool) -> int:
-    """How many unknowns y has for n joints in play."""
+    """Returns how many unknowns y has for n joints in play."""
     return 4 * (n + 1) + (1 + n if rounded else 0) + 1
 
 
 def _norm_blocks(n: int, u_c: Array) -> list[Block]:
-    """|a| <= kappa on the box: the LMI as a cone of one Gram matrix sampled at e_i + e_j, and tau >= 0."""
+    """Returns the blocks that say |a| <= kappa on the box: the LMI as a cone of one Gram matrix sampled at e_i + e_j, and tau >= 0."""
     size, columns = n + 4, _columns(n, rounded=True)
     rows, cols = np.tril_indices(size)
     points = np.eye(size)[rows] + np.where((rows == cols)[:, None], 0.0, np.eye(size)[cols])

@@ -1,4 +1,4 @@
-"""Configurations of P at which a pair's bodies are looked at before a program is solved: the centre and samples."""
+"""Before a program is solved, the screen looks at a pair's bodies at some configurations of P: the centre and samples."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from certifier.pair.frames import Frame
 
 SCREEN_SAMPLES = 64
 NEAREST_JOINTS = 4
-"""Up to so many joints the contact nearest to the centre is what a refutation tells of."""
+"""In scenes of up to this many joints a refutation shows the contact that is nearest to the centre."""
 GAP_SAMPLES = 16
 APART = 0.15
-"""Least gap at the samples, relative to the way that vertices sweep, for which volumes of several geometries are tried."""
+"""Volumes of several geometries are tried where their gap at the samples is at least this part of the way that their vertices sweep."""
 
 
 @dataclass(frozen=True)
 class Contact:
-    """A configuration at which two padded bodies touch.
+    """A contact is a configuration at which two padded bodies touch.
 
     Attributes:
-        s: (n,).
-        weights: (V,) convex weights of either body's vertices, at whose mean points they touch.
+        s: (n,) the configuration.
+        weights: for either body, (V,) convex weights of its vertices; the bodies touch at the mean points that these weights give.
     """
 
     s: Array
@@ -33,10 +33,11 @@ class Contact:
 
 
 class Screen:
-    """The configurations of one polytope.
+    """Looks at pairs of bodies at the configurations of one polytope.
 
     Args:
-        center: (n,) inside; samples: (S, n) inside.
+        center: (n,) a point inside the polytope.
+        samples: (S, n) points inside the polytope.
 
     Attributes:
         configurations: (1 + S, n) the centre, then the samples.
@@ -52,15 +53,15 @@ class Screen:
             self._first = self._first[np.argsort(gauge)]
 
     def contact(self, volumes: tuple[Volume, Volume], frame: Frame) -> Contact | None:
-        """A contact at the centre or at one of the first samples."""
+        """Returns a contact at the centre or at one of the first samples; None if there is none."""
         return self._contact(volumes, frame, self._first)
 
     def contact_near(self, volumes: tuple[Volume, Volume], frame: Frame, points: Array) -> Contact | None:
-        """A contact at the centre, at any sample, or at those of the points (w, n) that lie in the polytope."""
+        """Returns a contact at the centre, at any sample, or at one of the points (w, n) in the polytope; None if there is none."""
         return self._contact(volumes, frame, np.concatenate([self.configurations, points[self._polytope.contains(points)]]))
 
     def apart(self, volumes: tuple[Volume, Volume], frame: Frame) -> bool:
-        """Whether the padded volumes keep a distance at some of the samples that is large against what they sweep in the frame."""
+        """Returns whether, at each of a few samples, the padded volumes' distance is large against what they sweep in the frame."""
         A, B = (self._points(volume, frame, self.configurations[:GAP_SAMPLES]) for volume in volumes)
         least = APART * sum(float(np.linalg.norm(np.ptp(points, axis=0), axis=1).max()) for points in (A, B))
         least += sum(volume.radius for volume in volumes) + 2 * self._padding

@@ -1,4 +1,4 @@
-"""Where a pair's program fails and what would help: for the targeted contraction (certifier.growth.faces)."""
+"""The weakness of a pair is found here: where its program fails and what would help the targeted contraction (certifier.growth.faces)."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from certifier.pair.frames import Frame
 from certifier.pair.program import Sides
 
 LEAST_MASS = 0.15
-"""Of a functional, relative to the largest, for its mean to count."""
+"""The mean of a functional counts if its mass is more than this part of the largest mass."""
 
 
 def weak_points(frame: Frame, sides: Sides, solution: Solution) -> Array:
-    """Means (w, n) of the pseudo-moments that carry weight."""
+    """Returns the means (w, n) of the pseudo-moments that carry weight."""
     found = [sides.means(chain, x) for chain, x in zip((frame.chain_a, frame.chain_b), solution.x[:2], strict=True)]
     means, mass = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return means[mass > LEAST_MASS * mass.max()]
 
 
 def pull(frame: Frame, sides: Sides, faces: Polytope, solution: Solution) -> Array:
-    """What the program's optimum gains, to first order, when a joint's range shrinks towards the centre, (n,).
+    """Returns what the program's optimum gains, to first order, when a joint's range shrinks towards the centre, (n,).
 
-    The derivative for a face's offset is <Q_j, Lambda_0(x)>, and twice that for the weight 1 - u_i^2. A box's face belongs to its joint,
-    any other to its joints by their parts in its reach.
+    The derivative for a face's offset is <Q_j, Lambda_0(x)>, and twice that for the weight 1 - u_i^2. A face of the box belongs to its
+    joint. Any other face belongs to its joints by their parts in its reach.
 
     Args:
-        faces: P's, of which ``sides`` uses some.
+        faces: P's faces, of which ``sides`` uses some.
     """
     n = len(sides.u_c)
     share = np.abs(np.concatenate([faces.C * sides.box.half, np.eye(n), np.eye(n)]))

@@ -1,1 +1,1 @@
-"""Polytopes {s : C s <= d}: bounds, redundancy, the inscribed ellipsoid, samples."""
+"""Bounds, redundancy, the inscribed ellipsoid and samples of polytopes {s : C s <= d} are computed here."""

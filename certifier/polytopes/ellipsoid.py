@@ -1,4 +1,4 @@
-"""The largest ellipsoid inside a polytope P = {s : C s <= d}, C (m, n), d (m,), and the volume of P itself."""
+"""The largest ellipsoid inside a polytope P = {s : C s <= d}, C (m, n), d (m,), is found here, and the volume of P itself."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from certifier.polytopes.polytope import bounds, chebyshev_center
 from certifier.polytopes.sampling import CHAINS, hit_and_run
 
 _GAP = 1e-9
-"""Average complementarity at the end; the logarithm of the volume is within m times that of the largest."""
+"""The method ends at this average complementarity. Then the logarithm of the volume is within m times this of the largest possible."""
 _RESIDUAL = 1e-8
 _ITERATIONS = 100
 _SHRINK = 1 - 1e-9
@@ -22,7 +22,7 @@ _SHRINK = 1 - 1e-9
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """{Q u + center : |u| <= 1}.
+    """An ellipsoid is the set {Q u + center : |u| <= 1}.
 
     Attributes:
         center: (n,).
@@ -34,13 +34,14 @@ class Ellipsoid:
 
     @cached_property
     def volume(self) -> float:
-        """n-dimensional volume: |det Q| times the unit ball's."""
+        """Returns the n-dimensional volume: |det Q| times the unit ball's."""
         return _unit_ball(len(self.center)) * abs(float(np.linalg.det(self.shape)))
 
 
 def inscribed_ellipsoid(polytope: Polytope) -> Ellipsoid:
-    """The ellipsoid of largest volume inside P, to 1e-7 or so in volume, shrunk so that |Q c_j| <= d_j - c_j'center holds in
-    floating point for every row.
+    """Returns the ellipsoid of largest volume inside P, to about 1e-7 in volume.
+
+    It is shrunk so that |Q c_j| <= d_j - c_j'center holds in floating point for every row.
 
     Raises:
         RegionError: ``ellipsoid_failed`` when the method does not converge, or as :func:`certifier.polytopes.polytope.chebyshev_center`.
@@ -60,7 +61,9 @@ def inscribed_ellipsoid(polytope: Polytope) -> Ellipsoid:
 
 
 def volume_bound(polytope: Polytope) -> float:
-    """An upper bound of the inscribed ellipsoid's volume in a fraction of its time: that of the one in the bounding box.
+    """Returns an upper bound of the inscribed ellipsoid's volume: the volume of the ellipsoid inscribed in P's bounding box.
+
+    It takes a fraction of the time of the inscribed ellipsoid itself.
 
     Raises:
         RegionError: as :func:`certifier.polytopes.polytope.chebyshev_center`.
@@ -74,15 +77,16 @@ def _unit_ball(n: int) -> float:
 
 
 def _largest(A: Array) -> tuple[Array, Array]:
-    """Centre x (n,) and square E^2 (n, n) of the largest ellipsoid {x + E u} in {A x <= 1}: maximise log det E, |E a_i| + a_i'x <= 1.
+    """Returns the centre x (n,) and the square E^2 (n, n) of the largest ellipsoid {x + E u} in {A x <= 1}.
 
-    Zhang and Gao, *On numerical solution of the maximum volume ellipsoid problem* (SIOPT 2003), the primal-dual method with
-    E^-2 = A' diag(y) A eliminated. What is left is h_i = |E a_i|, the slacks z and the multipliers y:
+    That is: maximise log det E subject to |E a_i| + a_i'x <= 1. The method is the primal-dual one of Zhang and Gao, *On numerical solution
+    of the maximum volume ellipsoid problem* (SIOPT 2003), with E^-2 = A' diag(y) A eliminated. What is left is h_i = |E a_i|, the slacks z
+    and the multipliers y:
 
         A'(y h) = 0,   h + z = 1 - A x,   y z = mu.
 
     Raises:
-        np.linalg.LinAlgError: it does not converge.
+        np.linalg.LinAlgError: the method does not converge.
     """
     m, n = A.shape
     x, slack = np.zeros(n), np.ones(m)
@@ -105,7 +109,7 @@ def _largest(A: Array) -> tuple[Array, Array]:
         G = Q * Q * (y[:, None] * y)
         G.flat[:: m + 1] += weight * z
         missing = primal - central / y
-        # Both systems with one factorisation: dy = T dx - v.
+        # One factorisation serves both systems: dy = T dx - v.
         solved = np.linalg.solve(G, np.column_stack([(h + z)[:, None] * yA, weight * missing, weight[:, None] * A]))
         P = (weight[:, None] * solved[:, :n] - yA).T
         dx = np.linalg.solve(P @ A, P @ missing - dual)
@@ -118,14 +122,15 @@ def _largest(A: Array) -> tuple[Array, Array]:
 
 
 def volume(polytope: Polytope, seed: int, rays: int = 200_000, samples: int = 16_384) -> tuple[float, float]:
-    """P's volume and its standard error, by sampling; deterministic for a seed.
+    """Returns P's volume and its standard error, by sampling; the same seed gives the same result.
 
-    With the inscribed ellipsoid E and a radius R, vol(P) = vol(P cap R E) / Pr[s in R E]: independent rays rho(theta)
-    give the numerator, vol(E) mean(min(rho, R)^n), and hit-and-run in P the probability. R is the median of a first
-    sample, so neither part has a heavy tail; the probability's error is taken between independent chains.
+    With the inscribed ellipsoid E and a radius R, vol(P) = vol(P cap R E) / Pr[s in R E]. Independent rays rho(theta) give the numerator,
+    vol(E) mean(min(rho, R)^n). Hit-and-run in P gives the probability. R is the median of a first sample, so neither part has a heavy tail.
+    The probability's error is taken between independent chains.
 
     Args:
-        samples: a multiple of ``CHAINS``.
+        rays: number of rays for the numerator.
+        samples: number of samples for the probability, a multiple of ``CHAINS``.
 
     Raises:
         RegionError: as :func:`inscribed_ellipsoid`.

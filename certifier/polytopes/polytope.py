@@ -1,11 +1,11 @@
-"""Linear programs over polytopes P = {s : C s <= d}, C (m, n), d (m,).
+"""Linear programs are solved here over polytopes P = {s : C s <= d}, C (m, n), d (m,).
 
 Values found by a linear program (certifier.polytopes.simplex) are accurate to rounding. What has to hold for certain rests on weak
 duality instead: for multipliers y >= 0 and a box [l, u] around P,
 
     c's = y'C s + (c - y'C)'s <= y'd + sum_i max(r_i l_i, r_i u_i),   r = c - y'C,
 
-plus a bound on the rounding of the right-hand side itself.
+and a bound on the rounding of the right-hand side itself is added.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _RAYS = 2048
 
 
 def bounds(polytope: Polytope) -> tuple[Array, Array]:
-    """Support values along the axes: the smallest box around P, (n,) and (n,).
+    """Returns the smallest box around P, lower (n,) and upper (n,), from the support values along the axes.
 
     Raises:
         RegionError: as :func:`chebyshev_center`.
@@ -42,7 +42,7 @@ def _bounds(polytope: Polytope, inside: Array) -> tuple[Array, Array]:
 
 
 def bound_multipliers(polytope: Polytope, inside: Array | None = None) -> tuple[Array, Array, Array, Array]:
-    """A box around P with the multipliers that prove it in exact arithmetic.
+    """Returns a box around P with the multipliers that prove it in exact arithmetic.
 
     Every axis needs a row on either side that bounds it alone, as the joint limits do; residuals are absorbed there.
 
@@ -50,8 +50,8 @@ def bound_multipliers(polytope: Polytope, inside: Array | None = None) -> tuple[
         inside: (n,) a point inside, if one is known.
 
     Returns:
-        (lo, hi, Y_lo, Y_hi), (n,), (n,), (n, m), (n, m): Y >= 0, row i of Y_hi proves s_i <= hi_i and that of Y_lo
-        proves -s_i <= -lo_i. Bounds are rounded outwards.
+        (lo, hi, Y_lo, Y_hi), of shapes (n,), (n,), (n, m), (n, m). Y >= 0; row i of Y_hi proves s_i <= hi_i, and row i of Y_lo proves
+        -s_i <= -lo_i. Bounds are rounded outwards.
 
     Raises:
         RegionError: ``polytope_without_limits``, or as :func:`chebyshev_center`.
@@ -65,14 +65,14 @@ def bound_multipliers(polytope: Polytope, inside: Array | None = None) -> tuple[
     at_limit = values >= limits
     Y[at_limit] = 0
     scale = np.abs(polytope.C[rows[at_limit]]).max(axis=1)
-    # Rounded down, so that the residual is positive and meets the very same row.
+    # The multiplier is rounded down, so that the residual is positive and the very same row bounds it.
     Y[at_limit, rows[at_limit]] = np.where(scale == 1, 1, np.nextafter(1 / scale, 0))
     values = np.minimum(values, limits)
     return -values[n:], values[:n], Y[n:], Y[:n]
 
 
 def support(polytope: Polytope, c: Array) -> tuple[float, Array]:
-    """An upper bound of c's on P, rounded upwards, with the multipliers y (m,) that prove it as in :func:`bound_multipliers`.
+    """Returns an upper bound of c's on P, rounded upwards, with the multipliers y (m,) that prove it as in :func:`bound_multipliers`.
 
     Raises:
         RegionError: ``polytope_without_limits``, or as :func:`chebyshev_center`.
@@ -85,13 +85,13 @@ def support(polytope: Polytope, c: Array) -> tuple[float, Array]:
 
 
 def chebyshev_center(polytope: Polytope, names: tuple[str, ...] | None = None) -> tuple[Array, float]:
-    """Centre (n,) and radius of a largest ball inside P; refuses a polytope that is empty, flat or unbounded.
+    """Returns the centre (n,) and the radius of a largest ball inside P; refuses a polytope that is empty, flat or unbounded.
 
     Args:
         names: (n,) joint names for the messages.
 
     Raises:
-        RegionError: ``polytope_empty`` when no ball of positive radius fits inside, ``polytope_unbounded`` naming a
+        RegionError: ``polytope_empty`` when no ball of positive radius fits inside; ``polytope_unbounded``, which names a joint or a
             direction v with C v <= 0.
     """
     C, d, norms = polytope.C, polytope.d, np.linalg.norm(polytope.C, axis=1)
@@ -107,7 +107,7 @@ def chebyshev_center(polytope: Polytope, names: tuple[str, ...] | None = None) -
             )
     if np.isinf(_axis_limits(polytope)[0]).any():
         _check_cone(C)
-    # Where P is empty, the radius is negative: as far as all faces would have to move.
+    # Where P is empty, the radius is negative: its size is how far all faces would have to move.
     balls = Polytope(np.column_stack([C, norms])[rows], d[rows])
     start = np.append(np.zeros(C.shape[1]), (d[rows] / norms[rows]).min())
     point = _maximise(balls, np.eye(len(start))[-1:], start)[0][0]
@@ -120,9 +120,9 @@ def chebyshev_center(polytope: Polytope, names: tuple[str, ...] | None = None) -
 
 
 def _check_cone(C: Array) -> None:
-    """Refuse faces C s <= d with a direction v != 0, C v <= 0."""
-    # Stiemke: either some v has C v <= 0, C v != 0, or a positive combination of the rows vanishes; then P is bounded iff C has full rank.
-    # With C v >= -1 the optimum is 0, or at most -1.
+    """Refuses faces C s <= d for which some direction v != 0 has C v <= 0."""
+    # By Stiemke's lemma either some v has C v <= 0, C v != 0, or a positive combination of the rows vanishes. In the second case P is
+    # bounded iff C has full rank. With C v >= -1 the optimum is 0, or at most -1.
     C = C[C.any(axis=1)] / np.linalg.norm(C[C.any(axis=1)], axis=1, keepdims=True)
     if np.linalg.matrix_rank(C, tol=_FLAT) < C.shape[1]:
         raise _unbounded(np.linalg.svd(C).Vh[-1])
@@ -142,19 +142,23 @@ def _unbounded(direction: Array) -> RegionError:
 
 
 _CLEARLY = 1e-9
-"""Relative distance by which a row must be redundant to go, so that whoever proves it again succeeds as well."""
+"""A row must be redundant by this relative distance to be dropped, so that whoever proves it again succeeds as well."""
 
 
 def drop_redundant(polytope: Polytope, fixed: int = 0, inside: Array | None = None) -> NDArray[np.int64]:
-    """Indices, ascending, of rows that suffice to describe P. Never enlarges the set: rows go only when strict dual bounds
-    on P's bounding box prove them from the rows that stay, so some weakly redundant rows remain.
+    """Returns the indices, ascending, of rows that suffice to describe P.
 
-    The box does no harm: on a way out of P through rows that went, the first of them to be reached would be reached in the
-    box, where the bounds hold. Rows are called needed when a ray from inside leaves P through them alone; each round tries
-    all others against these, and shoots at the points where that fails (Clarkson's algorithm).
+    The set is never enlarged: rows are dropped only when strict dual bounds on P's bounding box prove them from the rows that stay. So
+    some weakly redundant rows remain.
+
+    The box does no harm. On a way out of P through dropped rows, the first of them to be reached would be reached in the box, where the
+    bounds hold.
+
+    Rows are called needed when a ray from inside leaves P through them alone. Each round tries all other rows against these, and shoots
+    rays at the points where that fails (Clarkson's algorithm).
 
     Args:
-        fixed: this many rows at the end stay whatever happens (the joint limits, say).
+        fixed: this many rows at the end stay whatever happens, for instance the joint limits.
         inside: (n,) a point well inside, if one is known.
 
     Raises:
@@ -184,12 +188,15 @@ def drop_redundant(polytope: Polytope, fixed: int = 0, inside: Array | None = No
 
 @lru_cache(maxsize=16)
 def _directions(n: int) -> Array:
-    """(_RAYS, n), always the same."""
+    """Returns random directions (_RAYS, n), which are always the same."""
     return np.random.default_rng(0).normal(size=(_RAYS, n))
 
 
 def _repeated(polytope: Polytope) -> NDArray[np.bool_]:
-    """(m,) True where a row with the same normal and a smaller offset, or the same offset further down, makes the row idle."""
+    """Returns for every row, (m,), whether another row with the same normal makes it idle.
+
+    That other row has a smaller offset, or it has the same offset and comes further down.
+    """
     order = np.lexsort((-np.arange(len(polytope.d)), polytope.d))
     _, first = np.unique(polytope.C[order], axis=0, return_index=True)
     repeated = np.ones(len(polytope.d), dtype=bool)
@@ -198,7 +205,7 @@ def _repeated(polytope: Polytope) -> NDArray[np.bool_]:
 
 
 def _left_through(polytope: Polytope, center: Array, rays: Array) -> NDArray[np.bool_]:
-    """(m,) True for rows through which alone some ray (r, n) from the centre leaves P."""
+    """Returns for every row, (m,), whether some ray (r, n) from the centre leaves P through this row alone."""
     rows = np.zeros(len(polytope.d), dtype=bool)
     _leave(polytope.C, polytope.d - polytope.C @ center, rays, rows)
     return rows
@@ -206,6 +213,7 @@ def _left_through(polytope: Polytope, center: Array, rays: Array) -> NDArray[np.
 
 @njit(cache=True)
 def _leave(C: Array, slack: Array, rays: Array, rows: NDArray[np.bool_]) -> None:
+    """Marks the rows through which alone some ray leaves P; slack is how far the centre is from the faces."""
     for ray in rays:
         through, first, second = 0, np.inf, np.inf
         for j in range(len(C)):
@@ -221,7 +229,7 @@ def _leave(C: Array, slack: Array, rays: Array, rows: NDArray[np.bool_]) -> None
 
 
 def _maximise(polytope: Polytope, directions: Array, start: Array) -> tuple[Array, Array]:
-    """As :func:`certifier.polytopes.simplex.maximise`, for a bounded P."""
+    """Does what :func:`certifier.polytopes.simplex.maximise` does, for a bounded P."""
     try:
         return simplex.maximise(polytope.C, polytope.d, directions, start)
     except np.linalg.LinAlgError as error:
@@ -229,13 +237,13 @@ def _maximise(polytope: Polytope, directions: Array, start: Array) -> tuple[Arra
 
 
 def _boxed(polytope: Polytope, lo: Array, hi: Array) -> Polytope:
-    """P within a box, whose faces come last."""
+    """Returns P within a box, whose faces come last."""
     eye = np.eye(len(lo))
     return Polytope(np.concatenate([polytope.C, eye, -eye]), np.concatenate([polytope.d, hi, -lo]))
 
 
 def _proved_bounds(polytope: Polytope, directions: Array, Y: Array, lo: Array, hi: Array) -> Array:
-    """(k,) upper bounds of the directions (k, n) on P, inside the box [lo, hi], by the multipliers Y (k, m); rounding included."""
+    """Returns upper bounds (k,) of the directions (k, n) on P, inside the box [lo, hi], by the multipliers Y (k, m), rounding included."""
     C, d = polytope.C, polytope.d
     r = directions - Y @ C
     values = Y @ d + np.maximum(r * lo, r * hi).sum(axis=1)
@@ -244,7 +252,10 @@ def _proved_bounds(polytope: Polytope, directions: Array, Y: Array, lo: Array, h
 
 
 def _axis_limits(polytope: Polytope) -> tuple[Array, NDArray[np.int64]]:
-    """(2n,) bounds of the directions e_i, then -e_i, by single rows, rounded up or inf, and the row (2n,) that each comes from."""
+    """Returns bounds (2n,) of the directions e_i, then -e_i, by single rows, and the row (2n,) that each bound comes from.
+
+    A bound is rounded up, and it is inf where no single row gives one.
+    """
     C, d = polytope.C, polytope.d
     n = C.shape[1]
     rows = np.full(2 * n, -1)
@@ -257,7 +268,7 @@ def _axis_limits(polytope: Polytope) -> tuple[Array, NDArray[np.int64]]:
 
 @njit(cache=True)
 def _single_rows(C: Array, d: Array, rows: NDArray[np.int64]) -> None:
-    """The row that gives the least bound alone, for e_i, then -e_i; -1 stays where there is none."""
+    """Fills in the row that alone gives the least bound, for e_i, then -e_i; -1 stays where there is none."""
     m, n = C.shape
     for j in range(m):
         axis, entries = 0, 0

@@ -1,7 +1,7 @@
-"""Uniform samples of a polytope P = {s : C s <= d} by hit-and-run, many chains at once.
+"""Hit-and-run draws uniform samples of a polytope P = {s : C s <= d}, with many chains at once.
 
 Directions are the axes of the chains' covariance (coordinate hit-and-run with rounding; Haraldsdóttir, Cousins, Thiele, Fleming,
-Vempala, *CHRR*, Bioinformatics 2017): a step costs a few operations a face, whatever the dimension.
+Vempala, *CHRR*, Bioinformatics 2017). So a step costs a few operations a face, whatever the dimension.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from certifier.errors import RegionError
 from certifier.model import Array, Polytope
 
 CHAINS = 64
-"""Number of independent chains."""
+"""This many independent chains are run."""
 
 
 def hit_and_run(polytope: Polytope, start: ArrayLike, count: int, seed: int) -> Array:
-    """(count, n) points of P, nearly uniform and nearly independent; deterministic for a seed.
+    """Returns points of P, (count, n), nearly uniform and nearly independent; the same seed gives the same points.
 
-    Chains start together at ``start``. In a first phase the covariance of all chains replaces that of the directions
-    round after round, so thin polytopes mix as well as round ones. Then it is fixed, the chains walk on until they have
-    forgotten it, and each gives a point every 2n + 10 steps; row i belongs to chain i modulo ``CHAINS``.
+    All chains start at ``start``. In a first phase, round after round, the covariance of all chains replaces that of the directions, so
+    thin polytopes mix as well as round ones. Then the covariance is fixed, and the chains walk on until they have forgotten it. After that
+    each gives a point every 2n + 10 steps; row i belongs to chain i modulo ``CHAINS``.
 
     Args:
         start: (n,) a point inside P.
@@ -50,7 +50,7 @@ def hit_and_run(polytope: Polytope, start: ArrayLike, count: int, seed: int) -> 
 
 
 def _walk(polytope: Polytope, s: Array, shape: Array, steps: int, rng: np.random.Generator) -> Array:
-    """The chains s (k, n) after that many steps along columns of the shape."""
+    """Returns the chains s (k, n) after that many steps along columns of the shape."""
     columns, places = rng.integers(len(shape), size=(len(s), steps)), rng.random((len(s), steps))
     moves, slack = np.zeros(s.shape), np.maximum(polytope.d - s @ polytope.C.T, 0)
     if not _steps((polytope.C @ shape).T.copy(), slack, columns, places, moves):
@@ -62,10 +62,16 @@ def _walk(polytope: Polytope, s: Array, shape: Array, steps: int, rng: np.random
 
 @njit(cache=True)
 def _steps(speed: Array, slack: Array, columns: Array, places: Array, moves: Array) -> bool:
-    """Adds up the chains' moves (k, n), steps to places (k, steps) in [0, 1) of their chords; False when one has no end.
+    """Adds up the chains' moves (k, n): each step goes to a place in [0, 1) of its chord.
 
     Args:
-        speed: (n, m) by which the faces come nearer along a column; slack: (k, m), changed.
+        speed: (n, m) by which the faces come nearer along a column.
+        slack: (k, m) of the faces, changed.
+        columns: (k, steps) the column that each step goes along.
+        places: (k, steps) in [0, 1).
+
+    Returns:
+        False when a chord has no end.
     """
     m = slack.shape[1]
     for chain in range(len(moves)):

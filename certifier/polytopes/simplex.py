@@ -1,8 +1,10 @@
-"""Linear programs over one polytope {x : A x <= b} from a point inside, by the simplex method from vertex to vertex.
+"""The simplex method solves linear programs over one polytope {x : A x <= b}, from a point inside and then from vertex to vertex.
 
-The programs here have few unknowns and many directions: a call to a general solver costs more than the whole of them. From a point inside
-one walks along the objective, projected onto the faces met so far, to a vertex; from there along edges, each time to the best neighbour
-(Dantzig's rule; Bland's after a step of no length, so that no cycle goes on). Every further direction starts from the last one's vertex.
+The programs here have few unknowns and many directions, so one call to a general solver costs more than all of them together.
+
+From a point inside, the method walks along the objective, projected onto the faces met so far, to a vertex. From there it walks along
+edges, each time to the best neighbour. (This is Dantzig's rule; after a step of no length Bland's rule is used, so that no cycle goes
+on.) Every further direction starts from the last one's vertex.
 """
 
 from __future__ import annotations
@@ -13,19 +15,19 @@ from numba import njit
 from certifier.model import Array
 
 _PARALLEL = 1e-9
-"""Sine below which a direction is taken as parallel to a face."""
+"""Below this sine a direction is taken as parallel to a face."""
 _OPTIMAL = 1e-11
-"""Most negative multiplier of an optimal vertex, relative to the objective."""
+"""An optimal vertex may have a multiplier that is negative by this much, relative to the objective."""
 _LEVEL = 1e-13
-"""Lengths of steps that count as none; the unknowns are of order one."""
+"""A step no longer than this counts as none; the unknowns are of order one."""
 _PIVOTS = 50
-"""Edges followed at most, for every row and unknown."""
+"""At most this many edges are followed for every row and unknown."""
 
 
 def maximise(A: Array, b: Array, directions: Array, start: Array) -> tuple[Array, Array]:
-    """Maximisers (k, n) of the directions (k, n) on {x : A x <= b}, and the rows' multipliers (k, m) >= 0.
+    """Returns the maximisers (k, n) of the directions (k, n) on {x : A x <= b}, and the rows' multipliers (k, m) >= 0.
 
-    Values are accurate to rounding; what has to hold for certain is to be proved by the multipliers.
+    Values are accurate to rounding. What has to hold for certain must be proved by the multipliers.
 
     Args:
         start: (n,) a point of the polytope, inside or on its faces.
@@ -55,7 +57,7 @@ def _walk(A: Array, b: Array, directions: Array, points: Array, multipliers: Arr
 
 @njit(cache=True)
 def _vertex(A: Array, b: Array, c: Array, basis: Array) -> bool:
-    """Rows of a vertex that is reached from 0 without going down in c; False when no face ends the way."""
+    """Fills in the rows of a vertex that is reached from 0 without going down in c; returns False when no face ends the way."""
     n = A.shape[1]
     x, frame, v, unit = np.zeros(n), np.zeros((n, n)), np.zeros(n), np.zeros(n)
     for k in range(n):
@@ -103,7 +105,7 @@ def _scale(v: Array, factor: float) -> None:
 
 @njit(cache=True)
 def _rest(frame: Array, k: int, v: Array, rest: Array) -> float:
-    """The part of v that is orthogonal to the first k rows, which are orthonormal, and its length."""
+    """Fills in the part of v that is orthogonal to the first k rows of the frame, which are orthonormal, and returns its length."""
     for i in range(len(v)):
         rest[i] = v[i]
     for _ in range(2):
@@ -116,9 +118,10 @@ def _rest(frame: Array, k: int, v: Array, rest: Array) -> float:
 
 @njit(cache=True)
 def _first(A: Array, b: Array, x: Array, v: Array, basis: Array, size: int, lowest: bool) -> tuple[int, float]:
-    """The row that ends the way from x along v, none of the first in the basis, and the length of the way; -1 if there is none.
+    """Returns the row that ends the way from x along v, and the length of the way; the row is -1 if there is none.
 
-    Of several the one that is met most squarely, or the one with the lowest number.
+    The first ``size`` rows of the basis are left out. Of several rows it is the one that is met most squarely or, if ``lowest``, the one
+    with the lowest number.
     """
     entering, step, speed = -1, np.inf, 0.0
     for j in range(len(b)):
@@ -138,7 +141,11 @@ def _first(A: Array, b: Array, x: Array, v: Array, basis: Array, size: int, lowe
 
 @njit(cache=True)
 def _edges(A: Array, basis: Array, edges: Array) -> bool:
-    """The columns of the inverse of the basis' rows (Gauss-Jordan, pivoted), row by row; False when they are numerically dependent."""
+    """Fills in the columns of the inverse of the basis' rows, row by row, by Gauss-Jordan elimination with pivots.
+
+    Returns:
+        False when the basis' rows are numerically dependent.
+    """
     n = len(basis)
     work = np.zeros((n, n))
     for i in range(n):
@@ -169,7 +176,11 @@ def _edges(A: Array, basis: Array, edges: Array) -> bool:
 
 @njit(cache=True)
 def _along_edges(A: Array, b: Array, c: Array, basis: Array, x: Array, multipliers: Array) -> bool:
-    """From the basis' vertex to the best one, which the basis then is; fills x and the multipliers. False when there is none."""
+    """Goes from the basis' vertex to the best one, which the basis then is; fills in x and the multipliers.
+
+    Returns:
+        False when there is no best vertex.
+    """
     m, n = A.shape
     size = np.sqrt(_dot(c, c))
     edges, v = np.zeros((n, n)), np.zeros(n)

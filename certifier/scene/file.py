@@ -17,10 +17,13 @@ from typing import Any
 import yaml
 
 from certifier.errors import SceneError
+from certifier.model import MAX_NAME, MAX_SENTENCE, is_name, is_sentence
 
 MAX_BYTES = 2**20
 MAX_DEPTH = 50
 MIN_HULL_VERTICES = 8
+ALPHABET = f"at most {MAX_NAME} ASCII letters, digits, _-./:+@#()[],= and single spaces inside"
+"""What a name may be made of (:func:`certifier.model.is_name`), for people."""
 
 
 @dataclass(frozen=True)
@@ -89,11 +92,11 @@ def read_scene_file(path: Path) -> SceneFile:
     _check_directives(directives)
     return SceneFile(
         path=path,
-        name=_string(values.get("name", path.parent.name if path.stem == "scene" else path.stem), "name"),
+        name=_name(values.get("name", path.parent.name if path.stem == "scene" else path.stem), "name"),
         packages=_packages(values.get("packages", {}), path.parent),
         directives=text[directives.start_mark.index : directives.end_mark.index].rstrip(),
         resolved_directives=_resolved(text, directives, path.parent),
-        models=tuple(node.value for node in _file_nodes(directives)),
+        models=tuple(node.value for _, node in _file_nodes(directives)),
         q_star=_q_star(values.get("q_star")),
         padding=_number(values.get("padding", 0.0), "padding", minimum=0.0),
         ignore=_ignore(values.get("ignore", [])),
@@ -122,6 +125,18 @@ def compose(text: str, name: str) -> yaml.Node | None:
         raise SceneError("scene_yaml", f"{name}{line}: {error.problem}") from None
     except yaml.YAMLError as error:
         raise SceneError("scene_yaml", f"{name} is not YAML: {str(error).splitlines()[0]}") from None
+
+
+def directive_files(text: str, name: str) -> list[tuple[str, str]]:
+    """The files that a document of Drake Model Directives names: ``add_model`` or ``add_directives``, and the file as written.
+
+    Raises:
+        SceneError: ``scene_yaml``, with the line.
+    """
+    root = compose(text, name)
+    entries = root.value if isinstance(root, yaml.MappingNode) else []
+    lists = [value for key, value in entries if key.value == "directives" and isinstance(value, yaml.SequenceNode)]
+    return [(kind, node.value) for directives in lists for kind, node in _file_nodes(directives)]
 
 
 def close_matches(name: str, known: list[str]) -> str:
@@ -192,6 +207,18 @@ def _string(value: Any, where: str) -> str:
     return value
 
 
+def _name(value: Any, where: str) -> str:
+    if not is_name(value):
+        raise _wrong(where, f"must be text, not {value!a}", hint=f"names have {ALPHABET}")
+    return str(value)
+
+
+def _sentence(value: Any, where: str) -> str:
+    if not value or not is_sentence(value):
+        raise _wrong(where, f"must be one line of at most {MAX_SENTENCE} printable characters, not {value!a}")
+    return str(value)
+
+
 def _number(value: Any, where: str, minimum: float = -math.inf) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise _wrong(where, f"must be a finite number, not {value!r}")
@@ -214,7 +241,7 @@ def _packages(value: Any, directory: Path) -> dict[str, Path]:
         path = (directory / _string(root, f"packages.{name}")).resolve()
         if not path.is_dir():
             raise _wrong(f"packages.{name}", f"there is no directory {root}")
-        roots[_string(name, "packages")] = path
+        roots[_name(name, "packages")] = path
     return roots
 
 
@@ -235,7 +262,7 @@ def _ignore(value: Any) -> tuple[IgnoreEntry, ...]:
         reason = "ignored by the scene file"
         if isinstance(entry, dict):
             _known(entry, where, ("pair", "reason"))
-            reason = _string(entry.get("reason", reason), f"{where}.reason")
+            reason = _sentence(entry.get("reason", reason), f"{where}.reason")
             where, entry = f"{where}.pair", entry.get("pair")
         if not isinstance(entry, list) or len(entry) != 2:
             raise _wrong(where, "must be two names, [a, b] or {pair: [a, b], reason: ...}")
@@ -252,10 +279,11 @@ def _check_directives(node: yaml.Node) -> None:
             raise _wrong(f"directives[{i}]", "must be a mapping with one key, the kind of directive, such as add_model")
 
 
-def _file_nodes(directives: yaml.Node) -> list[yaml.ScalarNode]:
+def _file_nodes(directives: yaml.Node) -> list[tuple[str, yaml.ScalarNode]]:
     return [
-        value
+        (kind.value, value)
         for entry in directives.value
+        if isinstance(entry, yaml.MappingNode)
         for kind, body in entry.value
         if kind.value in ("add_model", "add_directives") and isinstance(body, yaml.MappingNode)
         for key, value in body.value
@@ -266,7 +294,7 @@ def _file_nodes(directives: yaml.Node) -> list[yaml.ScalarNode]:
 def _resolved(text: str, directives: yaml.Node, directory: Path) -> str:
     start, end = directives.start_mark.index, directives.end_mark.index
     pieces, last = [], start
-    for node in _file_nodes(directives):
+    for _, node in _file_nodes(directives):
         if "://" not in node.value:
             pieces += [text[last : node.start_mark.index], json.dumps(f"file://{(directory / node.value).resolve()}", ensure_ascii=False)]
             last = node.end_mark.index

@@ -4,6 +4,9 @@
 hull across the way from its nearest point, and go on while the vertices are few enough. Every cut is a supporting
 half-space, so the hull stays inside, and the distance from the hull is a convex function, so its greatest value over the
 approximation is taken at a vertex and the inflation is known.
+
+Qhull rounds: what it drops as inside or on a face may lie some 1e-14 m outside of the vertices that it keeps. Points are therefore
+believed to be inside only where they are deeper than that, or are vertices; otherwise the vertices are moved out until they are.
 """
 
 from __future__ import annotations
@@ -21,6 +24,12 @@ _THICKNESS = 1e-6
 """The least half thickness in metres that a flat point set is given."""
 _SAFETY = 1e-9
 """Relative growth that puts rounding errors on the safe side."""
+_GROWTHS = (_SAFETY, 1e-8, 1e-7, 1e-6, 1e-5)
+"""Tried in turn, because thin bodies need more of it."""
+_ROUNDING = 64 * np.finfo(float).eps
+"""Bound of the rounding error of a point's distance from a plane, in units of their greatest coordinate."""
+_PRODUCTS = 2**22
+"""Distances of points from planes that are in memory at once."""
 
 
 def hull_vertices(points: Array) -> Array:
@@ -31,32 +40,66 @@ def hull_vertices(points: Array) -> Array:
         return np.unique(points, axis=0)
 
 
-def outer(points: Array, max_vertices: int) -> tuple[Array, float]:
+def outer(points: Array, max_vertices: int) -> tuple[Array, float, int]:
     """At most ``max_vertices`` >= 8 vertices whose convex hull contains every one of points (k, 3), metres.
 
     Returns:
-        vertices (v, 3), and the inflation: an upper bound in metres on the distance of any point of their hull from the hull of
-        ``points`` (0.0 when the vertices are the points' own).
+        vertices (v, 3); the inflation, an upper bound in metres on the distance of any point of their hull from the hull of ``points``
+        (0.0 only when the vertices are the points' own and no point is outside of them by as much as a rounding error); and the number
+        of vertices that the hull of ``points`` has.
 
     Raises:
         SceneError: rounding errors got the better of it; never a polytope that leaves a point out.
     """
-    extreme = hull_vertices(np.asarray(points, dtype=float))
-    if len(extreme) <= max_vertices:
-        return extreme, 0.0
+    points = np.asarray(points, dtype=float)
+    extreme = hull_vertices(points)
+    if len(extreme) <= max_vertices and _is_hull(extreme, points):
+        return extreme, 0.0, len(extreme)
     solid = hull_vertices(_thickened(extreme))
     center = solid.mean(axis=0)
-    vertices = _contain(_cut_down(solid - center, max_vertices), solid - center)
-    inflation = max(_nearest(v, extreme - center)[1] for v in vertices)
-    if not contains(vertices + center, extreme):
-        raise SceneError("hull", f"no polytope of {max_vertices} vertices was found around a mesh of {len(points)} points")
-    return vertices + center, inflation * (1 + _SAFETY)
+    solid = solid - center
+    around = _contain(solid if len(solid) <= max_vertices else _cut_down(solid, max_vertices), solid)
+    for growth in _GROWTHS:
+        vertices = around * (1 + growth)
+        if contains(vertices + center, points):
+            distance = max(_nearest(v, extreme - center)[1] for v in vertices)
+            inflation = max(distance * (1 + _SAFETY), distance + _ROUNDING * float(np.abs(points).max()))
+            return vertices + center, inflation, len(extreme)
+    raise SceneError("hull", f"no polytope of {max_vertices} vertices was found around a mesh of {len(points)} points")
 
 
 def contains(vertices: Array, points: Array, tolerance: float = 0.0) -> bool:
-    """Whether every one of points (k, 3) satisfies all half-spaces of the hull of vertices (v, 3), up to a tolerance in metres."""
-    equations = ConvexHull(vertices).equations
-    return bool(np.all(points @ equations[:, :3].T + equations[:, 3] <= tolerance))
+    """Whether every one of points (k, 3) is in the hull of vertices (v, 3), beyond doubt by rounding, up to a tolerance in metres."""
+    return bool(_depths(vertices, points).min() >= -tolerance)
+
+
+def _is_hull(vertices: Array, points: Array) -> bool:
+    """Whether every point is one of the vertices, which are among the points, or is inside their hull beyond doubt."""
+    try:
+        doubtful = points[_depths(vertices, points) < 0]
+    except QhullError:
+        doubtful = points
+    own = set(map(tuple, vertices.tolist()))
+    return all(tuple(point) in own for point in doubtful.tolist())
+
+
+def _depths(vertices: Array, points: Array) -> Array:
+    """How deep points (k, 3) are in the hull of vertices (v, 3), metres, (k,): inside beyond doubt where it is not negative.
+
+    Qhull's facets are triangles that close a surface within the hull. Their planes are not quite through their corners: the deepest corner
+    is ``slack`` below its plane, and so is every point of the triangles at most. The way from the middle to a point outside crosses
+    a triangle, so if both ends are farther than that below all planes, the point is inside.
+    """
+    hull = ConvexHull(vertices)
+    normals, offsets = hull.equations[:, :3], hull.equations[:, 3]
+    corners = vertices[hull.simplices]
+    slack = -(np.einsum("fij,fj->fi", corners, normals) + offsets[:, None]).min()
+    margin = max(slack, 0.0) + _ROUNDING * max(np.abs(vertices).max(), np.abs(points).max())
+    size = max(1, _PRODUCTS // len(normals))
+    chunks = (points[k : k + size] for k in range(0, len(points), size))
+    depths = np.concatenate([-(chunk @ normals.T + offsets).max(axis=1) for chunk in chunks]) - margin
+    middle = -(normals @ vertices.mean(axis=0) + offsets).max() - margin
+    return depths if middle > 0 else np.minimum(depths, middle)
 
 
 def _thickened(points: Array) -> Array:
@@ -100,10 +143,10 @@ def _intersection(normals: Array, points: Array) -> Array:
 
 
 def _contain(vertices: Array, points: Array) -> Array:
-    """The vertices, scaled about the origin by the little that makes their hull contain every point in spite of rounding."""
+    """The vertices, scaled about the origin by the little that makes their hull contain every point, but for rounding."""
     equations = ConvexHull(vertices).equations
     excess = (points @ equations[:, :3].T / -equations[:, 3]).max()
-    return vertices * max(1.0, excess) * (1 + _SAFETY)
+    return vertices * max(1.0, excess)
 
 
 def _nearest(x: Array, points: Array) -> tuple[Array, float]:

@@ -38,15 +38,18 @@ from pydrake.solvers import MathematicalProgram
 from pydrake.systems.framework import DiagramBuilder
 
 from certifier.errors import SceneError
-from certifier.model import WORLD, Array, Geometry, Joint, JointKind, Scene
+from certifier.model import MAX_NAME, MAX_SENTENCE, WORLD, Array, Geometry, Joint, JointKind, Scene, escaped, is_name
 from certifier.scene import shapes
-from certifier.scene.file import SceneFile, read_scene_file
+from certifier.scene.file import ALPHABET, SceneFile, read_scene_file
 from certifier.scene.lint import findings
 from certifier.scene.pairs import pairs
+from certifier.scene.strict import StrictReader
 from certifier.scene.tree import Tree, floating
 
-_MESSAGE_LENGTH = 600
-_IGNORED_SHAPE = "Ignoring unsupported SDFormat element in geometry"
+_IGNORED_SHAPE = re.compile(
+    r"Ignoring unsupported SDFormat element in geometry|geom \S+ specified unknown mesh|The geom type|The fromto tag"
+)
+"""Warnings of Drake's about collision geometry that it leaves out."""
 
 
 def parse(payload: dict[str, Any]) -> dict[str, Any]:
@@ -59,11 +62,13 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     scene_file = read_scene_file(path)
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    strict = StrictReader(scene_file)
+    strict.check(scene_file.resolved_directives, path.name)
     warnings = _read_models(scene_file, plant)
     inspector = scene_graph.model_inspector()
     tree = Tree(*_joints(plant))
     q_star = _center(scene_file, tree)
-    by_id = _geometries(scene_file, plant, inspector, tree)
+    by_id = _geometries(scene_file, strict, plant, inspector, tree)
     candidates = [(by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()]
     geometries = tuple(by_id.values())
     wanted, ignored, unused = pairs(candidates, geometries, tree, scene_file.ignore)
@@ -78,7 +83,7 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
         padding=scene_file.padding,
         provenance={
             "directives": scene_file.directives,
-            "packages": {name: root.name for name, root in scene_file.packages.items()},
+            "packages": {name: escaped(root.name) for name, root in scene_file.packages.items()},
             "drake": importlib.metadata.version("drake"),
         },
     )
@@ -109,7 +114,7 @@ def _read_models(scene_file: SceneFile, plant: MultibodyPlant) -> list[str]:
         except (Exception, SystemExit) as error:
             raise _model_error(scene_file, error) from None
     for warning in log.messages:
-        if _IGNORED_SHAPE in warning:
+        if _IGNORED_SHAPE.search(warning):
             raise SceneError("unsupported_shape", _one_line(scene_file, warning), field="directives", hint="use a primitive or a mesh")
     return list(dict.fromkeys(_one_line(scene_file, warning) for warning in log.messages))
 
@@ -142,16 +147,28 @@ def _model_error(scene_file: SceneFile, error: BaseException) -> SceneError:
 
 
 def _one_line(scene_file: SceneFile, message: str) -> str:
-    """A message of Drake's in one line, with paths relative to the scene file."""
+    """A message of Drake's in one printable line, with paths relative to the scene file."""
     message = message.replace("<string>", scene_file.path.name)
     message = re.sub(rf"(file:)?/*{re.escape(str(scene_file.path.parent.resolve()))}/", "", message)
-    return textwrap.shorten(message.removeprefix("error: "), _MESSAGE_LENGTH, placeholder=" ...")
+    return textwrap.shorten(escaped(" ".join(message.removeprefix("error: ").split())), MAX_SENTENCE, placeholder=" ...")
+
+
+def _named(name: str, what: str) -> str:
+    """The name of a joint, a body or a geometry, which statements may print.
+
+    Raises:
+        SceneError: ``scene_name``.
+    """
+    if not is_name(name):
+        message = f"the {what} {name[:MAX_NAME]!a} has a name that is not accepted"
+        raise SceneError("scene_name", message, field="directives", hint=f"names have {ALPHABET}")
+    return name
 
 
 def _body_name(plant: MultibodyPlant, body: RigidBody) -> str:
     if body.index() == plant.world_body().index():
         return WORLD
-    return f"{plant.GetModelInstanceName(body.model_instance())}/{body.name()}"
+    return _named(f"{plant.GetModelInstanceName(body.model_instance())}/{body.name()}", "body")
 
 
 def _joints(plant: MultibodyPlant) -> tuple[list[Joint], list[str]]:
@@ -164,7 +181,7 @@ def _joints(plant: MultibodyPlant) -> tuple[list[Joint], list[str]]:
 
 def _joint(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
     parent, child = _body_name(plant, joint.parent_body()), _body_name(plant, joint.child_body())
-    name = f"{plant.GetModelInstanceName(joint.model_instance())}/{joint.name()}"
+    name = _named(f"{plant.GetModelInstanceName(joint.model_instance())}/{joint.name()}", "joint")
     X_PF = joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4()
     X_BM = joint.frame_on_child().GetFixedPoseInBodyFrame().GetAsMatrix4()
     match joint:
@@ -221,7 +238,9 @@ def _center(scene_file: SceneFile, tree: Tree) -> Array:
     return q_star
 
 
-def _geometries(scene_file: SceneFile, plant: MultibodyPlant, inspector: SceneGraphInspector, tree: Tree) -> dict[GeometryId, Geometry]:
+def _geometries(
+    scene_file: SceneFile, strict: StrictReader, plant: MultibodyPlant, inspector: SceneGraphInspector, tree: Tree
+) -> dict[GeometryId, Geometry]:
     """Every geometry of the proximity role, half-spaces last because their size depends on the reach of the others.
 
     Drake makes names unique within a body by appending an index; its prefix, the model's name, is dropped.
@@ -232,12 +251,12 @@ def _geometries(scene_file: SceneFile, plant: MultibodyPlant, inspector: SceneGr
         body = plant.GetBodyFromFrameId(inspector.GetFrameId(i))
         body_name = _body_name(plant, body)
         short = inspector.GetName(i).removeprefix(f"{plant.GetModelInstanceName(body.model_instance())}::")
-        name = f"{body_name}/{short}"
+        name = _named(f"{body_name}/{short}", "geometry")
         if isinstance(inspector.GetShape(i), HalfSpace):
             half_spaces.append((i, name, body_name))
         else:
             X_BG = inspector.GetPoseInFrame(i)
-            found[i] = _placed(name, body_name, _convex(inspector.GetShape(i), name, scene_file), X_BG)
+            found[i] = _placed(name, body_name, _convex(inspector.GetShape(i), name, scene_file, strict), X_BG)
     reach = tree.reach(list(found.values()), scene_file.padding)
     for i, name, body_name in half_spaces:
         if body_name not in tree.anchored:
@@ -254,7 +273,7 @@ def _placed(name: str, body: str, convex: shapes.Body, X_BG: RigidTransform) -> 
     return Geometry(name, body, vertices, convex.radius, shape, convex.substitution, convex.inflation)
 
 
-def _convex(shape: Shape, name: str, scene_file: SceneFile) -> shapes.Body:
+def _convex(shape: Shape, name: str, scene_file: SceneFile, strict: StrictReader) -> shapes.Body:
     match shape:
         case Box():
             return shapes.box((shape.width(), shape.depth(), shape.height()))
@@ -267,10 +286,29 @@ def _convex(shape: Shape, name: str, scene_file: SceneFile) -> shapes.Body:
         case Ellipsoid():
             return shapes.ellipsoid((shape.a(), shape.b(), shape.c()), scene_file.max_vertices)
         case Convex() | Mesh():
-            hull = shape.GetConvexHull()
-            points = np.array([hull.vertex(k) for k in range(hull.num_vertices())])
-            said = {"kind": type(shape).__name__.lower(), "file": Path(shape.source().description()).name, "scale": shape.scale3().tolist()}
-            return shapes.polytope(said, points, scene_file.max_vertices)
+            said = {
+                "kind": type(shape).__name__.lower(),
+                "file": escaped(Path(shape.source().description()).name),
+                "scale": shape.scale3().tolist(),
+            }
+            return shapes.polytope(said, _mesh_points(shape, strict), scene_file.max_vertices)
         case _:
             message = f"geometry {name} is a {type(shape).__name__}, which is not supported"
             raise SceneError("unsupported_shape", message, field="directives")
+
+
+def _mesh_points(shape: Convex | Mesh, strict: StrictReader) -> Array:
+    """The points of a mesh, (k, 3), scaled, as its file has them.
+
+    First come those that are vertices of Drake's hull, in Drake's order, on which the hashes of scenes rest.
+
+    Raises:
+        SceneError: the file is not what a collision mesh may be, or the scale takes a point out of the range of numbers.
+    """
+    points = strict.points(shape.source().path()) * shape.scale3()
+    if not np.isfinite(points).all():
+        message = f"scaled by {shape.scale3().tolist()}, a point of {escaped(shape.source().path().name)} is not finite"
+        raise SceneError("scene_model", message, field="directives")
+    hull = shape.GetConvexHull()
+    rank = {tuple(hull.vertex(k)): k for k in range(hull.num_vertices())}
+    return points[np.argsort([rank.get(tuple(point), len(rank)) for point in points.tolist()], kind="stable")]

@@ -1,7 +1,7 @@
 """Which other files a scene's files refer to, and where those are.
 
 One reader per kind of file finds the references that Drake would follow; the same readers serve to pack a bundle and to check one
-that came from a stranger. XML is read by expat, with document types refused: they are what entity bombs are made of.
+that came from a stranger.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import yaml
 
 from certifier.errors import SceneError
 from certifier.scene.file import MAX_DEPTH, compose
+from certifier.scene.xml import parse_xml
 
 _ATTRIBUTES = {"file", "filename", "uri", "url"}
 _PLUGIN = "plugin"
@@ -84,18 +85,10 @@ def _xml(path: Path) -> list[str]:
             found.append("".join(text).strip())
         text.clear()
 
-    def refuse(*_: object) -> None:
-        raise SceneError("bundle_xml", f"{path.name} declares a document type or entity, which is not accepted")
+    def install(parser: expat.XMLParserType) -> None:
+        parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, text.append
 
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
-    parser.CharacterDataHandler = text.append
-    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
-    try:
-        parser.Parse(path.read_bytes(), True)
-    except expat.ExpatError as error:
-        raise SceneError("bundle_xml", f"{path.name} is not XML: {error}") from None
+    parse_xml(path, path.name, "bundle_xml", install)
     if any(".." in Path(value).parts for value in directories):
         raise SceneError("bundle_uri", f"{path.name}: .. is not accepted in {', '.join(sorted(_DIRECTORIES))}")
     return [value for value in found if value] + [f"{d}/{value}" for d in directories for value in found if value]

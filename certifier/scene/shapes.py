@@ -57,7 +57,7 @@ def cylinder(radius: float, length: float, sides: int) -> Body:
     ring = reach * np.column_stack([np.cos(angle), np.sin(angle)])
     vertices = np.concatenate([np.column_stack([ring, np.full(sides, z)]) for z in (-length / 2, length / 2)])
     shape = {"kind": "cylinder", "radius": radius, "length": length}
-    return Body(vertices, 0.0, shape, f"cylinder -> circumscribed prism with {sides} sides", reach - radius)
+    return Body(vertices, 0.0, shape, f"cylinder -> circumscribed prism with {sides} sides", float(reach - radius))
 
 
 def ellipsoid(semi_axes: tuple[float, float, float], max_vertices: int) -> Body:
@@ -71,9 +71,9 @@ def ellipsoid(semi_axes: tuple[float, float, float], max_vertices: int) -> Body:
 
 def polytope(shape: dict[str, Any], points: Array, max_vertices: int) -> Body:
     """The hull of points (k, 3), or a polytope of at most max_vertices around it; the shape's ``kind`` is "convex" or "mesh"."""
-    vertices, inflation = outer(points, max_vertices)
+    vertices, inflation, count = outer(points, max_vertices)
     if inflation > 0:
-        hull = f"polytope of {len(vertices)} vertices around its hull of {len(points)}"
+        hull = f"polytope of {len(vertices)} vertices around its hull of {count}"
     else:
         hull = f"convex hull with {len(vertices)} vertices"
     exact = shape["kind"] == "convex" and inflation == 0

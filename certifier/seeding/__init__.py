@@ -1,1 +1,1 @@
-"""Proposals: polytopes around a seed that are worth certifying."""
+"""Seeding makes proposals, which are polytopes around a seed that are worth certifying."""

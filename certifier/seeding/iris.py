@@ -1,9 +1,11 @@
-"""IRIS in s-space: large polytopes that are probably free of collisions (C-IRIS, appendix B.4 and C, algorithm 2).
+"""IRIS in s-space grows large polytopes that are probably free of collisions (C-IRIS, appendix B.4 and C, algorithm 2).
 
-The algorithms are Drake's: IrisNp2 (closest collision by nonlinear programming, program (14), then the tangent plane of the
-inscribed ellipsoid) and IrisZo (bisection towards sampled collisions instead), both grown in s through
-q = q* + 2 atan(s). Werner et al., "Faster Algorithms for Growing Collision-Free Convex Polytopes in Robot Configuration
-Space", 2024.
+The algorithms are Drake's, and both grow in s through q = q* + 2 atan(s):
+
+- IrisNp2 finds the closest collision by nonlinear programming (program (14)), then takes the tangent plane of the inscribed ellipsoid;
+- IrisZo bisects towards sampled collisions instead.
+
+Werner et al., "Faster Algorithms for Growing Collision-Free Convex Polytopes in Robot Configuration Space", 2024.
 """
 
 from __future__ import annotations
@@ -33,14 +35,14 @@ _START_RADIUS = 1e-2
 
 
 class Termination(StrEnum):
-    """Why IRIS stopped."""
+    """The termination says why IRIS stopped."""
 
     TOLERANCE = "tolerance"
     """The inscribed ellipsoid's volume grew by less than the tolerance."""
     ITERATION_LIMIT = "iteration_limit"
     """``max_iterations`` was reached."""
     SEED_CUT_OFF = "seed_cut_off"
-    """The next region would have lost the seed; the one before is the answer."""
+    """The next region would have lost the seed, so the one before is the answer."""
     CENTER_IN_COLLISION = "center_in_collision"
     """The ellipsoid's new centre is in collision."""
     UNKNOWN = "unknown"
@@ -48,12 +50,15 @@ class Termination(StrEnum):
 
 
 def iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Array, dict[str, Any]]:
-    """Faces (m, n), (m,) of an IRIS region around points (k, n) of s, the seed first, and what Drake said about them.
+    """Returns the faces (m, n), (m,) of an IRIS region around points of s, and what Drake said about them.
 
     |c_j| = 1, and the joint limits are left out. Whether the points are inside remains to be checked.
 
+    Args:
+        points: (k, n) points in s, the seed first.
+
     Returns:
-        (C, d, account) with the account's keys guarantee, termination, iterations, epsilon, delta, warnings.
+        (C, d, account); the account's keys are guarantee, termination, iterations, epsilon, delta, warnings.
 
     Raises:
         RegionError: ``seeding_failed`` with Drake's words.
@@ -102,7 +107,10 @@ def _checker(scene: Scene) -> SceneGraphCollisionChecker:
 
 
 def _apart(scene: Scene) -> Scene:
-    """The same scene with every geometry on a body of its own: Drake's checker knows collision filters between bodies only."""
+    """Returns the same scene with every geometry on a body of its own.
+
+    Drake's checker knows collision filters between bodies only.
+    """
     eye = np.eye(4)
     welds = tuple(Joint(f"{g.name}/weld", JointKind.WELD, g.body, f"{g.name}/body", np.zeros(3), eye, eye) for g in scene.geometries)
     return replace(
@@ -114,7 +122,7 @@ def _apart(scene: Scene) -> Scene:
 
 
 def _positions(scene: Scene) -> Callable[[Any], Any]:
-    """s -> q for doubles, Drake's AutoDiffXd and Expression."""
+    """Returns the function s -> q for doubles, Drake's AutoDiffXd and Expression."""
 
     def q(s: Any) -> Any:
         if s.dtype == float:
@@ -135,7 +143,7 @@ class _Recorder(logging.Handler):
 
 @contextmanager
 def _listening() -> Iterator[list[logging.LogRecord]]:
-    """What Drake logs meanwhile, at level INFO and above, kept from other handlers."""
+    """Yields the records that Drake logs meanwhile, at level INFO and above, and keeps them from other handlers."""
     recorder = _Recorder(logging.INFO)
     logger = logging.getLogger("drake")
     level, propagate, handlers = logger.level, logger.propagate, logger.handlers
@@ -157,7 +165,7 @@ _ENDINGS = (
 
 
 def _account(records: list[logging.LogRecord]) -> dict[str, Any]:
-    """Guarantee, termination and iterations, from the log: Drake's functions return the polytope alone."""
+    """Returns guarantee, termination, iterations and warnings, read from the log: Drake's functions return the polytope alone."""
     messages = [record.getMessage() for record in records]
     endings = [ending for words, ending in _ENDINGS if any(word in message for message in messages for word in words)]
     warnings = [record.getMessage() for record in records if record.levelno >= logging.WARNING]

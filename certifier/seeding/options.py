@@ -1,4 +1,4 @@
-"""What a proposal is made from, and by which method."""
+"""The options say from what a proposal is made, and by which method."""
 
 from __future__ import annotations
 
@@ -11,39 +11,42 @@ from certifier.errors import RegionError
 
 
 class Method(StrEnum):
-    """Where a proposal comes from."""
+    """The method says where a proposal comes from."""
 
     IRIS_NP2 = "iris_np2"
-    """Drake's IrisNp2."""
+    """Drake's IrisNp2 makes the polytope."""
     IRIS_ZO = "iris_zo"
-    """Drake's IrisZo: no nonlinear programs, more faces."""
+    """Drake's IrisZo makes the polytope: it solves no nonlinear programs and gives more faces."""
     LIMITS = "limits"
-    """The joint limits: what cannot be certified is cut off pair by pair, by faces in the pair's joints alone."""
+    """The joint limits are the polytope; what cannot be certified is cut off pair by pair, by faces in the pair's joints alone."""
     BOX = "box"
-    """A box around the seed, clipped to the joint limits."""
+    """A box around the seed, clipped to the joint limits, is the polytope."""
     POLYTOPE = "polytope"
-    """The given C and d."""
+    """The given C and d are the polytope."""
 
 
 MOST_IRIS_JOINTS = 8
-"""IRIS' faces have normals in all joints, which is dear where a pair has few of them between its bodies."""
+"""IRIS is the default up to this many joints.
+
+IRIS' faces have normals in all joints, which is dear where a pair has few of them between its bodies.
+"""
 
 
 @dataclass(frozen=True)
 class SeedOptions:
-    """What to propose.
+    """The options say what to propose.
 
     Attributes:
         method: one of :class:`Method`; None for IRIS_NP2 up to MOST_IRIS_JOINTS joints and LIMITS beyond.
-        q: (n,) the seed, joint positions; for every method but ``polytope``.
+        q: (n,) the seed as joint positions, in radians or metres; for every method but ``polytope``.
         contain: (n,) each, joint positions that the region has to contain besides q.
         C, d: (m, n), (m,) the polytope in s, for ``polytope``; the joint limits are added to it.
         center: (n,) a point inside that polytope, in s; default: the centre of its largest ball.
         half_width: half the side of the ``box``, in s.
-        epsilon, delta: IRIS stops adding faces when, but for a probability delta, at most the fraction epsilon of the
-            volume is in collision.
+        epsilon, delta: IRIS stops adding faces when, except with probability delta, at most the fraction epsilon of the volume is in
+            collision.
         max_iterations: IRIS' alternations between faces and ellipsoid.
-        max_iterations_separating_planes: IRIS' rounds of adding faces within each.
+        max_iterations_separating_planes: IRIS' rounds of adding faces within each alternation.
         tolerance: IRIS ends when the ellipsoid's volume grows by less than this fraction.
         margin: distance in s at which IRIS' faces stay clear of the collisions found.
         random_seed: seeds IRIS.
@@ -65,15 +68,15 @@ class SeedOptions:
     random_seed: int = 0
 
     def to_document(self) -> dict[str, Any]:
-        """The options as JSON-able data, those that are not given left out."""
+        """Returns the options as JSON-able data; those that are not given are left out."""
         return {name: value for name, value in asdict(self).items() if value is not None}
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> SeedOptions:
-        """Inverse of :meth:`to_document`.
+        """Does the inverse of :meth:`to_document`.
 
         Raises:
-            RegionError: an unknown, missing or out-of-range option; the error names it.
+            RegionError: an option is unknown, missing or out of range; the error names it.
         """
         known = {f.name for f in fields(cls)}
         for name in document:

@@ -1,4 +1,4 @@
-"""A proposal: a polytope to certify, as data. Nothing in it is a proof."""
+"""A proposal is a polytope to certify, kept as data. Nothing in it is a proof."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from certifier.model import Array
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """A polytope to certify, {C s <= d} within the joint limits.
+    """A proposal is a polytope to certify: {C s <= d} within the joint limits.
 
     Attributes:
         C, d: (m, n), (m,) the faces, |c_j| = 1 where IRIS made them; the joint limits are not among them.
-        center: (n,) the seed (for ``polytope``: the centre) in s, inside all faces and limits.
-        contain: (k, n) what else the region has to contain, in s, likewise.
+        center: (n,) the seed in s (for ``polytope``, the centre), inside all faces and limits.
+        contain: (k, n) what else the region has to contain, in s, inside all faces and limits as well.
         info: JSON-able: method, guarantee (``sampled`` when IRIS passed its statistical test, else ``none``), faces, seconds, and for
             IRIS termination, iterations, epsilon, delta and Drake's warnings.
     """
@@ -29,7 +29,7 @@ class Proposal:
     info: dict[str, Any]
 
     def to_document(self) -> dict[str, Any]:
-        """The proposal as JSON-able data."""
+        """Returns the proposal as JSON-able data."""
         return {
             "C": self.C.tolist(),
             "d": self.d.tolist(),
@@ -40,7 +40,7 @@ class Proposal:
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> Proposal:
-        """Inverse of :meth:`to_document`."""
+        """Does the inverse of :meth:`to_document`."""
         center = np.array(document["center"], dtype=float)
         C, contain = (np.array(document[name], dtype=float).reshape(-1, len(center)) for name in ("C", "contain"))
         return cls(C, np.array(document["d"], dtype=float), center, contain, document["info"])

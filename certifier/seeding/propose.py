@@ -1,4 +1,4 @@
-"""Proposals to certify: a polytope in s around a seed, or a given one. Nothing here is a proof."""
+"""Proposals to certify are made here: each is a polytope in s around a seed, or a given one. Nothing here is a proof."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from certifier.seeding.proposal import Proposal
 
 
 def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> None:
-    """Refuse joint positions around which no region can be certified.
+    """Refuses joint positions around which no region can be certified.
 
     Raises:
         RegionError: ``seed_wrong_length``, ``seed_not_finite``, ``seed_outside_limits`` (the limits themselves are outside) or
-            ``seed_in_collision``, naming the joint or the pair.
+            ``seed_in_collision``; the error names the joint or the pair.
     """
     q = np.asarray(q, dtype=float)
     if q.shape != (scene.n,):
@@ -47,7 +47,7 @@ def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> None:
 
 
 def _check_free(scene: Scene, q: Array, field: str) -> None:
-    """Refuse a configuration in which a pair is closer than twice the padding."""
+    """Refuses a configuration in which a pair is not farther apart than twice the padding."""
     if not scene.pairs:
         return
     diagram = build_diagram(scene)
@@ -70,9 +70,9 @@ def _check_free(scene: Scene, q: Array, field: str) -> None:
 
 
 def propose(scene: Scene, options: SeedOptions) -> Proposal:
-    """A polytope around the seed, by the options' method; deterministic for ``random_seed``.
+    """Returns a polytope around the seed, by the options' method; it is deterministic for ``random_seed``.
 
-    IRIS may take minutes, and native code runs: call it in a process that may die.
+    IRIS may take minutes, and it runs native code, so call it in a process that may die.
 
     Raises:
         RegionError: as :func:`check_seed` and ``polytope.chebyshev_center``; ``polytope_shape``; ``center_outside``;
@@ -113,7 +113,7 @@ def warm_up() -> None:
 
 
 def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:
-    """:func:`propose` in a child process: documents in, the document of the proposal out."""
+    """Runs :func:`propose` in a child process: takes documents and returns the document of the proposal."""
     return propose(Scene.from_document(payload["scene"]), SeedOptions.from_document(payload["seed"])).to_document()
 
 

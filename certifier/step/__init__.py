@@ -1,1 +1,1 @@
-"""The polytope step (12): all pairs coupled, the faces move."""
+"""The polytope step (12) moves the faces of a region, with all pairs coupled."""

@@ -1,6 +1,6 @@
-"""Objective and barriers of the faces in the polytope step, in coordinates in which the inscribed ellipsoid is the unit ball.
+"""The objective and the barriers of the polytope step's faces are made here, where the inscribed ellipsoid is the unit ball.
 
-The unknowns are, face by face, (c_j, d_j, delta_j), n + 2 numbers: the face is {c_j'w <= d_j}, w = E^-1 (s - s_E), and
+The unknowns are, face by face, (c_j, d_j, delta_j), which are n + 2 numbers. The face is {c_j'w <= d_j} with w = E^-1 (s - s_E), and
 
     |c_j| <= d_j - delta_j,   |c_j| <= 1,   delta_j >= 0,   d_j <= cap,   c_j'w_k <= d_j for every point w_k.
 """
@@ -13,11 +13,11 @@ from certifier.conic.arrow import Term
 from certifier.model import Array
 
 EPSILON = 1e-3
-"""Added to the margins in the geometric mean, so that a face that cannot move does not hold up the others."""
+"""This is added to the margins in the geometric mean, so that a face that cannot move does not hold up the others."""
 
 
 def objective_term(n: int) -> Term:
-    """What is minimised: the margins delta_j between the ellipsoid and the faces count by -sum log(delta_j + eps)."""
+    """Returns what is minimised: -sum log(delta_j + eps) of the margins delta_j between the ellipsoid and the faces."""
 
     def term(y: Array) -> tuple[float, Array, Array]:
         delta = y.reshape(-1, n + 2)[:, -1]
@@ -31,8 +31,13 @@ def objective_term(n: int) -> Term:
 
 
 def face_barrier(n: int, cap: float, points: Array) -> Term:
-    """-log of the slacks, the two cones as second-order cones; points (k, n)."""
-    # Rows of the linear slacks delta, cap - d, d - c'w_k: constant + rows v.
+    """Returns the barrier -log of the slacks, in which |c_j| <= 1 and |c_j| <= d_j - delta_j are second-order cones.
+
+    Args:
+        cap: the largest offset d_j.
+        points: (k, n) the points w_k.
+    """
+    # The linear slacks delta, cap - d and d - c'w_k are constant + rows v.
     rows = np.zeros((2 + len(points), n + 2))
     rows[0, -1], rows[1, -2], rows[2:, :n], rows[2:, -2] = 1.0, -1.0, -points, 1.0
     constant = np.zeros(len(rows))

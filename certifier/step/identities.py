@@ -1,12 +1,13 @@
-"""The pair programs' certificates as rationals of the polytope step: identities on a trust box, face multipliers fixed.
+"""The pair programs' certificates are the rationals of the polytope step: identities on a trust box, with fixed face multipliers.
 
-For every vertex v of a pair's bodies, with Z = [a; b] the plane and g_j = d_j - c_j'w the faces,
+Let Z = [a; b] be the plane and g_j = d_j - c_j'w the faces. For every vertex v of a pair's bodies
 
-    +-(a'p_v + b den) - r kappa den - t' den - sum_j lambda_vj g_j   in K,     |a| <= kappa at the corners of the box,
+    +-(a'p_v + b den) - r kappa den - t' den - sum_j lambda_vj g_j   in K,     |a| <= kappa at the corners of the box.
 
-K the weighted sums of squares over the faces of the trust box (certifier.conic.cone): the multipliers of 1 and of the box stay free.
-A proof is about a polytope and a box of its own. A face of either that holds on all of the trust box needs no multiplier here; any other is
-written as a nonnegative combination of the region's faces (Farkas), and its multiplier is handed on to them.
+K is the weighted sums of squares over the faces of the trust box (certifier.conic.cone), so the multipliers of 1 and of the box stay free.
+
+A proof is about a polytope and a box of its own. A face of either that holds on all of the trust box needs no multiplier here. Any other
+face is written as a nonnegative combination of the region's faces (Farkas), and its multiplier is handed on to them.
 """
 
 from __future__ import annotations
@@ -28,19 +29,21 @@ from certifier.polytopes.polytope import support
 from certifier.proof.pair import PairProof, Side
 
 CHUNK = 200_000
-"""Entries of the Schur complements that are formed at once."""
+"""The Schur complements that are formed at once have at most this many entries, or belong to one vertex."""
 CEILING = 10.0
 """The plane's function at the centre may grow by this factor."""
 CONE_SAMPLES = 300
 
 
 def holds_on(proof: PairProof, box: Box, faces: Iterable[int]) -> bool:
-    """Whether these faces, numbered as in the proof, hold on all of the box."""
+    """Returns whether these faces, numbered as in the proof, hold on all of the box."""
     return not _cut(*_face_rows(proof, faces), box).any()
 
 
 def face_multipliers(proof: PairProof, faces: Polytope, box: Box) -> Array:
-    """Weights Y, (f, m), that hand the multipliers of the proof's f faces on to the region's m faces; 0 where the trust box does.
+    """Returns weights Y, (f, m), that hand the multipliers of the proof's f faces on to the region's m faces.
+
+    A weight is 0 where the trust box takes the multiplier over.
 
     Args:
         faces: m faces, then the 2n of the trust box.
@@ -58,7 +61,7 @@ def face_multipliers(proof: PairProof, faces: Polytope, box: Box) -> Array:
 
 
 def _face_rows(proof: PairProof, faces: Iterable[int]) -> tuple[Array, Array]:
-    """Faces of a proof, its polytope's and its box's, as rows c's <= d."""
+    """Returns faces of a proof, those of its polytope or of its box, as rows c's <= d."""
     ground, chosen = proof.ground, list(faces)
     axes = np.diag(1 / ground.half)
     C = np.concatenate([ground.C, -axes, axes])
@@ -67,26 +70,28 @@ def _face_rows(proof: PairProof, faces: Iterable[int]) -> tuple[Array, Array]:
 
 
 def _cut(C: Array, d: Array, box: Box) -> NDArray[np.bool_]:
-    """Which rows cut something off the box, rounding apart."""
+    """Returns which rows cut something off the box, except for rounding."""
     reach = np.abs(C) @ box.half
     return np.asarray(C @ box.mid + reach > d + 1e-9 * reach)
 
 
 def squares(proof: PairProof, side: Side, points: Array) -> Array:
-    """Values of |L_j' rho|^2 of the faces used, (V, f, S), at points s (S, n)."""
+    """Returns the values of |L_j' rho|^2 for the faces used, (V, f, S), at points s (S, n)."""
     u = ((points - proof.ground.mid) / proof.ground.half)[:, list(side.chain)]
     monomials = rho(u) / np.sqrt(3.0) ** subsets(len(side.chain)).sum(axis=1)
     return np.square(np.einsum("nl,vjlk->vjnk", monomials, side.factors[:, 1:])).sum(axis=3)
 
 
 class Identities:
-    """Some vertices of one body of one pair; implements :class:`certifier.conic.arrow.Rationals`.
+    """The identities belong to some vertices of one body of one pair; the class implements :class:`certifier.conic.arrow.Rationals`.
 
     Args:
         lift: basis functions of [1; u] in the coordinates of the cone, see :class:`Lift`.
         p: (R, N_A, 4) numerators and denominator of the vertices, the side's sign included.
-        rounding: (N_A,) what kappa is multiplied by, or None without kappa; margin: (N_A,) t' den.
-        multipliers: (R, q, N_A) of the q faces ``used``, indices.
+        rounding: (N_A,) what kappa is multiplied by, or None without kappa.
+        margin: (N_A,) t' den.
+        multipliers: (R, q, N_A) of the q faces ``used``.
+        used: (q,) indices of the faces that have multipliers.
     """
 
     def __init__(
@@ -101,7 +106,7 @@ class Identities:
         return len(self._p)
 
     def columns(self) -> tuple[Array, Array, Array]:
-        """constant (R, N), local (R, N, p), coupled (R, N, q (n + 1))."""
+        """Returns constant (R, N), local (R, N, p) and coupled (R, N, q (n + 1))."""
         R, N, n = len(self._p), self.cone.N, self._lift.n
         constant = np.zeros((R, N))
         constant[:, : len(self._margin)] = -self._margin
@@ -119,10 +124,12 @@ class Identities:
 
 
 class Lift:
-    """Products of polynomials of a chain with 1 and u, as coordinates of the cone.
+    """Multiplies polynomials of a chain by 1 and u, with products in the coordinates of the cone.
 
     Args:
-        u: (N_A, n) the chain's points, 0 outside the chain; outside: the other joints, in the order of the cone.
+        u: (N_A, n) the chain's points, 0 outside the chain.
+        grid: how many leading points carry the outside joints.
+        outside: the other joints, in the order of the cone.
         ball: (n, n + 1) with w = ball [1; u].
     """
 
@@ -132,7 +139,7 @@ class Lift:
         self._grid, self._outside = grid, outside
 
     def __call__(self, values: Array) -> Array:
-        """(R, N_A) values at the points -> (R, N, n + 1)."""
+        """Returns the products of polynomials with 1 and u: (R, N_A) values at the points -> (R, N, n + 1)."""
         points = values.shape[1]
         lifted = np.zeros((len(values), points + len(self._outside) * self._grid, self.n + 1))
         lifted[:, :points] = values[:, :, None] * self._affine
@@ -147,7 +154,7 @@ class IdentityGroups:
 
     Args:
         scale: (m,) what the faces are multiplied by in the step's coordinates.
-        share: of a proof's margin that is kept.
+        share: the part of a proof's margin that is kept.
     """
 
     def __init__(self, scene: Scene, box: Box, ellipsoid: Ellipsoid, scale: Array, share: float) -> None:
@@ -162,7 +169,7 @@ class IdentityGroups:
         self._center = ellipsoid.center
 
     def group(self, proof: PairProof, Y: Array) -> Group:
-        """The pair's identities with multipliers handed on by Y, (f, m).
+        """Returns the pair's identities with multipliers handed on by Y, (f, m).
 
         Raises:
             np.linalg.LinAlgError: a cone of the trust box is numerically degenerate.
@@ -210,7 +217,7 @@ def _corner_norms(plane: Array) -> Array:
 
 
 def _plane_barrier(n: int, height: Array, ceiling: float, rounded: bool) -> Term:
-    """-log of ceiling - height'z and, with kappa, the second-order cones |a| <= kappa at the corners of the box."""
+    """Returns the barrier -log of ceiling - height'z and, with kappa, of the second-order cones |a| <= kappa at the corners of the box."""
     size = 4 * (n + 1) + rounded
     lifted = np.concatenate([np.ones((2**n, 1)), _corners(n)], axis=1) if rounded else np.zeros((0, n + 1))
     height = np.append(height, np.zeros(size - len(height)))

@@ -1,18 +1,20 @@
-"""The polytope step (12) of C-IRIS: all pairs coupled, the faces move, the inscribed ellipsoid cannot shrink.
+"""The polytope step (12) of C-IRIS couples all pairs: the faces move, and the inscribed ellipsoid cannot shrink.
 
-The moved polytope is {C s <= d} within a *trust box* B around the current one. With the face multipliers of the proofs fixed, free are the
-faces (C, d), the margins delta, every plane z_p, and the multipliers of 1 and of the faces of B:
+The moved polytope is {C s <= d} within a *trust box* B around the current one. The face multipliers of the proofs are fixed. Free are
+the faces (C, d), the margins delta, every plane z_p, and the multipliers of 1 and of the faces of B:
 
     maximise  sum_j log(delta_j + eps)
     s.t.      A_r z_p - t_p den - sum_j lambda_rj (d_j - c_j's)  in  K_B            for every rational r (certifier.step.identities),
-              |E c_j| <= d_j - c_j's_E - delta_j,   |E c_j| <= 1,   delta_j >= 0,   c_j's_k <= d_j for every point s_k to contain,
+              |E c_j| <= d_j - c_j's_E - delta_j,   |E c_j| <= 1,   delta_j >= 0,   c_j's_k <= d_j for every point s_k to contain.
 
-{E u + s_E} the inscribed ellipsoid and t_p a share of the pair's present margin, so that (11) is strictly feasible on what comes out.
-|E c_j| <= 1 where the paper has |c_j| <= 1: margins are measured against the ellipsoid, whatever the units of the joints.
-A pair that holds on all of B constrains nothing and is left out, and a face that no pair needs is dropped, B standing in for it. Before
+{E u + s_E} is the inscribed ellipsoid. t_p is a share of the pair's present margin, so that (11) is strictly feasible on what comes out.
+|E c_j| <= 1 stands for the paper's |c_j| <= 1, so that margins are measured against the ellipsoid, whatever the units of the joints.
+
+A pair that holds on all of B constrains nothing and is left out. A face that no pair needs is dropped, and B stands in for it. Before
 that, (11) is tried against the faces of B for every proof that does not hold there, so that few pairs ask for few faces.
-The program is an arrow (conic.arrow). The polytope that it starts from is feasible, so the ellipsoid cannot shrink; where the proofs
-have too little margin it starts from a slightly smaller one. What comes out is a proposal that has to be certified by (11).
+
+The program is an arrow (conic.arrow). The polytope that it starts from is feasible, so the ellipsoid cannot shrink. Where the proofs
+have too little margin, it starts from a slightly smaller polytope. What comes out is a proposal that has to be certified by (11).
 """
 
 from __future__ import annotations
@@ -37,27 +39,32 @@ from certifier.step.identities import IdentityGroups, face_multipliers, holds_on
 from certifier.step.stepped import Stepped
 
 TRUST = 1.3
-"""How far the trust box reaches, relative to the smallest box around the current polytope."""
+"""The trust box is larger by this factor than the smallest box around the current polytope."""
 MARGIN_SHARE = 0.25
 START_LENGTH = 0.9
-"""|E c_j| of the faces at the start, inside |E c_j| <= 1."""
+"""The faces have this |E c_j| at the start, which is inside |E c_j| <= 1."""
 RETREATS = (1.0, 0.95, 0.85)
-"""Scales of the polytope from which the step is tried, one after the other: targeted contraction ends where some pair has hardly any
-margin, and from there no proof is strictly feasible."""
+"""The step is tried from the polytope at these scales, one after the other.
+
+Targeted contraction ends where some pair has hardly any margin, and from there no proof is strictly feasible.
+"""
 PUSH = 0.5
-"""Share of the way to the first boundary by which all faces are moved out first, to have delta > 0."""
+"""All faces are first moved out by this share of the way to the first boundary, to have delta > 0."""
 WEIGHT = 512.0
-"""Of the objective against the barriers: large enough to come close to the optimum, small enough to stay off the boundary."""
+"""The objective has this weight against the barriers: large enough to come close to the optimum, small enough to stay off the boundary."""
 TOLERANCE = 0.005
-"""Of the objective, per face."""
+"""The objective is minimised to this tolerance per face."""
 MOST_TERMS = 4096
-"""Of a rational's polynomial, all joints of the scene in play: above, its Schur complement alone has 128 MiB, and a step takes hours."""
+"""A rational's polynomial may have this many terms, with all joints of the scene in play.
+
+Above, its Schur complement alone has 128 MiB, and a step takes hours.
+"""
 
 Progress = Callable[[str], None]
 
 
 def trust_box(scene: Scene, polytope: Polytope, ellipsoid: Ellipsoid) -> Box:
-    """The smallest box around P, enlarged about the ellipsoid's centre and cut to the joint limits."""
+    """Returns the smallest box around P, enlarged about the ellipsoid's centre and cut to the joint limits."""
     lower, upper = bounds(polytope)
     center = ellipsoid.center
     return Box.around(
@@ -72,17 +79,17 @@ def step(
     contain: Array | None = None,
     progress: Progress = lambda _: None,
 ) -> Stepped:
-    """One polytope step from a certified polytope.
+    """Carries out one polytope step from a certified polytope.
 
     Args:
-        polytope: joint limits as the last 2n rows.
+        polytope: its last 2n rows are the joint limits.
         proofs: pair index -> proof file; proofs on a polytope that contains this one will do. Those made against the faces of
             :func:`trust_box` (``Certification(..., box=...)``) are used as they are.
         contain: (k, n) points of the polytope that stay inside; None for none.
-        progress: called many times with a sentence; an exception it raises ends the step.
+        progress: called many times with a sentence; an exception that it raises ends the step.
 
     Raises:
-        RegionError: ``point_outside``; ``step_too_large``, naming the pair; ``step_failed``, and the current region stands.
+        RegionError: ``point_outside``; ``step_too_large``, which names the pair; or ``step_failed``, after which the current region stands.
     """
     points = np.zeros((0, scene.n)) if contain is None else contain
     if not polytope.contains(points).all():
@@ -106,7 +113,7 @@ def step(
 
 
 def _about(center: Array, polytope: Polytope, scale: float, fixed: int) -> Polytope:
-    """Scaled about a point, all but the last rows."""
+    """Returns the polytope scaled about a point, in all but its last ``fixed`` rows."""
     height = polytope.C @ center
     d = height + scale * (polytope.d - height)
     d[-fixed:] = polytope.d[-fixed:]
@@ -120,10 +127,10 @@ def _step(
     points: Array,
     progress: Progress,
 ) -> Stepped:
-    """The step from a polytope on which the proofs are strictly feasible; its growth is from there.
+    """Carries out the step from a polytope on which the proofs are strictly feasible; the result's growth is from there.
 
     Raises:
-        np.linalg.LinAlgError: they are not.
+        np.linalg.LinAlgError: the proofs are not strictly feasible.
     """
     n = scene.n
     before = inscribed_ellipsoid(polytope)
@@ -161,11 +168,11 @@ def _step(
 def _coupled(
     scene: Scene, polytope: Polytope, center: Array, current: Polytope, proofs: dict[int, bytes], box: Box, progress: Progress
 ) -> list[tuple[PairProof, Array]]:
-    """The proofs that do not hold on all of the box, with the faces they need; (11) is tried with those of the box first."""
+    """Returns the proofs that do not hold on all of the box, with the faces they need; (11) is tried with the faces of the box first."""
     trusted: Certification | None = None
     needed: dict[bytes, tuple[PairProof, Array]] = {}
     affordable = {index: _terms(scene, PairProof.from_bytes(data, scene)) <= MOST_TERMS for index, data in proofs.items()}
-    # What may have to be refused comes first; the others keep their order, on which the last digits of the step's sums depend.
+    # Proofs that may have to be refused come first. The others keep their order, on which the last digits of the step's sums depend.
     for count, index in enumerate(sorted(proofs, key=affordable.__getitem__)):
         data = proofs[index]
         proof = PairProof.from_bytes(data, scene)
@@ -188,7 +195,7 @@ def _coupled(
 
 
 def _terms(scene: Scene, proof: PairProof) -> int:
-    """Of the larger side's polynomials, with all joints of the scene in play."""
+    """Returns the number of terms of the larger side's polynomials, with all joints of the scene in play."""
     return max(dimension(k, k, scene.n - k) for k in (len(side.chain) for side in proof.sides))
 
 
@@ -201,13 +208,13 @@ def _check_size(scene: Scene, index: int, proof: PairProof) -> None:
 
 
 def _within(box: Box, C: Array, d: Array) -> Polytope:
-    """The faces, then those of the box."""
+    """Returns the faces, then those of the box."""
     eye = np.eye(len(box.mid))
     return Polytope(np.concatenate([C, eye, -eye]), np.concatenate([d, box.upper, -box.lower]))
 
 
 def _rows(scene: Scene, box: Box, C: Array, d: Array) -> tuple[Array, Array]:
-    """The faces, then those of the box that say more than the joint limits."""
+    """Returns the faces, then those of the box that say more than the joint limits."""
     inside = np.concatenate([box.upper < scene.s_upper, box.lower > scene.s_lower])
     rows = _within(box, C, d)
     keep = np.concatenate([np.ones(len(d), dtype=bool), inside])
@@ -224,11 +231,12 @@ def _weighted(objective: Term, barrier: Term) -> Term:
 
 
 class _Faces:
-    """Faces as unknowns, (c_j, d_j, delta_j) one after the other, in coordinates in which the ellipsoid is the unit ball.
+    """Holds the faces as unknowns (c_j, d_j, delta_j), one after the other, in coordinates in which the ellipsoid is the unit ball.
 
     Attributes:
         scale: (m,) what the rows are multiplied by, for |E c_j| = START_LENGTH.
-        start: (m (n + 2),) the given faces, delta = 0; push: the direction in which all of them move out.
+        start: (m (n + 2),) the given faces, with delta = 0.
+        push: (m (n + 2),) the direction in which all faces move out.
     """
 
     def __init__(self, C: Array, d: Array, ellipsoid: Ellipsoid) -> None:
@@ -240,7 +248,7 @@ class _Faces:
         self.push = np.tile(np.append(np.zeros(self._n), [1.0, 0.5]), len(d))
 
     def rows(self, y: Array) -> tuple[Array, Array]:
-        """C and d of unknowns."""
+        """Returns C and d of the unknowns."""
         v = y.reshape(-1, self._n + 2)
         C = np.linalg.solve(self._ellipsoid.shape, v[:, : self._n].T).T
         return C, v[:, self._n] + C @ self._ellipsoid.center

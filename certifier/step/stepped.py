@@ -1,4 +1,4 @@
-"""What a polytope step has come to, as data."""
+"""The result of a polytope step is kept here as data."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from certifier.model import Array, Polytope
 
 @dataclass(frozen=True, eq=False)
 class Stepped:
-    """The moved polytope and where it came from; both have the same rows, joint limits last.
+    """Holds the moved polytope and the one that it came from; their rows correspond, and the joint limits come last in both.
 
     Attributes:
         polytope: the new rows.
-        center: (n,) of the new inscribed ellipsoid, hence inside.
-        base: the polytope that was stepped from without the rows that no pair needs, within the trust box; what lies between the two is
-            feasible in (12) as well.
+        center: (n,) centre of the new inscribed ellipsoid, hence inside.
+        base: the polytope that was stepped from, within the trust box and without the rows that no pair needs. What lies between base and
+            polytope is feasible in (12) as well.
         growth: relative growth of the inscribed ellipsoid's volume, from the polytope that was given.
         info: JSON-able, what the step has to say of itself.
     """
@@ -30,7 +30,7 @@ class Stepped:
     info: dict[str, Any]
 
     def to_document(self) -> dict[str, Any]:
-        """The step's result as JSON-able data."""
+        """Returns the step's result as JSON-able data."""
         return {
             "C": self.polytope.C.tolist(),
             "d": self.polytope.d.tolist(),
@@ -43,6 +43,6 @@ class Stepped:
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> Stepped:
-        """Inverse of :meth:`to_document`."""
+        """Does the inverse of :meth:`to_document`."""
         moved, base = (Polytope(np.array(document[C]), np.array(document[d])) for C, d in (("C", "d"), ("base_C", "base_d")))
         return cls(moved, np.array(document["center"]), base, document["growth"], document["info"])

@@ -1,4 +1,9 @@
-"""Rigorous check of a dual proof: no certificate of a pair in this frame, with the given polytope's faces, can exist.
+"""Rigorous check of a dual proof: a pair has no certificate of one form, with the faces of a given polytope and its box, in one frame.
+
+The form: a plane affine in s; multipliers rho'Q_j rho of 1 and of every face, rho the products of distinct joints of the chain; and,
+where a radius is involved, a bound kappa of |a| by the matrix inequality of certifier.pair.program. That no such certificate exists does
+not mean that no plane separates the pair: one may need multipliers of a higher degree, and the check of a pair's proof takes the
+norm at the box's corners, which admits more normals than the matrix inequality.
 
 A certificate gives, for every vertex v of a body, +-(a'p_v + b den) - (r kappa + t) den = sum_j g_j rho'Q_j rho, Q_j psd, t > 0.
 Let x_v be functionals whose localising matrices Lambda_j(x_v) = x_v(g_j rho rho') are all psd, and R = sum_v +-x_v(p_v (x) [1, u]),
@@ -7,28 +12,37 @@ Let x_v be functionals whose localising matrices Lambda_j(x_v) = x_v(g_j rho rho
     0 <= <Z, R> - kappa sum_v r_v x_v(den) - t sum_v x_v(den).
 
 Where no radius is involved and R = 0, it follows that t <= 0. Where one is, the rows R_a of R that belong to a need not vanish: with
-Y = [[Yaa, -R_a/2], [-R_a'/2, Ybb]] psd, Ybb_ii <= Ybb_00 and tr Yaa + Ybb_00 <= sum_v r_v x_v(den), the matrix inequality by which
-kappa bounds |a| (certifier.pair.program) gives <Z_a, R_a> <= kappa sum_v r_v x_v(den).
+Y = [[Yaa, -R_a/2], [-R_a'/2, Ybb]] psd, Ybb_ii <= Ybb_00 and tr Yaa + Ybb_00 <= sum_v r_v x_v(den), the matrix inequality gives
+<Z_a, R_a> <= kappa sum_v r_v x_v(den).
 
 R never vanishes in floating point. The proof names as many moments as R has entries to vanish; changing them by c, G c = -R, makes R
-zero, and |c| is bounded by ball arithmetic. Every matrix is then shown to be positive definite whatever such a change does: it is reduced
-by the rounding of its entries and by the most that the change can do (Gershgorin), and by 2^-40 of its trace, far more than the rounding
-of any Cholesky factorisation of its size. If that succeeds, the matrix is positive definite (Rump, *Verification of positive
-definiteness*, BIT 46, 2006). Where the equations are dependent, as for two balls, fewer are solved; what is left of the others bounds t
-relative to the plane's coefficients, the ``slack``.
+zero, and |c| is bounded by ball arithmetic. Every matrix is then shown to be positive definite whatever such a change does. Where the
+equations are dependent, as for two balls, fewer are solved; what is left of the others bounds t relative to the plane's coefficients, the
+``slack``.
+
+Why the matrices are positive definite: a rounded operation errs by a factor 1 + d, |d| <= eps = 2^-53, or, where its result is
+subnormal, by 2^-1075 at most. Every face and every vertex' moments are first multiplied by powers of two that bring their largest
+numbers near 1, which changes no sign. An entry of Lambda_j is then a sum of n + 1 products of two numbers below 2, the face's rounded. It
+errs by less than (n + 4) eps times the sum of the products' magnitudes, plus 4 (n + 1) 2^-1074, which is far below UNDERFLOW. Twice that
+and more is added to what a change can do. The diagonal having been brought near 1 by powers of two again, the errors' sums over the rows
+are taken off it (Gershgorin), and so is 4 (L + 16) eps times the trace, L the size: by less than (L + 2) eps times the trace can the
+rounding of the reduction and of a Cholesky factorisation, in any order of its sums, hide a negative eigenvalue. If the factorisation
+succeeds, the matrix is positive definite (Rump, *Verification of positive definiteness*, BIT 46, 2006).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from flint import Ordering, arb, arb_mat, ctx, fmpq, fmpq_mpoly_ctx
 
 from certifier.errors import ProofError
-from certifier.model import Array, Pair, Volume
+from certifier.model import Array, Pair, Scene, Volume
 from certifier.proof import limits
 from certifier.proof.negative import DualProof
+from certifier.proof.pair import Ground
 from certifier.verify import limbs
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.moments import localised, table
@@ -37,23 +51,26 @@ from certifier.verify.residual import POSITION_BITS, Numerators, dyadic
 from certifier.verify.scene import check_scene
 
 PRECISION = 256
-ENTRY_ROUNDING = 2.0**-45
-"""Relative rounding of a sum of fewer than 200 products of doubles, several times over."""
-CHOLESKY_ROUNDING = 2.0**-40
+UNDERFLOW = 2.0**-1000
+"""Above what subnormal results can do to an entry of a matrix of numbers near 1."""
 LARGEST_SLACK = 1e-9
+LOOSENESS = 1e-9
+"""Part of a joint's range by which the box may reach beyond its limits: rounding."""
 
 
 @dataclass(frozen=True)
 class DualStatement:
-    """What a valid dual proof proves.
+    """What a valid dual proof proves: there is no certificate, of the form that this module is about, on its ground.
 
     Attributes:
-        pair: the pair that cannot be certified with a plane affine in s, in this frame.
+        pair: the pair that has none with a plane affine in s in this frame.
+        rounded: whether a radius is involved: then those alone are excluded whose normal is bounded by the matrix inequality.
         slack: a certificate's margin would be at most this part of its plane's largest coefficient; 0 when there is none at all.
     """
 
     pair: Pair
     frame: str
+    rounded: bool
     slack: float
 
 
@@ -68,6 +85,7 @@ def verify_dual(proof: DualProof) -> DualStatement:
     if proof.pair not in scene.pairs or proof.frame not in scene.bodies:
         raise ProofError("proof_pair", "the proof is about no pair, or no body, of the scene")
     check_ground(scene, proof.ground)
+    _check_tight(scene, proof.ground)
     check_interior(scene, proof.ground, proof.interior)
     precision = ctx.prec
     ctx.prec = PRECISION
@@ -75,6 +93,15 @@ def verify_dual(proof: DualProof) -> DualStatement:
         return _Check(proof).statement()
     finally:
         ctx.prec = precision
+
+
+def _check_tight(scene: Scene, ground: Ground) -> None:
+    """The box ends at the joint limits: with weaker faces than the joints have, there are fewer certificates."""
+    for joint, lower, upper, mid, half in zip(scene.moving, scene.s_lower, scene.s_upper, ground.mid, ground.half, strict=True):
+        low, high = exact(lower), exact(upper)
+        beyond = exact(half) + max(exact(mid) - high, low - exact(mid))
+        if beyond > exact(LOOSENESS) * (high - low):
+            raise ProofError("proof_box", f"the box of a dual proof reaches beyond the limits of {joint.name}")
 
 
 class _Check:
@@ -87,7 +114,7 @@ class _Check:
         numerators = [Numerators.between(kinematics, proof.frame, volume.body) for volume in volumes]
         self._sides = [_Side(*parts, self._n) for parts in zip(volumes, numerators, proof.moments, strict=True)]
         self._radii = [exact(volume.radius) + exact(scene.padding) for volume in volumes]
-        self._faces = np.array([[float(x) for x in face] for face in [[fmpq(1), *[fmpq(0)] * self._n], *faces_of(ground)]])
+        self._faces = np.array([_near_one(face) for face in [[fmpq(1), *[fmpq(0)] * self._n], *faces_of(ground)]])
         rows = (3,) if self._rounded else range(4)
         self._vanishing = [(c, e) for c in rows for e in range(self._n + 1)]
 
@@ -103,33 +130,36 @@ class _Check:
         if not mass > 0:
             raise ProofError("proof_dual", "the functionals have no mass")
         if len(self._proof.equations) < len(self._vanishing):
-            slack = float(np.nextafter(float((left / mass).upper()), np.inf))
+            slack = _above(left / mass)
             if not slack <= LARGEST_SLACK:
                 raise ProofError("proof_dual", f"the equations are not met: {slack:.3g}")
         for side in self._sides:
             side.check(self._faces, change)
         if self._rounded:
             self._check_normal(R, change)
-        return DualStatement(self._proof.pair, self._proof.frame, slack)
+        return DualStatement(self._proof.pair, self._proof.frame, self._rounded, slack)
 
-    def _correction(self, R: list[list[arb]]) -> tuple[float, arb]:
+    def _correction(self, R: list[list[arb]]) -> tuple[arb, arb]:
         """Bounds of the change that makes the equations named vanish, and of the sum of what is left of the others."""
         proof, named = self._proof, self._proof.equations
         if len(set(named)) != len(named) or len(named) != len(proof.entries) or not all(0 <= k < len(self._vanishing) for k in named):
             raise ProofError("proof_malformed", "the equations and the moments that meet them do not fit")
         if not named:
-            return 0.0, sum((abs(R[c][e]) for c, e in self._vanishing), arb(0))
+            return arb(0), sum((abs(R[c][e]) for c, e in self._vanishing), arb(0))
         columns = [self._column(*(int(i) for i in entry)) for entry in proof.entries]
         G = arb_mat([[column[self._vanishing[k]] for column in columns] for k in named])
         try:
             change = G.solve(arb_mat([[-R[c][e]] for c, e in (self._vanishing[k] for k in named)]))
         except ZeroDivisionError as error:
             raise ProofError("proof_dual", "the equations cannot be met by the moments named") from error
+        sizes = [abs(change[i, 0]).upper() for i in range(len(columns))]
+        if not all(size.is_finite() for size in sizes):
+            raise ProofError("proof_dual", "the equations cannot be met by the moments named")
         left = arb(0)
         for k, (c, e) in enumerate(self._vanishing):
             if k not in named:
                 left += abs(R[c][e] + sum((column[c, e] * change[i, 0] for i, column in enumerate(columns)), arb(0)))
-        return float(np.nextafter(max(float(abs(change[i, 0]).upper()) for i in range(len(columns))), np.inf)), left
+        return max(sizes), left
 
     def _column(self, side: int, vertex: int, monomial: int) -> dict[tuple[int, int], arb]:
         """What one unit of a moment adds to R."""
@@ -137,7 +167,7 @@ class _Check:
             raise ProofError("proof_malformed", "the proof names a moment that is not there")
         return self._sides[side].column(vertex, monomial, 1 - 2 * side)
 
-    def _check_normal(self, R: list[list[arb]], change: float) -> None:
+    def _check_normal(self, R: list[list[arb]], change: arb) -> None:
         """The part of the proof that concerns kappa."""
         n, (aa, bb) = self._n, self._proof.normal
         if aa.shape != (3, 3) or bb.shape != (n + 1, n + 1) or not (np.array_equal(aa, aa.T) and np.array_equal(bb, bb.T)):
@@ -147,14 +177,15 @@ class _Check:
         trace = sum((arb(float(aa[i, i])) for i in range(3)), arb(float(bb[0, 0])))
         if not trace <= sum((arb(radius) * side.mass(change) for radius, side in zip(self._radii, self._sides, strict=True)), arb(0)):
             raise ProofError("proof_dual", "the matrix that concerns the normal is too large")
-        reach = change * sum(side.reach for side in self._sides)
-        off = np.array([[-float(R[c][e].mid()) / 2 for e in range(n + 1)] for c in range(3)])
-        error = np.array(
-            [[float(R[c][e].rad()) + abs(float(R[c][e].mid())) * ENTRY_ROUNDING + reach for e in range(n + 1)] for c in range(3)]
-        )
-        Y, E = np.zeros((2, n + 4, n + 4))
-        Y[:3, :3], Y[3:, 3:], Y[:3, 3:], Y[3:, :3] = aa, bb, off, off.T
-        E[:3, 3:], E[3:, :3] = error, error.T
+        size = int(np.frexp(max(aa.max(), bb.max()))[1])
+        reach = change * sum((side.reach for side in self._sides), arb(0))
+        off = [[-(R[c][e] + arb(0, reach)) / 2 / arb(2) ** size for e in range(n + 1)] for c in range(3)]
+        middle = np.array([[float(x.mid()) for x in row] for row in off])
+        Y, E = np.zeros((n + 4, n + 4)), np.full((n + 4, n + 4), UNDERFLOW)
+        Y[:3, :3], Y[3:, 3:], Y[:3, 3:], Y[3:, :3] = np.ldexp(aa, -size), np.ldexp(bb, -size), middle, middle.T
+        error = np.array([[_above(abs(x - float(m))) for x, m in zip(*rows, strict=True)] for rows in zip(off, middle, strict=True)])
+        E[:3, 3:] += error
+        E[3:, :3] += error.T
         _check_positive(Y[None], E[None])
 
 
@@ -182,12 +213,12 @@ class _Side:
         self.sums = [[_ball(x, rounding, self._bits + moment_bits) for x in row] for row in product]
         self._largest = largest
         (sizes,) = limbs.absolute_sums(self._positions.reshape(len(self._positions), 1, -1))
-        self.reach = float(fmpq(sizes + largest * 4 * V * size) / fmpq(2) ** self._bits) * (1 + ENTRY_ROUNDING)
+        self.reach = arb(fmpq(sizes + largest * 4 * V * size) / fmpq(2) ** self._bits)
 
     def has(self, vertex: int, monomial: int) -> bool:
         return 0 <= vertex < len(self._moments) and 0 <= monomial < self._moments.shape[1]
 
-    def mass(self, change: float) -> arb:
+    def mass(self, change: arb) -> arb:
         """sum_v x_v(den), whatever the change."""
         return self.sums[3][0] + arb(0, change * self.reach)
 
@@ -199,21 +230,45 @@ class _Side:
                 column[c, int(e)] = _ball(sign * x, self._largest, self._bits)
         return column
 
-    def check(self, faces: Array, change: float) -> None:
+    def check(self, faces: Array, change: arb) -> None:
         """Every localising matrix is positive definite."""
         k = len(self._chain)
         if len(faces) * len(self._moments) * 4**k > limits.LOCALISED:
             raise ProofError("proof_too_large", f"a body's localising matrices have more than {limits.LOCALISED} entries")
         subsets = np.arange(2**k)[:, None] >> np.arange(k) & 1
         code = (subsets[:, None, :] + subsets[None, :, :]) @ 3 ** np.arange(k)
-        values = localised(self._moments, faces, self._chain)
-        errors = localised(ENTRY_ROUNDING * np.abs(self._moments) + change, np.abs(faces), self._chain)
+        values, errors = _enclosed(self._moments, faces, self._chain, change)
         _check_positive(values[:, :, code].reshape(-1, 2**k, 2**k), errors[:, :, code].reshape(-1, 2**k, 2**k))
+
+
+def _enclosed(moments: Array, faces: Array, chain: tuple[int, ...], change: arb) -> tuple[Array, Array]:
+    """x_v(g_j m), (F, V, 3^k), times a power of two for every vertex, and by what they may be off once every moment has changed.
+
+    Args:
+        faces: (F, n + 1) of :func:`_near_one`; the bounds are those of the faces before they were rounded.
+    """
+    sizes = np.frexp(np.abs(moments).max(axis=1))[1]
+    scaled = np.ldexp(moments, -sizes[:, None])
+    changes = np.array([_above(change / arb(2) ** int(size)) for size in sizes])
+    rounding = (faces.shape[1] + 7) * 2.0**-52 * np.abs(scaled)
+    return localised(scaled, faces, chain), localised(rounding + changes[:, None], np.abs(faces), chain) + UNDERFLOW
 
 
 def _ball(x: int, rounding: int, bits: int) -> arb:
     """(x +- rounding) 2^-bits."""
     return arb(fmpq(x) / fmpq(2) ** bits, fmpq(rounding) / fmpq(2) ** bits)
+
+
+def _above(x: arb) -> float:
+    """A double above every number of a ball; not finite where there is none."""
+    return float(np.nextafter(float(x.upper()), np.inf))
+
+
+def _near_one(row: Sequence[fmpq]) -> list[float]:
+    """The row, rounded, times the power of two that brings its largest number between 1/2 and 2; a row of zeros as it is."""
+    largest = max(abs(x) for x in row)
+    size = int(largest.p).bit_length() - int(largest.q).bit_length()
+    return [float(x / fmpq(2) ** size) for x in row]
 
 
 def _check_positive(values: Array, errors: Array) -> None:
@@ -225,14 +280,13 @@ def _check_positive(values: Array, errors: Array) -> None:
     diagonal = np.einsum("sii->si", values)
     if not (diagonal > 0).all():
         raise ProofError("proof_dual", "a localising matrix has no positive diagonal")
-    # Powers of two: the scaling is exact.
-    scale = np.exp2(-np.round(np.log2(diagonal) / 2))
-    values, errors = (M * scale[:, :, None] * scale[:, None, :] for M in (values, errors))
-    trace = np.einsum("sii->s", values)
-    reduced = values.copy()
-    np.einsum("sii->si", reduced)[:] -= 1.001 * errors.sum(axis=2) + CHOLESKY_ROUNDING * trace[:, None]
+    halves = -(np.frexp(diagonal)[1] // 2)
+    with np.errstate(over="ignore", invalid="ignore"):
+        values, errors = (np.ldexp(M, halves[:, :, None] + halves[:, None, :]) for M in (values, errors))
+        rounding = (values.shape[1] + 16) * 2.0**-51 * np.einsum("sii->s", values)
+        np.einsum("sii->si", values)[:] -= 1.001 * errors.sum(axis=2) + rounding[:, None]
     try:
-        positive = bool(np.isfinite(np.linalg.cholesky(reduced)).all())
+        positive = bool(np.isfinite(values).all() and np.isfinite(np.linalg.cholesky(values)).all())
     except np.linalg.LinAlgError:
         positive = False
     if not positive:

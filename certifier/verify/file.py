@@ -17,6 +17,7 @@ from certifier.proof.container import header_of, malformed
 from certifier.proof.negative import DualProof, WitnessProof
 from certifier.proof.pair import PairProof
 from certifier.proof.region import RegionProof
+from certifier.verify.decimals import exactly, rounded_down, rounded_up
 from certifier.verify.dual import verify_dual
 from certifier.verify.pair import verify_pair
 from certifier.verify.region import verify_region
@@ -60,7 +61,7 @@ def verify_file(data: bytes) -> FileStatement:
     with malformed():
         scene = Scene.from_document(header["scene"])
     found, guarantee = _READERS[kind](data, scene)
-    about = (f"scene of hash {scene.hash}", f"padding {scene.padding:g} m around every body")
+    about = (f"scene of hash {scene.hash}", f"padding {exactly(scene.padding)} m around every body")
     return FileStatement(kind, scene, (*about, *found, guarantee_line(guarantee)), guarantee)
 
 
@@ -123,7 +124,7 @@ def _cut(text: str) -> str:
 def guarantee_line(guarantee: Guarantee) -> str:
     """What a guarantee means, in a line."""
     meaning = {
-        Guarantee.EXACT: "exact (rigorous arithmetic; the parsed model's numbers taken as they are)",
+        Guarantee.EXACT: "exact (rigorous arithmetic; the parsed model taken at its word)",
         Guarantee.NUMERIC: f"numeric (to {TOLERANCE:g} m)",
     }
     return f"guarantee: {meaning[guarantee]}"
@@ -132,27 +133,35 @@ def guarantee_line(guarantee: Guarantee) -> str:
 def _pair(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
     proof = PairProof.from_bytes(data, scene)
     statement = verify_pair(proof)
-    polytope = f"a polytope of {len(proof.ground.d)} half-spaces within the joint limits"
-    lines = [f"at every configuration of {polytope} these are at least {statement.gap:.3g} m apart:"]
+    polytope = f"a polytope of {len(proof.ground.d)} half-spaces within the joint limits, which is not empty,"
+    lines = [f"at every configuration of {polytope} these padded bodies are at least {rounded_down(statement.gap)} m apart:"]
     return lines + [f"  {pair.a} and {pair.b}" for pair in statement.pairs], Guarantee.EXACT
 
 
 def _dual(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
     proof = DualProof.from_bytes(data, scene)
     statement = verify_dual(proof)
-    faces = f"the {len(proof.ground.d)} faces of the polytope and its box"
-    but = f", but for margins below {statement.slack:.3g} of its coefficients" if statement.slack else ""
+    ground = proof.ground
     lines = [
-        f"{statement.pair.a} and {statement.pair.b} are not certifiable with multipliers of this degree on {faces}:",
-        f"no plane affine in s, in the frame of {statement.frame}, separates them there{but}",
+        f"{statement.pair.a} and {statement.pair.b} have no certificate of this form, which does not mean that no plane separates them:",
+        f"  a plane affine in s, in the frame of {statement.frame};",
+        "  multipliers that are sums of squares of the chains' multi-affine functions (docs/proofs.md);",
+        *(["  a normal bounded by the matrix inequality of docs/proofs.md;"] if statement.rounded else []),
+        *([f"  a margin above {rounded_up(statement.slack)} of its largest coefficient;"] if statement.slack else []),
+        f"  for the faces, the {len(ground.d)} half-spaces of the polytope and the ends of a box:",
+        *(
+            f"    {joint.name}: s from {exactly(mid)} - {exactly(half)} to {exactly(mid)} + {exactly(half)}"
+            for joint, mid, half in zip(scene.moving, ground.mid, ground.half, strict=True)
+        ),
     ]
     return lines, Guarantee.EXACT
 
 
 def _witness(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
     statement = verify_witness(WitnessProof.from_bytes(data, scene))
-    q = ", ".join(f"{x:.6g}" for x in scene.to_q(statement.s))
-    return [f"{statement.pair.a} and {statement.pair.b} touch at a configuration of the polytope: q = {q}"], Guarantee.NUMERIC
+    s, q = (", ".join(map(exactly, values)) for values in (statement.s, scene.to_q(statement.s)))
+    touching = f"{statement.pair.a} and {statement.pair.b}, padded, touch at a configuration of the polytope"
+    return [f"{touching}: s = {s}", f"  to rounding, q = {q}"], Guarantee.NUMERIC
 
 
 _READERS: dict[str, Callable[[bytes, Scene], tuple[list[str], Guarantee]]] = {"pair": _pair, "dual": _dual, "witness": _witness}

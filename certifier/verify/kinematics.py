@@ -3,6 +3,13 @@
 With tau = tan(q*/2), the half-angle tangents add up to (tau + s)/(1 - tau s): R(q) has the half-angle cosine 1 - tau s and sine
 tau + s, up to the common factor (1 + tau^2)(1 + s^2), which is the joint's denominator here. tau is rounded to a dyadic within
 2^-100, so every rotation is exact, about an angle that is off by no more than that.
+
+The doubles of a rotation are hardly ever orthonormal, nor are those of an axis a unit vector. Taken literally, they would stretch bodies,
+and the pose of B in A would not be the inverse of that of A in B. So a matrix stands for the rotation of the quaternion that it gives
+(Shepperd, *Quaternion from rotation matrix*, 1978), and an axis for the unit vector of its stereographic projection, each rounded at
+2^-ROUNDING_BITS. All poses are therefore rational and exactly rigid. What is an exact rotation or unit vector already stands for itself
+but for the rounding; else either is within ten times what the doubles miss being one by. The quaternion's square norm is a constant
+factor of the denominator.
 """
 
 from __future__ import annotations
@@ -18,6 +25,8 @@ from certifier.model import WORLD, Array, Joint, JointKind, Scene
 Matrix = list[list[fmpq_mpoly]]
 Numbers = list[list[fmpq]]
 _TAU_BITS = 110
+ROUNDING_BITS = 60
+"""Of a quaternion with an entry of 1 or more, and of an axis' projection; finer than doubles near 1."""
 
 
 def exact(x: float) -> fmpq:
@@ -70,7 +79,7 @@ class ExactKinematics:
         return joints
 
     def pose(self, frame: str, body: str) -> Matrix:
-        """(4, 4) polynomials or numbers: X_FB times its denominator, the entry [3][3] = prod (1 + tau_i^2)(1 + s_i^2)."""
+        """(4, 4) polynomials or numbers: X_FB times its denominator, the entry [3][3], a multiple of prod (1 + s_i^2)."""
         # Constant factors are multiplied as numbers.
         fixed, X = _identity(), None
         for joint, upwards in self.path(frame, body):
@@ -86,15 +95,16 @@ class ExactKinematics:
         """(4, 4) X_FB of two bodies that are welded together, perhaps through others; None if a joint between them moves."""
         if any(joint.index is not None for joint, _ in self.path(frame, body)):
             return None
-        return [[entry.coefficient(0) if entry != 0 else fmpq(0) for entry in row] for row in self.pose(frame, body)]
+        X = [[entry.coefficient(0) if entry != 0 else fmpq(0) for entry in row] for row in self.pose(frame, body)]
+        return [[x / X[3][3] for x in row] for row in X]
 
     def scale(self, frame: str, body: str) -> fmpq:
-        """prod (1 + tau_i^2) over the revolute joints of the path: the least value of the denominator."""
-        revolute = [joint for joint, _ in self.path(frame, body) if joint.kind is JointKind.REVOLUTE]
-        taus = [half_tangent(float(self._q_star[joint.index])) for joint in revolute if joint.index is not None]
+        """The least value of the denominator: its value at s = 0."""
         product = fmpq(1)
-        for tau in taus:
-            product *= 1 + tau * tau
+        for joint, _ in self.path(frame, body):
+            product *= rigid(_doubles(joint.X_PF))[3][3] * rigid(_doubles(joint.X_BM))[3][3]
+            if joint.index is not None and joint.kind is JointKind.REVOLUTE:
+                product *= 1 + half_tangent(float(self._q_star[joint.index])) ** 2
         return product
 
     def _embedded(self, rows: list[list[fmpq]]) -> Matrix:
@@ -103,10 +113,10 @@ class ExactKinematics:
     def _joint(self, joint: Joint, upwards: bool) -> tuple[Numbers, Matrix | None, Numbers]:
         """The joint's fixed frame, its motion, and the other one."""
         first, last = (joint.X_BM, joint.X_PF) if upwards else (joint.X_PF, joint.X_BM)
-        outer, inner = _rational(_doubles(first)), _inverse(_doubles(last))
+        outer, inner = rigid(_doubles(first)), _inverse(_doubles(last))
         if joint.index is None:
             return outer, None, inner
-        axis = [exact(-x if upwards else x) for x in joint.axis]
+        axis = [-x if upwards else x for x in unit(_doubles(joint.axis))]
         s, q = self._s[joint.index], float(self._q_star[joint.index])
         if joint.kind is JointKind.PRISMATIC:
             middle = self._embedded(_identity())
@@ -138,18 +148,49 @@ def _doubles(X: Array) -> bytes:
 
 
 @lru_cache(maxsize=1024)
-def _rational(X: bytes) -> Numbers:
-    """The 16 doubles of a rigid transform, not to be changed."""
-    return [[exact(x) for x in row] for row in np.frombuffer(X).reshape(4, 4)]
+def rigid(doubles: bytes) -> Numbers:
+    """The rigid transform that 16 doubles stand for times its entry [3][3] > 0, (4, 4), not to be changed."""
+    X = [[exact(x) for x in row] for row in np.frombuffer(doubles).reshape(4, 4)]
+    (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = X
+    # Four times q_j q for each entry q_j of the unit quaternion q; the largest q_j is a half at least.
+    multiples = [
+        [1 + a + e + i, h - f, c - g, d - b],
+        [h - f, 1 + a - e - i, b + d, c + g],
+        [c - g, b + d, 1 - a + e - i, f + h],
+        [d - b, c + g, f + h, 1 - a - e + i],
+    ]
+    w, p, q, r = (_rounded(value) for value in max(enumerate(multiples), key=lambda row: row[1][row[0]])[1])
+    norm = w * w + p * p + q * q + r * r
+    return [
+        [w * w + p * p - q * q - r * r, 2 * (p * q - w * r), 2 * (p * r + w * q), norm * x],
+        [2 * (p * q + w * r), w * w - p * p + q * q - r * r, 2 * (q * r - w * p), norm * y],
+        [2 * (p * r - w * q), 2 * (q * r + w * p), w * w - p * p - q * q + r * r, norm * z],
+        [fmpq(0), fmpq(0), fmpq(0), norm],
+    ]
 
 
 @lru_cache(maxsize=1024)
-def _inverse(rigid: bytes) -> Numbers:
-    """Of a rigid transform: the rotation is transposed."""
-    X = _rational(rigid)
+def _inverse(doubles: bytes) -> Numbers:
+    """Of the rigid transform that 16 doubles stand for, times the same entry [3][3]."""
+    X, p = rigid(doubles), [exact(x) for x in np.frombuffer(doubles).reshape(4, 4)[:3, 3]]
     R = [[X[j][i] for j in range(3)] for i in range(3)]
-    p = [-sum((R[i][j] * X[j][3] for j in range(3)), fmpq(0)) for i in range(3)]
-    return [[*R[i], p[i]] for i in range(3)] + [[fmpq(0), fmpq(0), fmpq(0), fmpq(1)]]
+    return [[*row, -sum((x * y for x, y in zip(row, p, strict=True)), fmpq(0))] for row in R] + [X[3]]
+
+
+@lru_cache(maxsize=1024)
+def unit(doubles: bytes) -> list[fmpq]:
+    """The unit vector that the three doubles of an axis stand for, not to be changed."""
+    axis = [exact(x) for x in np.frombuffer(doubles)]
+    pole = max(range(3), key=lambda i: abs(axis[i]))
+    plane = [fmpq(0) if i == pole else _rounded(x / (1 + abs(axis[pole]))) for i, x in enumerate(axis)]
+    square = sum((x * x for x in plane), fmpq(0))
+    turned = (1 - square) / (1 + square)
+    return [(turned if axis[pole] > 0 else -turned) if i == pole else 2 * x / (1 + square) for i, x in enumerate(plane)]
+
+
+def _rounded(x: fmpq) -> fmpq:
+    """Down to a multiple of 2^-ROUNDING_BITS."""
+    return fmpq((x * 2**ROUNDING_BITS).floor()) / 2**ROUNDING_BITS
 
 
 def _multiply(A: Any, B: Any) -> Any:

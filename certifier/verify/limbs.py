@@ -7,6 +7,7 @@ Why no operation rounds: every double that occurs is an integer below 2^53 in ma
 integers are exact in double precision as long as they stay below it, in whatever order they are added and with or without fused
 multiply-add. A product of two limbs is at most 2^32, and :func:`product` refuses to add more than 2^16 of them: its limbs stay
 below 2^48, and up to 16 such arrays may be added before :func:`normal`. There 2^-16 x and floor are exact, the carries stay below 2^37.
+:func:`absolute_sums` adds normal limbs, fewer than 2^37 of them in any memory.
 """
 
 from __future__ import annotations

@@ -160,8 +160,8 @@ class PairCheck:
         padding = exact(scene.padding)
         radii = [exact(volume.radius) + padding for volume in proof.volumes]
         norm = _largest_square_norm(plane[:3])
-        if norm == 0:
-            raise ProofError("proof_plane", "the plane has no normal")
+        if not norm > 0:
+            raise ProofError("proof_norm", "the plane has no normal: it separates nothing, were the polytope not empty")
         if any(radii) and not (kappa >= 0 and kappa * kappa >= norm):
             raise ProofError("proof_norm", "kappa does not bound the plane's normal")
         weights = [[fmpq(1), *[fmpq(0)] * scene.n], *(self._faces[j] for j in proof.faces)]

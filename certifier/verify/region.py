@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +15,8 @@ from certifier.proof.pair import Ground
 from certifier.proof.region import RegionProof
 from certifier.verify.archimedean import check_archimedean
 from certifier.verify.box import Halfspaces
-from certifier.verify.kinematics import exact
+from certifier.verify.decimals import exactly, rounded_down, rounded_up
+from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.pair import PairCheck, check_ground
 from certifier.verify.scene import check_scene
 from certifier.verify.volume import check_contained
@@ -43,20 +46,36 @@ class RegionStatement:
         """The statement in plain words."""
         scene = self.scene
         joints = [
-            f"  {j.name}: {j.lower:g} to {j.upper:g} {'rad' if r else 'm'} (centre {q:g})"
-            for j, r, q in zip(scene.moving, scene.revolute, scene.q_star, strict=True)
+            f"  {j.name}: {exactly(lower)} to {exactly(upper)} {'rad' if r else 'm'} (centre {exactly(q)})"
+            for j, r, lower, upper, q in zip(scene.moving, scene.revolute, scene.q_lower, scene.q_upper, scene.q_star, strict=True)
         ]
+        unlisted = [f"{count} of {a} and {b}" for (a, b), count in _unlisted(scene).items()]
         closest = min(self.gaps, key=self.gaps.__getitem__, default=None)
         return [
             f"scene of hash {scene.hash}",
             f"{scene.n} joints, within their limits:",
             *joints,
-            f"a bounded, non-empty polytope of {self.faces} half-spaces in tangent space; |s|^2 <= {self.N:.6g}",
-            f"{len(self.gaps)} pairs of bodies separated at every configuration of it; padding {scene.padding:g} m around every body",
-            *([f"least distance at least {self.gap:.3g} m: {closest.a} and {closest.b}"] if closest else []),
+            f"a bounded, non-empty polytope of {self.faces} half-spaces in tangent space; |s|^2 <= {rounded_up(self.N, 6)}",
+            f"{len(self.gaps)} pairs of bodies separated at every configuration of it",
+            f"padding {exactly(scene.padding)} m around every body",
+            *([f"least distance, padded, at least {rounded_down(self.gap)} m: {closest.a} and {closest.b}"] if closest else []),
             *(f"not covered: {i.a} and {i.b} ({i.reason})" for i in scene.ignored),
-            "guarantee: exact (rigorous arithmetic; the parsed model's numbers taken as they are)",
+            *([f"not covered, as the scene has no such pairs: {', '.join(unlisted)}"] if unlisted else []),
+            "guarantee: exact (rigorous arithmetic; the parsed model taken at its word)",
         ]
+
+
+def _unlisted(scene: Scene) -> dict[tuple[str, str], int]:
+    """Bodies that move against each other, with how many pairs of their geometries the scene neither has nor gives a reason to ignore."""
+    body = {geometry.name: geometry.body for geometry in scene.geometries}
+    named = {frozenset((p.a, p.b)) for p in scene.pairs} | {frozenset((i.a, i.b)) for i in scene.ignored}
+    listed = Counter(frozenset(map(body.__getitem__, names)) for names in named if names <= body.keys())
+    held, kinematics = Counter(body.values()), ExactKinematics.at(scene, [])
+    moving = (
+        (a, b) for a, b in itertools.combinations(sorted(held), 2) if any(joint.index is not None for joint, _ in kinematics.path(a, b))
+    )
+    missing = {(a, b): held[a] * held[b] - listed[frozenset((a, b))] for a, b in moving}
+    return {bodies: count for bodies, count in missing.items() if count}
 
 
 def verify_region(data: bytes) -> RegionStatement:

@@ -1,6 +1,6 @@
 """Exact bound of how far the sums of squares of one side of a proof miss the polynomials they stand for.
 
-For every vertex v of the side's volume, in the box's coordinates u and divided by sigma = prod (1 + tau_i^2),
+For every vertex v of the side's volume, in the box's coordinates u and divided by sigma, the least value of den,
 
     e_v(u) = +-(a'p_v + b den)/sigma - (r kappa + t) den/sigma - sum_j g_j |L_j' rho|^2,   g_0 = 1,
 
@@ -29,7 +29,8 @@ from certifier.verify.kinematics import ExactKinematics, exact
 
 POSITION_BITS = 128
 MAX_CHAIN = 7
-"""Sums of 4^k products of two limbs of a factor, at most 4 such sums, stay below 2^52."""
+"""With k joints 4^k products of two limbs of a factor are added, and 4 such sums, as a factor's 64 bits are 4 limbs: below 2^52. Then
+k + 1 differences of two products of matrices are, 16 arrays below 2^48."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +58,15 @@ class Numerators:
             raise ProofError("proof_too_large", f"more than {MAX_CHAIN} joints between {frame} and {body}")
         scale = fmpq(2) ** POSITION_BITS / kinematics.scale(frame, body)
         X, size = kinematics.pose(frame, body), 3 ** len(chain)
+        places: dict[tuple[int, ...], int] = {}
         columns: list[list[int]] = [[], [], [], []]
         for c, i in itertools.product(range(4), repeat=2):
             values = [0] * size
             for powers, coefficient in X[i][c].to_dict().items():
-                values[sum(powers[joint] * 3**position for position, joint in enumerate(chain))] = int((coefficient * scale).floor())
+                if powers not in places:
+                    places[powers] = sum(powers[joint] * 3**position for position, joint in enumerate(chain))
+                # As integers: to reduce the fraction of the product would take longer.
+                values[places[powers]] = int(coefficient.p * scale.p // (coefficient.q * scale.q))
             columns[c] += values
         return cls(chain, limbs.of_rows(columns))
 

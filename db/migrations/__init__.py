@@ -1,1 +1,1 @@
-"""Alembic's environment: env.py and one module of versions/ for each change of the schema."""
+"""This is Alembic's environment: env.py, and one module in versions/ for each change of the schema."""

@@ -1,4 +1,4 @@
-"""Run by Alembic: all migrations of one call in one transaction, on SQLite too (db.migrate gives the connection)."""
+"""Alembic runs this module. All migrations of one call share one transaction, on SQLite too; db.migrate opens the connection."""
 
 from __future__ import annotations
 

@@ -17,6 +17,7 @@ from certifier.jobs.region import Region
 from certifier.model import Scene
 from certifier.verify.region import verify_region
 from client.cli import _joined
+from client.commands import save_proof
 from client.find import data_dir
 from db.settings import Settings
 from tests.client.conftest import PLANAR, Ciris, command, surroundings
@@ -68,8 +69,8 @@ def files(tmp_path: Path) -> Path:
     ("arguments", "words"),
     [
         (("certify", PLANAR, "--polytope", "missing.npz"), "there is no file missing.npz"),
-        (("certify", PLANAR, "--polytope", "text.npz"), "cannot be read as an npz file"),
-        (("certify", PLANAR, "--polytope", "pickled.npz"), "cannot be read as an npz file"),
+        (("certify", PLANAR, "--polytope", "text.npz"), "is no npz file of numbers"),
+        (("certify", PLANAR, "--polytope", "pickled.npz"), "is no npz file of numbers"),
         (("certify", PLANAR, "--polytope", "nothing.npz"), "no array C and no array d"),
         (("certify", PLANAR, "--polytope", "ragged.npz"), "C is (4, 2) and d is (2,)"),
         (("certify", PLANAR, "--polytope", "nan.npz"), "must be finite numbers"),
@@ -85,6 +86,8 @@ def files(tmp_path: Path) -> Path:
         (("grow", PLANAR, "--q", "0,9"), "seed.q[1]: joint arm/elbow is at 9"),
         (("grow", PLANAR, "--q", "-1.2,1.0"), "arm/lower/bar and obstacles/body/post overlap"),
         (("grow", PLANAR, "--method", "magic"), "seed.method"),
+        (("grow", PLANAR, "--out", "nowhere/region.proof"), "the proof cannot be written into"),
+        (("grow", PLANAR, "--out", "."), ". is a directory"),
     ],
 )
 @pytest.mark.usefixtures("parsed_once")
@@ -92,6 +95,28 @@ def test_bad_input_is_one_line_that_says_where(ciris: Ciris, files: Path, argume
     done = ciris(*arguments, "--local", "--json")
     assert (done.status, done.raw) == (2, b"")
     assert words in done.error
+
+
+@pytest.mark.parametrize("name", ["../../elsewhere", "/tmp/elsewhere", "..", "a b/c"])
+def test_a_scenes_name_leads_the_proof_nowhere_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = save_proof({"scene": {"name": name}}, b"proof", None)
+    assert path.resolve().parent == tmp_path.resolve()
+    assert path.read_bytes() == b"proof"
+
+
+@pytest.mark.parametrize("name", ["", ".."])
+def test_what_no_name_can_be_is_asked_nobody(ciris: Ciris, name: str) -> None:
+    done = ciris("scene", "show", name, CIRIS_URL="http://127.0.0.1:9")
+    assert (done.status, done.raw) == (2, b"")
+    assert "is no name and no id" in done.error
+
+
+def test_a_data_directory_that_cannot_be_made_is_said_in_one_line(spawn: Ciris, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done = spawn("up", "--data", tmp_path / "file")
+    assert (done.status, done.raw) == (2, b"")
+    assert "cannot be made" in done.error
 
 
 def test_certifying_here_prints_the_stable_document(spawn: Ciris, files: Path) -> None:

@@ -39,6 +39,10 @@ def fake_python(directory: Path, name: str, body: str) -> None:
     (directory / name).chmod(0o755)
 
 
+def stamp(copy: Path, name: str) -> str:
+    return f"{copy}\n{(copy / 'pyproject.toml').read_text()}{(copy / f'requirements/{name}.lock').read_text()}"
+
+
 @pytest.mark.parametrize("script", SCRIPTS)
 def test_a_script_is_executable_bash_without_errors(script: str) -> None:
     assert os.access(ROOT / script, os.X_OK)
@@ -63,10 +67,24 @@ def test_a_current_environment_is_left_alone(copy: Path, tools: Path) -> None:
     (copy / ".venv/bin").mkdir(parents=True)
     fake_python(copy / ".venv/bin", "python", '[ "$1" = -c ] || echo "$*"')
     for name in ("runtime", "test"):
-        text = f"{copy}\n{(copy / 'pyproject.toml').read_text()}{(copy / f'requirements/{name}.lock').read_text()}"
-        (copy / f".venv/{name}.stamp").write_text(text)
+        (copy / f".venv/{name}.stamp").write_text(stamp(copy, name))
     done = run(["./start", "--once"], copy, str(tools))
     assert (done.returncode, done.stdout, done.stderr) == (0, "-m client.demo --once\n", "")
+
+
+@pytest.mark.parametrize(("set_to", "seen"), [(None, "true"), ("", "true"), ("1", "1")])
+def test_ci_is_told_to_the_tests(copy: Path, tools: Path, set_to: str | None, seen: str) -> None:
+    (copy / ".venv/bin").mkdir(parents=True)
+    for name in ("ruff", "mypy", "lint-imports"):
+        fake_python(copy / ".venv/bin", name, "exit 0")
+    fake_python(copy / ".venv/bin", "python", '[ "$1" = -c ] || echo "CI=$CI $*"')
+    for name in ("runtime", "test"):
+        (copy / f".venv/{name}.stamp").write_text(stamp(copy, name))
+    environment = {"PATH": str(tools), "HOME": str(copy)} | ({} if set_to is None else {"CI": set_to})
+    done = subprocess.run([".ci/run"], cwd=copy, env=environment, capture_output=True, text=True, check=False)
+    assert f"CI={seen} requirements/browser.py .venv/browser\n" in done.stdout
+    assert f"CI={seen} -m pytest " in done.stdout
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_changed_lock_is_installed_into_the_same_environment(copy: Path, tools: Path) -> None:

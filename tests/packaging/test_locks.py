@@ -14,6 +14,7 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 LOCKS = {name: (ROOT / "requirements" / f"{name}.lock").read_text() for name in ("runtime", "test")}
+BROWSER = (ROOT / "requirements/browser.lock").read_text()
 
 
 def pins(lock: str) -> dict[str, Requirement]:
@@ -33,7 +34,7 @@ def direct(extra: str) -> list[Requirement]:
     return found
 
 
-@pytest.mark.parametrize("lock", LOCKS.values(), ids=LOCKS)
+@pytest.mark.parametrize("lock", [*LOCKS.values(), BROWSER], ids=[*LOCKS, "browser"])
 def test_a_lock_names_no_address(lock: str) -> None:
     assert "://" not in lock
     assert not re.search(r"^\s*(-i|-f|--[a-z-]*(url|links|host))\b", lock, re.MULTILINE)
@@ -47,6 +48,13 @@ def test_every_pin_is_exact_and_hashed(lock: str) -> None:
     for block in blocks:
         assert re.match(r"[\w.-]+==[\w.]+ ", block), block
         assert "--hash=sha256:" in block, block
+
+
+def test_every_package_of_the_browser_is_exact_and_hashed() -> None:
+    packages = [line for line in BROWSER.splitlines() if not line.startswith("#")]
+    assert packages
+    for package in packages:
+        assert re.fullmatch(r"(@[\w-]+/)?[\w-]+@\d+\.\d+\.\d+ sha512-[\w+/]{86}==", package), package
 
 
 @pytest.mark.parametrize(("name", "extra"), [("runtime", "service"), ("test", "test")])

@@ -1,4 +1,4 @@
-"""First tables
+"""Adds the first tables
 
 Revision: 0001, follows None, 2026-11-21 02:28:04.226761.
 """

@@ -1,4 +1,4 @@
-"""Keys and webhooks
+"""Adds API keys and webhooks
 
 Revision: 0002, follows 0001.
 """

@@ -1,4 +1,6 @@
-"""A fair order of work: priority and service of jobs, no messages bound to rows, whose fault a death was
+"""Adds what a fair order of work needs: priority and served seconds of jobs, and how often a row killed its process
+
+Rows hold no ids of messages any more.
 
 Revision: 0003, follows 0002.
 """

@@ -1,4 +1,4 @@
-"""An iteration ends after a number of failures, and knows which of its pairs are hard
+"""Makes an iteration end after a number of failures, and store which of its pairs are hard
 
 Revision: 0004, follows 0003.
 """
@@ -46,7 +46,7 @@ def _with_first_failure(action: dict[str, Any]) -> None:
 
 
 def _rewrite(change: Any) -> None:
-    """What unfinished jobs hold of the certification that they are at."""
+    """Changes what unfinished jobs store of the certification that they wait for."""
     jobs = sa.table("jobs", sa.column("id", sa.String()), sa.column("action", sa.JSON()), sa.column("growth", sa.JSON()))
     bind = op.get_bind()
     for row in bind.execute(sa.select(jobs).where(jobs.c.action.is_not(None))).all():

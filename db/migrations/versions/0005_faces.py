@@ -1,4 +1,4 @@
-"""Regions and iterations know the number of their faces, so that lists need not read their arrays
+"""Stores the number of faces of regions and iterations, so that lists need not read their arrays
 
 Revision: 0005, follows 0004.
 """

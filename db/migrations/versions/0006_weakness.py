@@ -1,6 +1,7 @@
-"""What is known of a pair's failure is called its weakness; a job's action says which iteration it waits for and no more
+"""Renames what is known of a pair's failure to weakness; a job's action now names only the iteration that it waits for
 
-The state of the growth has another shape since: a job that is under way meanwhile ends with the error ``other_version``.
+The state of the growth has another shape since this revision. A job that is under way during the migration ends with the error
+``other_version``.
 
 Revision: 0006, follows 0005.
 """

@@ -1,5 +1,7 @@
 """Outer approximations contain what they replace, and say how far they reach."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -43,7 +45,7 @@ def clouds(draw):
 @settings(max_examples=60, deadline=None)
 @given(clouds(), st.integers(8, 40))
 def test_outer_contains_every_point_and_knows_its_inflation(points, max_vertices):
-    vertices, inflation = outer(points, max_vertices)
+    vertices, inflation, _ = outer(points, max_vertices)
     if inflation == 0:
         original = {tuple(p) for p in points}
         assert all(tuple(v) in original for v in vertices)
@@ -62,9 +64,45 @@ def test_outer_contains_every_point_and_knows_its_inflation(points, max_vertices
 
 
 def test_few_vertices_are_kept_as_they_are():
-    vertices, inflation = outer(np.concatenate([shapes.CORNERS, 0.5 * shapes.CORNERS, shapes.CORNERS]), 32)
-    assert inflation == 0.0
+    vertices, inflation, count = outer(np.concatenate([shapes.CORNERS, 0.5 * shapes.CORNERS, shapes.CORNERS]), 32)
+    assert (inflation, count) == (0.0, 8)
     assert sorted(map(tuple, vertices)) == sorted(map(tuple, shapes.CORNERS))
+
+
+def in_a_tetrahedron(point, vertices):
+    """Whether a point is exactly in a tetrahedron between the vertices' mean and three of them: an oracle in rational numbers."""
+    exact = [[Fraction(x) for x in v] for v in vertices.tolist()]
+    mean = [sum(column) / len(exact) for column in zip(*exact, strict=True)]
+    p = [Fraction(x) - m for x, m in zip(point.tolist(), mean, strict=True)]
+    for triangle in ConvexHull(vertices).simplices:
+        a, b, c = ([x - m for x, m in zip(exact[k], mean, strict=True)] for k in triangle)
+        whole = determinant(a, b, c)
+        weights = [determinant(*rows) / whole for rows in ((p, b, c), (a, p, c), (a, b, p))] if whole else [Fraction(-1)]
+        if min(weights) >= 0 and sum(weights) <= 1:
+            return True
+    return False
+
+
+def determinant(a, b, c):
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.01, 1.0]), st.sampled_from([0.0, 5.0]), st.sampled_from([1.0, 0.01]))
+@example(0, 1.0, 0.0, 1.0)
+def test_no_point_is_outside_by_a_rounding_error(seed, size, offset, thinness):
+    """The points of a turned box's faces are up to some 1e-16 outside of its corners' hull."""
+    rng = np.random.default_rng(seed)
+    grid = np.stack(np.meshgrid(*[[-1.0, -0.3, 1.0]] * 3), axis=-1).reshape(-1, 3)
+    points = size * (grid * [1, 0.7, thinness]) @ np.linalg.qr(rng.standard_normal((3, 3)))[0].T + offset
+    vertices, inflation, _ = outer(points, 32)
+    own = {tuple(v) for v in vertices.tolist()}
+    assert all(tuple(p) in own or in_a_tetrahedron(p, vertices) for p in points)
+    assert inflation < 1e-7 * size
+    if inflation > 0:
+        assert shapes.polytope({"kind": "convex"}, points, 32).substitution is not None
+        for v in vertices:
+            assert np.linalg.norm(points - v, axis=1).min() <= inflation
 
 
 def test_more_vertices_fit_closer():

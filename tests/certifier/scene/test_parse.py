@@ -174,7 +174,7 @@ def floating(scene=SCENE):
             "m.obj",
         ),
         ({"shape": '<cone radius="1"/>'}, "scene_model", "directives", "arm.urdf"),
-        ({"shape": '<box size="1 1"/>'}, "scene_model", "directives", "Expected 3 values"),
+        ({"shape": '<box size="1 1"/>'}, "scene_model", "directives", "instead of 3 finite decimal numbers"),
         ({"shape": '<box size="0 1 1"/>'}, "scene_model", "directives", "arm.urdf"),
         ({"limit": LIMIT.replace('"2"', '"-3"')}, "scene_model", "directives", "arm.urdf"),
         ({"limit": LIMIT.replace('"2"', '"nan"')}, "scene_model", "directives", "arm.urdf:5"),

@@ -85,6 +85,12 @@ def chains():
         yield replace(tree, joints=tuple(joints))
 
 
+def value(polynomial, u):
+    """A polynomial at the point u."""
+    terms = polynomial.to_dict().items()
+    return sum(fraction(c) * math.prod(x ** int(e) for x, e in zip(u, powers, strict=True)) for powers, c in terms)
+
+
 @pytest.mark.parametrize("scene", list(chains()))
 def test_positions_are_those_of_exact_fractions(scene):
     mid, half = np.linspace(-0.3, 0.4, scene.n), np.linspace(0.1, 0.7, scene.n)
@@ -93,12 +99,11 @@ def test_positions_are_those_of_exact_fractions(scene):
     s = [Fraction(m) + Fraction(h) * x for m, h, x in zip(mid.tolist(), half.tolist(), u, strict=True)]
     for frame, body in itertools.product(scene.bodies, repeat=2):
         X, den = position(scene, kinematics, frame, body, s)
-        pose = kinematics.pose(frame, body)
+        _, least = position(scene, kinematics, frame, body, [Fraction(0)] * scene.n)
+        numerators = [[value(entry, u) for entry in row] for row in kinematics.pose(frame, body)]
         for i, j in itertools.product(range(4), repeat=2):
-            value = sum(
-                fraction(c) * math.prod(x ** int(e) for x, e in zip(u, powers, strict=True)) for powers, c in pose[i][j].to_dict().items()
-            )
-            assert value == X[i][j] * den
+            assert numerators[i][j] == X[i][j] * numerators[3][3]
+        assert numerators[3][3] * least == den * fraction(kinematics.scale(frame, body))
 
 
 def expanded(scene, volume, side, frame, mid, half, plane, weights):

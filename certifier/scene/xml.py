@@ -1,0 +1,34 @@
+"""XML, read by expat with document types refused: entity bombs are made of them, and Drake would not replace an entity."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from xml.parsers import expat
+
+from certifier.errors import SceneError
+
+
+def parse_xml(path: Path, name: str, code: str, install: Callable[[expat.XMLParserType], None]) -> None:
+    """Run expat over a file.
+
+    Args:
+        name: the file's name for people.
+        code: the code of the errors.
+        install: sets the parser's handlers, before anything is read.
+
+    Raises:
+        SceneError: with ``code`` and the line, for XML that is broken or declares a document type; and whatever the handlers raise.
+    """
+    parser = expat.ParserCreate()
+
+    def refuse(*_: object) -> None:
+        message = f"{name}:{parser.CurrentLineNumber}: the file declares a document type or entity, which is not accepted"
+        raise SceneError(code, message, field="directives")
+
+    install(parser)
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
+    try:
+        parser.Parse(path.read_bytes(), True)
+    except expat.ExpatError as error:
+        raise SceneError(code, f"{name}:{error.lineno}: this is not XML: {expat.ErrorString(error.code)}", field="directives") from None
