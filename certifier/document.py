@@ -123,7 +123,7 @@ class Node:
 
 
 def _is_number(x: Any) -> bool:
-    return type(x) in (float, int) and abs(x) <= LARGEST and float(x) == x
+    return (isinstance(x, float) or type(x) is int) and abs(x) <= LARGEST and float(x) == x
 
 
 def _check_array(value: Any, shape: tuple[int | None, ...], where: str) -> None:

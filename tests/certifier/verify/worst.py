@@ -183,10 +183,10 @@ def dual() -> bytes:
     scene = replace(scene, geometries=(many, other), pairs=(Pair(many.name, other.name),))
     exponents = [monomials(joints, n) for joints in (tuple(range(n)), ())]
     one, two = (np.prod(np.where(e % 2, 0.0, 1 / (e + 1)), axis=1) for e in exponents)
-    faces = limits.LOCALISED // (V * 4**n) - 2 * n - 1
-    box, none = whole_box(n), np.zeros((n, faces))
-    Y = [np.concatenate([none, multipliers], axis=1) for multipliers in (box.Y_lower, box.Y_upper)]
-    ground = Ground(rng.normal(size=(faces, n)), np.full(faces, 99.0), box.mid, box.half, *Y)
+    more = limits.LOCALISED // (V * 4**n) - 4 * n - 1
+    box = Ground.of_box(np.zeros(n), np.full(n, 0.2))
+    C, d = np.concatenate([box.C, rng.normal(size=(more, n))]), np.concatenate([box.d, np.full(more, 99.0)])
+    ground = Ground(C, d, box.mid, box.half, *(np.pad(Y, ((0, 0), (0, more))) for Y in (box.Y_lower, box.Y_upper)))
     normal = (np.eye(3), np.eye(n + 1))
     moments = (np.tile(one, (V, 1)), two[None])
     entries = np.zeros((0, 3), dtype=np.int64)
