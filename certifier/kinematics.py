@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -50,15 +50,11 @@ class Kinematics:
         """Returns the kinematics of the scene, which is made once and kept."""
         return Kinematics(scene)
 
-    @cached_property
-    def _joint_above(self) -> dict[str, Joint]:
-        return {joint.child: joint for joint in self.scene.joints}
-
     def ancestors(self, body: str) -> list[str]:
         """Returns the bodies from ``body`` up to the world, both included."""
         bodies = [body]
         while bodies[-1] != WORLD:
-            bodies.append(self._joint_above[bodies[-1]].parent)
+            bodies.append(self.scene.joint_above[bodies[-1]].parent)
         return bodies
 
     def common(self, a: str, b: str) -> str:
@@ -73,8 +69,8 @@ class Kinematics:
 
     def rigid_root(self, body: str) -> str:
         """Returns the first body on the way up, ``body`` included, that a joint moves relative to its parent, or else the world."""
-        while body != WORLD and self._joint_above[body].index is None:
-            body = self._joint_above[body].parent
+        while body != WORLD and self.scene.joint_above[body].index is None:
+            body = self.scene.joint_above[body].parent
         return body
 
     def path(self, frame: str, body: str) -> list[Factor]:
@@ -84,8 +80,8 @@ class Kinematics:
         bodies = self.bodies_between(frame, body)
         factors = []
         for here, there in itertools.pairwise(bodies):
-            inverse = self._joint_above.get(here) is not None and self._joint_above[here].parent == there
-            factors.append(_factor(self._joint_above[here if inverse else there], self.scene.q_star, inverse))
+            inverse = self.scene.joint_above.get(here) is not None and self.scene.joint_above[here].parent == there
+            factors.append(_factor(self.scene.joint_above[here if inverse else there], self.scene.q_star, inverse))
         self._paths[frame, body] = factors
         return factors
 

@@ -196,6 +196,11 @@ class Scene:
         return self.q_star + np.where(self.revolute, 2 * np.arctan(s), s)
 
     @cached_property
+    def joint_above(self) -> dict[str, Joint]:
+        """The joint whose child a body is; the world has none."""
+        return {joint.child: joint for joint in self.joints}
+
+    @cached_property
     def _geometry(self) -> dict[str, Geometry]:
         return {g.name: g for g in self.geometries}
 

@@ -50,7 +50,7 @@ class ExactKinematics:
     def __init__(self, scene: Scene, s: list[Any], embed: Any) -> None:
         self._embed, self._s = embed, s
         self._q_star = scene.q_star
-        self._above = {joint.child: joint for joint in scene.joints}
+        self._above = scene.joint_above
 
     @classmethod
     def on_box(cls, scene: Scene, ring: fmpq_mpoly_ctx, mid: Array, half: Array) -> ExactKinematics:

@@ -16,10 +16,13 @@ from certifier.proof.region import RegionProof
 from certifier.verify.archimedean import check_archimedean
 from certifier.verify.box import Halfspaces
 from certifier.verify.decimals import exactly, rounded_down, rounded_up
-from certifier.verify.kinematics import ExactKinematics, exact
+from certifier.verify.kinematics import exact
 from certifier.verify.pair import PairCheck, check_ground
 from certifier.verify.scene import check_scene
 from certifier.verify.volume import check_contained
+
+NAMED = 20
+"""Two bodies each that a statement names of those that the scene leaves out."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class RegionStatement:
             f"  {j.name}: {exactly(lower)} to {exactly(upper)} {'rad' if r else 'm'} (centre {exactly(q)})"
             for j, r, lower, upper, q in zip(scene.moving, scene.revolute, scene.q_lower, scene.q_upper, scene.q_star, strict=True)
         ]
-        unlisted = [f"{count} of {a} and {b}" for (a, b), count in _unlisted(scene).items()]
+        unlisted = _unlisted(scene)
         closest = min(self.gaps, key=self.gaps.__getitem__, default=None)
         return [
             f"scene of hash {scene.hash}",
@@ -60,22 +63,36 @@ class RegionStatement:
             f"padding {exactly(scene.padding)} m around every body",
             *([f"least distance, padded, at least {rounded_down(self.gap)} m: {closest.a} and {closest.b}"] if closest else []),
             *(f"not covered: {i.a} and {i.b} ({i.reason})" for i in scene.ignored),
-            *([f"not covered, as the scene has no such pairs: {', '.join(unlisted)}"] if unlisted else []),
+            *([f"not covered, as the scene has no such pairs: {unlisted}"] if unlisted else []),
             "guarantee: exact (rigorous arithmetic; the parsed model taken at its word)",
         ]
 
 
-def _unlisted(scene: Scene) -> dict[tuple[str, str], int]:
-    """Bodies that move against each other, with how many pairs of their geometries the scene neither has nor gives a reason to ignore."""
+def _unlisted(scene: Scene) -> str:
+    """Returns what the scene leaves out in words: pairs of geometries that move against each other, but are neither pairs nor ignored.
+
+    They are counted for each two bodies, NAMED of which are named. What is looked at is linear in what the scene lists, since two
+    bodies without a listed pair are among those named.
+    """
     body = {geometry.name: geometry.body for geometry in scene.geometries}
-    named = {frozenset((p.a, p.b)) for p in scene.pairs} | {frozenset((i.a, i.b)) for i in scene.ignored}
-    listed = Counter(frozenset(map(body.__getitem__, names)) for names in named if names <= body.keys())
-    held, kinematics = Counter(body.values()), ExactKinematics.at(scene, [])
-    moving = (
-        (a, b) for a, b in itertools.combinations(sorted(held), 2) if any(joint.index is not None for joint, _ in kinematics.path(a, b))
-    )
-    missing = {(a, b): held[a] * held[b] - listed[frozenset((a, b))] for a, b in moving}
-    return {bodies: count for bodies, count in missing.items() if count}
+    held = Counter(body.values())
+    parts: dict[str, list[str]] = {}
+    for name in sorted(held):
+        parts.setdefault(_rigid_part(scene, name), []).append(name)
+    pairs = {frozenset((p.a, p.b)) for p in scene.pairs} | {frozenset((i.a, i.b)) for i in scene.ignored}
+    listed = Counter(frozenset(map(body.__getitem__, names)) for names in pairs)
+    moving = (bodies for two in itertools.combinations(parts.values(), 2) for bodies in itertools.product(*two))
+    missing = ((a, b, held[a] * held[b] - listed[frozenset((a, b))]) for a, b in moving)
+    named = list(itertools.islice((f"{count} of {a} and {b}" for a, b, count in missing if count), NAMED + 1))
+    return ", ".join(named[:NAMED]) + (", and more" if len(named) > NAMED else "")
+
+
+def _rigid_part(scene: Scene, body: str) -> str:
+    """Returns the body nearest to the world that this one is welded to, perhaps through others."""
+    above = scene.joint_above
+    while body in above and above[body].index is None:
+        body = above[body].parent
+    return body
 
 
 def verify_region(data: bytes) -> RegionStatement:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -9,12 +10,12 @@ import pytest
 
 from certifier.errors import ProofError
 from certifier.jobs.region import certified_region
-from certifier.model import Ignored, Volume
+from certifier.model import WORLD, Ignored, Joint, JointKind, Volume
 from certifier.pair.certification import Certification
 from certifier.proof.pair import Ground, PairProof, Side
 from certifier.verify.pair import PairCheck, verify_pair
-from certifier.verify.region import verify_region
-from tests.certifier.scenes import accepted, cube, planar_arm
+from certifier.verify.region import _unlisted, verify_region
+from tests.certifier.scenes import accepted, ball, cube, planar_arm, pose
 
 
 def test_a_plane_without_a_normal_on_an_empty_polytope_is_refused():
@@ -62,3 +63,19 @@ def statement(scene) -> list[str]:
     shared = Certification(scene, polytope, np.zeros(2))
     proofs = {i: shared.certify(i).proof for i in range(len(scene.pairs))}
     return verify_region(certified_region(scene, accepted(polytope, np.zeros(2)), proofs, {}).proof).lines()
+
+
+def test_what_a_scene_leaves_out_is_named_in_a_line_however_much_it_is():
+    """Two times 1000 bodies that move against each other make a million of two each; twenty are named."""
+    scene = planar_arm(1)
+    held = ("arm/link1", WORLD)
+    bodies = tuple(f"{body}/{i}" for body in held for i in range(1000))
+    pairs = [(body, f"{body}/{i}") for body in held for i in range(1000)]
+    welds = tuple(Joint(f"{name}/weld", JointKind.WELD, body, name, np.zeros(3), pose(), pose()) for body, name in pairs)
+    balls = tuple(ball(f"{body}/ball", body, 0.1, (0.0, 0.0, 0.0)) for body in bodies)
+    crowded = replace(scene, joints=(*scene.joints, *welds), bodies=(*scene.bodies, *bodies), geometries=(*scene.geometries, *balls))
+    started = time.process_time()
+    words = _unlisted(crowded)
+    assert words.count(" of ") == 20
+    assert words.endswith(", and more")
+    assert time.process_time() - started < 2.0
