@@ -23,7 +23,7 @@ from benchmarks import catalogue, measure
 from benchmarks.measure import Progress
 from certifier.errors import CirisError
 
-CIRIS = [sys.executable, "-m", "client.cli"]
+CIRIS = [sys.executable, "-P", "-m", "client.cli"]
 SERVICE, LOCAL = "service", "--local"
 
 

@@ -18,7 +18,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from flint import arb, ctx
+from flint import arb, ctx, fmpq
 from numpy.typing import ArrayLike, NDArray
 
 from certifier.document import Node
@@ -171,19 +171,19 @@ class Scene:
 
     @cached_property
     def s_lower(self) -> Array:
-        return self._limits_in_s(self.q_lower)
+        return -self._outer(self.q_star, self.q_lower)
 
     @cached_property
     def s_upper(self) -> Array:
-        return self._limits_in_s(self.q_upper)
+        return self._outer(self.q_upper, self.q_star)
 
-    def _limits_in_s(self, limits: Array) -> Array:
-        """Tangent-space coordinates of joint limits, (n,), the same on every machine.
+    def _outer(self, q: Array, base: Array) -> Array:
+        """The least doubles, (n,), that are no less than tan((q - base)/2) or q - base, exactly, and the same on every machine.
 
-        Proofs rest on them to the last bit, and NumPy's tangent depends on the processor; that of ball arithmetic does not.
+        Proofs rest on the joint limits to the last bit: rounded inwards they would leave configurations out. NumPy's tangent
+        is rounded otherwise by other processors.
         """
-        delta = limits - self.q_star
-        return np.array([_tangent(x / 2) if revolute else x for x, revolute in zip(delta.tolist(), self.revolute, strict=True)])
+        return np.array([_not_less(*joint) for joint in zip(q.tolist(), base.tolist(), self.revolute, strict=True)])
 
     def to_s(self, q: ArrayLike) -> Array:
         """Tangent-space coordinates of positions q, (..., n) -> (..., n)."""
@@ -302,11 +302,15 @@ class Scene:
         return scene
 
 
-def _tangent(angle: float) -> float:
+def _not_less(q: float, base: float, revolute: bool) -> float:
+    """The least double that is no less than tan((q - base)/2), or than q - base."""
+    difference = fmpq(*q.as_integer_ratio()) - fmpq(*base.as_integer_ratio())
     precision = ctx.prec
-    ctx.prec = 256
+    ctx.prec = 4096  # a difference of doubles is exact
     try:
-        return float(arb(angle).tan().mid())
+        exactly = (arb(difference) / 2).tan() if revolute else arb(difference)
+        nearest = float(exactly.mid())
+        return nearest if arb(nearest) >= exactly else float(np.nextafter(nearest, np.inf))
     finally:
         ctx.prec = precision
 

@@ -25,14 +25,14 @@ def up(args: Namespace) -> int:
     """Replaces this process by the supervisor of the embedded stack."""
     options = [f"--{name}={value}" for name, value in (("port", args.port), ("data", args.data)) if value is not None]
     sys.stdout.flush()
-    os.execv(sys.executable, [sys.executable, "-m", "workers.stack", *options])
+    os.execv(sys.executable, [sys.executable, "-P", "-m", "workers.stack", *options])
 
 
 def key(args: Namespace) -> int:
     """Replaces this process by the command that acts on the keys in the database."""
     options = [] if args.data is None else [f"--data={args.data}"]
     sys.stdout.flush()
-    os.execv(sys.executable, [sys.executable, "-m", "db.keys", *options, args.verb, *args.words(args)])
+    os.execv(sys.executable, [sys.executable, "-P", "-m", "db.keys", *options, args.verb, *args.words(args)])
 
 
 def scene_add(args: Namespace) -> int:

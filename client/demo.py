@@ -101,7 +101,7 @@ def _stack() -> Iterator[str]:
     log.parent.mkdir(parents=True, exist_ok=True)
     print("starting the service ...", flush=True)
     with log.open("ab") as errors:
-        stack = subprocess.Popen([sys.executable, "-m", "workers.stack"], stdout=subprocess.PIPE, stderr=errors, text=True)
+        stack = subprocess.Popen([sys.executable, "-P", "-m", "workers.stack"], stdout=subprocess.PIPE, stderr=errors, text=True)
     try:
         assert stack.stdout is not None
         if not stack.stdout.readline():

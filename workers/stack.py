@@ -154,12 +154,12 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
 def _children(settings: Settings, data: Path, queue_socket: Path) -> list[Child]:
     """Returns the child processes, in the order of starting."""
     children = [
-        Child("control", [sys.executable, "-m", "workers", "control"], signal.SIGQUIT),
-        Child("solve", [sys.executable, "-m", "workers", "solve"], signal.SIGQUIT, background=True),
+        Child("control", [sys.executable, "-P", "-m", "workers", "control"], signal.SIGQUIT),
+        Child("solve", [sys.executable, "-P", "-m", "workers", "solve"], signal.SIGQUIT, background=True),
     ]
     for name in ["api", *(f"api-{i}" for i in range(2, settings.api_processes + 1))]:
         counts = {"CIRIS_REQUESTS_FILE": str(data / "requests" / name)}
-        children.append(Child(name, [sys.executable, "-m", "api"], signal.SIGTERM, own=counts))
+        children.append(Child(name, [sys.executable, "-P", "-m", "api"], signal.SIGTERM, own=counts))
     if not settings.redis_url:
         children.insert(0, Child(QUEUE, queue_server_command(data / "queue", queue_socket), signal.SIGTERM))
     return children

@@ -82,7 +82,7 @@ class _Nursery:
         path = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
         with theirs:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "certifier.isolation.nursery", module, str(theirs.fileno())],
+                [sys.executable, "-P", "-m", "certifier.isolation.nursery", module, str(theirs.fileno())],
                 stdin=subprocess.DEVNULL,
                 stdout=self._log,
                 stderr=self._log,

@@ -32,7 +32,7 @@ HEADER = "header.json"
 _NPY = re.compile(rb"\x93NUMPY\x01\x00..\{'descr': '(<..)', 'fortran_order': False, 'shape': \(([0-9, ]{0,60})\), \} *\n", re.DOTALL)
 _END = struct.Struct("<4s4H2LH")
 """Of a zip: signature, disks, members (twice), size and offset of the directory, length of the comment."""
-_LOCAL, _ENTRY = 30, 46
+_LOCAL, _ENTRY, _LOCATOR = 30, 46, 20
 """Bytes of a member in a zip before its content and in the directory, besides its name."""
 
 
@@ -133,6 +133,8 @@ def _check_end(data: bytes) -> None:
     signature, disk, first_disk, here, members, size, offset, comment = _END.unpack(data[-_END.size :])
     if (signature, disk, first_disk, comment) != (b"PK\5\6", 0, 0, 0) or here != members or offset + size + _END.size != len(data):
         raise _malformed("it does not end as a zip of one piece without a comment does")
+    if data[-_END.size - _LOCATOR : -_END.size].startswith(b"PK\6\7"):
+        raise _malformed("it ends as a zip of more than 4 GiB does")
     if members > limits.MEMBERS or size > members * (_ENTRY + limits.MEMBER_NAME):
         raise ProofError("proof_too_large", f"the proof file has more than {limits.MEMBERS} members, or too long names")
 

@@ -20,6 +20,8 @@ PATH = 64
 GEOMETRIES = 20_000
 VERTICES = 4_096
 """Of a geometry."""
+MAGNITUDE = 1e6
+"""Of every length, in metres, and of every joint position, limit and q*, in metres or radians."""
 PAIRS = 20_000
 """Of the pairs to prove, and of those that are ignored."""
 

@@ -9,9 +9,15 @@ from __future__ import annotations
 import numpy as np
 from flint import fmpq
 
-from certifier.model import Array
+from certifier.model import Array, Scene
 from certifier.proof import limits
 from certifier.verify.kinematics import exact
+
+
+def within_limits(scene: Scene, point: Array) -> bool:
+    """Whether s, (n,) doubles, is within the joint limits beyond the rounding of the limits in s, which are rounded outwards."""
+    lower, upper = np.nextafter(scene.s_lower, np.inf), np.nextafter(scene.s_upper, -np.inf)
+    return bool(np.all(lower <= point) and np.all(point <= upper))
 
 
 class Halfspaces:

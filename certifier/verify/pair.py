@@ -22,7 +22,7 @@ from certifier.errors import ProofError
 from certifier.model import Array, Pair, Scene, Volume
 from certifier.proof import limits
 from certifier.proof.pair import Ground, PairProof, Side
-from certifier.verify.box import Halfspaces
+from certifier.verify.box import Halfspaces, within_limits
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.residual import Numerators, largest_residual
 from certifier.verify.scene import check_scene
@@ -92,7 +92,7 @@ def check_interior(scene: Scene, ground: Ground, point: Array) -> None:
     Raises:
         ProofError: the point is not in it.
     """
-    if point.shape != (scene.n,) or not _limited(scene, ground).contains(point):
+    if point.shape != (scene.n,) or not (within_limits(scene, point) and _limited(scene, ground).contains(point)):
         raise ProofError("proof_interior", "the point that should show that the polytope is not empty is not in it")
 
 

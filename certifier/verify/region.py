@@ -14,7 +14,7 @@ from certifier.proof import limits
 from certifier.proof.pair import Ground
 from certifier.proof.region import RegionProof
 from certifier.verify.archimedean import check_archimedean
-from certifier.verify.box import Halfspaces
+from certifier.verify.box import Halfspaces, within_limits
 from certifier.verify.decimals import exactly, rounded_down, rounded_up
 from certifier.verify.kinematics import exact
 from certifier.verify.pair import PairCheck, check_ground
@@ -135,6 +135,8 @@ def _check_polytope(proof: RegionProof) -> None:
     limited = scene.polytope(np.zeros((0, n)), np.zeros(0))
     if not _among(proof.C, proof.d, limited.C, limited.d):
         raise ProofError("proof_limits", "the joint limits are not among the region's half-spaces")
+    if not within_limits(scene, proof.interior):
+        raise ProofError("proof_interior", "the interior point is not within the joint limits")
     point = [exact(x) for x in proof.interior]
     for c, d in zip(proof.C, proof.d, strict=True):
         if not sum(exact(x) * s for x, s in zip(c, point, strict=True)) < exact(d):

@@ -6,12 +6,10 @@ It must also be one whose statement can be printed, names and reasons as they st
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from certifier.document import LARGEST
 from certifier.errors import ProofError
 from certifier.model import WORLD, Joint, JointKind, Scene, escaped, is_name, is_sentence
 from certifier.proof import limits
@@ -68,7 +66,7 @@ def _check_words(scene: Scene) -> None:
 
 
 def _finite(*values: Any) -> bool:
-    return all(isinstance(x, (int, float)) and not isinstance(x, bool) and abs(x) <= LARGEST for x in values)
+    return all(isinstance(x, (int, float)) and not isinstance(x, bool) and abs(x) <= limits.MAGNITUDE for x in values)
 
 
 def _check_tree(scene: Scene) -> None:
@@ -84,13 +82,13 @@ def _check_tree(scene: Scene) -> None:
             path.append(above[path[-1]])
     _require(scene.q_star.size, "no joint of it moves")
     positions = [joint.index for joint in scene.joints if joint.index is not None]
-    _require(scene.q_star.shape == (len(positions),) and (np.abs(scene.q_star) <= LARGEST).all(), "q*")
+    _require(scene.q_star.shape == (len(positions),) and (np.abs(scene.q_star) <= limits.MAGNITUDE).all(), "q*")
     _require(all(type(i) is int for i in positions) and sorted(positions) == list(range(scene.n)), "the joints' positions")
 
 
 def _check_joint(scene: Scene, joint: Joint) -> None:
     for X in (joint.X_PF, joint.X_BM):
-        _require(X.shape == (4, 4) and (np.abs(X) <= LARGEST).all() and (X[3] == [0, 0, 0, 1]).all(), f"a frame of {joint.name}")
+        _require(X.shape == (4, 4) and (np.abs(X) <= limits.MAGNITUDE).all() and (X[3] == [0, 0, 0, 1]).all(), f"a frame of {joint.name}")
         _require(np.abs(X[:3, :3].T @ X[:3, :3] - np.eye(3)).max() < RIGID and np.linalg.det(X[:3, :3]) > 0, f"a rotation of {joint.name}")
     _require((joint.index is None) == (joint.kind is JointKind.WELD), f"the kind of {joint.name}")
     if joint.index is None:
@@ -111,12 +109,12 @@ def _check_bodies(scene: Scene) -> None:
         vertices = geometry.vertices
         _require(geometry.body in bodies, f"the body of {geometry.name}")
         _require(vertices.ndim == 2 and vertices.shape[1] == 3 and len(vertices) > 0, f"the vertices of {geometry.name}")
-        _require((np.abs(vertices) <= LARGEST).all(), f"the vertices of {geometry.name}")
+        _require((np.abs(vertices) <= limits.MAGNITUDE).all(), f"the vertices of {geometry.name}")
         _require(_finite(geometry.radius) and geometry.radius >= 0, f"the radius of {geometry.name}")
     _require(len(set(scene.pairs)) == len(scene.pairs), "its pairs")
     for what, pairs in (("a pair", scene.pairs), ("an ignored pair", scene.ignored)):
-        _require(_all_known(names, pairs), f"{what} of unknown geometries")
-
-
-def _all_known(names: set[str], pairs: Iterable[Any]) -> bool:
-    return all(p.a in names and p.b in names and p.a != p.b for p in pairs)
+        _require(all(p.a in names and p.b in names for p in pairs), f"{what} of unknown geometries")
+        _require(all(p.a < p.b for p in pairs), f"{what} that is not in the order of the names")
+    ignored = {(p.a, p.b) for p in scene.ignored}
+    _require(len(ignored) == len(scene.ignored), "a pair that is ignored twice")
+    _require(not any((p.a, p.b) in ignored for p in scene.pairs), "a pair that is ignored as well")

@@ -13,6 +13,7 @@ from flint import fmpq
 from certifier.errors import ProofError
 from certifier.model import Array, Pair
 from certifier.proof.negative import WitnessProof
+from certifier.verify.box import Halfspaces, within_limits
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.scene import check_scene
 
@@ -50,11 +51,9 @@ def check_witness(proof: WitnessProof) -> WitnessStatement:
         raise ProofError("proof_malformed", "the arrays of the witness do not fit the scene")
     if proof.pair not in scene.pairs:
         raise ProofError("proof_pair", f"{proof.pair.a} and {proof.pair.b} are not a pair of the scene")
+    if not (within_limits(scene, s) and Halfspaces(proof.C, proof.d).contains(s)):
+        raise ProofError("proof_witness", "the configuration is not in the polytope, or not within the joint limits")
     point = [exact(x) for x in s]
-    limited = scene.polytope(proof.C, proof.d)
-    for c, d in zip(limited.C, limited.d, strict=True):
-        if not sum((exact(x) * y for x, y in zip(c, point, strict=True)), fmpq(0)) <= exact(d):
-            raise ProofError("proof_witness", "the configuration is not in the polytope")
     a, b = scene.geometry(proof.pair.a), scene.geometry(proof.pair.b)
     X = ExactKinematics.at(scene, point).pose(a.body, b.body)
     p, other = (_mean(g.vertices, w) for g, w in zip((a, b), proof.weights, strict=True))

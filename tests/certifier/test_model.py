@@ -37,15 +37,19 @@ def test_escaped_text_is_one_printable_line_and_tells_different_texts_apart():
     assert escaped("4 mm \u00fcber") == "4 mm \u00fcber"
 
 
-@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5))
-def test_joint_limits_are_the_doubles_nearest_to_their_tangents(upper, center):
-    assume(-3.14 < upper - center < 3.14)
-    joint = Joint("a/j", JointKind.REVOLUTE, WORLD, "a/b", np.array([0.0, 0.0, 1.0]), np.eye(4), np.eye(4), 0, upper - 0.1, upper)
+@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.sampled_from([JointKind.REVOLUTE, JointKind.PRISMATIC]))
+def test_joint_limits_in_s_are_the_nearest_doubles_that_leave_nothing_out(limit, center, kind):
+    revolute = kind is JointKind.REVOLUTE
+    assume(not revolute or -3.0 < limit - center < 3.0)
+    joint = Joint("a/j", kind, WORLD, "a/b", np.array([0.0, 0.0, 1.0]), np.eye(4), np.eye(4), 0, limit, limit)
     scene = Scene("s", (joint,), (WORLD, "a/b"), (), (), (), np.array([center]))
-    precision, ctx.prec = ctx.prec, 1000
+    precision, ctx.prec = ctx.prec, 3000
     try:
-        exact = (arb(upper - center) / 2).tan()
-        error = abs(arb(float(scene.s_upper[0])) - exact)
-        assert error <= arb(math.ulp(float(scene.s_upper[0]))) * 0.5000001
+        exactly = arb(limit) - arb(center)
+        exactly = (exactly / 2).tan() if revolute else exactly
+        upper, lower = float(scene.s_upper[0]), float(scene.s_lower[0])
+        assert arb(lower) <= exactly <= arb(upper)
+        assert not arb(math.nextafter(upper, -math.inf)) >= exactly
+        assert not arb(math.nextafter(lower, math.inf)) <= exactly
     finally:
         ctx.prec = precision

@@ -221,3 +221,16 @@ def wait_for(condition, seconds=20):
     while not condition():
         assert time.monotonic() < deadline, "timed out"
         time.sleep(0.02)
+
+
+def test_modules_in_the_working_directory_are_not_run(tmp_path: Path) -> None:
+    """A stranger's folder may hold a ``struct.py`` beside the proof or the scene that is to be read."""
+    for name in ("struct", "json", "numpy"):
+        (tmp_path / f"{name}.py").write_text("open('ran', 'w')\nraise SystemExit\n")
+    call = (
+        "from certifier.isolation.child import run_in_child; print(run_in_child('json:dumps', {'a': 1}, timeout_s=60, memory_bytes=2**33))"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    done = subprocess.run([sys.executable, "-P", "-c", call], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout == '{"a": 1}\n', done.stderr
+    assert not (tmp_path / "ran").exists()
