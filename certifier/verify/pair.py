@@ -9,8 +9,8 @@ certifier.verify.residual bounds the residual e_v of every vertex on the box. Wi
 for every configuration of the polytope. If t is larger than the bound and |a| <= kappa, then the volume, its ball included, is strictly on
 its side of the plane.
 
-The check takes |a| <= kappa at the box's corners. This suffices for the whole box, because |a| is convex. certifier.verify.volume checks
-that the volumes contain the geometries that they stand for.
+It is enough to check |a| <= kappa at the box's corners, because |a| is convex. certifier.verify.volume checks that the volumes contain the
+geometries that they stand for.
 """
 
 from __future__ import annotations
