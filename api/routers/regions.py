@@ -31,7 +31,7 @@ class ExportFormat(StrEnum):
     NPZ = "npz"
     """The arrays of the region, C, d, center and the ellipsoid, for NumPy."""
     DRAKE_YAML = "drake-yaml"
-    """Drake's IrisRegions, in tangent space coordinates s, for Drake's LoadIrisRegionsYamlFile."""
+    """Drake's IrisRegions, in tangent-space coordinates s, for Drake's LoadIrisRegionsYamlFile."""
 
 
 @router.get("")
@@ -101,7 +101,11 @@ def _verify(db: Database, region_id: str) -> Verification:
     "/{region_id}/export", response_class=Response, responses={200: {"content": {kind: {} for kind in exports.MEDIA_TYPES.values()}}}
 )
 def export_region(region_id: str, db: Db, format: ExportFormat = ExportFormat.JSON) -> Response:
-    """Returns the region as a file for other programs."""
+    """Returns the region as a file for other programs.
+
+    `json` is the manifest. `npz` holds arrays in s for NumPy: C, d, center and the ellipsoid. `drake-yaml` holds Drake's IrisRegions in s,
+    which LoadIrisRegionsYamlFile reads.
+    """
     with db.read() as session:
         row = regions.get(session, region_id)
     data, suffix = exports.WRITERS[format](row)

@@ -71,7 +71,7 @@ def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
         scene = str(json.loads((root / INDEX).read_text(encoding="utf-8"))["scene"])
     except SceneError:
         raise
-    except Exception as error:  # zipfile and the decompressors raise a dozen kinds
+    except Exception as error:  # zipfile and the decompressors raise many kinds of error
         hint = "make bundles with pack_bundle or `ciris scene add`"
         raise SceneError("bundle_zip", f"this is not a scene bundle: {type(error).__name__}: {error}", hint=hint) from None
     _checked_name(scene)

@@ -22,12 +22,12 @@ matrix (4, n + 1). Apply the functionals to the identities, and add these up. Th
 Where no radius is involved and R = 0, it follows that t <= 0, because the check requires that sum_v x_v(den) > 0.
 
 Where a radius is involved, the rows R_a of R that belong to a need not vanish. Let Y = [[Yaa, -R_a/2], [-R_a'/2, Ybb]] be psd, with
-Ybb_ii <= Ybb_00 and tr Yaa + Ybb_00 <= sum_v r_v x_v(den). Then the matrix inequality gives <Z_a, R_a> <= kappa sum_v r_v x_v(den), and
-t <= 0 follows again.
+Ybb_ii <= Ybb_00 and tr Yaa + Ybb_00 <= sum_v r_v x_v(den). Then the matrix inequality gives <Z_a, R_a> <= kappa sum_v r_v x_v(den). If the
+row of R that belongs to b vanishes, t <= 0 follows again.
 
 R never vanishes in floating point. So the proof names as many moments as R has entries that have to vanish. A change c of these moments
-with G c = -R makes R zero, where G holds what one unit of each moment adds to R. Ball arithmetic bounds |c|. Every matrix is then shown
-to be positive definite whatever such a change does.
+with G c = -R makes these entries zero, where G holds what one unit of each moment adds to R. Ball arithmetic bounds |c|. Every matrix is
+then shown to be positive definite whatever such a change does.
 
 Where the equations are dependent, as for two balls, fewer of them are solved. What is left of the others bounds t relative to the plane's
 coefficients. This bound is the ``slack``.

@@ -31,7 +31,7 @@ Matrix = list[list[fmpq_mpoly]]
 Numbers = list[list[fmpq]]
 _TAU_BITS = 110
 ROUNDING_BITS = 60
-"""A quaternion, with an entry of 1 or more, and an axis' projection are rounded at this bit, which is finer than doubles near 1."""
+"""Of a quaternion with an entry of 1 or more, and of an axis' projection, this many binary places are kept: finer than doubles near 1."""
 
 
 def exact(x: float) -> fmpq:

@@ -91,7 +91,7 @@ def check_ground(scene: Scene, ground: Ground) -> None:
 
 
 def check_interior(scene: Scene, ground: Ground, point: Array) -> None:
-    """Checks that the point shows the ground, within the joint limits, not to be empty.
+    """Checks that the point is in the ground and within the joint limits, so that this polytope is not empty.
 
     Everything could be said of an empty polytope.
 

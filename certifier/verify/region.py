@@ -25,7 +25,7 @@ from certifier.verify.scene import check_scene
 from certifier.verify.volume import check_contained
 
 NAMED = 20
-"""A statement names at most this many times two bodies whose pairs the scene leaves out."""
+"""A statement gives at most this many counts of pairs that the scene leaves out; each count is for two bodies."""
 
 
 @dataclass(frozen=True)
