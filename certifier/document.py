@@ -1,7 +1,7 @@
-"""JSON from strangers, read strictly: every value is of its type and in its place, or an error says which is not.
+"""JSON from strangers is read strictly here: every value is of its type and in its place, or an error says which is not.
 
-Python's reader takes NaN, infinities, keys that occur twice and any depth; NumPy takes text and truth values for numbers. Here they are
-refused, so that a document means one thing to every reader.
+Python's reader takes NaN, infinities, keys that occur twice and any depth. NumPy takes text and truth values for numbers. This module
+refuses them, so that a document means one thing to every reader.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from certifier.errors import CirisError
 
 LARGEST = 1e100
-"""Numbers above it stand for nothing real; sums and products of a few below it do not overflow."""
+"""Larger numbers stand for nothing real; sums and products of a few numbers up to this one do not overflow."""
 MAX_NESTING = 16
-"""Levels of lists and objects in a value of free form."""
+"""A value of free form has at most this many levels of lists and objects."""
 _SHOWN = 60
 
 
 def parse(data: bytes, where: str) -> Any:
-    """The document in a JSON text, which stands there.
+    """Returns the document in a JSON text; ``where`` names the text in errors.
 
     Raises:
-        CirisError: document, not JSON in UTF-8, or JSON with NaN, an infinity, a key that occurs twice, or too deep a nesting.
+        CirisError: document, when this is not JSON in UTF-8, or holds NaN, an infinity or a key twice, or is nested too deeply.
     """
     try:
         return json.loads(data.decode(), object_pairs_hook=_unique, parse_constant=_constant)
@@ -47,7 +47,7 @@ def _constant(name: str) -> NoReturn:
 
 
 class Node:
-    """A value of a document and where it stands, as in ``joints[2].axis``.
+    """A node is a value of a document, with the place where it stands, as in ``joints[2].axis``.
 
     Every method raises CirisError, document, with the place as its field, when the value is not what the method reads.
     """
@@ -56,7 +56,7 @@ class Node:
         self.value, self.where = value, where
 
     def fields(self, *names: str, optional: tuple[str, ...] = ()) -> dict[str, Node]:
-        """The members of an object that has all of these names, perhaps the optional ones, and no other."""
+        """Returns the members of an object that has all of these names, perhaps the optional ones, and no other."""
         if not isinstance(self.value, dict):
             self.refuse("an object")
         for name in names:
@@ -68,7 +68,7 @@ class Node:
         return {name: Node(value, f"{self.where}.{name}".lstrip(".")) for name, value in self.value.items()}
 
     def items(self, most: int | None = None) -> list[Node]:
-        """The items of a list that has at most so many."""
+        """Returns the items of a list that has at most ``most`` of them."""
         if not isinstance(self.value, list):
             self.refuse("a list")
         if most is not None and len(self.value) > most:
@@ -76,7 +76,7 @@ class Node:
         return [Node(value, f"{self.where}[{i}]") for i, value in enumerate(self.value)]
 
     def two(self) -> tuple[Node, Node]:
-        """The items of a list of two."""
+        """Returns the items of a list of two."""
         if not isinstance(self.value, list) or len(self.value) != 2:
             self.refuse("a list of two")
         first, second = self.items()
@@ -88,25 +88,25 @@ class Node:
         return str(self.value)
 
     def count(self) -> int:
-        """A whole number from 0."""
+        """Returns a whole number that is not negative."""
         if type(self.value) is not int or not 0 <= self.value <= LARGEST:
             self.refuse("a whole number from 0")
         return int(self.value)
 
     def number(self) -> float:
-        """A number that a double holds, at most LARGEST in magnitude; as it stands, an integer or not."""
+        """Returns a number that a double holds exactly, at most LARGEST in magnitude, as the integer or the float that it is."""
         if not _is_number(self.value):
             self.refuse(f"a number of at most {LARGEST:g} that a double holds")
         number: float = self.value
         return number
 
     def array(self, *shape: int | None) -> NDArray[np.float64]:
-        """Nested lists of numbers of this shape; the first length may be left open."""
+        """Returns nested lists of numbers as an array of this shape; a first length of None stands for any."""
         _check_array(self.value, shape, self.where)
         return np.array(self.value, dtype=float).reshape(-1 if shape[0] is None else shape[0], *shape[1:])
 
     def free(self) -> dict[str, Any]:
-        """An object of free form: finite numbers, nested at most MAX_NESTING deep."""
+        """Returns an object of free form, whose numbers are finite and which is nested at most MAX_NESTING deep."""
         if not isinstance(self.value, dict):
             self.refuse("an object")
         level: list[Any] = [self.value]
@@ -138,7 +138,7 @@ def _check_array(value: Any, shape: tuple[int | None, ...], where: str) -> None:
 
 
 def _shown(value: Any) -> str:
-    """The beginning of a value, for people."""
+    """Returns the beginning of a value, for people."""
     if isinstance(value, (dict, list)):
         return "an object" if isinstance(value, dict) else "a list"
     text = repr(value[: _SHOWN + 1] if isinstance(value, str) else value)

@@ -1,10 +1,10 @@
-"""The scene as numbers: joints, bodies, convex geometries, pairs.
+"""A scene is held here as numbers: joints, bodies, convex geometries and pairs.
 
-A :class:`Scene` is self-contained: it needs no robot file, no mesh and no Drake to be used, and it is what the content
-hash, the kinematics, the proofs and the verifier refer to. Drake's parsed doubles are taken as exact numbers.
+A :class:`Scene` is self-contained: nobody needs a robot file, a mesh or Drake to use it. The content hash, the kinematics, the proofs and
+the verifier all refer to it. Drake's parsed doubles are taken as exact numbers.
 
-Monogram notation: X_PF is the pose of frame F measured in frame P, p_BV the position of point V in frame B.
-Tangent configuration space (C-IRIS, eq. 4): s_i = tan((q_i - q*_i) / 2) for a revolute joint, q_i - q*_i for a prismatic one.
+Monogram notation: X_PF is the pose of frame F measured in frame P, and p_BV is the position of point V in frame B.
+Tangent configuration space (C-IRIS, eq. 4): s_i = tan((q_i - q*_i) / 2) for a revolute joint, s_i = q_i - q*_i for a prismatic one.
 """
 
 from __future__ import annotations
@@ -29,25 +29,26 @@ Array = NDArray[Any]
 SCHEMA_VERSION = 1
 WORLD = "world"
 MAX_NAME, MAX_SENTENCE = 200, 500
-"""Characters of a name and of a sentence of free text."""
+"""A name has at most MAX_NAME characters, and a sentence of free text has at most MAX_SENTENCE."""
 _NAME = re.compile(r"[\w\-./:+@#()\[\],=]+(?: [\w\-./:+@#()\[\],=]+)*", re.ASCII)
 
 
 def is_name(text: object) -> bool:
-    """Whether a joint, a body or a geometry may be called so: ASCII letters, digits, ``_-./:+@#()[],=`` and single spaces inside.
+    """Returns whether a joint, a body or a geometry may have this name.
 
-    Statements print names, so nothing in them may pass for another line or drive a terminal.
+    A name consists of at most 200 ASCII letters, digits, characters of ``_-./:+@#()[],=`` and single spaces inside. Statements print
+    names, so nothing in a name may look like another line or control a terminal.
     """
     return isinstance(text, str) and len(text) <= MAX_NAME and _NAME.fullmatch(text) is not None
 
 
 def is_sentence(text: object) -> bool:
-    """Whether a reason or a substitution may read so: one line of at most 500 printable characters."""
+    """Returns whether this may be a reason or a substitution: one line of at most 500 printable characters."""
     return isinstance(text, str) and len(text) <= MAX_SENTENCE and text.isprintable()
 
 
 def escaped(text: str) -> str:
-    """The text as one line for people: what is not printable, and the backslash, is written as Python escapes it."""
+    """Returns the text as one line for people. What is not printable, and the backslash, is written as Python escapes it."""
     return "".join(c if c.isprintable() and c != "\\" else c.encode("unicode_escape").decode() for c in text)
 
 
@@ -59,15 +60,19 @@ class JointKind(StrEnum):
 
 @dataclass(frozen=True)
 class Joint:
-    """One edge of the kinematic tree: X_PB(q) = X_PF X_FM(q) X_BM^-1.
+    """A joint is one edge of the kinematic tree: X_PB(q) = X_PF X_FM(q) X_BM^-1.
 
     Attributes:
         name: ``model/joint``.
-        parent, child: body names.
+        kind: revolute, prismatic or weld.
+        parent: name of the body on the side of the world.
+        child: name of the other body.
         axis: (3,) unit axis in F (zeros for a weld).
-        X_PF, X_BM: (4, 4) fixed frames on parent and child, metres. A weld's own offset is folded into X_PF.
+        X_PF: (4, 4) pose of F, which is fixed on the parent, metres. A weld's own offset is folded into it.
+        X_BM: (4, 4) pose of M, which is fixed on the child, metres.
         index: position index in q and s; None for a weld.
-        lower, upper: limits of q in radians or metres; None for a weld.
+        lower: lower limit of q in radians or metres; None for a weld.
+        upper: upper limit of q in radians or metres; None for a weld.
     """
 
     name: str
@@ -84,15 +89,15 @@ class Joint:
 
 @dataclass(frozen=True)
 class Geometry:
-    """A convex body fixed to a link: conv(vertices) + ball(radius), in the frame of its body.
+    """A geometry is a convex body fixed to a link: conv(vertices) + ball(radius), in the frame of its body.
 
     Attributes:
         name: ``model/body/geometry``.
         body: ``model/body``, or ``world``.
-        vertices: (v, 3) metres in the body's frame. A sphere has one, a capsule two.
+        vertices: (v, 3) metres in the body's frame. A sphere has one vertex, a capsule has two.
         radius: metres, 0 for a polytope. The scene's padding is *not* included.
         shape: what the file said, JSON-able: ``{"kind": "box", "size": [x, y, z], "X_BG": 4x4 list}`` and so on.
-        substitution: None when vertices and radius describe the shape exactly, else a sentence naming the conservative
+        substitution: None when vertices and radius describe the shape exactly, else a sentence that names the conservative
             replacement (mesh -> hull with V vertices, cylinder -> prism ...).
         inflation: upper bound in metres on how far the replacement reaches outside the shape.
     """
@@ -108,7 +113,7 @@ class Geometry:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two geometries, by name, that must not touch; a < b in string order."""
+    """A pair names two geometries that must not touch; a < b in string order."""
 
     a: str
     b: str
@@ -116,7 +121,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Ignored:
-    """A pair of geometries that is not certified, and why."""
+    """Names a pair of geometries that is not certified, and says why."""
 
     a: str
     b: str
@@ -125,12 +130,17 @@ class Ignored:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A kinematic tree with convex geometries and the pairs to certify; equal to itself alone, so that what is derived from it can be kept.
+    """A scene is a kinematic tree with convex geometries and the pairs to certify.
+
+    A scene is equal to itself alone, so that what is derived from it can be kept.
 
     Attributes:
-        joints: every joint of the tree, welds included; each body but ``world`` is the child of exactly one.
-        q_star: (n,) centre of the parametrisation.
-        padding: metres added around every geometry of every pair (both sides).
+        joints: every joint of the tree, welds included; each body but ``world`` is the child of exactly one joint.
+        bodies: names of the bodies, ``world`` included.
+        pairs: the pairs of geometries to certify.
+        ignored: the pairs of geometries that are not certified by request.
+        q_star: (n,) centre of the parametrisation, radians or metres.
+        padding: metres that are added around every geometry of every pair (both sides).
         warnings: lint findings, sentences for people.
         provenance: how the scene was made (directives, package roots, Drake's version); not part of the hash.
     """
@@ -148,17 +158,17 @@ class Scene:
 
     @property
     def n(self) -> int:
-        """Number of joint positions."""
+        """Returns the number of joint positions."""
         return len(self.q_star)
 
     @cached_property
     def moving(self) -> tuple[Joint, ...]:
-        """The n joints that have a position, in position order."""
+        """Returns the n joints that have a position, in position order."""
         return tuple(sorted((j for j in self.joints if j.index is not None), key=lambda j: j.index or 0))
 
     @cached_property
     def revolute(self) -> NDArray[np.bool_]:
-        """(n,) True where the joint is revolute."""
+        """Returns, (n,), True where the joint is revolute."""
         return np.array([j.kind is JointKind.REVOLUTE for j in self.moving], dtype=bool)
 
     @cached_property
@@ -178,26 +188,26 @@ class Scene:
         return self._outer(self.q_upper, self.q_star)
 
     def _outer(self, q: Array, base: Array) -> Array:
-        """The least doubles, (n,), that are no less than tan((q - base)/2) or q - base, exactly, and the same on every machine.
+        """Returns the least doubles, (n,), that are no less than tan((q - base)/2) or q - base, the same on every machine.
 
-        Proofs rest on the joint limits to the last bit: rounded inwards they would leave configurations out. NumPy's tangent
-        is rounded otherwise by other processors.
+        Proofs rest on the joint limits to the last bit. Rounded inwards, the limits would leave configurations out. NumPy's
+        tangent depends on the processor, so it is not used here.
         """
         return np.array([_not_less(*joint) for joint in zip(q.tolist(), base.tolist(), self.revolute, strict=True)])
 
     def to_s(self, q: ArrayLike) -> Array:
-        """Tangent-space coordinates of positions q, (..., n) -> (..., n)."""
+        """Returns the tangent-space coordinates of positions q, (..., n) -> (..., n)."""
         delta = np.asarray(q, dtype=float) - self.q_star
         return np.where(self.revolute, np.tan(delta / 2), delta)
 
     def to_q(self, s: ArrayLike) -> Array:
-        """Joint positions of tangent-space coordinates s, (..., n) -> (..., n)."""
+        """Returns the joint positions of tangent-space coordinates s, (..., n) -> (..., n)."""
         s = np.asarray(s, dtype=float)
         return self.q_star + np.where(self.revolute, 2 * np.arctan(s), s)
 
     @cached_property
     def joint_above(self) -> dict[str, Joint]:
-        """The joint whose child a body is; the world has none."""
+        """Maps every body to the joint whose child it is; the world has none."""
         return {joint.child: joint for joint in self.joints}
 
     @cached_property
@@ -205,11 +215,11 @@ class Scene:
         return {g.name: g for g in self.geometries}
 
     def has_geometry(self, name: str) -> bool:
-        """Whether a geometry is called ``name``."""
+        """Returns whether a geometry is called ``name``."""
         return name in self._geometry
 
     def geometry(self, name: str) -> Geometry:
-        """The geometry called ``name``.
+        """Returns the geometry called ``name``.
 
         Raises:
             SceneError: no geometry has that name.
@@ -228,22 +238,22 @@ class Scene:
         return found
 
     def pairs_of(self, name: str) -> list[tuple[int, Pair]]:
-        """The pairs that a geometry is one of, each with its place among all."""
+        """Returns the pairs that contain the geometry called ``name``, each with its index in ``pairs``."""
         return self._pairs_of.get(name, [])
 
     def polytope(self, C: ArrayLike, d: ArrayLike) -> Polytope:
-        """The polytope {C s <= d} with the joint limits added as its last 2n rows (upper, then lower)."""
+        """Returns the polytope {C s <= d} with the joint limits added as its last 2n rows (upper, then lower)."""
         C, d = np.asarray(C, dtype=float).reshape(-1, self.n), np.asarray(d, dtype=float).reshape(-1)
         eye = np.eye(self.n)
         return Polytope(np.concatenate([C, eye, -eye]), np.concatenate([d, self.s_upper, -self.s_lower]))
 
     def to_document(self) -> dict[str, Any]:
-        """The scene as JSON-able data (keys are stable; see docs/architecture.md)."""
+        """Returns the scene as JSON-able data, whose keys are stable (docs/architecture.md)."""
         return {**self._content(), "name": self.name, "hash": self.hash, "warnings": list(self.warnings), "provenance": self.provenance}
 
     @cached_property
     def hash(self) -> str:
-        """SHA-256 over everything a proof depends on: not the scene's name, not its provenance."""
+        """Returns the SHA-256 over everything that a proof depends on, which the scene's name and its provenance are not."""
         text = json.dumps(self._content(), sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -286,10 +296,10 @@ class Scene:
 
     @classmethod
     def from_document(cls, document: Any) -> Scene:
-        """Inverse of :meth:`to_document`.
+        """Reads what :meth:`to_document` returns.
 
         Raises:
-            SceneError: it is no scene document, its schema version is unknown, or the stored hash does not match the content.
+            SceneError: this is no scene document, its schema version is unknown, or the stored hash does not match the content.
         """
         try:
             scene = _read(document)
@@ -303,7 +313,7 @@ class Scene:
 
 
 def _not_less(q: float, base: float, revolute: bool) -> float:
-    """The least double that is no less than tan((q - base)/2), or than q - base."""
+    """Returns the least double that is no less than tan((q - base)/2), or than q - base."""
     difference = fmpq(*q.as_integer_ratio()) - fmpq(*base.as_integer_ratio())
     precision = ctx.prec
     ctx.prec = 4096  # a difference of doubles is exact
@@ -316,10 +326,10 @@ def _not_less(q: float, base: float, revolute: bool) -> float:
 
 
 def _read(document: Any) -> Scene:
-    """The scene of a document, its hash unseen.
+    """Returns the scene of a document; the document's hash is not looked at.
 
     Raises:
-        CirisError: it is none.
+        CirisError: this is no scene document.
     """
     version = document.get("schema_version") if isinstance(document, dict) else SCHEMA_VERSION
     if version != SCHEMA_VERSION or type(version) is not int:
@@ -384,9 +394,9 @@ def _texts(node: Node) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Polytope:
-    """{s : C s <= d}; C is (m, n), d is (m,), finite. Plain rows: whether the joint limits are among them is up to the maker.
+    """A polytope is {s : C s <= d}, where C is (m, n) and d is (m,), both finite.
 
-    :meth:`given` checks what comes from users.
+    Whoever makes it decides whether the joint limits are among its rows. :meth:`given` checks what comes from users.
     """
 
     C: Array
@@ -394,11 +404,11 @@ class Polytope:
 
     @classmethod
     def given(cls, C: Any, d: Any, n: int | None = None, field: str = "polytope") -> Polytope:
-        """A polytope as users give it: nested lists or arrays of numbers.
+        """Returns a polytope from what users give: nested lists or arrays of numbers.
 
         Args:
-            n: number of columns that C has to have; None for any. No rows at all are none of that many columns.
-            field: where the user gave it.
+            n: number of columns that C has to have; None for any. A C without rows counts as one of that many columns.
+            field: field in which the user gave the polytope, for errors.
 
         Raises:
             RegionError: ``polytope_shape`` or ``polytope_not_finite``.
@@ -417,31 +427,36 @@ class Polytope:
         return cls(rows, offsets)
 
     def contains(self, s: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
-        """Which of the points s, (..., n), satisfy C s <= d + tolerance."""
+        """Returns which of the points s, (..., n), satisfy C s <= d + tolerance."""
         return np.all(np.asarray(s) @ self.C.T <= self.d + tolerance, axis=-1)
 
 
 @dataclass(frozen=True)
 class Box:
-    """Coordinates u = (s - mid)/half of a box that contains the polytope; (n,) each."""
+    """A box contains the polytope and gives it the coordinates u = (s - mid)/half.
+
+    Attributes:
+        mid: (n,) centre.
+        half: (n,) half edges.
+    """
 
     mid: Array
     half: Array
 
     @classmethod
     def around(cls, lower: Array, upper: Array) -> Box:
-        """The box of these bounds, rounded outwards to numbers with few bits."""
+        """Returns the box of these bounds, rounded outwards."""
         mid = (lower + upper) / 2
         return cls(mid, np.nextafter(np.maximum(upper - mid, mid - lower) * (1 + 1e-12), np.inf))
 
     @property
     def lower(self) -> Array:
-        """The least doubles inside."""
+        """Returns the least doubles inside the box, (n,)."""
         return np.nextafter(self.mid - self.half, np.inf)
 
     @property
     def upper(self) -> Array:
-        """The largest doubles inside."""
+        """Returns the largest doubles inside the box, (n,)."""
         return np.nextafter(self.mid + self.half, -np.inf)
 
     def to_u(self, s: Array) -> Array:
@@ -450,13 +465,13 @@ class Box:
 
 @dataclass(frozen=True)
 class Volume:
-    """A convex body conv(vertices) + ball(radius), fixed to a link, that contains every geometry it names and stands for all of them.
+    """A volume is a convex body conv(vertices) + ball(radius), fixed to a link. It contains, and stands for, every geometry that it names.
 
     Attributes:
-        geometries: names.
-        body: whose frame the vertices are in; the geometries' own bodies are welded to it, or it is theirs.
+        geometries: names of the geometries.
+        body: body in whose frame the vertices are. It is the geometries' own body, or their bodies are welded to it.
         vertices: (V, 3) metres.
-        radius: metres; the scene's padding comes on top.
+        radius: metres; the scene's padding is added to it.
     """
 
     geometries: tuple[str, ...]
@@ -466,11 +481,11 @@ class Volume:
 
     @classmethod
     def of(cls, geometry: Geometry) -> Volume:
-        """The geometry itself."""
+        """Returns the volume that is the geometry itself."""
         return cls((geometry.name,), geometry.body, geometry.vertices, geometry.radius)
 
     def is_geometry_of(self, scene: Scene) -> bool:
-        """Whether it is exactly the one geometry that it names."""
+        """Returns whether the volume is exactly the one geometry that it names."""
         geometry = scene.geometry(self.geometries[0])
         return (
             len(self.geometries) == 1

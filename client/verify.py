@@ -1,6 +1,6 @@
-"""``ciris verify``: a proof file checked on this machine, with nothing installed but numpy and python-flint.
+"""``ciris verify`` checks a proof file on this machine, with nothing installed but numpy and python-flint.
 
-Files come from strangers: a child process checks them, with limits on its time and its memory.
+Files come from strangers, so a child process checks them, with limits on its time and its memory.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ TIMEOUT_S = 3600.0
 
 
 def verify(args: Namespace) -> int:
-    """Checks a file and prints what it proves.
+    """Checks a file, prints what it proves, and returns the command's exit status.
 
     Raises:
         CirisError: the file cannot be read.
@@ -40,7 +40,7 @@ def verify(args: Namespace) -> int:
 
 
 def _answer(path: Path) -> dict[str, Any]:
-    """What :func:`certifier.verify.file.answer` says of the file, or why that took too much."""
+    """Returns what :func:`certifier.verify.file.answer` says of the file, or which error ended the child process that checked it."""
     payload = {"path": str(path.absolute())}
     try:
         found: dict[str, Any] = run_in_child(

@@ -1,4 +1,4 @@
-"""Regions: lists, manifests, proofs, exports."""
+"""These routes list regions, show their manifests, hand out and check their proofs, export them and delete them."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ router = APIRouter(prefix="/v1/regions", tags=["regions"], dependencies=[READ], 
 
 
 class ExportFormat(StrEnum):
-    """What a region can be exported as."""
+    """Names the format in which a region is exported."""
 
     JSON = "json"
-    """The manifest."""
+    """The region's manifest."""
     NPZ = "npz"
-    """C, d, center and the ellipsoid, for NumPy."""
+    """The arrays of the region, C, d, center and the ellipsoid, for NumPy."""
     DRAKE_YAML = "drake-yaml"
-    """Drake's IrisRegions, in s; LoadIrisRegionsYamlFile reads it."""
+    """Drake's IrisRegions, in tangent-space coordinates s, for Drake's LoadIrisRegionsYamlFile."""
 
 
 @router.get("")
@@ -42,7 +42,10 @@ def list_regions(
     after: Cursor = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> RegionPage:
-    """Certified regions, newest first."""
+    """Lists the certified regions, newest first.
+
+    `scene` and `job` keep only the regions of that scene and of that job.
+    """
     with db.read() as session:
         scene_id = scenes.find(session, scene) if scene else None
         job_id = jobs.get(session, job).id if job else None
@@ -52,14 +55,14 @@ def list_regions(
 
 @router.get("/{region_id}")
 def get_region(region_id: str, db: Db) -> RegionDetail:
-    """One region with its manifest."""
+    """Returns one region with its manifest."""
     with db.read() as session:
         return RegionDetail.of(regions.get(session, region_id))
 
 
 @router.get("/{region_id}/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
 def download_region_proof(region_id: str, db: Db) -> Response:
-    """The proof file; `ciris verify` checks it offline."""
+    """Returns the region's proof file, which `ciris verify` checks offline."""
     with db.read() as session:
         digest = regions.get(session, region_id).proof_digest
         data = proofs.get(session, digest)
@@ -68,7 +71,10 @@ def download_region_proof(region_id: str, db: Db) -> Response:
 
 @router.post("/{region_id}/verify")
 async def verify_region(region_id: str, db: Db, children: Children) -> Verification:
-    """Check the stored proof again, whole, in a process of its own with limits on time and memory; what it proves, in plain words."""
+    """Checks the region's whole stored proof again and returns what it proves, in plain words.
+
+    A process of its own, with limits on time and memory, does the check.
+    """
     return await children.run(_verify, db, region_id)
 
 
@@ -95,7 +101,11 @@ def _verify(db: Database, region_id: str) -> Verification:
     "/{region_id}/export", response_class=Response, responses={200: {"content": {kind: {} for kind in exports.MEDIA_TYPES.values()}}}
 )
 def export_region(region_id: str, db: Db, format: ExportFormat = ExportFormat.JSON) -> Response:
-    """The region as a file for other programs."""
+    """Returns the region as a file for other programs.
+
+    `json` is the manifest. `npz` holds arrays in s for NumPy: C, d, center and the ellipsoid. `drake-yaml` holds Drake's IrisRegions in s,
+    which LoadIrisRegionsYamlFile reads.
+    """
     with db.read() as session:
         row = regions.get(session, region_id)
     data, suffix = exports.WRITERS[format](row)
@@ -104,7 +114,7 @@ def export_region(region_id: str, db: Db, format: ExportFormat = ExportFormat.JS
 
 @router.delete("/{region_id}", dependencies=[ADMIN], status_code=status.HTTP_204_NO_CONTENT)
 def delete_region(region_id: str, db: Db) -> None:
-    """Forget a region and its proof file."""
+    """Deletes a region, and its proof file unless another region has the same."""
     with db.write() as session:
         regions.delete(session, region_id)
 

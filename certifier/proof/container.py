@@ -1,7 +1,7 @@
-"""The container of a proof: a zip of one JSON header and plain arrays (docs/proofs.md, "The file").
+"""The container of a proof is a zip of one JSON header and plain arrays (docs/proofs.md, "The file").
 
-Files come from strangers. What can be written in two ways is read in one: a zip with a comment, a member twice, an array in Fortran's
-order or with a header of its own making are refused, as is what no part of the proof reads.
+Files come from strangers. What can be written in two ways is read in one only. So the reader refuses a zip with a comment, a zip with a
+member twice, and an array in Fortran's order or with a header that NumPy would not write. It also refuses what no part of the proof reads.
 """
 
 from __future__ import annotations
@@ -26,22 +26,23 @@ from certifier.proof import limits
 
 FORMAT = 3
 WORTH_DEFLATING = 1024
-"""Bytes; a compressor takes longer to set up than a smaller member to write."""
+"""Members of at least this many bytes are deflated; a compressor takes longer to set up than a smaller member takes to write."""
 TYPES: dict[bytes, np.dtype[Any]] = {b"<f8": np.dtype("<f8"), b"<i4": np.dtype("<i4"), b"<i8": np.dtype("<i8")}
 HEADER = "header.json"
 _NPY = re.compile(rb"\x93NUMPY\x01\x00..\{'descr': '(<..)', 'fortran_order': False, 'shape': \(([0-9, ]{0,60})\), \} *\n", re.DOTALL)
 _END = struct.Struct("<4s4H2LH")
-"""Of a zip: signature, disks, members (twice), size and offset of the directory, length of the comment."""
+"""The end of a zip holds a signature, disks, members (twice), size and offset of the directory, and the length of the comment."""
 _LOCAL, _ENTRY, _LOCATOR = 30, 46, 20
-"""Bytes of a member in a zip before its content and in the directory, besides its name."""
+"""A member takes _LOCAL bytes before its content and _ENTRY in the directory, besides its name. What stands before the end of a zip of more
+than 4 GiB takes _LOCATOR."""
 
 
 @contextmanager
 def malformed() -> Iterator[None]:
-    """Whatever a broken file says of itself is the same error: the file is malformed.
+    """Turns every error about a broken file into the same one: the file is malformed.
 
     Raises:
-        ProofError: proof_malformed, or the one that was raised.
+        ProofError: proof_malformed for any other CirisError; a ProofError is raised as it is.
     """
     try:
         yield
@@ -56,7 +57,7 @@ def _malformed(problem: str, where: str | None = None) -> ProofError:
 
 
 def pack(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> bytes:
-    """The file; the same content gives the same bytes."""
+    """Returns the bytes of the file; the same content gives the same bytes."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         members = {HEADER: json.dumps(header, sort_keys=True).encode(), **{f"{name}.npy": npy(a) for name, a in arrays.items()}}
@@ -67,7 +68,7 @@ def pack(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> bytes:
 
 
 def npy(array: np.ndarray) -> bytes:
-    """The array in NumPy's format."""
+    """Returns the array in NumPy's format."""
     return _npy_header(array.dtype.str, array.shape) + array.tobytes()
 
 
@@ -79,10 +80,10 @@ def _npy_header(dtype: str, shape: tuple[int, ...]) -> bytes:
 
 
 def unpack(data: bytes, kind: str) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Header and arrays of a file of this kind; every double is at most LARGEST in magnitude.
+    """Returns the header and the arrays of a file of this kind; every double is at most LARGEST in magnitude.
 
     Raises:
-        ProofError: not such a file of this format, or one beyond the limits.
+        ProofError: this is no such file of this format, or it is beyond the limits.
     """
     with _opened(data) as (archive, header):
         if header["kind"] != kind:
@@ -92,17 +93,17 @@ def unpack(data: bytes, kind: str) -> tuple[dict[str, Any], dict[str, np.ndarray
 
 
 def header_of(data: bytes) -> dict[str, Any]:
-    """The header of a file of any kind, with its ``kind`` in it, a text.
+    """Returns the header of a file of any kind; its ``kind`` is there and is a text.
 
     Raises:
-        ProofError: not a file of this format, or one beyond the limits.
+        ProofError: this is no file of this format, or it is beyond the limits.
     """
     with _opened(data) as (_, header):
         return header
 
 
 def with_scene(data: bytes, scene: Scene) -> bytes:
-    """The file with the scene itself besides its hash: whoever has it can check it."""
+    """Returns the file with the scene itself besides its hash, so that whoever has the file can check it."""
     header, arrays = unpack(data, header_of(data)["kind"])
     return pack({**header, "scene": scene.to_document()}, arrays)
 
@@ -112,7 +113,7 @@ def _opened(data: bytes) -> Iterator[tuple[zipfile.ZipFile, dict[str, Any]]]:
     _check_end(data)
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
-    except Exception as error:  # zipfile raises what it likes about a broken file
+    except Exception as error:  # zipfile raises many kinds of error about a broken file
         raise _malformed(f"it is no zip: {error}") from error
     with archive, malformed():
         _check_members(archive, len(data))
@@ -125,7 +126,7 @@ def _opened(data: bytes) -> Iterator[tuple[zipfile.ZipFile, dict[str, Any]]]:
 
 
 def _check_end(data: bytes) -> None:
-    """The end of the zip is where it belongs and says that its directory is not too long: zipfile would read it all."""
+    """Checks that the end of the zip is where it belongs and gives a directory that is not too long, as zipfile would read it all."""
     if len(data) > limits.FILE_BYTES:
         raise ProofError("proof_too_large", f"the proof file has {len(data)} bytes, more than {limits.FILE_BYTES}")
     if len(data) < _END.size:
@@ -160,7 +161,7 @@ def _check_members(archive: zipfile.ZipFile, size: int) -> None:
 
 
 def _content(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
-    """A member of the length that the directory says; no more is inflated, whatever it holds."""
+    """Returns the content of a member, of the length that the directory says; no more is inflated, whatever the member holds."""
     try:
         with archive.open(info) as member:
             content = member.read(info.file_size)
@@ -187,16 +188,16 @@ def _array(name: str, data: bytes) -> np.ndarray:
 
 
 class Arrays:
-    """The arrays of a file, to be read once each."""
+    """Holds the arrays of a file, which are to be read once each."""
 
     def __init__(self, arrays: dict[str, np.ndarray]) -> None:
         self._left = dict(arrays)
 
     def take(self, name: str, *types: str) -> np.ndarray:
-        """An array, of one of these types.
+        """Returns an array that has not been read yet, of one of these types.
 
         Raises:
-            ProofError: proof_malformed.
+            ProofError: proof_malformed, when it is missing or of another type.
         """
         array = self._left.pop(name, None)
         if array is None:
@@ -206,24 +207,24 @@ class Arrays:
         return array
 
     def floats(self, name: str) -> Array:
-        """An array of doubles.
+        """Returns an array of doubles that has not been read yet.
 
         Raises:
-            ProofError: proof_malformed.
+            ProofError: proof_malformed, when it is missing or of another type.
         """
         return self.take(name, "float64")
 
     def end(self) -> None:
-        """Raises ProofError, proof_malformed, if there are more than were read."""
+        """Raises ProofError, proof_malformed, if the file has more arrays than were read."""
         if self._left:
             raise _malformed("it is no part of the proof", f"{min(self._left)}.npy")
 
 
 def head(header: dict[str, Any], *names: str) -> dict[str, Node]:
-    """The members of a header that has these besides format, kind and the scene or its hash.
+    """Returns the members of a header that has these names besides format, kind and the scene or its hash.
 
     Raises:
-        CirisError: it has others.
+        CirisError: the header lacks one of them, or has others.
     """
     scene, more = ("scene", ()) if header["kind"] == "region" else ("scene_hash", ("scene",))
     return Node(header, "header").fields("format", "kind", scene, *names, optional=more)

@@ -1,47 +1,47 @@
-"""What a proof file may have: with these the time and the memory that checking takes are linear in its size (docs/proofs.md, "Limits")."""
+"""These are the limits of a proof file. With them, checking takes time and memory linear in its size (docs/proofs.md, "Limits")."""
 
 from __future__ import annotations
 
 FILE_BYTES = 256 << 20
 UNPACKED_BYTES = 256 << 20
 RATIO = 100
-"""The file's members are together at most so many times its own size, and FREE_BYTES."""
+"""The file's members together have at most this many times its own size, plus FREE_BYTES."""
 FREE_BYTES = 1 << 20
 HEADER_BYTES = 16 << 20
 MEMBERS = 65_535
 MEMBER_NAME = 64
 DIMENSION = 1 << 24
-"""Of an array, whether or not it has entries."""
+"""Each dimension of an array is at most this long, whether or not the array has entries."""
 
 JOINTS = 10_000
 POSITIONS = 64
 PATH = 64
-"""Joints, welds among them, between the world and a body. Exact numbers gain bits with every one."""
+"""At most this many joints, welds among them, are between the world and a body. Exact numbers gain bits with every joint."""
 GEOMETRIES = 20_000
 VERTICES = 4_096
-"""Of a geometry."""
+"""A geometry has at most this many vertices."""
 MAGNITUDE = 1e6
-"""Of every length, in metres, and of every joint position, limit and q*, in metres or radians."""
+"""No length, in metres, and no joint position, limit or q*, in metres or radians, is larger than this."""
 PAIRS = 20_000
-"""Of the pairs to prove, and of those that are ignored."""
+"""This limit holds for the pairs to prove, and again for those that are ignored."""
 
 PROOFS = 8_000
 GROUNDS = 1_000
 VOLUMES = 16_000
 CORNERS = 8
-"""Vertices of a volume that is none of the scene's geometries."""
+"""A volume that is none of the scene's geometries has at most this many vertices."""
 CONTAINED = 500_000
-"""Vertices of geometries that such volumes stand for, all volumes together."""
+"""All such volumes together stand for geometries with at most this many vertices."""
 FACES = 4_096
-"""Half-spaces of a polytope, and those that it implies."""
+"""A polytope has at most this many half-spaces, and implies at most this many more."""
 MULTIPLIERS = 2
-"""Multipliers that are not 0 in one proof of a half-space, for each joint; one for each suffices (Caratheodory)."""
+"""A proof of a half-space has at most this many multipliers that are not 0 for each joint; one for each suffices (Caratheodory)."""
 
 FACTORS = 1 << 22
-"""Entries of the Gram matrices of one vertex."""
+"""The Gram matrices of one vertex have at most this many entries."""
 EXPONENT = 256
-"""Of two, in the exponents of Gram factors."""
+"""The exponent of two in a Gram factor has at most this magnitude."""
 MOMENTS = 1 << 18
-"""Of one body in a dual proof."""
+"""One body in a dual proof has at most this many moments."""
 LOCALISED = 1 << 23
-"""Entries of the localising matrices of one body in a dual proof."""
+"""The localising matrices of one body in a dual proof have at most this many entries."""

@@ -1,4 +1,7 @@
-"""Proofs that a pair cannot be certified on a polytope: by functionals that exclude every certificate, or by a configuration in contact."""
+"""These proofs say that a pair cannot be certified on a polytope.
+
+Functionals exclude every certificate, or a configuration shows the bodies in contact.
+"""
 
 from __future__ import annotations
 
@@ -14,14 +17,15 @@ from certifier.proof.pair import Ground, ground_arrays, read_ground, same_scene
 
 @dataclass(frozen=True)
 class DualProof:
-    """Functionals that exclude every certificate of one pair on a polytope, in one frame (certifier.verify.dual says how).
+    """Holds functionals that exclude every certificate of one pair on a polytope, in one frame (certifier.verify.dual says how).
 
     Attributes:
         frame: body whose frame the planes are expressed in.
         interior: (n,) a point of the ground's polytope, which is therefore not empty.
-        moments: of a's and of b's vertices, (V, N): values on the monomials in the order of certifier.verify.moments.
-        equations: K of those that have to vanish, the 4 (n + 1) entries of R row by row, or its n + 1 of b where a radius is involved.
-        entries: (K, 3) int64 the moments whose change makes them vanish: side, vertex, monomial.
+        moments: (V, N) for a's and for b's vertices, the functionals' values on the monomials in the order of certifier.verify.moments.
+        equations: numbers of the K equations that are solved. The equations say that the entries of R vanish: the 4 (n + 1) entries, row
+            by row, or only the n + 1 entries of b where a radius is involved.
+        entries: (K, 3) int64 side, vertex and monomial of each moment whose change makes these K entries of R vanish.
         normal: Yaa (3, 3) and Ybb (n + 1, n + 1); empty where no radius is involved.
     """
 
@@ -36,7 +40,7 @@ class DualProof:
     normal: tuple[Array, Array]
 
     def to_bytes(self) -> bytes:
-        """The proof as a file."""
+        """Returns the proof as a file."""
         header = {
             "format": FORMAT,
             "kind": "dual",
@@ -51,10 +55,10 @@ class DualProof:
 
     @classmethod
     def from_bytes(cls, data: bytes, scene: Scene) -> DualProof:
-        """Inverse of :meth:`to_bytes`.
+        """Reads what :meth:`to_bytes` writes.
 
         Raises:
-            ProofError: not a dual proof, or one about another scene.
+            ProofError: the file is no dual proof, or one about another scene.
         """
         header, unpacked = unpack(data, "dual")
         with malformed():
@@ -81,12 +85,14 @@ class DualProof:
 
 @dataclass(frozen=True)
 class WitnessProof:
-    """A configuration of a polytope at which the padded bodies of a pair touch.
+    """Holds a configuration of a polytope at which the padded bodies of a pair touch.
 
     Attributes:
-        C, d: (m, n), (m,) the polytope; the joint limits hold besides.
+        C: (m, n) left-hand sides of the polytope's faces; the joint limits hold besides.
+        d: (m,) right-hand sides of the polytope's faces.
         s: (n,) the configuration.
-        weights: (V,) convex weights of each body's vertices, at whose mean points they touch; not all zero, their sum is divided out.
+        weights: (V,) for each body, convex weights of its vertices. The bodies touch at the means that they give. The weights of a body
+            are not all zero, and the verifier divides by their sum.
     """
 
     scene: Scene
@@ -97,16 +103,16 @@ class WitnessProof:
     weights: tuple[Array, Array]
 
     def to_bytes(self) -> bytes:
-        """The proof as a file."""
+        """Returns the proof as a file."""
         header = {"format": FORMAT, "kind": "witness", "scene_hash": self.scene.hash, "pair": [self.pair.a, self.pair.b]}
         return pack(header, {"C": self.C, "d": self.d, "s": self.s, "weights0": self.weights[0], "weights1": self.weights[1]})
 
     @classmethod
     def from_bytes(cls, data: bytes, scene: Scene) -> WitnessProof:
-        """Inverse of :meth:`to_bytes`.
+        """Reads what :meth:`to_bytes` writes.
 
         Raises:
-            ProofError: not a witness, or one about another scene.
+            ProofError: the file is no witness, or one about another scene.
         """
         header, unpacked = unpack(data, "witness")
         with malformed():

@@ -1,13 +1,17 @@
-"""Proofs as data: what a certificate of a pair, or of a region, consists of, and its portable file.
+"""A pair's proof is held here as data, and is written to and read from its portable file.
 
-A pair's proof on P = {s : C s <= d} holds, in the frame F and the coordinates u = (s - mid)/half of a box around P,
-the plane [a; b] = Z [1; u], a margin t, a bound kappa of |a|, and for every vertex v of either volume Gram factors L_j with
+A pair's proof on P = {s : C s <= d} is expressed in a frame F and in the coordinates u = (s - mid)/half of a box around P. It holds the
+plane [a; b] = Z [1; u], a margin t and a bound kappa of |a|. For every vertex v of either volume it holds Gram factors L_j with
 
-    +-(a'p_v + b den) - (r kappa + t) den - sigma (|L_0' rho|^2 + sum_j g_j |L_j' rho|^2)  ~  0,
+    +-(a'p_v + b den) - (r kappa + t) den - sigma (|L_0' rho|^2 + sum_j g_j |L_j' rho|^2)  ~  0.
 
-the g_j some of P's faces d_j - c_j's and of its box's, 1 + u_i and 1 - u_i, rho the 2^k products of the chain's coordinates u_i
-(plain monomials). The factors are fixed-point numbers, one exponent a face, of 30 bits or, where rounding would eat up the margin,
-of 48. Nothing here decides whether a proof holds: certifier.verify does. The file is described in docs/proofs.md.
+The g_j are some of P's faces d_j - c_j's and of its box's faces, 1 + u_i and 1 - u_i. rho are the 2^k products of the chain's coordinates
+u_i (plain monomials).
+
+The factors are fixed-point numbers of 30 bits, with one exponent for each face. They have 48 bits where rounding to 30 would eat up the
+margin.
+
+Nothing here decides whether a proof holds: certifier.verify does. docs/proofs.md describes the file.
 """
 
 from __future__ import annotations
@@ -30,17 +34,20 @@ from certifier.proof.container import FORMAT, Arrays, head, malformed, npy, pack
 _T = TypeVar("_T")
 
 BITS = {"int32": 30, "int64": 48}
-"""Bits of a Gram factor's mantissa by its type."""
+"""The mantissa of a Gram factor has this many bits, by its type."""
 
 
 @dataclass(frozen=True)
 class Ground:
-    """The polytope a proof is about and its box.
+    """A ground is the polytope that a proof is about, with its box.
 
     Attributes:
-        C, d: (m, n), (m,) faces; the joint limits hold besides.
-        mid, half: (n,) the box.
-        Y_lower, Y_upper: (n, m + 2n) multipliers of the faces, the upper and the lower joint limits, that prove the box.
+        C: (m, n) left-hand sides of the faces; the joint limits hold besides.
+        d: (m,) right-hand sides of the faces.
+        mid: (n,) centre of the box.
+        half: (n,) half edges of the box.
+        Y_lower: (n, m + 2n) multipliers of the faces, the upper and the lower joint limits that prove the box's lower bounds.
+        Y_upper: (n, m + 2n) multipliers of the same that prove the box's upper bounds.
     """
 
     C: Array
@@ -52,7 +59,7 @@ class Ground:
 
     @classmethod
     def of_box(cls, mid: Array, half: Array) -> Ground:
-        """A box as a polytope: its upper, then its lower faces, a rounding inside the exact ones."""
+        """Returns a box as a polytope: its upper, then its lower faces, which are a rounding inside the exact ones."""
         eye, unit = np.eye(len(mid)), np.eye(2 * len(mid), 4 * len(mid))
         d = np.concatenate([np.nextafter(mid + half, -np.inf), -np.nextafter(mid - half, np.inf)])
         return cls(np.concatenate([eye, -eye]), d, mid, half, unit[len(mid) :], unit[: len(mid)])
@@ -60,18 +67,18 @@ class Ground:
 
 @lru_cache(maxsize=16)
 def lower_triangle(length: int) -> tuple[np.ndarray, np.ndarray]:
-    """Its rows and columns, row by row."""
+    """Returns the row and the column of every entry of a lower triangle of that many rows, row by row."""
     return np.tril_indices(length)
 
 
 @dataclass(frozen=True)
 class Side:
-    """Gram factors of one volume's vertices: factor = mantissa 2^exponent, lower triangles row by row.
+    """Holds the Gram factors of one volume's vertices: factor = mantissa 2^exponent, as lower triangles row by row.
 
     Attributes:
-        chain: position indices of the joints between F and the body, ascending; rho's coordinates in this order.
-        mantissa: (V, f + 1, L (L + 1) / 2) int32 or int64, L = 2^k, for 1 and the f faces used.
-        exponent: (f + 1,) int32.
+        chain: position indices of the joints between F and the body, ascending; rho's coordinates are in this order.
+        mantissa: (V, f + 1, L (L + 1) / 2) int32 or int64, with L = 2^k, for 1 and the f faces used.
+        exponent: (f + 1,) int32, for 1 and the f faces used.
     """
 
     chain: tuple[int, ...]
@@ -80,7 +87,7 @@ class Side:
 
     @classmethod
     def rounded(cls, chain: tuple[int, ...], factor: Array, kind: str = "int32") -> Side:
-        """Rounded factors, (V, f + 1, L, L) lower triangular, of Gram matrices in plain monomials; ``kind`` as in BITS."""
+        """Rounds factors, (V, f + 1, L, L) lower triangular, of Gram matrices in plain monomials; ``kind`` is a key of BITS."""
         exponent = np.frexp(np.abs(factor).max(axis=(0, 2, 3)))[1].astype(np.int32) - BITS[kind]
         rows, columns = lower_triangle(factor.shape[-1])
         mantissa = np.rint(np.ldexp(factor[:, :, rows, columns], -exponent[:, None])).astype(kind)
@@ -88,7 +95,7 @@ class Side:
 
     @property
     def factors(self) -> Array:
-        """The lower triangular factors, (V, f + 1, L, L)."""
+        """Returns the lower triangular factors, (V, f + 1, L, L)."""
         length = 2 ** len(self.chain)
         rows, columns = lower_triangle(length)
         L = np.zeros((*self.mantissa.shape[:2], length, length))
@@ -98,18 +105,19 @@ class Side:
 
 @dataclass(frozen=True)
 class PairProof:
-    """A plane that separates two volumes on a polytope, with the sums of squares that prove it.
+    """Holds a plane that separates two volumes on a polytope, with the sums of squares that prove it.
 
-    It covers every pair of the scene with one geometry in the first volume and the other in the second.
+    The proof covers every pair of the scene with one geometry in the first volume and the other in the second.
 
     Attributes:
-        volumes: on the positive and on the negative side of the plane.
+        volumes: the volume on the positive side of the plane, and the one on the negative side.
         frame: body whose frame the plane is expressed in.
-        interior: (n,) a point of the ground's polytope, which is therefore not empty; of a region's proofs the region's own.
+        interior: (n,) a point of the ground's polytope, which is therefore not empty. The proofs of a region have the region's own point.
         plane: Z, (4, n + 1).
-        t, kappa: margin and bound of |a(u)| on the box (0 where no radius is involved).
+        t: margin.
+        kappa: bound of |a(u)| on the box (0 where no radius is involved).
         faces: the f faces used: j for the ground's face j, m + i for 1 + u_i, m + n + i for 1 - u_i.
-        sides: of the volumes.
+        sides: the Gram factors of the two volumes.
     """
 
     scene: Scene
@@ -125,24 +133,24 @@ class PairProof:
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
-        """The pairs of the scene that are covered, in its order."""
+        """Returns the pairs of the scene that the proof covers, in the scene's order."""
         first, second = (set(volume.geometries) for volume in self.volumes)
         found = {i: p for name in first for i, p in self.scene.pairs_of(name) if (p.b if p.a == name else p.a) in second}
         return tuple(found[i] for i in sorted(found))
 
     @property
     def needs_box_alone(self) -> bool:
-        """Whether it uses no face of the polytope but those of the box."""
+        """Returns whether the proof uses no face of the polytope but those of the box."""
         return all(j >= len(self.ground.d) for j in self.faces)
 
     def on_its_box(self) -> PairProof:
-        """The same proof, stated on all of its box; only if it needs no other face."""
+        """Returns the same proof, stated on all of its box. The proof must need no other face than the box's."""
         ground = Ground.of_box(self.ground.mid, self.ground.half)
         shift = len(ground.d) - len(self.ground.d)
         return replace(self, ground=ground, faces=tuple(j + shift for j in self.faces))
 
     def to_bytes(self) -> bytes:
-        """The proof as a file."""
+        """Returns the proof as a file."""
         pool = Pool(self.scene)
         headers = [pool.add(self)]
         header = {"format": FORMAT, "kind": "pair", "scene_hash": self.scene.hash, **pool.header(), "proofs": headers}
@@ -150,10 +158,10 @@ class PairProof:
 
     @classmethod
     def from_bytes(cls, data: bytes, scene: Scene) -> PairProof:
-        """Inverse of :meth:`to_bytes`.
+        """Reads what :meth:`to_bytes` writes.
 
         Raises:
-            ProofError: not a pair's proof, or one about another scene.
+            ProofError: the file is no pair's proof, or one about another scene.
         """
         header, unpacked = unpack(data, "pair")
         with malformed():
@@ -167,7 +175,7 @@ class PairProof:
 
 
 class Pool:
-    """The arrays of several proofs, with what they share stored once."""
+    """Collects the arrays of several proofs, and stores once what they share."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -177,7 +185,7 @@ class Pool:
         self._proofs = 0
 
     def add(self, proof: PairProof) -> dict[str, Any]:
-        """Takes the proof's arrays in; returns its header."""
+        """Takes the proof's arrays in and returns its header."""
         ground, prefix = self._ground(proof.ground), f"proof/{self._proofs}"
         self._proofs += 1
         self.arrays |= {f"{prefix}/plane": proof.plane, f"{prefix}/scalars": np.array([proof.t, proof.kappa])}
@@ -192,7 +200,7 @@ class Pool:
         }
 
     def header(self) -> dict[str, Any]:
-        """The grounds' number and the volumes, for the file's header."""
+        """Returns the number of grounds and the volumes, for the file's header."""
         return {"grounds": sum(name.endswith("/mid") for name in self.arrays), "volumes": self._volumes}
 
     def _ground(self, ground: Ground) -> int:
@@ -210,7 +218,7 @@ class Pool:
         return index
 
     def _once(self, kind: str, header: dict[str, Any], arrays: dict[str, np.ndarray]) -> int:
-        """The number of these arrays among those of their kind, stored if they are new."""
+        """Returns the number of these arrays among those of their kind; new ones are stored first."""
         key: tuple[str | bytes, ...] = (kind, json.dumps(header), *(npy(a) for a in arrays.values()))
         if key not in self._known:
             self._known[key] = index = sum(known[0] == kind for known in self._known)
@@ -219,14 +227,14 @@ class Pool:
 
 
 SHARED = ("grounds", "volumes", "proofs")
-"""What of a header :class:`Pool` writes and :func:`read_proofs` reads."""
+"""These members of a header are those that :class:`Pool` writes and :func:`read_proofs` reads."""
 
 
 def read_proofs(scene: Scene, header: dict[str, Node], arrays: Arrays, interior: Array) -> tuple[PairProof, ...]:
-    """The proofs of a file; they share grounds and volumes, none of which is there for nothing.
+    """Returns the proofs of a file. They share grounds and volumes, each of which belongs to at least one proof.
 
     Args:
-        interior: (n,) what the file has for a point of all grounds.
+        interior: (n,) what the file gives as a point of all grounds.
 
     Raises:
         CirisError: something is missing, superfluous, or not of its kind.
@@ -290,7 +298,7 @@ def _proof(
 
 
 def _item(node: Node, items: list[_T]) -> _T:
-    """The item of this number."""
+    """Returns the item whose number the node holds."""
     number = node.count()
     if number >= len(items):
         raise CirisError("document", f"there is no number {number}, only {len(items)}", field=node.where)
@@ -298,7 +306,7 @@ def _item(node: Node, items: list[_T]) -> _T:
 
 
 def digest(data: bytes) -> str:
-    """SHA-256 of a proof file."""
+    """Returns the SHA-256 of a proof file."""
     return hashlib.sha256(data).hexdigest()
 
 
@@ -309,10 +317,10 @@ def same_scene(header: dict[str, Node], scene: Scene) -> None:
 
 
 def ground_arrays(ground: Ground, i: int) -> dict[str, np.ndarray]:
-    """The arrays of a file's ground i."""
+    """Returns the arrays of a file's ground i."""
     return {f"ground/{i}/{name}": value for name, value in vars(ground).items()}
 
 
 def read_ground(arrays: Arrays, i: int) -> Ground:
-    """Ground i of a file."""
+    """Returns ground i of a file."""
     return Ground(*(arrays.floats(f"ground/{i}/{field.name}") for field in dataclasses.fields(Ground)))

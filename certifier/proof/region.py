@@ -1,4 +1,4 @@
-"""The proof of a region: the proofs of all its pairs, and what shows that the region is bounded and not empty."""
+"""The proof of a region consists of the proofs of all its pairs, and of what shows that the region is bounded and not empty."""
 
 from __future__ import annotations
 
@@ -15,13 +15,15 @@ from certifier.proof.pair import SHARED, PairProof, Pool, read_proofs
 
 @dataclass(frozen=True)
 class Archimedean:
-    """Numbers that show P to be Archimedean.
+    """Holds numbers that show P to be Archimedean (certifier.verify.archimedean says how).
 
     Attributes:
-        N: |s|^2 <= N on P.
-        lower, upper: (n,) l and u, the box.
-        Y_lower, Y_upper: (n, m) multipliers of the faces that prove the box.
-        y: (m,) multipliers that prove the remainder.
+        N: bound with |s|^2 <= N on P.
+        lower: (n,) l, the lower bounds of the box.
+        upper: (n,) u, the upper bounds of the box.
+        Y_lower: (n, m) multipliers of the faces that prove the lower bounds.
+        Y_upper: (n, m) multipliers of the faces that prove the upper bounds.
+        y: (m,) multipliers of the faces that prove the affine remainder to be nonnegative.
     """
 
     N: float
@@ -34,7 +36,13 @@ class Archimedean:
 
 @dataclass(frozen=True)
 class Implied:
-    """Half-spaces that contain a polytope of m faces, with the multipliers that prove it: (h, n), (h,), (h, m)."""
+    """Holds half-spaces that contain a polytope of m faces, with the multipliers that prove it.
+
+    Attributes:
+        C: (h, n) left-hand sides of the half-spaces.
+        d: (h,) right-hand sides of the half-spaces.
+        Y: (h, m) multipliers of the polytope's faces, a row for each half-space.
+    """
 
     C: Array
     d: Array
@@ -43,13 +51,15 @@ class Implied:
 
 @dataclass(frozen=True)
 class RegionProof:
-    """Everything needed to check that a region is free of collision for every pair of its scene.
+    """Holds everything that is needed to check that a region is free of collision for every pair of its scene.
 
     Attributes:
-        C, d: (m, n), (m,) the region's half-spaces, joint limits included.
-        interior: (n,) a point strictly inside.
-        implied: half-spaces around the region that are redundant to it, but faces of some ground.
-        proofs: they cover every pair of the scene; each ground contains the region.
+        C: (m, n) left-hand sides of the region's half-spaces, joint limits included.
+        d: (m,) right-hand sides of the region's half-spaces.
+        interior: (n,) a point strictly inside the region.
+        implied: half-spaces around the region that are redundant to it, but are faces of some ground.
+        archimedean: numbers that show the region to be bounded.
+        proofs: proofs that together cover every pair of the scene; the ground of each contains the region.
     """
 
     scene: Scene
@@ -61,7 +71,7 @@ class RegionProof:
     proofs: tuple[PairProof, ...] = field(repr=False)
 
     def to_bytes(self) -> bytes:
-        """The proof as a file; grounds and volumes that several proofs share are stored once."""
+        """Returns the proof as a file, which stores grounds and volumes that several proofs share once."""
         pool = Pool(self.scene)
         headers = [pool.add(proof) for proof in self.proofs]
         arrays: dict[str, np.ndarray] = {"region/C": self.C, "region/d": self.d, "region/interior": self.interior}
@@ -72,10 +82,10 @@ class RegionProof:
 
     @classmethod
     def from_bytes(cls, data: bytes) -> RegionProof:
-        """Inverse of :meth:`to_bytes`.
+        """Reads what :meth:`to_bytes` writes.
 
         Raises:
-            ProofError: not a region's proof.
+            ProofError: the file is no region's proof.
         """
         header, unpacked = unpack(data, "region")
         with malformed():

@@ -1,4 +1,4 @@
-"""Scene files and bundles -> Scene."""
+"""Scene files and bundles are read into a Scene here."""
 
 from certifier.scene.bundle import BundleLimits, load_bundle, pack_bundle
 from certifier.scene.load import load_scene

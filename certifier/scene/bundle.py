@@ -1,6 +1,6 @@
-"""A scene as one file: a zip of the scene file and everything it refers to, for sending to a service.
+"""A bundle is a scene in one file, to be sent to a service: a zip of the scene file and of everything that it refers to.
 
-``bundle.json`` names the scene file; all paths in the zip are relative to one directory that holds every file.
+``bundle.json`` names the scene file. All paths in the zip are relative to one directory that holds every file.
 """
 
 from __future__ import annotations
@@ -21,14 +21,22 @@ from certifier.scene.load import read_in_child
 from certifier.scene.references import references, resolve
 
 INDEX = "bundle.json"
-"""Where the bundle says which file is the scene file."""
+"""In this file the bundle says which file is the scene file."""
 _READER = "certifier.scene.unpack:parse_bundle"
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 @dataclass(frozen=True)
 class BundleLimits:
-    """What a service accepts: bytes of the zip and of its content, number of files, seconds and bytes of memory to parse it."""
+    """Limits what a service accepts.
+
+    Attributes:
+        bytes: bytes of the zip.
+        unpacked_bytes: bytes of its content.
+        files: number of its files.
+        timeout_s: seconds that parsing it may take.
+        memory_bytes: bytes of memory that parsing it may take.
+    """
 
     bytes: int = 64 * 2**20
     unpacked_bytes: int = 256 * 2**20
@@ -38,9 +46,9 @@ class BundleLimits:
 
 
 def pack_bundle(path: str | Path) -> bytes:
-    """The scene file and every file it refers to, directly or through others, as a zip; equal files give equal bytes.
+    """Returns a zip of the scene file and every file that it refers to, directly or through others; equal files give equal bytes.
 
-    A file that is referred to but does not exist is left out: whoever loads the bundle gets Drake's word on it.
+    A file that is referred to but does not exist is left out. Whoever loads the bundle gets Drake's message about it.
 
     Raises:
         SceneError: the scene file is wrong, or a reference cannot travel (``bundle_uri``).
@@ -71,7 +79,7 @@ def expect_bundles() -> None:
 
 
 def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
-    """The scene in a bundle from a stranger: unpacked within limits, checked and parsed, all of it in a child process.
+    """Returns the scene in a bundle from a stranger. A child process unpacks it within limits, checks it and parses it.
 
     Raises:
         SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_path``, ``bundle_file``, ``bundle_uri``, ``bundle_xml``,
@@ -93,7 +101,10 @@ def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
 
 
 def starts(file: Path, scene: Path) -> set[Path]:
-    """The directories that a relative reference in ``file`` may start at: its own, and for SDFormat's include the working directory."""
+    """Returns the directories at which a relative reference in ``file`` may start.
+
+    They are the file's own directory and, for SDFormat's include, the working directory, which is that of the scene file.
+    """
     return {file.parent, scene.parent} if file.suffix.lower() == ".sdf" else {file.parent}
 
 

@@ -1,4 +1,4 @@
-"""A Drake model built from a Scene's numbers alone: no user file is read, so nothing here can meet a broken one."""
+"""A Drake model is built here from a Scene's numbers alone. No user file is read, so nothing here can meet a broken one."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _INSTANCE = "scene"
 
 
 def build_diagram(scene: Scene) -> RobotDiagram:
-    """The scene as a Drake diagram with the same joint positions in the same order, in which only ``scene.pairs`` can collide.
+    """Returns the scene as a Drake diagram, with the same joint positions in the same order. Only ``scene.pairs`` can collide in it.
 
-    Geometries are the scene's conv(vertices) + ball(radius); ``scene.padding`` is not in them: a configuration is free when the signed
+    The geometries are the scene's conv(vertices) + ball(radius), without ``scene.padding``. So a configuration is free when the signed
     distance of every pair is more than twice the padding. :func:`geometry_name` gives the scene's name of a geometry.
 
     Raises:
@@ -46,7 +46,7 @@ def build_diagram(scene: Scene) -> RobotDiagram:
 
 
 def geometry_name(inspector: SceneGraphInspector, geometry_id: GeometryId) -> str:
-    """The scene's name of a geometry of :func:`build_diagram`."""
+    """Returns the scene's name of a geometry of :func:`build_diagram`."""
     return inspector.GetName(geometry_id).removeprefix(f"{_INSTANCE}::")
 
 

@@ -1,7 +1,7 @@
-"""The scene file: its schema, and errors that name the field.
+"""The scene file is read and checked against its schema here; errors name the field.
 
-The file is composed into YAML nodes, not loaded, so that ``directives`` reach Drake as they were written, tags and all, at the same
-line numbers. Only their relative ``file`` paths are made absolute, because Drake has no place to start from in a string.
+The file is composed into YAML nodes and not loaded. So ``directives`` reach Drake as they were written, tags and all, at the same line
+numbers. Only their relative ``file`` paths are made absolute, because in a string Drake has no directory to start from.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ MAX_BYTES = 2**20
 MAX_DEPTH = 50
 MIN_HULL_VERTICES = 8
 ALPHABET = f"at most {MAX_NAME} ASCII letters, digits, _-./:+@#()[],= and single spaces inside"
-"""What a name may be made of (:func:`certifier.model.is_name`), for people."""
+"""This text tells people what a name may consist of (:func:`certifier.model.is_name`)."""
 
 
 @dataclass(frozen=True)
 class IgnoreEntry:
-    """Two bodies or geometries whose pairs are not certified; ``field`` is where the file says so."""
+    """Names two bodies or geometries whose pairs are not certified; ``field`` is where the file says so."""
 
     a: str
     b: str
@@ -38,17 +38,19 @@ class IgnoreEntry:
 
 @dataclass(frozen=True)
 class SceneFile:
-    """A scene file that passed the schema.
+    """Holds a scene file that has passed the schema.
 
     Attributes:
         path: the file itself.
-        packages: absolute roots for package:// URIs.
+        packages: absolute root directories for package:// URIs, by the package's name.
         directives: Drake Model Directives, verbatim.
-        resolved_directives: a document for Drake, the same with absolute paths, at the line numbers of the file.
+        resolved_directives: a document for Drake, the same directives with absolute paths, at the line numbers of the file.
         models: every ``file`` of the directives, as written.
-        q_star: centre of the parametrisation; None for the middle of the joint limits.
-        padding: metres.
-        max_vertices: a mesh's hull has at most this many.
+        q_star: (n,) centre of the parametrisation, radians or metres; None for the middle of the joint limits.
+        padding: metres that are added around every geometry.
+        ignore: the pairs that are not certified.
+        max_vertices: greatest number of vertices that stand for a mesh or an ellipsoid.
+        cylinder_sides: number of sides of the prism that stands for a cylinder.
     """
 
     path: Path
@@ -65,7 +67,7 @@ class SceneFile:
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML's safe loader that also reads ``1e-3`` as a number."""
+    """This is YAML's safe loader, which here also reads ``1e-3`` as a number."""
 
 
 _Loader.yaml_implicit_resolvers = {k: list(v) for k, v in yaml.SafeLoader.yaml_implicit_resolvers.items()}
@@ -73,7 +75,7 @@ _Loader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9
 
 
 def read_scene_file(path: Path) -> SceneFile:
-    """Read and check a scene file.
+    """Reads and checks a scene file.
 
     Raises:
         SceneError: ``scene_not_found``, ``scene_yaml`` (not YAML, with the line) or ``scene_field`` (with the field).
@@ -106,7 +108,7 @@ def read_scene_file(path: Path) -> SceneFile:
 
 
 def compose(text: str, name: str) -> yaml.Node | None:
-    """The YAML nodes of a stranger's text: no aliases, and no deeper than a scene needs.
+    """Returns the YAML nodes of a stranger's text, which may have no aliases and may be no deeper than a scene needs.
 
     Raises:
         SceneError: ``scene_yaml``, with the line.
@@ -128,7 +130,9 @@ def compose(text: str, name: str) -> yaml.Node | None:
 
 
 def directive_files(text: str, name: str) -> list[tuple[str, str]]:
-    """The files that a document of Drake Model Directives names: ``add_model`` or ``add_directives``, and the file as written.
+    """Returns the files that a document of Drake Model Directives names.
+
+    Each comes as ``add_model`` or ``add_directives`` and the file as written.
 
     Raises:
         SceneError: ``scene_yaml``, with the line.
@@ -140,7 +144,7 @@ def directive_files(text: str, name: str) -> list[tuple[str, str]]:
 
 
 def close_matches(name: str, known: list[str]) -> str:
-    """A hint naming the known names most like ``name``; empty when none is."""
+    """Returns a hint with the known names that are most like ``name``; the hint is empty when none is like it."""
     tails = {k.rsplit("/", 1)[-1]: k for k in known}
     matches = difflib.get_close_matches(name, known, n=3) or [
         tails[t] for t in difflib.get_close_matches(name.rsplit("/", 1)[-1], list(tails), n=3)

@@ -1,8 +1,10 @@
-"""URDF, SDFormat and MJCF as written: what a file includes, and a refusal of what Drake would read otherwise than it is written.
+"""URDF, SDFormat and MJCF files are read as written here. What Drake would read otherwise than it is written is refused.
 
-Drake takes ``1,5`` or ``0x10`` for 1 and 0 in some places and refuses them in others, makes 1 of a size that is missing or negative,
-keeps the first of two, and leaves out elements that it does not know (docs/scenes.md has the table). Only what joints and collision
-geometries are made of is looked at here; whether it makes a robot is left to Drake.
+Drake takes ``1,5`` or ``0x10`` for 1 and 0 in some places and refuses them in others. It makes 1 of a size that is missing or negative,
+keeps the first of two elements, and leaves out elements that it does not know (docs/scenes.md has the table).
+
+This module looks only at what joints and collision geometries consist of, and at what a file includes. Drake decides whether that makes
+a robot.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ _SHAPES = frozenset(["box", "sphere", "cylinder", "capsule", "ellipsoid", "plane
 
 @dataclass(frozen=True)
 class Reference:
-    """Another file, as written, and the line that names it."""
+    """A reference is the name of another file, as written, and the line where it stands."""
 
     file: str
     line: int
@@ -36,29 +38,29 @@ class _Element:
     line: int
     attributes: dict[str, str]
     around: frozenset[str]
-    """The names of the elements that it is in."""
+    """The names of the elements that this one is in."""
     children: set[str] = field(default_factory=set)
     text: str = ""
     interrupted: bool = False
-    """Whether something else stands in its text, which Drake reads up to there."""
+    """Whether something else interrupts the element's text. Drake reads the text only up to there."""
 
 
 class ModelFile:
-    """One model file that has passed; a subclass for each format.
+    """Reads and checks one model file; each format has a subclass.
 
     Attributes:
-        includes: model files that Drake reads in its place.
+        includes: model files that this one includes.
         meshes: files of collision geometry.
-        mesh_directories: where meshes are, relative to the model.
+        mesh_directories: directories of the meshes, relative to the model.
 
     Raises:
-        SceneError: ``scene_model`` with the file and the line, when it is read.
+        SceneError: ``scene_model`` with the file and the line, when the file is not accepted.
     """
 
     ONCE: ClassVar[frozenset[str]]
-    """Elements that may stand once in their parent: Drake reads the first one."""
+    """These elements may stand only once in their parent, because Drake reads the first one."""
     UNREAD: ClassVar[frozenset[str]] = frozenset()
-    """Elements that Drake does not look into."""
+    """Drake does not look into these elements."""
 
     def __init__(self, path: Path, name: str) -> None:
         self.name = name
@@ -116,7 +118,7 @@ class ModelFile:
 
 
 class Urdf(ModelFile):
-    """URDF: numbers are attributes."""
+    """Reads URDF, where numbers are attributes."""
 
     ONCE = _SHAPES | {"origin", "axis", "limit", "geometry", "parent", "child"}
     UNREAD = frozenset(["gazebo"])
@@ -136,7 +138,7 @@ class Urdf(ModelFile):
 
 
 class Sdf(ModelFile):
-    """SDFormat: numbers are the text of elements."""
+    """Reads SDFormat, where numbers are the text of elements."""
 
     _DIMENSIONS: ClassVar[dict[str, dict[str, int]]] = {
         "box": {"size": 3},
@@ -187,7 +189,7 @@ class Sdf(ModelFile):
 
 
 class Mjcf(ModelFile):
-    """MJCF: numbers are attributes, and the same ones in defaults."""
+    """Reads MJCF, where numbers are attributes, which defaults have as well."""
 
     ONCE = frozenset()
     _NUMBERED = frozenset(["body", "geom", "joint", "mesh"])
@@ -200,9 +202,9 @@ class Mjcf(ModelFile):
         "ref": (1,),
     }
     _IN_BODIES = frozenset(["body", "geom", "joint", "freejoint", "inertial", "site", "camera", "light", "plugin", "include"])
-    """What Drake reads in a body, and what has no collision geometry in it."""
+    """Drake reads these elements in a body, or they have no collision geometry in them."""
     _MOVED = frozenset(["refpos", "refquat", "fitscale", "mocap"])
-    """Attributes that change the robot, and that Drake does not read."""
+    """These attributes change the robot, but Drake does not read them."""
 
     def _check(self, element: _Element, parent: str) -> None:
         if parent in ("body", "worldbody") and element.name not in self._IN_BODIES:

@@ -1,12 +1,14 @@
-"""Convex hulls and their outer approximation by few vertices.
+"""Convex hulls are formed here, and are approximated from outside by polytopes of few vertices.
 
-``outer`` cuts a bounding box down to the hull: take the vertex farthest from the hull, cut it off with the supporting plane of the
-hull across the way from its nearest point, and go on while the vertices are few enough. Every cut is a supporting
-half-space, so the hull stays inside, and the distance from the hull is a convex function, so its greatest value over the
-approximation is taken at a vertex and the inflation is known.
+``outer`` cuts a bounding box down to the hull. It takes the vertex that is farthest from the hull and the point of the hull that is nearest
+to this vertex. It cuts the vertex off with the hull's supporting plane that is perpendicular to the line between the two. It goes on while
+the vertices are few enough.
 
-Qhull rounds: what it drops as inside or on a face may lie some 1e-14 m outside of the vertices that it keeps. Points are therefore
-believed to be inside only where they are deeper than that, or are vertices; otherwise the vertices are moved out until they are.
+Every cut is a supporting half-space, so the hull stays inside. The distance from the hull is a convex function, so its greatest value over
+the approximation is taken at a vertex. Therefore the inflation is known.
+
+Qhull rounds: a point that it drops as inside or on a face may lie some 1e-14 m outside of the vertices that it keeps. So a point counts as
+inside only where it is deeper than that, or is a vertex. Otherwise the vertices are moved out until every point is inside.
 """
 
 from __future__ import annotations
@@ -19,21 +21,21 @@ from certifier.errors import SceneError
 from certifier.model import Array
 
 _FLAT = 1e-5
-"""A hull thinner than this fraction of its size counts as flat, and is given that half thickness."""
+"""A hull that is thinner than this fraction of its size counts as flat, and gets this fraction as its half thickness."""
 _THICKNESS = 1e-6
-"""The least half thickness in metres that a flat point set is given."""
+"""A flat point set gets at least this half thickness, in metres."""
 _SAFETY = 1e-9
-"""Relative growth that puts rounding errors on the safe side."""
+"""This relative growth puts rounding errors on the safe side."""
 _GROWTHS = (_SAFETY, 1e-8, 1e-7, 1e-6, 1e-5)
-"""Tried in turn, because thin bodies need more of it."""
+"""These relative growths are tried in turn, because thin bodies need more."""
 _ROUNDING = 64 * np.finfo(float).eps
-"""Bound of the rounding error of a point's distance from a plane, in units of their greatest coordinate."""
+"""This bounds the rounding error of a point's distance from a plane, in units of their greatest coordinate."""
 _PRODUCTS = 2**22
-"""Distances of points from planes that are in memory at once."""
+"""At most this many distances of points from planes are in memory at once."""
 
 
 def hull_vertices(points: Array) -> Array:
-    """The extreme points, (v, 3), of the convex hull of points (k, 3); all points where the hull has no volume."""
+    """Returns the extreme points, (v, 3), of the convex hull of points (k, 3); these are all points where the hull has no volume."""
     try:
         return points[ConvexHull(points).vertices]
     except QhullError:
@@ -41,7 +43,7 @@ def hull_vertices(points: Array) -> Array:
 
 
 def outer(points: Array, max_vertices: int) -> tuple[Array, float, int]:
-    """At most ``max_vertices`` >= 8 vertices whose convex hull contains every one of points (k, 3), metres.
+    """Finds at most ``max_vertices`` >= 8 vertices whose convex hull contains every one of points (k, 3), metres.
 
     Returns:
         vertices (v, 3); the inflation, an upper bound in metres on the distance of any point of their hull from the hull of ``points``
@@ -49,7 +51,7 @@ def outer(points: Array, max_vertices: int) -> tuple[Array, float, int]:
         of vertices that the hull of ``points`` has.
 
     Raises:
-        SceneError: rounding errors got the better of it; never a polytope that leaves a point out.
+        SceneError: rounding errors prevented it. No polytope that leaves a point out is ever returned.
     """
     points = np.asarray(points, dtype=float)
     extreme = hull_vertices(points)
@@ -69,12 +71,12 @@ def outer(points: Array, max_vertices: int) -> tuple[Array, float, int]:
 
 
 def contains(vertices: Array, points: Array, tolerance: float = 0.0) -> bool:
-    """Whether every one of points (k, 3) is in the hull of vertices (v, 3), beyond doubt by rounding, up to a tolerance in metres."""
+    """Returns whether every one of points (k, 3) is in the hull of vertices (v, 3), up to a tolerance in metres, whatever rounding does."""
     return bool(_depths(vertices, points).min() >= -tolerance)
 
 
 def _is_hull(vertices: Array, points: Array) -> bool:
-    """Whether every point is one of the vertices, which are among the points, or is inside their hull beyond doubt."""
+    """Returns whether every point is one of the vertices, which are among the points, or is inside their hull beyond doubt."""
     try:
         doubtful = points[_depths(vertices, points) < 0]
     except QhullError:
@@ -84,11 +86,12 @@ def _is_hull(vertices: Array, points: Array) -> bool:
 
 
 def _depths(vertices: Array, points: Array) -> Array:
-    """How deep points (k, 3) are in the hull of vertices (v, 3), metres, (k,): inside beyond doubt where it is not negative.
+    """Returns how deep points (k, 3) are in the hull of vertices (v, 3), metres, (k,).
 
-    Qhull's facets are triangles that close a surface within the hull. Their planes are not quite through their corners: the deepest corner
-    is ``slack`` below its plane, and so is every point of the triangles at most. The way from the middle to a point outside crosses
-    a triangle, so if both ends are farther than that below all planes, the point is inside.
+    A point is inside beyond doubt where its depth is not negative, for this reason. Qhull's facets are triangles that close a surface
+    within the hull. Their planes are not quite through their corners: the deepest corner is ``slack`` below its plane, and every point of
+    the triangles is at most that far below. The way from the middle to a point outside crosses a triangle. So if the middle and a point
+    are both farther than ``slack`` below all planes, the point is inside.
     """
     hull = ConvexHull(vertices)
     normals, offsets = hull.equations[:, :3], hull.equations[:, 3]
@@ -103,7 +106,7 @@ def _depths(vertices: Array, points: Array) -> Array:
 
 
 def _thickened(points: Array) -> Array:
-    """The points, or two copies of them on either side of their plane when they are flat."""
+    """Returns the points, or two copies of them, one on either side of their plane, when they are flat."""
     axes = np.linalg.svd(points - points.mean(axis=0))[2]
     extent = np.ptp(points @ axes.T, axis=0)
     if extent[2] > _FLAT * extent[0]:
@@ -113,7 +116,10 @@ def _thickened(points: Array) -> Array:
 
 
 def _cut_down(points: Array, max_vertices: int) -> Array:
-    """Vertices of the last intersection of half-spaces that has at most max_vertices; the origin is inside points' hull."""
+    """Returns the vertices of the last intersection of half-spaces that has at most max_vertices.
+
+    The origin must be inside the hull of the points.
+    """
     axes = np.linalg.svd(points)[2]
     normals = np.concatenate([axes, -axes])
     vertices = _intersection(normals, points)
@@ -135,7 +141,7 @@ def _cut_down(points: Array, max_vertices: int) -> Array:
 
 
 def _intersection(normals: Array, points: Array) -> Array:
-    """Vertices of {x : n'x <= max over points of n'p, for every n}, near-duplicates merged."""
+    """Returns the vertices of {x : n'x <= max over points p of n'p, for every normal n}, with near-duplicates merged."""
     offsets = (points @ normals.T).max(axis=0)
     vertices = HalfspaceIntersection(np.column_stack([normals, -offsets]), np.zeros(3)).intersections
     scale = np.abs(vertices).max()
@@ -143,14 +149,17 @@ def _intersection(normals: Array, points: Array) -> Array:
 
 
 def _contain(vertices: Array, points: Array) -> Array:
-    """The vertices, scaled about the origin by the little that makes their hull contain every point, but for rounding."""
+    """Returns the vertices, scaled about the origin just enough for their hull to contain every point, but for rounding."""
     equations = ConvexHull(vertices).equations
     excess = (points @ equations[:, :3].T / -equations[:, 3]).max()
     return vertices * max(1.0, excess)
 
 
 def _nearest(x: Array, points: Array) -> tuple[Array, float]:
-    """A point of the hull of points near x, (3,), and its distance: nonnegative least squares with a heavy row for the sum of weights."""
+    """Returns a point of the hull of points near x, (3,), and its distance from x.
+
+    It solves nonnegative least squares with a heavy row for the sum of the weights.
+    """
     scale = np.abs(points).max()
     weights, _ = nnls(np.vstack([points.T / scale, np.full(len(points), 1e3)]), np.append(x / scale, 1e3))
     nearest = weights @ points / weights.sum()

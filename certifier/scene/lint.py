@@ -1,4 +1,4 @@
-"""Findings about a scene that loads but may not mean what its author thinks: sentences for people."""
+"""This module finds what in a scene that loads may not mean what its author thinks, and says it in sentences for people."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _HUGE = 10.0
 
 
 def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn: set[str]) -> list[str]:
-    """What a careful colleague would remark on.
+    """Returns what a careful colleague would remark on.
 
     Args:
-        candidates: the pairs of geometries that the model files' collision filters leave.
+        candidates: the pairs of geometries that the collision filters of the model files leave.
         drawn: bodies that have a visual geometry.
     """
     return [
@@ -36,7 +36,7 @@ def _substituted(g: Geometry) -> str:
 
 
 def _filtered(scene: Scene, tree: Tree, candidates: list[tuple[str, str]]) -> list[str]:
-    """Pairs that a collision filter hides although no joint connects their bodies directly."""
+    """Returns a finding about the pairs that a collision filter hides although no joint connects their bodies directly."""
     kept = {frozenset(c) for c in candidates}
     neighbours = {frozenset((j.parent, j.child)) for j in tree.joints}
     hidden = [
@@ -76,7 +76,10 @@ def _huge(scene: Scene) -> list[str]:
 
 
 def _always_touching(scene: Scene) -> list[str]:
-    """Pairs that overlap at every one of a few random configurations, which no region can be certified for."""
+    """Returns findings about pairs that overlap at every configuration tried: no region can be certified for them.
+
+    The configurations are q*, moved into the joint limits, and a few random ones.
+    """
     diagram = build_diagram(scene)
     context = diagram.CreateDefaultContext()
     plant, scene_graph = diagram.plant(), diagram.scene_graph()

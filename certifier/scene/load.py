@@ -1,4 +1,4 @@
-"""From a scene file to a Scene, with Drake at arm's length."""
+"""A scene file is read into a Scene here. Drake reads the models in a child process, which may crash."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from certifier.model import Scene
 
 
 def load_scene(path: str | Path, *, timeout_s: float = 60, memory_bytes: int = 4 * 2**30) -> Scene:
-    """The scene that a scene file describes, read by a child process that may die without harm.
+    """Returns the scene that a scene file describes. A child process reads it, and may die without harm.
 
     Args:
         path: the scene file (docs/architecture.md); relative paths in it start at its directory.
         timeout_s: wall-clock limit of the child, seconds.
-        memory_bytes: memory limit of the child.
+        memory_bytes: memory limit of the child, bytes.
 
     Raises:
         SceneError: what is wrong and where; ``scene_model_crash`` when reading the models ended the child.
@@ -29,14 +29,14 @@ def load_scene(path: str | Path, *, timeout_s: float = 60, memory_bytes: int = 4
 
 
 def read_in_child(function: str, payload: dict[str, Any], name: str, directory: Path | None, timeout_s: float, memory_bytes: int) -> Scene:
-    """The scene whose document ``function(payload)`` returns, computed by a child process.
+    """Returns the scene whose document ``function(payload)`` returns in a child process.
 
     Args:
-        name: what is read, for people.
+        name: name of what is read, for people.
         directory: the child's working directory; None for this process's own.
 
     Raises:
-        SceneError: the function's own, or ``scene_model_crash``.
+        SceneError: whatever the function raises, or ``scene_model_crash``.
     """
     try:
         document = run_in_child(function, payload, timeout_s=timeout_s, memory_bytes=memory_bytes, directory=directory)

@@ -1,8 +1,8 @@
-"""The points of an OBJ mesh, read strictly.
+"""The points of an OBJ mesh are read strictly here.
 
-Drake's reader makes 0 of ``nan``, 1 of ``1,5`` and leaves out what it does not know, without a word. So collision meshes are read here, and
-whatever is not said beyond doubt is refused. Only vertices count for a convex hull; faces are checked because a face without its
-vertex is a sign of a file that was cut short.
+Drake's reader makes 0 of ``nan`` and 1 of ``1,5``, and leaves out what it does not know, without a word. So collision meshes are read here,
+and whatever is in doubt is refused. Only vertices count for a convex hull. Faces are checked because a face whose vertex is missing is a
+sign of a file that was cut short.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from certifier.model import Array
 
 _BOM = b"\xef\xbb\xbf"
 _LENGTH = 1000
-"""Bytes of a vertex line."""
+"""A vertex line has at most this many bytes."""
 _DIGITS = b"0123456789+-.eE \t"
-"""What the numbers of a line are made of: ``float`` reads every text of these bytes either as a decimal number or not at all."""
+"""The numbers of a line consist of these bytes. ``float`` reads every text of them either as a decimal number or not at all."""
 _FACE = re.compile(rb"f(?:[ \t]+-?[0-9]{1,12}(?:/(?:-?[0-9]{1,12})?(?:/-?[0-9]{1,12})?)?){3,}[ \t]*")
 _CORNERS = re.compile(rb"[ \t](-?[0-9]+)")
 _OTHER = frozenset([b"vt", b"vn", b"g", b"o", b"s", b"l", b"p", b"mtllib", b"usemtl"])
-"""Statements that move no point of the surface."""
+"""These statements move no point of the surface."""
 
 
 def read_points(path: Path, name: str) -> Array:
-    """Every vertex of an OBJ file, (k, 3), as written there; those that no face uses are among them.
+    """Returns every vertex of an OBJ file, (k, 3), as written there. Those that no face uses are among them.
 
     Args:
         name: the file's name for people.
 
     Raises:
-        SceneError: ``scene_model``, with the line: a vertex that is not three finite decimal numbers, a face that names no vertex, a
-            statement that is not known.
+        SceneError: ``scene_model``, with the line, when a vertex is not three finite decimal numbers, a face names a vertex that does not
+            exist, or a statement is not known.
     """
     data = path.read_bytes().removeprefix(_BOM)
     coordinates = array("d")
@@ -78,7 +78,10 @@ def read_points(path: Path, name: str) -> Array:
 
 
 def _vertex(line: bytes, words: list[bytes]) -> list[float] | None:
-    """The three coordinates of a vertex line; None unless they are three finite decimal numbers, with weight 1 or a colour behind them."""
+    """Returns the three coordinates of a vertex line, or None.
+
+    It returns None unless the line has three finite decimal numbers, perhaps with weight 1 or a colour behind them.
+    """
     if len(line) > _LENGTH or len(words) not in (4, 5, 7) or line[1:].translate(None, _DIGITS):
         return None
     try:

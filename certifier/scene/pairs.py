@@ -1,4 +1,4 @@
-"""Which pairs of geometries must be certified, and which are ignored by request."""
+"""This module decides which pairs of geometries must be certified, and which are ignored by request."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from certifier.scene.tree import Tree
 def pairs(
     candidates: Iterable[tuple[str, str]], geometries: tuple[Geometry, ...], tree: Tree, ignore: tuple[IgnoreEntry, ...]
 ) -> tuple[tuple[Pair, ...], tuple[Ignored, ...], list[str]]:
-    """The candidates with a moving joint between their bodies, split into those to certify and those ignored, each sorted.
+    """Splits the candidates that have a moving joint between their bodies into those to certify and those ignored.
 
     Returns:
-        pairs, ignored pairs, and a warning for every ignore entry that concerns no pair.
+        the pairs to certify and the ignored pairs, each sorted, and a warning for every ignore entry that concerns no pair.
 
     Raises:
         SceneError: an ignore entry names neither a body nor a geometry.

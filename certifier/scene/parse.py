@@ -1,6 +1,6 @@
-"""The child's side of scene loading: Drake reads the models, this module turns the plant into a Scene.
+"""This module is the child's side of scene loading: Drake reads the models, and the module turns Drake's plant into a Scene.
 
-Only here do user files meet Drake, which ends the process on some of them; run it through ``certifier.scene.load``.
+Only here do user files meet Drake, which ends the process on some of them. So ``certifier.scene.load`` runs it in a child process.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ from certifier.scene.tree import Tree, floating
 _IGNORED_SHAPE = re.compile(
     r"Ignoring unsupported SDFormat element in geometry|geom \S+ specified unknown mesh|The geom type|The fromto tag"
 )
-"""Warnings of Drake's about collision geometry that it leaves out."""
+"""These are Drake's warnings about collision geometry that it leaves out."""
 
 
 def parse(payload: dict[str, Any]) -> dict[str, Any]:
-    """The document of the Scene described by the file ``payload["path"]``.
+    """Returns the document of the Scene that the file ``payload["path"]`` describes.
 
     Raises:
         SceneError: whatever is wrong with the file, the models it names or the scene they make.
@@ -94,9 +94,9 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
 
 
 def _read_models(scene_file: SceneFile, plant: MultibodyPlant) -> list[str]:
-    """Add the directives' models to the plant and finalise it; Drake's warnings.
+    """Adds the directives' models to the plant, finalises it and returns Drake's warnings.
 
-    What is printed first is what remains if Drake ends the process.
+    It prints the models' names first, because only what is printed remains if Drake ends the process.
     """
     parser = Parser(plant)
     packages = parser.package_map()
@@ -120,7 +120,7 @@ def _read_models(scene_file: SceneFile, plant: MultibodyPlant) -> list[str]:
 
 
 class _DrakeLog(logging.Handler):
-    """Collects what Drake says at level warning and above."""
+    """Collects what Drake logs at level warning and above."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -138,7 +138,10 @@ class _DrakeLog(logging.Handler):
 
 
 def _model_error(scene_file: SceneFile, error: BaseException) -> SceneError:
-    """What Drake raised, as an error for people; a failed assertion (SystemExit in pydrake) names every model it may come from."""
+    """Returns what Drake raised as an error for people. For a failed assertion (SystemExit in pydrake) it names every model.
+
+    The assertion does not say which model it comes from.
+    """
     message = _one_line(scene_file, str(error))
     if not isinstance(error, RuntimeError):
         message = f"Drake cannot use a model ({', '.join(scene_file.models)}): {message}"
@@ -147,17 +150,17 @@ def _model_error(scene_file: SceneFile, error: BaseException) -> SceneError:
 
 
 def _one_line(scene_file: SceneFile, message: str) -> str:
-    """A message of Drake's in one printable line, with paths relative to the scene file."""
+    """Returns a message of Drake's in one printable line, with paths relative to the scene file."""
     message = message.replace("<string>", scene_file.path.name)
     message = re.sub(rf"(file:)?/*{re.escape(str(scene_file.path.parent.resolve()))}/", "", message)
     return textwrap.shorten(escaped(" ".join(message.removeprefix("error: ").split())), MAX_SENTENCE, placeholder=" ...")
 
 
 def _named(name: str, what: str) -> str:
-    """The name of a joint, a body or a geometry, which statements may print.
+    """Returns the name of a joint, a body or a geometry, once it is known that statements may print it.
 
     Raises:
-        SceneError: ``scene_name``.
+        SceneError: ``scene_name``, when they may not.
     """
     if not is_name(name):
         message = f"the {what} {name[:MAX_NAME]!a} has a name that is not accepted"
@@ -215,7 +218,7 @@ def _coupled(plant: MultibodyPlant, joints: list[Joint]) -> SceneError:
 
 
 def _center(scene_file: SceneFile, tree: Tree) -> Array:
-    """q*, checked: every joint has an interior range, and no revolute joint's range reaches q* +- pi."""
+    """Returns q*, (n,), after it has checked that every joint's range has an interior and no revolute joint's reaches q* +- pi."""
     moving = sorted((j for j in tree.joints if j.index is not None), key=lambda j: j.index or 0)
     if not moving:
         raise SceneError("no_joints", "no joint of the scene can move, so there is no configuration space", field="directives")
@@ -241,9 +244,9 @@ def _center(scene_file: SceneFile, tree: Tree) -> Array:
 def _geometries(
     scene_file: SceneFile, strict: StrictReader, plant: MultibodyPlant, inspector: SceneGraphInspector, tree: Tree
 ) -> dict[GeometryId, Geometry]:
-    """Every geometry of the proximity role, half-spaces last because their size depends on the reach of the others.
+    """Returns every geometry of the proximity role, half-spaces last because their size depends on the reach of the others.
 
-    Drake makes names unique within a body by appending an index; its prefix, the model's name, is dropped.
+    Drake makes names unique within a body by appending an index. Its prefix, the model's name, is dropped.
     """
     found: dict[GeometryId, Geometry] = {}
     half_spaces = []
@@ -298,12 +301,12 @@ def _convex(shape: Shape, name: str, scene_file: SceneFile, strict: StrictReader
 
 
 def _mesh_points(shape: Convex | Mesh, strict: StrictReader) -> Array:
-    """The points of a mesh, (k, 3), scaled, as its file has them.
+    """Returns the points of a mesh, (k, 3), as its file has them, times the scale.
 
-    First come those that are vertices of Drake's hull, in Drake's order, on which the hashes of scenes rest.
+    First come those that are vertices of Drake's hull, in Drake's order, on which the hashes of scenes depend.
 
     Raises:
-        SceneError: the file is not what a collision mesh may be, or the scale takes a point out of the range of numbers.
+        SceneError: the file is not what a collision mesh may be, or a scaled point is not finite.
     """
     points = strict.points(shape.source().path()) * shape.scale3()
     if not np.isfinite(points).all():

@@ -1,7 +1,7 @@
-"""Which other files a scene's files refer to, and where those are.
+"""This module finds which other files a scene's files refer to, and where those are.
 
-One reader per kind of file finds the references that Drake would follow; the same readers serve to pack a bundle and to check one
-that came from a stranger.
+One reader for each kind of file finds the references that Drake would follow. The same readers serve to pack a bundle and to check a bundle
+from a stranger.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _SCHEME = re.compile(r"^([a-zA-Z][\w+.-]*):(//)?")
 
 
 def references(path: Path) -> list[str]:
-    """The references in one file, as written; none for a kind of file that refers to nothing.
+    """Returns the references in one file, as written; a kind of file that refers to nothing has none.
 
     Raises:
         SceneError: ``bundle_file`` for a kind of file that has no place in a scene, ``bundle_xml`` for XML that is broken or declares a
@@ -45,7 +45,7 @@ def references(path: Path) -> list[str]:
 
 
 def resolve(reference: str, directory: Path, packages: dict[str, Path]) -> Path:
-    """The path that a reference in a file of ``directory`` means.
+    """Returns the path that a reference means in a file of ``directory``.
 
     Raises:
         SceneError: ``bundle_uri`` for an absolute path, a scheme other than package:// and model://, or an unknown package.

@@ -1,8 +1,8 @@
-"""Shapes as conv(vertices) + ball(radius), the only kind of geometry the certifier knows.
+"""Shapes become conv(vertices) + ball(radius) here, the only kind of geometry that the certifier knows.
 
 Boxes, convex polytopes of few vertices, spheres and capsules are exact. The others are replaced by something larger: a mesh by its
-hull or by fewer vertices outside it, a cylinder by a circumscribed prism, an ellipsoid by a circumscribed polytope, a
-half-space by the box of it within reach.
+hull or by fewer vertices outside it, a cylinder by a circumscribed prism, and an ellipsoid by a circumscribed polytope. A half-space is
+replaced by the box that is its part within the robot's reach.
 """
 
 from __future__ import annotations
@@ -21,11 +21,13 @@ CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)
 
 @dataclass(frozen=True)
 class Body:
-    """A convex body in its geometry frame G: vertices (v, 3) and radius in metres.
+    """A body is convex and given in its geometry frame G.
 
     Attributes:
-        shape: the original, JSON-able.
-        substitution: what replaced the original, None when it is exact.
+        vertices: (v, 3) metres in G.
+        radius: metres.
+        shape: the original shape, JSON-able.
+        substitution: what replaced the original; None when the body is exact.
         inflation: upper bound in metres on how far the replacement reaches outside the original.
     """
 
@@ -37,7 +39,7 @@ class Body:
 
 
 def box(size: tuple[float, float, float]) -> Body:
-    """A box with edges ``size``, centred on G."""
+    """Returns a box with edges ``size``, metres, centred on G."""
     return Body(CORNERS * np.array(size) / 2, 0.0, {"kind": "box", "size": list(size)})
 
 
@@ -46,12 +48,12 @@ def sphere(radius: float) -> Body:
 
 
 def capsule(radius: float, length: float) -> Body:
-    """A capsule along z; ``length`` is between the centres of its caps."""
+    """Returns a capsule along z; ``length`` is between the centres of its caps. Both numbers are in metres."""
     return Body(np.array([[0, 0, -length / 2], [0, 0, length / 2]]), radius, {"kind": "capsule", "radius": radius, "length": length})
 
 
 def cylinder(radius: float, length: float, sides: int) -> Body:
-    """The regular prism circumscribed about a cylinder along z."""
+    """Returns the regular prism that is circumscribed about a cylinder along z."""
     angle = 2 * np.pi * (np.arange(sides) + 0.5) / sides
     reach = radius / np.cos(np.pi / sides)
     ring = reach * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -61,7 +63,7 @@ def cylinder(radius: float, length: float, sides: int) -> Body:
 
 
 def ellipsoid(semi_axes: tuple[float, float, float], max_vertices: int) -> Body:
-    """The affine image of a polytope circumscribed about the unit sphere."""
+    """Returns the affine image of a polytope that is circumscribed about the unit sphere."""
     points = _spread(max_vertices)
     scale = float(1 / -ConvexHull(points).equations[:, 3].max())
     shape = {"kind": "ellipsoid", "semi_axes": list(semi_axes)}
@@ -70,7 +72,7 @@ def ellipsoid(semi_axes: tuple[float, float, float], max_vertices: int) -> Body:
 
 
 def polytope(shape: dict[str, Any], points: Array, max_vertices: int) -> Body:
-    """The hull of points (k, 3), or a polytope of at most max_vertices around it; the shape's ``kind`` is "convex" or "mesh"."""
+    """Returns the hull of points (k, 3), or a polytope of at most max_vertices around it; the shape's ``kind`` is "convex" or "mesh"."""
     vertices, inflation, count = outer(points, max_vertices)
     if inflation > 0:
         hull = f"polytope of {len(vertices)} vertices around its hull of {count}"
@@ -81,7 +83,10 @@ def polytope(shape: dict[str, Any], points: Array, max_vertices: int) -> Body:
 
 
 def half_space(center: Array, reach: float) -> Body:
-    """The box of the half-space z <= 0 that contains its part within ``reach`` of ``center`` (3,), both in G and metres."""
+    """Returns a box in the half-space z <= 0 that contains the half-space's part within ``reach`` of ``center``, (3,).
+
+    ``reach`` and ``center`` are in metres, in G.
+    """
     depth = max(reach - center[2], 0.01 * reach)
     lower, upper = np.append(center[:2] - reach, -depth), np.append(center[:2] + reach, 0.0)
     vertices = (lower + upper) / 2 + CORNERS * (upper - lower) / 2
@@ -89,7 +94,7 @@ def half_space(center: Array, reach: float) -> Body:
 
 
 def _spread(count: int) -> Array:
-    """Points (count, 3) spread evenly over the unit sphere (Fibonacci lattice)."""
+    """Returns points, (count, 3), that are spread evenly over the unit sphere (Fibonacci lattice)."""
     k = np.arange(count) + 0.5
     z, angle = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
     r = np.sqrt(1 - z**2)

@@ -1,4 +1,4 @@
-"""The model files of a scene, read strictly before Drake reads them, and the points of its collision meshes."""
+"""The model files of a scene are read strictly here, before Drake reads them, and so are the points of its collision meshes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _OBJ = ".obj"
 
 
 class StrictReader:
-    """Reads the model files that a scene's directives lead to, through includes, as Drake finds them, and OBJ meshes."""
+    """Reads OBJ meshes and the model files that a scene's directives lead to, also through includes. It finds files as Drake does."""
 
     def __init__(self, scene_file: SceneFile) -> None:
         self._packages, self._root = scene_file.packages, scene_file.path.parent.resolve()
@@ -26,10 +26,10 @@ class StrictReader:
         self._models: set[tuple[type[ModelFile], Path]] = set()
 
     def points(self, path: Path) -> Array:
-        """Every vertex of an OBJ file, (k, 3), as written there.
+        """Returns every vertex of an OBJ file, (k, 3), as written there.
 
         Raises:
-            SceneError: ``scene_model``, with file and line; or for a mesh of another kind.
+            SceneError: ``scene_model``, with file and line, when the file is not accepted or is a mesh of another kind.
         """
         if path.suffix.lower() != _OBJ:
             raise _not_read(self._name(path))
@@ -39,14 +39,16 @@ class StrictReader:
         return self._points[path]
 
     def check(self, directives: str, name: str) -> None:
-        """Check every model file, and the collision meshes that are found; what is not found, or no model, is left to Drake.
+        """Checks every model file and every collision mesh that is found.
+
+        What is not found, or is no model, is left to Drake.
 
         Args:
-            directives: a YAML document of Drake Model Directives; relative paths in it start at nothing.
+            directives: a YAML document of Drake Model Directives; its relative paths have no directory of their own to start from.
             name: the document's name for people.
 
         Raises:
-            SceneError: ``scene_model``, with file and line; ``scene_yaml``.
+            SceneError: ``scene_model``, with file and line, or ``scene_yaml``.
         """
         documents, read = [(directives, name)], set[Path]()
         for text, document in documents:
@@ -63,7 +65,7 @@ class StrictReader:
                     self._check_model(path, _FORMATS[suffix.lower()])
 
     def _check_model(self, path: Path, kind: type[ModelFile]) -> None:
-        """A model and what it includes; MJCF's paths start at the model, SDFormat's in the working directory."""
+        """Checks a model and what it includes. MJCF's paths start at the model's directory, SDFormat's in the working directory."""
         waiting = [(path, kind)]
         for file, kind in waiting:
             if (kind, file) in self._models:

@@ -1,4 +1,4 @@
-"""The kinematic tree as a table: what is rigidly joined to what, and how far anything can get from the world's origin."""
+"""The kinematic tree is sorted here. It says what is rigidly joined to what, and how far anything can get from the world's origin."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from certifier.model import WORLD, Array, Geometry, Joint, JointKind
 
 
 class Tree:
-    """Joints sorted so that every parent comes before its children, each turned to point away from the world.
+    """Holds joints, sorted so that every parent comes before its children, and each turned so that it points away from the world.
 
-    Turning a joint round swaps its two fixed frames and flips its axis: (X_PF X_FM(q) X_BM^-1)^-1 = X_BM X_FM(q)^-1 X_PF^-1.
+    To turn a joint round means to swap its two fixed frames and to flip its axis: (X_PF X_FM(q) X_BM^-1)^-1 = X_BM X_FM(q)^-1 X_PF^-1.
 
     Raises:
-        SceneError: ``floating_body`` or ``loop``.
+        SceneError: ``floating_body`` or ``loop``, when the joints and bodies are no tree.
     """
 
     def __init__(self, joints: list[Joint], bodies: list[str]) -> None:
         self.bodies = tuple(bodies)
         self.joints = tuple(_outward(joints, bodies))
-        """Parents before children."""
+        """In this order, parents come before children."""
 
     @cached_property
     def group(self) -> dict[str, str]:
-        """For every body, the body nearest the world that it is rigidly joined to; ``world`` if it cannot move."""
+        """Maps every body to the body nearest the world that it is rigidly joined to, which is ``world`` if it cannot move."""
         group = {WORLD: WORLD}
         for j in self.joints:
             group[j.child] = group[j.parent] if j.kind is JointKind.WELD else j.child
@@ -34,7 +34,7 @@ class Tree:
 
     @cached_property
     def anchored(self) -> dict[str, Array]:
-        """X_WB, (4, 4), of the bodies that cannot move."""
+        """Maps every body that cannot move to its pose X_WB, (4, 4), metres."""
         poses = {WORLD: np.eye(4)}
         for j in self.joints:
             if j.kind is JointKind.WELD and j.parent in poses:
@@ -42,10 +42,10 @@ class Tree:
         return poses
 
     def reach(self, geometries: list[Geometry], padding: float) -> float:
-        """Metres from the world's origin that no point of a moving geometry gets beyond, whatever the joint positions.
+        """Returns a distance from the world's origin, in metres, that no point of a moving geometry exceeds at any joint positions.
 
-        The sum of the offsets along the chain: a revolute joint turns about its frame's origin, a prismatic one moves
-        its child by at most its greatest position.
+        It adds up the offsets along the chain. A revolute joint turns about its frame's origin, and a prismatic joint moves its child by
+        at most its greatest position.
         """
         distance = {body: float(np.linalg.norm(X[:3, 3])) for body, X in self.anchored.items()}
         for j in self.joints:
@@ -83,7 +83,7 @@ def _outward(joints: list[Joint], bodies: list[str]) -> list[Joint]:
 
 
 def floating(body: str) -> SceneError:
-    """The error for a body that no joint connects to the world."""
+    """Returns the error for a body that no joint connects to the world."""
     drake_name = body.replace("/", "::")
     hint = f"weld it: add_weld: {{parent: world, child: {drake_name}}}"
     return SceneError("floating_body", f"body {body} is not attached to anything", field="directives", hint=hint)

@@ -1,4 +1,4 @@
-"""A bundle from a stranger, in the child process that reads it: unpacked within limits, every file checked before Drake sees it."""
+"""The child process that reads a stranger's bundle unpacks it here within limits, and checks every file before Drake sees it."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _CHUNK = 2**20
 
 
 def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
-    """The document of the Scene. Drake sees the files once they have passed.
+    """Returns the document of the bundle's Scene. Drake sees the files once they have passed.
 
     Raises:
-        SceneError: as :func:`certifier.scene.bundle.load_bundle`.
+        SceneError: as :func:`certifier.scene.bundle.load_bundle` says.
     """
     root = Path(payload["root"])
     scene = root / unpack(Path(payload["archive"]), root, BundleLimits(**payload["limits"]))
@@ -32,10 +32,10 @@ def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
 
 
 def check_bundle(root: Path, scene: Path) -> None:
-    """Check every file of an unpacked bundle before Drake sees it: known kinds, no entities, no reference out of ``root``.
+    """Checks every file of an unpacked bundle before Drake sees it: known kinds, no entities, no reference out of ``root``.
 
     Raises:
-        SceneError: as :func:`certifier.scene.bundle.load_bundle`.
+        SceneError: as :func:`certifier.scene.bundle.load_bundle` says.
     """
     packages = read_scene_file(scene).packages
     for name, directory in packages.items():
@@ -55,7 +55,7 @@ def _inside(path: Path, root: Path, what: str) -> None:
 
 
 def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
-    """Write the zip's files below root; the path of the scene file.
+    """Writes the zip's files below root, and returns the path of the scene file.
 
     Raises:
         SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_path``.
@@ -71,7 +71,7 @@ def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
         scene = str(json.loads((root / INDEX).read_text(encoding="utf-8"))["scene"])
     except SceneError:
         raise
-    except Exception as error:  # zipfile and the decompressors raise a dozen kinds
+    except Exception as error:  # zipfile and the decompressors raise many kinds of error
         hint = "make bundles with pack_bundle or `ciris scene add`"
         raise SceneError("bundle_zip", f"this is not a scene bundle: {type(error).__name__}: {error}", hint=hint) from None
     _checked_name(scene)
@@ -79,7 +79,10 @@ def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
 
 
 def _extract(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, root: Path, left: int) -> int:
-    """Write one entry, unless it has more than ``left`` bytes, whatever it says; the number of its bytes."""
+    """Writes one entry and returns the number of its bytes.
+
+    An entry of more than ``left`` bytes is refused, whatever size it claims.
+    """
     target = root / _checked_name(entry.filename)
     if entry.is_dir():
         target.mkdir(parents=True, exist_ok=True)

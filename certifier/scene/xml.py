@@ -1,4 +1,4 @@
-"""XML, read by expat with document types refused: entity bombs are made of them, and Drake would not replace an entity."""
+"""Expat reads XML here, and document types are refused: entity bombs are made of them, and Drake would not replace an entity."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from certifier.errors import SceneError
 
 
 def parse_xml(path: Path, name: str, code: str, install: Callable[[expat.XMLParserType], None]) -> None:
-    """Run expat over a file.
+    """Runs expat over a file.
 
     Args:
         name: the file's name for people.
@@ -18,7 +18,7 @@ def parse_xml(path: Path, name: str, code: str, install: Callable[[expat.XMLPars
         install: sets the parser's handlers, before anything is read.
 
     Raises:
-        SceneError: with ``code`` and the line, for XML that is broken or declares a document type; and whatever the handlers raise.
+        SceneError: with ``code`` and the line, for XML that is broken or declares a document type; or whatever the handlers raise.
     """
     parser = expat.ParserCreate()
 

@@ -1,1 +1,1 @@
-"""The verifier: exact re-checks of proofs. It imports neither the pair solver nor the polytope step; data types only."""
+"""The verifier checks proofs again, exactly. It imports data types only: neither the pair solver nor the polytope step."""

@@ -1,14 +1,14 @@
-"""Exact check that P = {s : C s <= d} is Archimedean (C-IRIS, appendix A, definition 1).
+"""The verifier checks here, exactly, that P = {s : C s <= d} is Archimedean (C-IRIS, appendix A, definition 1).
 
-With a box l_i <= s_i <= u_i around P, the identity
+The proof gives a box l_i <= s_i <= u_i around P. The identity
 
     (s_i - l_i)(u_i - s_i) = [(u_i - s_i)^2 (s_i - l_i) + (s_i - l_i)^2 (u_i - s_i)] / (u_i - l_i)
 
-makes the left-hand side a combination of bounds with squares as multipliers, and
+makes the left-hand side a combination of the bounds s_i - l_i and u_i - s_i with squares as multipliers. Moreover
 
     N - sum_i s_i^2 = sum_i (s_i - l_i)(u_i - s_i) + [N + sum_i l_i u_i - sum_i (l_i + u_i) s_i].
 
-Every bound, and the affine remainder in brackets, is a nonnegative combination of faces plus a nonnegative constant.
+Every bound is a nonnegative combination of faces plus a nonnegative constant. So is the affine remainder in brackets.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from certifier.verify.kinematics import exact
 
 
 def check_archimedean(C: Array, d: Array, proof: Archimedean) -> bool:
-    """True when the numbers prove, in exact arithmetic, that {C s <= d} is Archimedean with the constant N.
+    """Returns True when the numbers prove, in exact arithmetic, that {C s <= d} is Archimedean with the constant N.
 
-    The slope l + u of the remainder is not a double in general. It is split into its double c and the rest e, and e's
-    is bounded over the box.
+    The slope l + u of the remainder is not a double in general. The check splits it into its double c and the rest e. It bounds
+    the product e's over the box.
     """
     rows = Halfspaces(C, d)
     if not rows.lie_in_box(proof.lower, proof.upper, proof.Y_lower, proof.Y_upper) or not np.all(proof.lower < proof.upper):

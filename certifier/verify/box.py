@@ -1,7 +1,9 @@
-"""Exact check that a polytope {s : C s <= d} lies in a half-space or a box, by multipliers (Farkas).
+"""The verifier checks here, exactly, that a polytope {s : C s <= d} lies in a half-space or a box. Multipliers prove it (Farkas).
 
-For y >= 0 every point of the polytope has c's <= y'd + r's, r = c - y'C. The numbers are doubles taken as they are, so
-r rarely vanishes; what is left of it is bounded by rows that bound one coordinate alone (the joint limits).
+Let y >= 0 be multipliers of the rows, and let ' mean transposed. Every point s of the polytope has c's <= y'd + r's with r = c - y'C.
+
+The numbers are doubles and are taken as they are, so r rarely vanishes. The rows that bound one coordinate alone (the joint limits)
+bound what is left of it.
 """
 
 from __future__ import annotations
@@ -21,10 +23,13 @@ def within_limits(scene: Scene, point: Array) -> bool:
 
 
 class Halfspaces:
-    """{s : C s <= d}, C (m, n), d (m,), and what those rows say in which no other coordinate occurs.
+    """Holds the polytope {s : C s <= d}, with C (m, n) and d (m,), and the bounds of its single coordinates.
+
+    Such a bound comes from a row in which only one coordinate occurs.
 
     Attributes:
-        upper, lower: for each coordinate the least upper and the largest lower bound of such rows; None where there is none.
+        upper: for each coordinate the least upper bound of such rows; None where there is none.
+        lower: for each coordinate the largest lower bound of such rows; None where there is none.
     """
 
     def __init__(self, C: Array, d: Array) -> None:
@@ -38,15 +43,15 @@ class Halfspaces:
             bounds[i] = bound if known is None else closer(bound, known)
 
     def contains(self, point: Array) -> bool:
-        """Whether the point, (n,) doubles, satisfies every row, exactly."""
+        """Returns whether the point, (n,) doubles, satisfies every row exactly."""
         s = [exact(x) for x in point]
         return all(_dot(c, s) <= exact(d) for c, d in zip(self.C, self.d, strict=True))
 
     def upper_bound(self, c: Array, y: Array) -> fmpq | None:
-        """An exact upper bound of c's, with c (n,), y (m,).
+        """Returns an exact upper bound of c's on the polytope, with c (n,) and multipliers y (m,).
 
-        None when y proves nothing: a multiplier is negative or not finite, there are more of them than limits.MULTIPLIERS for each
-        coordinate, or a residual meets no row that bounds its coordinate alone.
+        Returns None when y proves nothing. Then a multiplier is negative or not finite, or more of them are nonzero than
+        limits.MULTIPLIERS for each coordinate, or a residual meets no row that bounds its coordinate alone.
         """
         if y.shape != self.d.shape or not np.all(np.isfinite(y)) or np.any(y < 0):
             return None
@@ -68,12 +73,15 @@ class Halfspaces:
         return bound
 
     def lie_in(self, c: Array, value: float, y: Array) -> bool:
-        """True when y proves c's <= value, exactly."""
+        """Returns True when y proves, exactly, that c's <= value on the polytope."""
         bound = self.upper_bound(c, y)
         return bound is not None and bool(np.isfinite(value)) and bound <= exact(value)
 
     def lie_in_box(self, lower: Array, upper: Array, Y_lower: Array, Y_upper: Array) -> bool:
-        """True when row i of Y_upper (n, m) proves s_i <= upper_i and row i of Y_lower proves -s_i <= -lower_i, exactly, for every i."""
+        """Returns True when the multipliers prove the box, exactly.
+
+        For every i, row i of Y_upper, (n, m), has to prove s_i <= upper_i. Row i of Y_lower, (n, m), has to prove -s_i <= -lower_i.
+        """
         m, n = self.C.shape
         if not (lower.shape == upper.shape == (n,) and Y_lower.shape == Y_upper.shape == (n, m)):
             return False

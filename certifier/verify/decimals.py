@@ -1,4 +1,4 @@
-"""Bounds in print: decimals of a few digits on the safe side of a double, as a statement has to be true as it is read."""
+"""Bounds are printed as decimals of a few digits on the safe side of a double, because a statement has to be true as it is read."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 
 def rounded_down(x: float, digits: int = 3, times: int = 1) -> str:
-    """Returns the largest decimal of so many significant digits that is no more than x, a finite number, times a whole number."""
+    """Returns the largest decimal of ``digits`` significant digits that is no more than x times ``times``; x must be finite."""
     return f"{Context(digits, ROUND_FLOOR).multiply(Decimal(x), Decimal(times)):g}"
 
 
 def rounded_up(x: float, digits: int = 3, times: int = 1) -> str:
-    """Returns the least decimal of so many significant digits that is no less than x, a finite number, times a whole number."""
+    """Returns the least decimal of ``digits`` significant digits that is no less than x times ``times``; x must be finite."""
     return f"{Context(digits, ROUND_CEILING).multiply(Decimal(x), Decimal(times)):g}"
 
 
 def at_least_mm(metres: float) -> str:
-    """Returns a lower bound in metres as a text in millimetres that is no larger."""
+    """Returns a lower bound, given in metres, as a text in millimetres that is rounded down."""
     return f"{rounded_down(metres, times=1000)} mm"
 
 
 def at_most_mm(metres: float) -> str:
-    """Returns an upper bound in metres as a text in millimetres that is no smaller."""
+    """Returns an upper bound, given in metres, as a text in millimetres that is rounded up."""
     return f"{rounded_up(metres, times=1000)} mm"
 
 

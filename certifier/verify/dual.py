@@ -1,33 +1,52 @@
-"""Rigorous check of a dual proof: a pair has no certificate of one form, with the faces of a given polytope and its box, in one frame.
+"""The verifier checks a dual proof rigorously here. Such a proof says that a pair has no certificate of one form, in one frame.
 
-The form: a plane affine in s; multipliers rho'Q_j rho of 1 and of every face, rho the products of distinct joints of the chain; and,
-where a radius is involved, a bound kappa of |a| by the matrix inequality of certifier.pair.program. That no such certificate exists does
-not mean that no plane separates the pair: one may need multipliers of a higher degree, and the check of a pair's proof takes the
-norm at the box's corners, which admits more normals than the matrix inequality.
+The form of certificate is this:
 
-A certificate gives, for every vertex v of a body, +-(a'p_v + b den) - (r kappa + t) den = sum_j g_j rho'Q_j rho, Q_j psd, t > 0.
-Let x_v be functionals whose localising matrices Lambda_j(x_v) = x_v(g_j rho rho') are all psd, and R = sum_v +-x_v(p_v (x) [1, u]),
-(4, n + 1). Applied to the identities and added up, they give
+- The plane is affine in s.
+- The multipliers of 1 and of every face are rho'Q_j rho, where rho are the products of distinct joints of the chain. The faces are those
+  of a given polytope and of its box.
+- Where a radius is involved, the matrix inequality of certifier.pair.program bounds |a| by kappa.
+
+That no such certificate exists does not mean that no plane separates the pair. A plane may need multipliers of a higher degree. Also,
+the check of a pair's proof takes the norm at the box's corners, which admits more normals than the matrix inequality does.
+
+A certificate gives, for every vertex v of a body,
+
+    +-(a'p_v + b den) - (r kappa + t) den = sum_j g_j rho'Q_j rho,   Q_j psd, t > 0.
+
+Let x_v be functionals whose localising matrices Lambda_j(x_v) = x_v(g_j rho rho') are all psd. Let R = sum_v +-x_v(p_v (x) [1, u]), a
+matrix (4, n + 1). Apply the functionals to the identities, and add these up. This gives
 
     0 <= <Z, R> - kappa sum_v r_v x_v(den) - t sum_v x_v(den).
 
-Where no radius is involved and R = 0, it follows that t <= 0. Where one is, the rows R_a of R that belong to a need not vanish: with
-Y = [[Yaa, -R_a/2], [-R_a'/2, Ybb]] psd, Ybb_ii <= Ybb_00 and tr Yaa + Ybb_00 <= sum_v r_v x_v(den), the matrix inequality gives
-<Z_a, R_a> <= kappa sum_v r_v x_v(den).
+Where no radius is involved and R = 0, it follows that t <= 0, because the check requires that sum_v x_v(den) > 0.
 
-R never vanishes in floating point. The proof names as many moments as R has entries to vanish; changing them by c, G c = -R, makes R
-zero, and |c| is bounded by ball arithmetic. Every matrix is then shown to be positive definite whatever such a change does. Where the
-equations are dependent, as for two balls, fewer are solved; what is left of the others bounds t relative to the plane's coefficients, the
-``slack``.
+Where a radius is involved, the rows R_a of R that belong to a need not vanish. Let Y = [[Yaa, -R_a/2], [-R_a'/2, Ybb]] be psd, with
+Ybb_ii <= Ybb_00 and tr Yaa + Ybb_00 <= sum_v r_v x_v(den). Then the matrix inequality gives <Z_a, R_a> <= kappa sum_v r_v x_v(den). If the
+row of R that belongs to b vanishes, t <= 0 follows again.
 
-Why the matrices are positive definite: a rounded operation errs by a factor 1 + d, |d| <= eps = 2^-53, or, where its result is
-subnormal, by 2^-1075 at most. Every face and every vertex' moments are first multiplied by powers of two that bring their largest
-numbers near 1, which changes no sign. An entry of Lambda_j is then a sum of n + 1 products of two numbers below 2, the face's rounded. It
-errs by less than (n + 4) eps times the sum of the products' magnitudes, plus 4 (n + 1) 2^-1074, which is far below UNDERFLOW. Twice that
-and more is added to what a change can do. The diagonal having been brought near 1 by powers of two again, the errors' sums over the rows
-are taken off it (Gershgorin), and so is 4 (L + 16) eps times the trace, L the size: by less than (L + 2) eps times the trace can the
-rounding of the reduction and of a Cholesky factorisation, in any order of its sums, hide a negative eigenvalue. If the factorisation
-succeeds, the matrix is positive definite (Rump, *Verification of positive definiteness*, BIT 46, 2006).
+R never vanishes in floating point. So the proof names as many moments as R has entries that have to vanish. A change c of these moments
+with G c = -R makes these entries zero, where G holds what one unit of each moment adds to R. Ball arithmetic bounds |c|. Every matrix is
+then shown to be positive definite whatever such a change does.
+
+Where the equations are dependent, as for two balls, fewer of them are solved. What is left of the others bounds t relative to the plane's
+coefficients. This bound is the ``slack``.
+
+Why the matrices are positive definite:
+
+A rounded operation errs by a factor 1 + d, |d| <= eps = 2^-53. Where its result is subnormal, it errs by 2^-1075 at most.
+
+Every face, and the moments of every vertex, are first multiplied by powers of two that bring their largest numbers near 1. This changes
+no sign. An entry of Lambda_j is then a sum of n + 1 products of two numbers below 2, of which the face's number is rounded. The entry
+errs by less than (n + 4) eps times the sum of the products' magnitudes, plus 4 (n + 1) 2^-1074, which is far below UNDERFLOW. The check
+adds more than twice that to what a change can do.
+
+Then powers of two bring the diagonal near 1 again. The check takes the sums of the errors over the rows off the diagonal (Gershgorin).
+It also takes off 4 (L + 16) eps times the trace, where L is the size. A Cholesky factorisation follows.
+
+The reduction of the diagonal and the factorisation round. Whatever the order of its sums, this rounding can hide a negative eigenvalue
+only if its magnitude is less than (L + 2) eps times the trace. So if the factorisation succeeds, the matrix is positive definite (Rump,
+*Verification of positive definiteness*, BIT 46, 2006).
 """
 
 from __future__ import annotations
@@ -52,20 +71,21 @@ from certifier.verify.scene import check_scene
 
 PRECISION = 256
 UNDERFLOW = 2.0**-1000
-"""Above what subnormal results can do to an entry of a matrix of numbers near 1."""
+"""This is above what subnormal results can do to an entry of a matrix of numbers near 1."""
 LARGEST_SLACK = 1e-9
 LOOSENESS = 1e-9
-"""Part of a joint's range by which the box may reach beyond its limits: rounding."""
+"""Because of rounding, the box may reach beyond a joint's limits by this part of the joint's range."""
 
 
 @dataclass(frozen=True)
 class DualStatement:
-    """What a valid dual proof proves: there is no certificate, of the form that this module is about, on its ground.
+    """States what a valid dual proof proves: on its ground there is no certificate of the form that this module is about.
 
     Attributes:
-        pair: the pair that has none with a plane affine in s in this frame.
-        rounded: whether a radius is involved: then those alone are excluded whose normal is bounded by the matrix inequality.
-        slack: a certificate's margin would be at most this part of its plane's largest coefficient; 0 when there is none at all.
+        pair: the pair that has no such certificate.
+        frame: body in whose frame the plane, affine in s, would be.
+        rounded: whether a radius is involved. Then only certificates are excluded whose normal is bounded by the matrix inequality.
+        slack: bound on a certificate's margin, as a part of its plane's largest coefficient; 0 when there is no certificate at all.
     """
 
     pair: Pair
@@ -75,10 +95,10 @@ class DualStatement:
 
 
 def verify_dual(proof: DualProof) -> DualStatement:
-    """Check a dual proof.
+    """Checks a dual proof and returns what it proves.
 
     Raises:
-        ProofError: it does not hold; the code says which part.
+        ProofError: the proof does not hold; the code says which part.
     """
     scene = proof.scene
     check_scene(scene)
@@ -96,7 +116,7 @@ def verify_dual(proof: DualProof) -> DualStatement:
 
 
 def _check_tight(scene: Scene, ground: Ground) -> None:
-    """The box ends at the joint limits: with weaker faces than the joints have, there are fewer certificates."""
+    """Checks that the box ends at the joint limits, because with weaker faces than the joints have there are fewer certificates."""
     for joint, lower, upper, mid, half in zip(scene.moving, scene.s_lower, scene.s_upper, ground.mid, ground.half, strict=True):
         low, high = exact(lower), exact(upper)
         beyond = exact(half) + max(exact(mid) - high, low - exact(mid))
@@ -140,7 +160,7 @@ class _Check:
         return DualStatement(self._proof.pair, self._proof.frame, self._rounded, slack)
 
     def _correction(self, R: list[list[arb]]) -> tuple[arb, arb]:
-        """Bounds of the change that makes the equations named vanish, and of the sum of what is left of the others."""
+        """Returns a bound of the change that makes the named equations vanish, and one of the sum of what is left of the others."""
         proof, named = self._proof, self._proof.equations
         if len(set(named)) != len(named) or len(named) != len(proof.entries) or not all(0 <= k < len(self._vanishing) for k in named):
             raise ProofError("proof_malformed", "the equations and the moments that meet them do not fit")
@@ -162,13 +182,13 @@ class _Check:
         return max(sizes), left
 
     def _column(self, side: int, vertex: int, monomial: int) -> dict[tuple[int, int], arb]:
-        """What one unit of a moment adds to R."""
+        """Returns what one unit of a moment adds to R."""
         if side not in (0, 1) or not self._sides[side].has(vertex, monomial):
             raise ProofError("proof_malformed", "the proof names a moment that is not there")
         return self._sides[side].column(vertex, monomial, 1 - 2 * side)
 
     def _check_normal(self, R: list[list[arb]], change: arb) -> None:
-        """The part of the proof that concerns kappa."""
+        """Checks the part of the proof that concerns kappa."""
         n, (aa, bb) = self._n, self._proof.normal
         if aa.shape != (3, 3) or bb.shape != (n + 1, n + 1) or not (np.array_equal(aa, aa.T) and np.array_equal(bb, bb.T)):
             raise ProofError("proof_malformed", "the matrices that concern the normal do not fit")
@@ -190,7 +210,7 @@ class _Check:
 
 
 class _Side:
-    """The functionals of one body's vertices."""
+    """Holds the functionals of one body's vertices."""
 
     def __init__(self, volume: Volume, numerators: Numerators, moments: Array, n: int) -> None:
         V, size, self._chain = len(volume.vertices), 3 ** len(numerators.chain), numerators.chain
@@ -205,7 +225,7 @@ class _Side:
         self._bits = POSITION_BITS + vertex_bits
         largest = max(sum(map(abs, place)) for place in places)
         self._positions = limbs.normal(limbs.product(limbs.of_rows(places), numerators.columns)).reshape(-1, V, 4, size)
-        # Row m of what the positions are multiplied with holds x_v(u_e m) for all e.
+        # The positions are multiplied with a matrix whose row m holds x_v(u_e m) for all e.
         expanded = [[values[v][i] for i in row] for v in range(V) for row in self._index.T]
         flat = np.moveaxis(self._positions, 2, 1).reshape(len(self._positions), 4, V * size)
         product = limbs.integers(limbs.product(flat, limbs.of_rows(expanded)))
@@ -219,11 +239,11 @@ class _Side:
         return 0 <= vertex < len(self._moments) and 0 <= monomial < self._moments.shape[1]
 
     def mass(self, change: arb) -> arb:
-        """sum_v x_v(den), whatever the change."""
+        """Returns a ball around sum_v x_v(den) that holds whatever the change does."""
         return self.sums[3][0] + arb(0, change * self.reach)
 
     def column(self, vertex: int, monomial: int, sign: int) -> dict[tuple[int, int], arb]:
-        """What one unit of a moment adds to R: sign times the coefficients of p_v that meet it."""
+        """Returns what one unit of a moment adds to R: ``sign`` times the coefficients of p_v that meet it."""
         column = {(c, e): arb(0) for c in range(4) for e in range(len(self._index))}
         for e, m in zip(*np.nonzero(self._index == monomial), strict=True):
             for c, (x,) in enumerate(limbs.integers(self._positions[:, vertex, :, m, None])):
@@ -231,7 +251,7 @@ class _Side:
         return column
 
     def check(self, faces: Array, change: arb) -> None:
-        """Every localising matrix is positive definite."""
+        """Checks that every localising matrix is positive definite, whatever the change does."""
         k = len(self._chain)
         if len(faces) * len(self._moments) * 4**k > limits.LOCALISED:
             raise ProofError("proof_too_large", f"a body's localising matrices have more than {limits.LOCALISED} entries")
@@ -242,10 +262,12 @@ class _Side:
 
 
 def _enclosed(moments: Array, faces: Array, chain: tuple[int, ...], change: arb) -> tuple[Array, Array]:
-    """x_v(g_j m), (F, V, 3^k), times a power of two for every vertex, and by what they may be off once every moment has changed.
+    """Returns x_v(g_j m), (F, V, 3^k), times a power of two for every vertex, and bounds of how far they are off.
+
+    The bounds hold once every moment has changed, and for the faces before they were rounded.
 
     Args:
-        faces: (F, n + 1) of :func:`_near_one`; the bounds are those of the faces before they were rounded.
+        faces: (F, n + 1) rows of :func:`_near_one`.
     """
     sizes = np.frexp(np.abs(moments).max(axis=1))[1]
     scaled = np.ldexp(moments, -sizes[:, None])
@@ -255,27 +277,27 @@ def _enclosed(moments: Array, faces: Array, chain: tuple[int, ...], change: arb)
 
 
 def _ball(x: int, rounding: int, bits: int) -> arb:
-    """(x +- rounding) 2^-bits."""
+    """Returns the ball (x +- rounding) 2^-bits."""
     return arb(fmpq(x) / fmpq(2) ** bits, fmpq(rounding) / fmpq(2) ** bits)
 
 
 def _above(x: arb) -> float:
-    """A double above every number of a ball; not finite where there is none."""
+    """Returns a double above every number of a ball; the result is not finite where there is no such double."""
     return float(np.nextafter(float(x.upper()), np.inf))
 
 
 def _near_one(row: Sequence[fmpq]) -> list[float]:
-    """The row, rounded, times the power of two that brings its largest number between 1/2 and 2; a row of zeros as it is."""
+    """Returns the row, rounded, times the power of two that brings its largest number between 1/2 and 2; zeros stay zeros."""
     largest = max(abs(x) for x in row)
     size = int(largest.p).bit_length() - int(largest.q).bit_length()
     return [float(x / fmpq(2) ** size) for x in row]
 
 
 def _check_positive(values: Array, errors: Array) -> None:
-    """Every symmetric matrix within the errors of these, (S, L, L), is positive definite.
+    """Checks that every symmetric matrix within ``errors`` of ``values``, both (S, L, L), is positive definite.
 
     Raises:
-        ProofError: not shown.
+        ProofError: this is not shown.
     """
     diagonal = np.einsum("sii->si", values)
     if not (diagonal > 0).all():

@@ -1,4 +1,4 @@
-"""Any proof file, checked: what it proves in plain words, and how much that is worth."""
+"""The verifier checks a proof file of any kind here, and says in plain words what it proves and how much that is worth."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from certifier.verify.region import verify_region
 from certifier.verify.witness import TOLERANCE, verify_witness
 
 LONGEST = 500
-"""Characters of an error's message."""
+"""A text of an error is cut after this many characters."""
 
 
 @dataclass(frozen=True)
 class FileStatement:
-    """What a valid file proves.
+    """States what a valid file proves.
 
     Attributes:
         kind: ``region``, ``pair``, ``dual`` or ``witness``.
-        lines: the statement in plain words, the guarantee last; it follows from what the scene's hash covers and from the proof.
+        lines: the statement in plain words, the guarantee last. It follows from the proof and from what the scene's hash covers.
     """
 
     kind: str
@@ -43,7 +43,7 @@ class FileStatement:
 
 
 def verify_file(data: bytes) -> FileStatement:
-    """Check a proof file of any kind that carries its scene.
+    """Checks a proof file of any kind that carries its scene, and returns what it proves.
 
     Raises:
         ProofError: the file is malformed, carries no scene, or its proof does not hold.
@@ -66,9 +66,9 @@ def verify_file(data: bytes) -> FileStatement:
 
 
 def answer(data: bytes) -> dict[str, Any]:
-    """The statement of a proof file, or why there is none, as JSON-able data; stable keys, and no text that is not printable.
+    """Returns the statement of a proof file, or why there is none, as JSON-able data.
 
-    ``scene.name`` is what the file calls its scene; no proof is about it.
+    The keys are stable, and every text is printable. ``scene.name`` is what the file calls its scene; no proof is about that name.
     """
     try:
         statement = verify_file(data)
@@ -84,7 +84,9 @@ def answer(data: bytes) -> dict[str, Any]:
 
 
 def answer_about_region(payload: dict[str, Any]) -> dict[str, Any]:
-    """The answer about a stored proof, as a child process gives it (certifier.isolation.child): it has to be of that very region.
+    """Returns the answer about a stored proof, which has to be about the very region that the payload names.
+
+    A child process runs this function (certifier.isolation.child).
 
     Args:
         payload: ``proof`` in base 64; ``scene_hash``, ``C`` and ``d`` of the region.
@@ -100,10 +102,10 @@ def answer_about_region(payload: dict[str, Any]) -> dict[str, Any]:
 
 
 def answer_about_file(payload: dict[str, Any]) -> dict[str, Any]:
-    """The answer about the file at ``path``, as a child process gives it.
+    """Returns the answer about the file at ``path``. A child process runs this function.
 
     Raises:
-        CirisError: no_file, it cannot be read.
+        CirisError: no_file, when the file cannot be read.
     """
     try:
         with open(payload["path"], "rb") as file:
@@ -122,7 +124,7 @@ def _cut(text: str) -> str:
 
 
 def guarantee_line(guarantee: Guarantee) -> str:
-    """What a guarantee means, in a line."""
+    """Returns a line that says what a guarantee means."""
     meaning = {
         Guarantee.EXACT: "exact (rigorous arithmetic; the parsed model taken at its word)",
         Guarantee.NUMERIC: f"numeric (to {TOLERANCE:g} m)",

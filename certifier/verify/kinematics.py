@@ -1,15 +1,20 @@
-"""Rational forward kinematics as exact polynomials in u, s = mid + half u (C-IRIS eq. 4-6), from a scene's stored numbers.
+"""Forward kinematics, which are rational, are formed here as exact polynomials in u, from the numbers that a scene stores.
 
-With tau = tan(q*/2), the half-angle tangents add up to (tau + s)/(1 - tau s): R(q) has the half-angle cosine 1 - tau s and sine
-tau + s, up to the common factor (1 + tau^2)(1 + s^2), which is the joint's denominator here. tau is rounded to a dyadic within
-2^-100, so every rotation is exact, about an angle that is off by no more than that.
+The box gives s = mid + half u (C-IRIS eq. 4-6). With tau = tan(q*/2), the half-angle tangents add up to (tau + s)/(1 - tau s). So R(q)
+has the half-angle cosine 1 - tau s and the half-angle sine tau + s, up to the common factor (1 + tau^2)(1 + s^2). This factor is the
+joint's denominator here. tau is rounded to a dyadic number within 2^-100, so every rotation is exact, about an angle that is off by no
+more than that.
 
 The doubles of a rotation are hardly ever orthonormal, nor are those of an axis a unit vector. Taken literally, they would stretch bodies,
-and the pose of B in A would not be the inverse of that of A in B. So a matrix stands for the rotation of the quaternion that it gives
-(Shepperd, *Quaternion from rotation matrix*, 1978), and an axis for the unit vector of its stereographic projection, each rounded at
-2^-ROUNDING_BITS. All poses are therefore rational and exactly rigid. What is an exact rotation or unit vector already stands for itself
-but for the rounding; else either is within ten times what the doubles miss being one by. The quaternion's square norm is a constant
-factor of the denominator.
+and the pose of B in A would not be the inverse of the pose of A in B.
+
+So a matrix stands for the rotation of the quaternion that it gives (Shepperd, *Quaternion from rotation matrix*, 1978). An axis stands
+for the unit vector of its stereographic projection. Quaternion and projection are rounded at 2^-ROUNDING_BITS. All poses are therefore
+rational and exactly rigid.
+
+A matrix that is an exact rotation already stands for itself, but for the rounding, and so does an exact unit vector. Any other differs
+from what it stands for by at most ten times what its doubles miss being a rotation, or a unit vector, by. The quaternion's square norm is
+a constant factor of the denominator.
 """
 
 from __future__ import annotations
@@ -26,16 +31,16 @@ Matrix = list[list[fmpq_mpoly]]
 Numbers = list[list[fmpq]]
 _TAU_BITS = 110
 ROUNDING_BITS = 60
-"""Of a quaternion with an entry of 1 or more, and of an axis' projection; finer than doubles near 1."""
+"""Of a quaternion with an entry of 1 or more, and of an axis' projection, this many binary places are kept: finer than doubles near 1."""
 
 
 def exact(x: float) -> fmpq:
-    """A double as the rational number it is."""
+    """Returns a double as the rational number that it is."""
     return fmpq(*float(x).as_integer_ratio())
 
 
 def half_tangent(angle: float) -> fmpq:
-    """A dyadic tau with |2 atan(tau) - angle| < 2^-100."""
+    """Returns a dyadic tau with |2 atan(tau) - angle| < 2^-100."""
     precision = ctx.prec
     ctx.prec = 256
     try:
@@ -45,7 +50,7 @@ def half_tangent(angle: float) -> fmpq:
 
 
 class ExactKinematics:
-    """Numerators of positions as polynomials of the ring Q[u_0 .. u_{n-1}], or as numbers at one configuration."""
+    """Computes numerators of positions, as polynomials of the ring Q[u_0 .. u_{n-1}] or as numbers at one configuration."""
 
     def __init__(self, scene: Scene, s: list[Any], embed: Any) -> None:
         self._embed, self._s = embed, s
@@ -54,17 +59,17 @@ class ExactKinematics:
 
     @classmethod
     def on_box(cls, scene: Scene, ring: fmpq_mpoly_ctx, mid: Array, half: Array) -> ExactKinematics:
-        """Polynomials in u, s = mid + half u."""
+        """Returns the kinematics in polynomials of u, where s = mid + half u."""
         s = [ring.constant(exact(m)) + exact(h) * u for m, h, u in zip(mid, half, ring.gens(), strict=True)]
         return cls(scene, s, ring.constant)
 
     @classmethod
     def at(cls, scene: Scene, s: list[fmpq]) -> ExactKinematics:
-        """Numbers at the configuration s."""
+        """Returns the kinematics in numbers at the configuration s."""
         return cls(scene, s, fmpq)
 
     def path(self, frame: str, body: str) -> list[tuple[Joint, bool]]:
-        """Joints from the frame's body to the body, each with whether it is crossed upwards."""
+        """Returns the joints from the frame's body to the body, each with whether it is crossed upwards, from child to parent."""
         up, down = self._to_world(frame), self._to_world(body)
         while up and down and up[-1] is down[-1]:
             up.pop()
@@ -79,7 +84,10 @@ class ExactKinematics:
         return joints
 
     def pose(self, frame: str, body: str) -> Matrix:
-        """(4, 4) polynomials or numbers: X_FB times its denominator, the entry [3][3], a multiple of prod (1 + s_i^2)."""
+        """Returns X_FB times its denominator, (4, 4), in polynomials or numbers.
+
+        The denominator is the entry [3][3], a multiple of prod (1 + s_i^2).
+        """
         # Constant factors are multiplied as numbers.
         fixed, X = _identity(), None
         for joint, upwards in self.path(frame, body):
@@ -92,14 +100,14 @@ class ExactKinematics:
         return self._embedded(fixed) if X is None else _multiply(X, fixed)
 
     def fixed_pose(self, frame: str, body: str) -> list[list[fmpq]] | None:
-        """(4, 4) X_FB of two bodies that are welded together, perhaps through others; None if a joint between them moves."""
+        """Returns X_FB, (4, 4), of two bodies that are welded together, perhaps through others; None if a joint between them moves."""
         if any(joint.index is not None for joint, _ in self.path(frame, body)):
             return None
         X = [[entry.coefficient(0) if entry != 0 else fmpq(0) for entry in row] for row in self.pose(frame, body)]
         return [[x / X[3][3] for x in row] for row in X]
 
     def scale(self, frame: str, body: str) -> fmpq:
-        """The least value of the denominator: its value at s = 0."""
+        """Returns the least value of the denominator, which is its value at s = 0."""
         product = fmpq(1)
         for joint, _ in self.path(frame, body):
             product *= rigid(_doubles(joint.X_PF))[3][3] * rigid(_doubles(joint.X_BM))[3][3]
@@ -111,7 +119,7 @@ class ExactKinematics:
         return [[self._embed(x) for x in row] for row in rows]
 
     def _joint(self, joint: Joint, upwards: bool) -> tuple[Numbers, Matrix | None, Numbers]:
-        """The joint's fixed frame, its motion, and the other one."""
+        """Returns the joint's first fixed frame, its motion (None for a weld), and its last fixed frame, in the order of the path."""
         first, last = (joint.X_BM, joint.X_PF) if upwards else (joint.X_PF, joint.X_BM)
         outer, inner = rigid(_doubles(first)), _inverse(_doubles(last))
         if joint.index is None:
@@ -128,7 +136,10 @@ class ExactKinematics:
         return outer, middle, inner
 
     def _rotation(self, axis: list[fmpq], cosine: fmpq_mpoly, sine: fmpq_mpoly) -> Matrix:
-        """(c^2 + s^2) R about the axis for half-angle cosine and sine: (c^2 + s^2) I + 2 c s [u] + 2 s^2 [u]^2."""
+        """Returns (c^2 + s^2) R = (c^2 + s^2) I + 2 c s [u] + 2 s^2 [u]^2 for the half-angle cosine c and sine s.
+
+        [u] is the cross-product matrix of the axis.
+        """
         x, y, z = axis
         zero = fmpq(0)
         skew = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
@@ -149,10 +160,10 @@ def _doubles(X: Array) -> bytes:
 
 @lru_cache(maxsize=1024)
 def rigid(doubles: bytes) -> Numbers:
-    """The rigid transform that 16 doubles stand for times its entry [3][3] > 0, (4, 4), not to be changed."""
+    """Returns the rigid transform that 16 doubles stand for, (4, 4), times its entry [3][3] > 0. The caller must not change it."""
     X = [[exact(x) for x in row] for row in np.frombuffer(doubles).reshape(4, 4)]
     (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = X
-    # Four times q_j q for each entry q_j of the unit quaternion q; the largest q_j is a half at least.
+    # Row j is 4 q_j q, for each entry q_j of the unit quaternion q. The largest |q_j| is at least a half.
     multiples = [
         [1 + a + e + i, h - f, c - g, d - b],
         [h - f, 1 + a - e - i, b + d, c + g],
@@ -171,7 +182,7 @@ def rigid(doubles: bytes) -> Numbers:
 
 @lru_cache(maxsize=1024)
 def _inverse(doubles: bytes) -> Numbers:
-    """Of the rigid transform that 16 doubles stand for, times the same entry [3][3]."""
+    """Returns the inverse of the rigid transform that 16 doubles stand for, times the same entry [3][3]."""
     X, p = rigid(doubles), [exact(x) for x in np.frombuffer(doubles).reshape(4, 4)[:3, 3]]
     R = [[X[j][i] for j in range(3)] for i in range(3)]
     return [[*row, -sum((x * y for x, y in zip(row, p, strict=True)), fmpq(0))] for row in R] + [X[3]]
@@ -179,7 +190,7 @@ def _inverse(doubles: bytes) -> Numbers:
 
 @lru_cache(maxsize=1024)
 def unit(doubles: bytes) -> list[fmpq]:
-    """The unit vector that the three doubles of an axis stand for, not to be changed."""
+    """Returns the unit vector that the three doubles of an axis stand for. The caller must not change it."""
     axis = [exact(x) for x in np.frombuffer(doubles)]
     pole = max(range(3), key=lambda i: abs(axis[i]))
     plane = [fmpq(0) if i == pole else _rounded(x / (1 + abs(axis[pole]))) for i, x in enumerate(axis)]
@@ -189,12 +200,12 @@ def unit(doubles: bytes) -> list[fmpq]:
 
 
 def _rounded(x: fmpq) -> fmpq:
-    """Down to a multiple of 2^-ROUNDING_BITS."""
+    """Returns x rounded down to a multiple of 2^-ROUNDING_BITS."""
     return fmpq((x * 2**ROUNDING_BITS).floor()) / 2**ROUNDING_BITS
 
 
 def _multiply(A: Any, B: Any) -> Any:
-    """Of numbers, polynomials, or either and the other."""
+    """Returns the product of two matrices, each of which holds numbers or polynomials."""
     product, zero = [], 0 * A[0][0] * B[0][0]
     for row in A:
         terms = [(k, x) for k, x in enumerate(row) if x != 0]

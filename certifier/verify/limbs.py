@@ -1,13 +1,16 @@
-"""Exact integer arrays whose products are done by BLAS.
+"""BLAS multiplies arrays of integers exactly, when they are held as this module holds them.
 
-An array of integers X is held as doubles x of shape (w, ...), its *limbs*: X = sum_i x[i] 2^(16 i). It is *normal* when
-0 <= x[i] < 2^16 for all but the last limb, which carries the sign and lies in [-2^15, 2^15).
+An array of integers X is held as doubles x of shape (w, ...), its *limbs*: X = sum_i x[i] 2^(16 i). The limbs are *normal* when
+0 <= x[i] < 2^16 for all but the last one. The last limb carries the sign and lies in [-2^15, 2^15).
 
-Why no operation rounds: every double that occurs is an integer below 2^53 in magnitude, and sums, differences and products of
-integers are exact in double precision as long as they stay below it, in whatever order they are added and with or without fused
-multiply-add. A product of two limbs is at most 2^32, and :func:`product` refuses to add more than 2^16 of them: its limbs stay
-below 2^48, and up to 16 such arrays may be added before :func:`normal`. There 2^-16 x and floor are exact, the carries stay below 2^37.
-:func:`absolute_sums` adds normal limbs, fewer than 2^37 of them in any memory.
+Why no operation rounds:
+
+Every double that occurs is an integer below 2^53 in magnitude. Sums, differences and products of integers are exact in double precision
+as long as they stay below 2^53. This is so in whatever order they are added, and with or without fused multiply-add.
+
+A product of two limbs is at most 2^32, and :func:`product` refuses to add more than 2^16 of them. So its limbs stay below 2^48, and up to
+16 such arrays may be added before :func:`normal` is called. In :func:`normal`, 2^-16 x and floor are exact, and the carries stay below
+2^37. :func:`absolute_sums` adds normal limbs, and any memory holds fewer than 2^37 of them.
 """
 
 from __future__ import annotations
@@ -26,14 +29,14 @@ MAX_TERMS = 1 << 16
 
 
 def of_rows(rows: Sequence[Sequence[int]]) -> Array:
-    """Normal limbs of Python integers, (w, r, c)."""
+    """Returns normal limbs of Python integers, (w, r, c)."""
     width = max((value.bit_length() for row in rows for value in row), default=0) // BITS + 1
     words = b"".join(value.to_bytes(2 * width, "little", signed=True) for row in rows for value in row)
     return _of_words(np.frombuffer(words, dtype="<u2").reshape(len(rows), -1, width))
 
 
 def of_array(values: np.ndarray) -> Array:
-    """Normal limbs of an int64 array, (w, *shape)."""
+    """Returns normal limbs of an int64 array, (w, *shape)."""
     return _trimmed(_of_words(np.ascontiguousarray(values, dtype="<i8").view("<u2").reshape(*values.shape, 4)))
 
 
@@ -44,13 +47,13 @@ def _of_words(words: np.ndarray) -> Array:
 
 
 def normal(x: Array) -> Array:
-    """The same integers in normal limbs; the limbs given are integers below 2^52 in magnitude."""
+    """Returns the same integers in normal limbs; the limbs given must be integers below 2^52 in magnitude."""
     return _trimmed(_carried(x))
 
 
 def _carried(x: Array) -> Array:
-    """Normal limbs, the last ones perhaps without need."""
-    # Three limbs more take up what reaches beyond the last one.
+    """Returns normal limbs, of which the last ones may not be needed."""
+    # Three more limbs take up what reaches beyond the last one.
     limbs = np.concatenate([x, np.zeros((3, *x.shape[1:]))])
     carry = np.empty(x.shape[1:])
     for low, high in itertools.pairwise(limbs):
@@ -63,7 +66,7 @@ def _carried(x: Array) -> Array:
 
 
 def _trimmed(x: Array) -> Array:
-    """Without leading limbs that only repeat the sign."""
+    """Returns the limbs without leading ones that only repeat the sign."""
     while len(x) > 1:
         last = x[-2] + BASE * x[-1]
         if last.size and (last.min() < -BASE / 2 or last.max() >= BASE / 2):
@@ -74,10 +77,12 @@ def _trimmed(x: Array) -> Array:
 
 
 def product(A: Array, B: Array) -> Array:
-    """Limbs, not normal, of the matrix product of normal A, (a, r, s), and normal B, (b, s, c): (a + b - 1, r, c), below 2^48.
+    """Returns limbs of the matrix product of A, (a, r, s), and B, (b, s, c), whose limbs must be normal.
+
+    The limbs returned, (a + b - 1, r, c), are below 2^48 and not normal.
 
     Raises:
-        ProofError: so many terms that a sum might round.
+        ProofError: a sum has so many terms that it might round.
     """
     (a, r, s), (b, _, c) = A.shape, B.shape
     if s * min(a, b) > MAX_TERMS:
@@ -90,7 +95,7 @@ def product(A: Array, B: Array) -> Array:
 
 
 def difference(A: Array, B: Array) -> Array:
-    """Limbs of A - B, shapes (a, ...) and (b, ...), not normal."""
+    """Returns limbs of A - B, for A (a, ...) and B (b, ...); they are not normal."""
     limbs = np.zeros((max(len(A), len(B)), *A.shape[1:]))
     limbs[: len(A)] += A
     limbs[: len(B)] -= B
@@ -98,12 +103,12 @@ def difference(A: Array, B: Array) -> Array:
 
 
 def integers(x: Array) -> list[list[int]]:
-    """The integers X of shape (r, c), for limbs (w, r, c), normal or not."""
+    """Returns the integers X of shape (r, c), for limbs (w, r, c), normal or not."""
     return [[_integer(x[:, i, j]) for j in range(x.shape[2])] for i in range(x.shape[1])]
 
 
 def absolute_sums(x: Array) -> list[int]:
-    """Sums of |X| over the last axis, for X of shape (r, c) in limbs (w, r, c) below 2^52: r integers."""
+    """Returns the sums of |X| over the last axis, r integers, for X of shape (r, c) in limbs (w, r, c) below 2^52."""
     limbs = _carried(x)
     sums = np.where(limbs[-1] < 0, -limbs, limbs).sum(axis=-1)
     return [_integer(row) for row in sums.T]

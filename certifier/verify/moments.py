@@ -1,8 +1,13 @@
-"""Pseudo-moments: linear functionals on the polynomials of one side of a pair, by their values on monomials.
+"""Pseudo-moments are linear functionals on the polynomials of one side of a pair, given by their values on monomials.
 
-With k chain joints out of n and m the 3^k monomials of coordinate degree <= 2 in the chain's coordinates, every polynomial of the program
-is a combination of u_e m, e = 0 .. n, u_0 = 1. The distinct ones, N = 3^k + k 3^(k-1) + (n - k) 3^k, in this order: the m, prod u_i^e_i at
-sum_i e_i 3^i; for every chain joint those with its exponent 3, at the same sum over the others; for every other joint u_l m.
+Let k of the n joints be on the chain. Let m be the 3^k monomials of coordinate degree <= 2 in the chain's coordinates. Every polynomial of
+the program is a combination of u_e m, e = 0 .. n, with u_0 = 1.
+
+N = 3^k + k 3^(k-1) + (n - k) 3^k of these products are distinct. They stand in this order:
+
+- first the m, with prod u_i^e_i at sum_i e_i 3^i;
+- then, for every chain joint, the products in which its exponent is 3, at the same sum over the other joints of the chain;
+- then, for every joint l that is not on the chain, the products u_l m.
 """
 
 from __future__ import annotations
@@ -16,7 +21,7 @@ from certifier.model import Array
 
 @lru_cache(maxsize=64)
 def table(chain: tuple[int, ...], n: int) -> np.ndarray:
-    """(n + 1, 3^k) index of u_e m among the N monomials."""
+    """Returns the index of every u_e m among the N monomials, (n + 1, 3^k)."""
     k, size = len(chain), 3 ** len(chain)
     code = np.arange(size)
     digits = code[:, None] // 3 ** np.arange(k) % 3
@@ -33,7 +38,7 @@ def table(chain: tuple[int, ...], n: int) -> np.ndarray:
 
 
 def monomials(chain: tuple[int, ...], n: int) -> np.ndarray:
-    """(N, n) exponents of the monomials."""
+    """Returns the exponents of the monomials, (N, n)."""
     index = table(chain, n)
     exponents = np.zeros((index.max() + 1, n), dtype=int)
     digits = np.arange(index.shape[1])[:, None] // 3 ** np.arange(len(chain)) % 3
@@ -45,6 +50,6 @@ def monomials(chain: tuple[int, ...], n: int) -> np.ndarray:
 
 
 def localised(moments: Array, weights: Array, chain: tuple[int, ...]) -> Array:
-    """x_v(g_j m) for moments (V, N) and weights g (F, n + 1) in [1, u]: (F, V, 3^k)."""
+    """Returns x_v(g_j m), (F, V, 3^k), for moments (V, N) and weights g (F, n + 1) in [1, u]."""
     expanded = moments[:, table(chain, weights.shape[1] - 1)]
     return np.einsum("fe,vem->fvm", weights, expanded)

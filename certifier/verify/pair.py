@@ -1,12 +1,16 @@
-"""Exact check of one pair's proof (certifier.proof.pair): what it states is true of the scene's numbers, or ProofError says why not.
+"""The verifier checks one pair's proof (certifier.proof.pair) exactly here.
 
-With every vertex's residual e_v on the box bounded (certifier.verify.residual), and den >= sigma,
+What the proof states is true of the scene's numbers, or ProofError says why not.
+
+certifier.verify.residual bounds the residual e_v of every vertex on the box. With this bound, and because den >= sigma,
 
     a'p_v/den + b >= r kappa + t - max |e_v|
 
-for every configuration of the polytope: if t is larger than the bound and |a| <= kappa, then the volume, its ball included, is strictly on
-its side of the plane. That |a| <= kappa on the box is checked at the box's corners, |a| being convex. That the volumes contain the
-geometries they stand for is certifier.verify.volume's matter.
+for every configuration of the polytope. If t is larger than the bound and |a| <= kappa, then the volume, its ball included, is strictly on
+its side of the plane.
+
+It is enough to check |a| <= kappa at the box's corners, because |a| is convex. certifier.verify.volume checks that the volumes contain the
+geometries that they stand for.
 """
 
 from __future__ import annotations
@@ -30,16 +34,16 @@ from certifier.verify.volume import check_contained, check_volume
 
 MAX_CORNER_JOINTS = 16
 TOGETHER = 1 << 20
-"""Entries of the Gram matrices that are checked at once."""
+"""The vertices are checked in parts of at most this many entries of Gram matrices, or of one vertex."""
 
 
 @dataclass(frozen=True)
 class PairStatement:
-    """What a valid proof proves.
+    """States what a valid proof proves.
 
     Attributes:
-        pairs: the pairs of the scene that it covers.
-        gap: lower bound in metres of the distance between the two (padded) bodies of each on the polytope.
+        pairs: the pairs of the scene that the proof covers.
+        gap: lower bound in metres of the distance between the two (padded) bodies of each of these pairs on the polytope.
     """
 
     pairs: tuple[Pair, ...]
@@ -47,7 +51,7 @@ class PairStatement:
 
 
 def verify_pair(proof: PairProof) -> PairStatement:
-    """Check a pair's proof in exact arithmetic.
+    """Checks a pair's proof in exact arithmetic and returns what it proves.
 
     Raises:
         ProofError: the proof does not hold; the code says which part.
@@ -60,10 +64,10 @@ def verify_pair(proof: PairProof) -> PairStatement:
 
 
 def check_ground(scene: Scene, ground: Ground) -> None:
-    """Check shapes, and that the faces and the joint limits imply the box.
+    """Checks the shapes of a ground, and that its faces and the joint limits imply its box.
 
     Raises:
-        ProofError: they do not.
+        ProofError: the ground is too large, a shape is wrong, or the box is not implied.
     """
     n, m = scene.n, ground.d.size
     if m > limits.FACES:
@@ -74,7 +78,7 @@ def check_ground(scene: Scene, ground: Ground) -> None:
             raise ProofError("proof_malformed", f"{name} of a polytope is {getattr(ground, name).shape}, not {shape}")
     if not (ground.half > 0).all():
         raise ProofError("proof_box", "the box of a polytope is empty")
-    # Doubles just inside the exact corners mid -+ half imply the corners.
+    # The doubles just inside the exact corners mid -+ half imply the corners.
     lower, upper = np.nextafter(ground.mid - ground.half, np.inf), np.nextafter(ground.mid + ground.half, -np.inf)
     for i in range(n):
         if not (
@@ -87,23 +91,25 @@ def check_ground(scene: Scene, ground: Ground) -> None:
 
 
 def check_interior(scene: Scene, ground: Ground, point: Array) -> None:
-    """Check that a ground has a point within the joint limits: of an empty polytope everything could be said.
+    """Checks that the point is in the ground and within the joint limits, so that this polytope is not empty.
+
+    Everything could be said of an empty polytope.
 
     Raises:
-        ProofError: the point is not in it.
+        ProofError: the point is not in the ground, or not within the joint limits.
     """
     if point.shape != (scene.n,) or not (within_limits(scene, point) and _limited(scene, ground).contains(point)):
         raise ProofError("proof_interior", "the point that should show that the polytope is not empty is not in it")
 
 
 def _limited(scene: Scene, ground: Ground) -> Halfspaces:
-    """The ground's faces and the joint limits."""
+    """Returns the ground's faces and the joint limits as half-spaces."""
     polytope = scene.polytope(ground.C, ground.d)
     return Halfspaces(polytope.C, polytope.d)
 
 
 def faces_of(ground: Ground) -> list[list[fmpq]]:
-    """Coefficients in [1, u], (m + 2n, n + 1), of the ground's faces d_j - c_j's, then of 1 + u_i, then of 1 - u_i."""
+    """Returns the coefficients in [1, u], (m + 2n, n + 1), of the ground's faces d_j - c_j's, then of 1 + u_i, then of 1 - u_i."""
     mid, half = [exact(x) for x in ground.mid], [exact(x) for x in ground.half]
     faces = []
     for c, d in zip(ground.C, ground.d, strict=True):
@@ -120,7 +126,7 @@ class PairCheck:
     """Checks proofs that share one ground, which :func:`check_ground` has accepted.
 
     Args:
-        contained: volumes that are known to contain their geometries, by id; checks of one scene may share it.
+        contained: volumes that are known to contain their geometries, by id. The checks of one scene may share it.
     """
 
     def __init__(self, scene: Scene, ground: Ground, contained: dict[int, Volume] | None = None) -> None:
@@ -132,10 +138,10 @@ class PairCheck:
         self._contained: dict[int, Volume] = {} if contained is None else contained
 
     def verify(self, proof: PairProof) -> PairStatement:
-        """Check one proof on the ground.
+        """Checks one proof on the ground and returns what it proves.
 
         Raises:
-            ProofError: it does not hold.
+            ProofError: the proof does not hold.
         """
         scene = self._scene
         if proof.scene.hash != scene.hash:
@@ -185,7 +191,7 @@ class PairCheck:
 def _residual(
     numerators: Numerators, volume: Volume, side: Side, plane: Sequence[Sequence[fmpq]], weights: Sequence[Sequence[fmpq]]
 ) -> fmpq:
-    """Largest bound of |e_v| on the box, over the volume's vertices, so many at once as fit into little memory."""
+    """Returns the largest bound of |e_v| on the box over the volume's vertices, taking as many at once as fit into little memory."""
     k, V = len(side.chain), len(volume.vertices)
     entries = max(len(weights) * 4**k, 4 * len(plane[0]) * 3**k)
     if entries > limits.FACTORS:
@@ -206,10 +212,12 @@ def _names(proof: PairProof) -> str:
 
 
 def _largest_square_norm(normal: Sequence[Sequence[fmpq]]) -> fmpq:
-    """Largest |a(u)|^2 over the corners of the box, a(u) = normal [1; u]; |a| is convex, so over the box.
+    """Returns the largest |a(u)|^2 over the corners of the box, where a(u) = normal [1; u].
+
+    It is the largest over the whole box, because |a| is convex.
 
     Raises:
-        ProofError: too many corners.
+        ProofError: the box has too many corners.
     """
     moving = [i for i in range(1, len(normal[0])) if any(row[i] != 0 for row in normal)]
     if len(moving) > MAX_CORNER_JOINTS:
@@ -226,6 +234,6 @@ def _largest_square_norm(normal: Sequence[Sequence[fmpq]]) -> fmpq:
 
 
 def _lower_root(x: fmpq) -> float:
-    """A double below the square root of x > 0."""
+    """Returns a double below the square root of x > 0."""
     root = math.isqrt((int(x.p) << 256) // int(x.q))
     return float(np.nextafter(root * 2.0**-128, 0.0)) if root < 1 << 1000 else 0.0

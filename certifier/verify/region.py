@@ -1,4 +1,7 @@
-"""Exact check of a region's proof: every pair of the scene is separated on the whole region, or ProofError says why not."""
+"""The verifier checks a region's proof exactly here.
+
+Every pair of the scene is separated on the whole region, or ProofError says why not.
+"""
 
 from __future__ import annotations
 
@@ -22,17 +25,17 @@ from certifier.verify.scene import check_scene
 from certifier.verify.volume import check_contained
 
 NAMED = 20
-"""Two bodies each that a statement names of those that the scene leaves out."""
+"""A statement gives at most this many counts of pairs that the scene leaves out; each count is for two bodies."""
 
 
 @dataclass(frozen=True)
 class RegionStatement:
-    """What a valid proof proves.
+    """States what a valid proof proves.
 
     Attributes:
         faces: number of half-spaces, joint limits included.
         gaps: for every pair of the scene, in its order, a lower bound in metres of the distance between the two (padded) bodies.
-        N: |s|^2 <= N on the region (Archimedean, appendix A).
+        N: bound with |s|^2 <= N on the region (Archimedean, appendix A).
     """
 
     scene: Scene
@@ -42,11 +45,11 @@ class RegionStatement:
 
     @property
     def gap(self) -> float:
-        """Least certified distance in metres over all pairs (0 when there is no pair)."""
+        """Returns the least certified distance in metres over all pairs (0 when there is no pair)."""
         return min(self.gaps.values(), default=0.0)
 
     def lines(self) -> list[str]:
-        """The statement in plain words."""
+        """Returns the statement in plain words."""
         scene = self.scene
         joints = [
             f"  {j.name}: {exactly(lower)} to {exactly(upper)} {'rad' if r else 'm'} (centre {exactly(q)})"
@@ -69,10 +72,10 @@ class RegionStatement:
 
 
 def _unlisted(scene: Scene) -> str:
-    """Returns what the scene leaves out in words: pairs of geometries that move against each other, but are neither pairs nor ignored.
+    """Returns, in words, how many pairs of geometries the scene leaves out: they can move against each other, but it does not list them.
 
-    They are counted for each two bodies, NAMED of which are named. What is looked at is linear in what the scene lists, since two
-    bodies without a listed pair are among those named.
+    Listed are the pairs to certify and the ignored ones. The missing ones are counted for each two bodies, and the first NAMED counts
+    are given. The time is linear in what the scene lists: of the bodies looked at, two without a listed pair are among those named.
     """
     body = {geometry.name: geometry.body for geometry in scene.geometries}
     held = Counter(body.values())
@@ -96,7 +99,7 @@ def _rigid_part(scene: Scene, body: str) -> str:
 
 
 def verify_region(data: bytes) -> RegionStatement:
-    """Check a region's proof file.
+    """Checks a region's proof file and returns what it proves.
 
     Raises:
         ProofError: the file is malformed or the proof does not hold.
@@ -126,7 +129,7 @@ def verify_region(data: bytes) -> RegionStatement:
 
 
 def _check_polytope(proof: RegionProof) -> None:
-    """The region has the joint limits among its rows, a point strictly inside, and is Archimedean, hence bounded."""
+    """Checks that the region has the joint limits among its rows and a point strictly inside, and is Archimedean, hence bounded."""
     scene, n = proof.scene, proof.scene.n
     if max(proof.d.size, proof.implied.d.size) > limits.FACES:
         raise ProofError("proof_too_large", f"the region has more than {limits.FACES} half-spaces, or implies more")
@@ -146,7 +149,7 @@ def _check_polytope(proof: RegionProof) -> None:
 
 
 def _check_implied(proof: RegionProof) -> None:
-    """The multipliers prove the implied half-spaces."""
+    """Checks that the multipliers prove the implied half-spaces."""
     implied, n = proof.implied, proof.scene.n
     h = implied.d.size
     if implied.d.shape != (h,) or implied.C.shape != (h, n) or implied.Y.shape != (h, len(proof.d)):
@@ -158,14 +161,14 @@ def _check_implied(proof: RegionProof) -> None:
 
 
 def _check_inside(proof: RegionProof, ground: Ground) -> None:
-    """Every face of the ground is a half-space of the region or an implied one, or one of them moved outwards."""
+    """Checks that every face of the ground is a half-space of the region or an implied one, or one of them moved outwards."""
     C, d = np.concatenate([proof.C, proof.implied.C]), np.concatenate([proof.d, proof.implied.d])
     if not _among(C, d, ground.C, ground.d):
         raise ProofError("proof_ground", "a pair's proof is about a polytope that does not contain the region")
 
 
 def _among(C: np.ndarray, d: np.ndarray, rows: np.ndarray, offsets: np.ndarray) -> bool:
-    """Whether every row is one of C's with an offset that is no smaller."""
+    """Returns whether every one of ``rows`` is a row of C, with an offset that is no smaller than the one in d."""
     least: dict[bytes, float] = {}
     for c, offset in zip(C + 0.0, d, strict=True):
         least[c.tobytes()] = min(offset, least.get(c.tobytes(), np.inf))

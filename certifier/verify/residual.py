@@ -1,13 +1,16 @@
-"""Exact bound of how far the sums of squares of one side of a proof miss the polynomials they stand for.
+"""The verifier bounds here, exactly, how far the sums of squares of one side of a proof miss the polynomials that they stand for.
 
-For every vertex v of the side's volume, in the box's coordinates u and divided by sigma, the least value of den,
+For every vertex v of the side's volume the residual is, in the box's coordinates u and divided by sigma, the least value of den,
 
-    e_v(u) = +-(a'p_v + b den)/sigma - (r kappa + t) den/sigma - sum_j g_j |L_j' rho|^2,   g_0 = 1,
+    e_v(u) = +-(a'p_v + b den)/sigma - (r kappa + t) den/sigma - sum_j g_j |L_j' rho|^2,   g_0 = 1.
 
-and |e_v| <= the sum of its coefficients' absolute values on |u_i| <= 1. With m the 3^k monomials of coordinate degree <= 2 in the
-chain's coordinates, every part is of the form sum_e u_e (c_e' m), u_0 = 1: the plane's coefficients times those of p_v, the faces' times
-those of the squares. Both are matrix products of integers (certifier.verify.limbs). The coefficients of the numerators alone are
-rounded down, to multiples of 2^-128; what that can change is part of the bound.
+On the box, where |u_i| <= 1, |e_v| is at most the sum of the absolute values of its coefficients.
+
+Let m be the 3^k monomials of coordinate degree <= 2 in the chain's coordinates. Every part of e_v has the form sum_e u_e (c_e' m), with
+u_0 = 1: the plane's coefficients times those of p_v, and the faces' coefficients times those of the squares. Both are matrix products of
+integers (certifier.verify.limbs).
+
+Only the coefficients of the numerators are rounded, down to multiples of 2^-128. What that can change is part of the bound.
 """
 
 from __future__ import annotations
@@ -29,18 +32,21 @@ from certifier.verify.kinematics import ExactKinematics, exact
 
 POSITION_BITS = 128
 MAX_CHAIN = 7
-"""With k joints 4^k products of two limbs of a factor are added, and 4 such sums, as a factor's 64 bits are 4 limbs: below 2^52. Then
-k + 1 differences of two products of matrices are, 16 arrays below 2^48."""
+"""A chain may have this many joints, so that no sum rounds.
+
+With k joints, 4^k products of two limbs of a factor are added, and then 4 such sums, because a factor's 64 bits are 4 limbs. The result is
+below 2^52. Then k + 1 differences of two products of matrices are added, which are 16 arrays below 2^48.
+"""
 
 
 @dataclass(frozen=True)
 class Numerators:
-    """X_FB times its denominator over sigma, in units of 2^-POSITION_BITS, rounded down.
+    """Holds X_FB times its denominator over sigma, in units of 2^-POSITION_BITS, rounded down.
 
     Attributes:
         chain: position indices of the joints between F and B, ascending.
-        columns: limbs of the (4, 4 * 3^k) integers; row c holds column c of the matrix, its four entries one after the other, the
-            monomial prod u_i^e_i at sum_i e_i 3^i.
+        columns: limbs of the (4, 4 * 3^k) integers. Row c holds column c of the matrix, its four entries one after the other. In each
+            entry the monomial prod u_i^e_i is at sum_i e_i 3^i.
     """
 
     chain: tuple[int, ...]
@@ -48,7 +54,7 @@ class Numerators:
 
     @classmethod
     def between(cls, kinematics: ExactKinematics, frame: str, body: str) -> Numerators:
-        """The numerators from frame body F to body B.
+        """Returns the numerators from the frame of body F to body B.
 
         Raises:
             ProofError: more joints lie between them than MAX_CHAIN.
@@ -65,7 +71,7 @@ class Numerators:
             for powers, coefficient in X[i][c].to_dict().items():
                 if powers not in places:
                     places[powers] = sum(powers[joint] * 3**position for position, joint in enumerate(chain))
-                # As integers: to reduce the fraction of the product would take longer.
+                # The product is taken in integers, because to reduce its fraction would take longer.
                 values[places[powers]] = int(coefficient.p * scale.p // (coefficient.q * scale.q))
             columns[c] += values
         return cls(chain, limbs.of_rows(columns))
@@ -74,7 +80,7 @@ class Numerators:
 def largest_residual(
     numerators: Numerators, volume: Volume, side: Side, plane: Sequence[Sequence[fmpq]], weights: Sequence[Sequence[fmpq]]
 ) -> fmpq:
-    """Largest bound of |e_v| on the box, over the volume's vertices.
+    """Returns the largest bound of |e_v| on the box, over the volume's vertices.
 
     Args:
         plane: (4, n + 1) coefficients in [1, u] of +-a, and of +-b - (r kappa + t); dyadic numbers.
@@ -108,18 +114,18 @@ def largest_residual(
 
 
 def dyadic(rows: Sequence[Sequence[fmpq]]) -> tuple[list[list[int]], int]:
-    """Integers X and the least e >= 0 such that the rows are 2^-e X."""
+    """Returns integers X and the least e >= 0 such that the rows are 2^-e X."""
     bits = _bits(rows)
     return _integers(rows, [bits] * len(rows)), bits
 
 
 def _bits(values: Sequence[Sequence[fmpq]]) -> int:
-    """The least e >= 0 for which all 2^e x are integers."""
+    """Returns the least e >= 0 for which all 2^e x are integers."""
     return max(int(x.q).bit_length() for row in values for x in row) - 1
 
 
 def _integers(values: Sequence[Sequence[fmpq]], bits: Sequence[int]) -> list[list[int]]:
-    """2^bits[i] times row i."""
+    """Returns the integers 2^bits[i] times row i, for every row."""
     return [[int(x.p) << e + 1 - int(x.q).bit_length() for x in row] for row, e in zip(values, bits, strict=True)]
 
 
@@ -128,7 +134,7 @@ def _transposed(rows: list[list[int]]) -> Array:
 
 
 def _squares(side: Side) -> Array:
-    """|L_j' rho|^2 in units of 4^exponent_j, in normal limbs of the (f + 1, V * 3^k) integers."""
+    """Returns |L_j' rho|^2 in units of 4^exponent_j, in normal limbs of the (f + 1, V * 3^k) integers."""
     length, (vertices, faces) = 2 ** len(side.chain), side.mantissa.shape[:2]
     mantissa = limbs.of_array(side.mantissa)
     rows, columns = lower_triangle(length)
@@ -144,20 +150,23 @@ def _squares(side: Side) -> Array:
 
 @lru_cache(maxsize=MAX_CHAIN + 1)
 def _places(k: int) -> np.ndarray:
-    """(3^k,) where the monomial of degrees 0 to 2 stands among those of degrees 0 to 3."""
+    """Returns where each monomial of degrees 0 to 2 stands among those of degrees 0 to 3, (3^k,)."""
     return np.array([sum(d * 4**i for i, d in enumerate(reversed(digits))) for digits in itertools.product(range(3), repeat=k)], dtype=int)
 
 
 @lru_cache(maxsize=MAX_CHAIN + 1)
 def _gather(k: int) -> Array:
-    """(4^k, 3^k): 1 where rho_i rho_j is the monomial."""
+    """Returns a matrix, (4^k, 3^k), that is 1 where rho_i rho_j is the monomial and 0 elsewhere."""
     subsets = np.array(list(itertools.product(range(2), repeat=k)), dtype=int).reshape(2**k, k)
     code = (subsets[:, None, :] + subsets[None, :, :]) @ 3 ** np.arange(k)
     return np.asarray(code.reshape(-1, 1) == np.arange(3**k), dtype=float)
 
 
 def _coefficient_sums(missed: Array, chain: tuple[int, ...]) -> list[int]:
-    """Sums of the absolute values of the coefficients of sum_e u_e (c_e' m), for c in limbs (w, n + 1, V, 3^k): V integers."""
+    """Returns, for every vertex, the sum of the absolute values of the coefficients of sum_e u_e (c_e' m), V integers.
+
+    c is given in limbs (w, n + 1, V, 3^k).
+    """
     k, width, place = len(chain), missed.shape[0], _places(len(chain))
     inside = np.zeros((width, missed.shape[2], 4**k))
     inside[:, :, place] += missed[:, 0]

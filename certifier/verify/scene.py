@@ -1,6 +1,7 @@
-"""Exact checks need a model that makes sense: a tree of rigid links, limits that tan((q - q*)/2) can express, bodies that are not empty.
+"""The verifier checks here that the model of a proof makes sense, which exact checks need.
 
-It must also be one whose statement can be printed, names and reasons as they stand, and that can be checked within limits.
+A model makes sense when it is a tree of rigid links, when tan((q - q*)/2) can express its limits, and when no body is empty. A statement
+must also be able to print its names and reasons as they stand, and the model must be within the limits of what is checked.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ from certifier.model import WORLD, Joint, JointKind, Scene, escaped, is_name, is
 from certifier.proof import limits
 
 RIGID = 1e-9
-"""How far the numbers of a rotation or of an axis may be from orthonormal; those of a parsed model are so to about 1e-16."""
+"""The numbers of a rotation or of an axis may be this far from orthonormal; those of a parsed model are within about 1e-16."""
 
 
 def check_scene(scene: Scene) -> None:
-    """Check the model that a proof is about.
+    """Checks the model that a proof is about.
 
     Raises:
         ProofError: proof_model, with what is wrong, or proof_too_large.

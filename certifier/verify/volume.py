@@ -1,11 +1,12 @@
-"""Exact check that a proof's volume contains every geometry it stands for.
+"""The verifier checks here, exactly, that a proof's volume contains every geometry that it stands for.
 
-A geometry conv(V) + ball(r) lies in conv(W) + ball(R) if each of its vertices v does with its ball, the latter being convex. For that
+A geometry conv(V) + ball(r) lies in conv(W) + ball(R) if each of its vertices v does so together with its ball v + ball(r), because
+conv(W) + ball(R) is convex. For a vertex, one of two conditions suffices:
 
-    |v - p| <= R - r   for a point p of W, or of a segment between two of them,
+- |v - p| <= R - r for a point p of W, or of a segment between two points of W;
+- W are the corners of a box along the axes, and v lies in the box with r - R (if positive) taken off every face.
 
-suffices, or, where W are the corners of a box along the axes, that v lies in the box with r - R (if positive) taken off every face. The
-vertices are taken into the volume's frame through welds; fixed frames are rigid motions, to the rounding of their doubles.
+The vertices are taken into the volume's frame through welds. Fixed frames are rigid motions, to the rounding of their doubles.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ Point = tuple[fmpq, ...]
 
 
 def check_contained(scene: Scene, volumes: Iterable[Volume]) -> None:
-    """Check that it is within limits to see whether the volumes contain their geometries.
+    """Checks that the volumes stand for so few vertices that it is within limits to see whether they contain their geometries.
 
     Raises:
         ProofError: proof_too_large.
@@ -35,10 +36,10 @@ def check_contained(scene: Scene, volumes: Iterable[Volume]) -> None:
 
 
 def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> None:
-    """Check that the volume is a body of the scene's and contains its geometries.
+    """Checks that the volume is fixed to a body of the scene and contains its geometries.
 
     Raises:
-        ProofError: it does not; the message names the geometry.
+        ProofError: the volume makes no sense, or does not contain a geometry, which the message names.
     """
     if not _is_known(scene, volume):
         raise ProofError("proof_volume", "a volume stands for nothing, or for what is no geometry of the scene")
@@ -63,12 +64,12 @@ def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> N
 
 
 def _is_known(scene: Scene, volume: Volume) -> bool:
-    """Whether the volume names geometries of the scene, and at least one."""
+    """Returns whether the volume names only geometries of the scene, and at least one."""
     return bool(volume.geometries) and all(map(scene.has_geometry, volume.geometries))
 
 
 def _vertices(kinematics: ExactKinematics, body: str, geometry: Geometry) -> list[Point]:
-    """The geometry's vertices in the body's frame."""
+    """Returns the geometry's vertices in the body's frame."""
     vertices = [tuple(exact(x) for x in vertex) for vertex in geometry.vertices]
     if geometry.body == body:
         return vertices
@@ -83,7 +84,7 @@ def _near_corner(v: Point, corners: Sequence[Point], distance: fmpq) -> bool:
 
 
 def _near_segment(v: Point, corners: Sequence[Point], distance: fmpq) -> bool:
-    """Whether v is within the distance of a point between two corners, by projection."""
+    """Returns whether v is within the distance of a point between two corners, which projection finds."""
     for start, end in itertools.combinations(corners, 2):
         offset, direction = _minus(v, start), _minus(end, start)
         length, along = _dot(direction, direction), _dot(offset, direction)
@@ -93,7 +94,7 @@ def _near_segment(v: Point, corners: Sequence[Point], distance: fmpq) -> bool:
 
 
 def _box(vertices: Array) -> tuple[Point, Point] | None:
-    """Lower and upper corner, if the vertices are exactly the eight corners of a box along the axes."""
+    """Returns the lower and the upper corner if the vertices are exactly the corners of a box along the axes, else None."""
     lower, upper = vertices.min(axis=0), vertices.max(axis=0)
     corners = set(itertools.product(*zip(lower.tolist(), upper.tolist(), strict=True)))
     if corners != set(map(tuple, vertices.tolist())):

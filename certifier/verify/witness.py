@@ -1,7 +1,7 @@
-"""Check of a refutation: at a configuration of the polytope a point of one padded body lies in the other, to TOLERANCE.
+"""The verifier checks a refutation here: at a configuration of the polytope a point of one padded body lies in the other, to TOLERANCE.
 
-The configuration is rational, so the positions of the two points are exact; bodies that just touch do so at no rational configuration,
-which is what the tolerance is for.
+The configuration is rational, so the positions of the two points are exact. Bodies that just touch do so at no rational configuration.
+The tolerance is there for that.
 """
 
 from __future__ import annotations
@@ -18,32 +18,32 @@ from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.scene import check_scene
 
 TOLERANCE = 1e-6
-"""Metres."""
+"""Two padded bodies that are at most this far apart, in metres, count as touching."""
 
 
 @dataclass(frozen=True)
 class WitnessStatement:
-    """What a valid witness proves: at s, in the polytope, the padded bodies of the pair touch or come within TOLERANCE of it."""
+    """States what a valid witness proves: at s, in the polytope, the padded bodies of the pair touch, or nearly so, to TOLERANCE."""
 
     pair: Pair
     s: Array
 
 
 def verify_witness(proof: WitnessProof) -> WitnessStatement:
-    """Check a refutation.
+    """Checks a refutation and returns what it proves.
 
     Raises:
-        ProofError: it does not hold.
+        ProofError: the refutation does not hold.
     """
     check_scene(proof.scene)
     return check_witness(proof)
 
 
 def check_witness(proof: WitnessProof) -> WitnessStatement:
-    """Check a refutation in a scene that :func:`check_scene` has accepted.
+    """Checks a refutation in a scene that :func:`check_scene` has accepted, and returns what it proves.
 
     Raises:
-        ProofError: it does not hold.
+        ProofError: the refutation does not hold.
     """
     scene, s = proof.scene, proof.s
     n, m = scene.n, proof.d.size
