@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import io
 import os
 import re
 import sys
@@ -29,6 +30,7 @@ class _Parser(argparse.ArgumentParser):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command and returns the exit status."""
+    _prepare_streams()
     parsed = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
         return _command(parsed.run)(parsed)
@@ -41,6 +43,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(f"{error.filename or ''}: {error.strerror or error}".removeprefix(": "), 2)
     except KeyboardInterrupt:
         return _fail("interrupted", INTERRUPTED)
+
+
+def _prepare_streams() -> None:
+    """Sees to it that whatever is printed can be printed.
+
+    A stream that the caller has closed leads nowhere, so that no file takes its place. A character that the terminal's encoding lacks is
+    written as an escape.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the least free number, which is this one
+    sys.stdout, sys.stderr = sys.stdout or open(1, "w", closefd=False), sys.stderr or open(2, "w", closefd=False)  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _command(where: str) -> Callable[[argparse.Namespace], int]:

@@ -5,14 +5,19 @@ Files come from strangers, so a child process checks them, with limits on its ti
 
 from __future__ import annotations
 
+import stat
 import sys
+import tempfile
 from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from certifier.errors import CirisError
 from certifier.isolation.child import run_in_child
 from certifier.model import escaped
+from certifier.proof.limits import FILE_BYTES
 from client.output import print_json
 
 HOLDS, DOES_NOT = 0, 1
@@ -26,7 +31,8 @@ def verify(args: Namespace) -> int:
     Raises:
         CirisError: the file cannot be read.
     """
-    found = _answer(Path(args.proof))
+    with _readable(Path(args.proof)) as path:
+        found = _answer(path)
     if args.json:
         print_json(found)
     elif found["holds"]:
@@ -39,6 +45,29 @@ def verify(args: Namespace) -> int:
     return DOES_NOT
 
 
+@contextmanager
+def _readable(path: Path) -> Iterator[Path]:
+    """Yields a path at which a child process finds the proof: the file itself, or a copy of what comes from a pipe.
+
+    Raises:
+        CirisError: no_file, naming the path.
+    """
+    where = path.absolute()
+    try:
+        if stat.S_ISREG(where.stat().st_mode) and where.parts[1] not in ("dev", "proc"):
+            yield where
+            return
+        with tempfile.NamedTemporaryFile(prefix="ciris-") as copy, open(where, "rb") as pipe:
+            copy.write(pipe.read(FILE_BYTES + 1))
+            copy.flush()
+            yield Path(copy.name)
+    except (OSError, CirisError) as error:
+        if isinstance(error, CirisError) and error.code != "no_file":
+            raise
+        what = error.message if isinstance(error, CirisError) else error.strerror or str(error)
+        raise CirisError("no_file", what, field=escaped(str(path))) from None
+
+
 def _answer(path: Path) -> dict[str, Any]:
     """Returns what :func:`certifier.verify.file.answer` says of the file, or which error ended the child process that checked it."""
     payload = {"path": str(path.absolute())}
@@ -48,6 +77,6 @@ def _answer(path: Path) -> dict[str, Any]:
         )
     except CirisError as error:
         if error.code == "no_file":
-            raise CirisError(error.code, error.message, field=escaped(str(path))) from None
+            raise CirisError(error.code, error.message) from None
         return {"holds": False, "error": {**error.to_document(), "message": escaped(error.message)}}
     return found

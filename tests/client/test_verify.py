@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from certifier.model import Ignored, Pair
 from certifier.proof import limits
 from certifier.proof.container import pack, unpack
+from certifier.proof.region import RegionProof
 from tests.certifier.proofs import region
-from tests.client.conftest import Ciris
+from tests.client.conftest import Ciris, command, surroundings
 
 
 def test_what_cannot_be_read_is_bad_input(ciris: Ciris, tmp_path: Path) -> None:
@@ -61,3 +65,36 @@ def test_what_takes_too_much_is_stopped(
     assert "the proof could not be checked" in done.error
     assert words in done.error
     assert done.error.isprintable()
+
+
+@pytest.mark.parametrize(
+    ("line", "printed"),
+    [
+        ("verify region", True),
+        ("verify <(cat region)", True),
+        ("verify /dev/stdin < region", True),
+        ("verify region <&-", True),
+        ("verify region >&-", False),
+        ("verify --json region >&-", False),
+        ("verify region <&- >&- 2>&-", False),
+    ],
+)
+def test_wherever_the_proof_comes_from_and_the_answer_goes(tmp_path: Path, line: str, printed: bool) -> None:
+    (tmp_path / "region").write_bytes(region())
+    ciris = " ".join(command())
+    done = subprocess.run(["bash", "-c", f"{ciris} {line}"], cwd=tmp_path, env=surroundings(), capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("the proof holds:") == printed
+
+
+def test_a_letter_that_the_terminal_lacks_is_escaped(tmp_path: Path) -> None:
+    proof = RegionProof.from_bytes(region())
+    a, b = sorted(geometry.name for geometry in proof.scene.geometries)[:2]
+    ignored = tuple(i for i in proof.scene.ignored if (i.a, i.b) != (a, b))
+    scene = replace(proof.scene, ignored=(*ignored, Ignored(a, b, "\u00fcber ein Gelenk")))
+    assert Pair(a, b) not in scene.pairs
+    (tmp_path / "region").write_bytes(replace(proof, scene=scene, proofs=tuple(replace(p, scene=scene) for p in proof.proofs)).to_bytes())
+    environment = surroundings(PYTHONIOENCODING="ascii")
+    done = subprocess.run(command("verify", "region"), cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "\\xfcber ein Gelenk" in done.stdout
