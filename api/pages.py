@@ -23,7 +23,7 @@ from api.access import READ, Db
 from api.routers import jobs, regions, scenes
 from api.schemas.jobs import GrowthPoint, Iteration, Job, PairCell, PairMatrix
 from api.schemas.scenes import PairInfo
-from certifier.verify.decimals import at_least_mm
+from certifier.verify.decimals import at_least_mm, at_most_mm
 from db.session import Database
 
 _ROOT = Path(dashboard.__file__).parent
@@ -36,7 +36,7 @@ _SECURITY = {
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse, dependencies=[READ])
 templates = Jinja2Templates(_ROOT / "templates")
-templates.env.filters["at_least_mm"] = at_least_mm
+templates.env.filters |= {"at_least_mm": at_least_mm, "at_most_mm": at_most_mm}
 
 
 def install(app: FastAPI) -> None:

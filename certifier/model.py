@@ -44,7 +44,7 @@ def is_name(text: object) -> bool:
 
 def is_sentence(text: object) -> bool:
     """Returns whether this may be a reason or a substitution: one line of at most 500 printable characters."""
-    return isinstance(text, str) and len(text) <= MAX_SENTENCE and text.isprintable()
+    return isinstance(text, str) and len(text) <= MAX_SENTENCE and text.isprintable() and "  " not in text
 
 
 def escaped(text: str) -> str:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from certifier.errors import CirisError
+from certifier.model import escaped
 from client.output import NEGATIVE
 
 EPILOG = """exit status: 0 success; 1 a negative answer (not certified, a proof that does not hold, a point outside);
@@ -25,7 +26,7 @@ INTERRUPTED = 130
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        self.exit(2, f"error: {message} (see {self.prog} --help)\n")
+        self.exit(2, f"error: {escaped(message)} (see {self.prog} --help)\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,7 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _prepare_streams()
     parsed = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
-        return _command(parsed.run)(parsed)
+        status = _command(parsed.run)(parsed)
+        sys.stdout.flush()  # what cannot be written is said below, not when Python ends
+        return status
     except CirisError as error:
         return _fail(str(error), 1 if error.code in NEGATIVE else 2)
     except BrokenPipeError:

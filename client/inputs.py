@@ -80,7 +80,7 @@ def polytope_file(path: str) -> PolytopeFile:
     """
     try:
         with np.load(path, allow_pickle=False) as arrays:
-            content = {name: np.asarray(arrays[name], dtype=float) for name in arrays.files if name in ("C", "d", "center")}
+            content = {name: arrays[name].astype(float, casting="same_kind") for name in arrays.files if name in ("C", "d", "center")}
     except FileNotFoundError:
         raise RegionError("polytope_file", f"there is no file {path}", field="--polytope") from None
     except (OSError, ValueError, TypeError, BadZipFile, EOFError):

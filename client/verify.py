@@ -40,7 +40,7 @@ def verify(args: Namespace) -> int:
     if found["holds"]:
         return HOLDS
     problem = CirisError.from_document(found["error"])
-    what = "could not be checked" if problem.code.startswith("child_") else "does not hold"
+    what = "could not be checked" if problem.code.startswith("child_") or problem.code == "proof_too_large" else "does not hold"
     print("error:", escaped(f"{args.proof}: the proof {what}: ") + " ".join(str(problem).split()), file=sys.stderr)
     return DOES_NOT
 

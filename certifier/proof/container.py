@@ -12,6 +12,7 @@ import math
 import re
 import struct
 import zipfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
@@ -89,7 +90,7 @@ def unpack(data: bytes, kind: str) -> tuple[dict[str, Any], dict[str, np.ndarray
         if header["kind"] != kind:
             raise _malformed(f"it is a proof of kind {header['kind']}, not {kind}", "header.kind")
         names = [info for info in archive.infolist() if info.filename != HEADER]
-        return header, {info.filename.removesuffix(".npy"): _array(info.filename, _content(archive, info)) for info in names}
+        return header, {info.filename.removesuffix(".npy"): _array(info.filename, _content(data, info)) for info in names}
 
 
 def header_of(data: bytes) -> dict[str, Any]:
@@ -116,8 +117,8 @@ def _opened(data: bytes) -> Iterator[tuple[zipfile.ZipFile, dict[str, Any]]]:
     except Exception as error:  # zipfile raises many kinds of error about a broken file
         raise _malformed(f"it is no zip: {error}") from error
     with archive, malformed():
-        _check_members(archive, len(data))
-        header = parse(_content(archive, archive.getinfo(HEADER)), "header")
+        _check_members(archive, data)
+        header = parse(_content(data, archive.getinfo(HEADER)), "header")
         if not isinstance(header, dict) or header.get("format") != FORMAT or type(header["format"]) is not int:
             raise _malformed(f"it is not of format {FORMAT}, the one that this version reads and writes", "header.format")
         if not isinstance(header.get("kind"), str):
@@ -140,7 +141,7 @@ def _check_end(data: bytes) -> None:
         raise ProofError("proof_too_large", f"the proof file has more than {limits.MEMBERS} members, or too long names")
 
 
-def _check_members(archive: zipfile.ZipFile, size: int) -> None:
+def _check_members(archive: zipfile.ZipFile, data: bytes) -> None:
     members = {info.filename: info for info in archive.infolist()}
     if len(members) < len(archive.infolist()):
         raise _malformed("it has two members of the same name")
@@ -150,25 +151,40 @@ def _check_members(archive: zipfile.ZipFile, size: int) -> None:
         kinds = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
         if info.compress_type not in kinds or info.flag_bits or info.extra or info.comment or not (name == HEADER or name.endswith(".npy")):
             raise _malformed("it is no plain array, stored or deflated", name)
+    if not all(_starts(data, info) for info in members.values()):
+        raise _malformed("a member begins otherwise than the directory says")
     if sum(_LOCAL + len(name) + info.compress_size for name, info in members.items()) != archive.start_dir:
         raise _malformed("its members do not lie one after the other, or hold more than the directory says")
     total = sum(info.file_size for info in members.values())
-    if total > min(limits.UNPACKED_BYTES, limits.FREE_BYTES + limits.RATIO * size):
+    if total > min(limits.UNPACKED_BYTES, limits.FREE_BYTES + limits.RATIO * len(data)):
         most = f"{limits.UNPACKED_BYTES} or {limits.RATIO} times what it takes"
         raise ProofError("proof_too_large", f"the proof file unpacks to {total} bytes, more than {most}")
     if members[HEADER].file_size > limits.HEADER_BYTES:
         raise ProofError("proof_too_large", f"the header has {members[HEADER].file_size} bytes, more than {limits.HEADER_BYTES}")
 
 
-def _content(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
-    """Returns the content of a member, of the length that the directory says; no more is inflated, whatever the member holds."""
-    try:
-        with archive.open(info) as member:
-            content = member.read(info.file_size)
-    except Exception as error:  # as in _opened
-        raise _malformed(f"it cannot be read: {error}", info.filename) from error
+def _starts(data: bytes, info: zipfile.ZipInfo) -> bool:
+    """Returns whether a member's own header repeats what the directory says."""
+    header = info.FileHeader(zip64=False)
+    return data[info.header_offset : info.header_offset + len(header)] == header
+
+
+def _content(data: bytes, info: zipfile.ZipInfo) -> bytes:
+    """Returns a member, which has the length and the sum that the directory says; no more is inflated, and nothing hides behind it."""
+    start = info.header_offset + len(info.FileHeader(zip64=False))
+    content = data[start : start + info.compress_size]
+    if info.compress_type == zipfile.ZIP_DEFLATED:
+        inflating = zlib.decompressobj(-zlib.MAX_WBITS)
+        try:
+            content = inflating.decompress(content, info.file_size + 1)
+        except zlib.error as error:
+            raise _malformed(f"it cannot be read: {error}", info.filename) from error
+        if len(content) <= info.file_size and (not inflating.eof or inflating.unused_data):
+            raise _malformed("it ends otherwise than the directory says", info.filename)
     if len(content) != info.file_size:
-        raise _malformed(f"it has {len(content)} bytes, not {info.file_size}", info.filename)
+        raise _malformed(f"it has not {info.file_size} bytes", info.filename)
+    if zlib.crc32(content) != info.CRC:
+        raise _malformed("it is not what it was: its checksum is wrong", info.filename)
     return content
 
 

@@ -30,7 +30,7 @@ GROUNDS = 1_000
 VOLUMES = 16_000
 CORNERS = 8
 """A volume that is none of the scene's geometries has at most this many vertices."""
-CONTAINED = 500_000
+CONTAINED = 4_000_000
 """All such volumes together stand for geometries with at most this many vertices."""
 FACES = 4_096
 """A polytope has at most this many half-spaces, and implies at most this many more."""

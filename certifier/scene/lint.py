@@ -7,6 +7,7 @@ import numpy as np
 from certifier.model import Geometry, Pair, Scene
 from certifier.scene.drake_model import build_diagram, geometry_name
 from certifier.scene.tree import Tree
+from certifier.verify.decimals import at_most_mm
 
 _SAMPLES = 40
 _STEEP = 50.0
@@ -32,7 +33,7 @@ def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn:
 
 
 def _substituted(g: Geometry) -> str:
-    return f"{g.name}: {g.substitution}" + (f", reaching up to {1000 * g.inflation:.3g} mm outside" if g.inflation else "")
+    return f"{g.name}: {g.substitution}" + (f", reaching at most {at_most_mm(g.inflation)} outside" if g.inflation else "")
 
 
 def _filtered(scene: Scene, tree: Tree, candidates: list[tuple[str, str]]) -> list[str]:

@@ -27,4 +27,4 @@ def at_most_mm(metres: float) -> str:
 
 def exactly(x: float) -> str:
     """Returns the shortest decimal that is read back as this double."""
-    return repr(float(x))
+    return repr(float(x) + 0.0)  # no sign of a zero

@@ -273,7 +273,11 @@ def _enclosed(moments: Array, faces: Array, chain: tuple[int, ...], change: arb)
     scaled = np.ldexp(moments, -sizes[:, None])
     changes = np.array([_above(change / arb(2) ** int(size)) for size in sizes])
     rounding = (faces.shape[1] + 7) * 2.0**-52 * np.abs(scaled)
-    return localised(scaled, faces, chain), localised(rounding + changes[:, None], np.abs(faces), chain) + UNDERFLOW
+    # A change beyond all doubles is no factor for a face's 0. The sums of the bounds may be rounded down, n + 2 times.
+    finite = np.where(np.isfinite(changes), changes, 0.0)
+    bounds = localised(rounding + finite[:, None], np.abs(faces), chain) * (1 + (faces.shape[1] + 4) * 2.0**-52)
+    bounds += np.where(np.isfinite(changes), UNDERFLOW, np.inf)[None, :, None]
+    return localised(scaled, faces, chain), bounds
 
 
 def _ball(x: int, rounding: int, bits: int) -> arb:

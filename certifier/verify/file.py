@@ -137,7 +137,7 @@ def _pair(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
     statement = verify_pair(proof)
     polytope = f"a polytope of {len(proof.ground.d)} half-spaces within the joint limits, which is not empty,"
     lines = [f"at every configuration of {polytope} these padded bodies are at least {rounded_down(statement.gap)} m apart:"]
-    return lines + [f"  {pair.a} and {pair.b}" for pair in statement.pairs], Guarantee.EXACT
+    return lines + [f"  '{pair.a}' and '{pair.b}'" for pair in statement.pairs], Guarantee.EXACT
 
 
 def _dual(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
@@ -145,14 +145,19 @@ def _dual(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
     statement = verify_dual(proof)
     ground = proof.ground
     lines = [
-        f"{statement.pair.a} and {statement.pair.b} have no certificate of this form, which does not mean that no plane separates them:",
-        f"  a plane affine in s, in the frame of {statement.frame};",
+        f"'{statement.pair.a}' and '{statement.pair.b}' have no certificate of this form,",
+        "which does not mean that no plane separates them:",
+        f"  a plane affine in s, in the frame of '{statement.frame}';",
         "  multipliers that are sums of squares of the chains' multi-affine functions (docs/proofs.md);",
         *(["  a normal bounded by the matrix inequality of docs/proofs.md;"] if statement.rounded else []),
-        *([f"  a margin above {rounded_up(statement.slack)} of its largest coefficient;"] if statement.slack else []),
+        *(
+            [f"  a margin above {rounded_up(statement.slack)} of its largest coefficient in u, which goes from -1 to 1 over the box;"]
+            if statement.slack
+            else []
+        ),
         f"  for the faces, the {len(ground.d)} half-spaces of the polytope and the ends of a box:",
         *(
-            f"    {joint.name}: s from {exactly(mid)} - {exactly(half)} to {exactly(mid)} + {exactly(half)}"
+            f"    '{joint.name}': s from {exactly(mid)} - {exactly(half)} to {exactly(mid)} + {exactly(half)}"
             for joint, mid, half in zip(scene.moving, ground.mid, ground.half, strict=True)
         ),
     ]
@@ -162,7 +167,7 @@ def _dual(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
 def _witness(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
     statement = verify_witness(WitnessProof.from_bytes(data, scene))
     s, q = (", ".join(map(exactly, values)) for values in (statement.s, scene.to_q(statement.s)))
-    touching = f"{statement.pair.a} and {statement.pair.b}, padded, touch at a configuration of the polytope"
+    touching = f"'{statement.pair.a}' and '{statement.pair.b}', padded, touch at a configuration of the polytope"
     return [f"{touching}: s = {s}", f"  to rounding, q = {q}"], Guarantee.NUMERIC
 
 

@@ -28,7 +28,7 @@ from certifier.proof import limits
 from certifier.proof.pair import Ground, PairProof, Side
 from certifier.verify.box import Halfspaces, within_limits
 from certifier.verify.kinematics import ExactKinematics, exact
-from certifier.verify.residual import Numerators, largest_residual
+from certifier.verify.residual import NumeratorCache, Numerators, largest_residual
 from certifier.verify.scene import check_scene
 from certifier.verify.volume import check_contained, check_volume
 
@@ -127,14 +127,17 @@ class PairCheck:
 
     Args:
         contained: volumes that are known to contain their geometries, by id. The checks of one scene may share it.
+        numerators: what was computed before. The checks of one scene may share it.
     """
 
-    def __init__(self, scene: Scene, ground: Ground, contained: dict[int, Volume] | None = None) -> None:
+    def __init__(
+        self, scene: Scene, ground: Ground, contained: dict[int, Volume] | None = None, numerators: NumeratorCache | None = None
+    ) -> None:
         self._scene, self._ground = scene, ground
         ring = fmpq_mpoly_ctx.get([f"u{i}" for i in range(scene.n)], Ordering.lex)
         self._kinematics = ExactKinematics.on_box(scene, ring, ground.mid, ground.half)
         self._faces = faces_of(ground)
-        self._numerators: dict[tuple[str, str], Numerators] = {}
+        self._numerators = NumeratorCache() if numerators is None else numerators
         self._contained: dict[int, Volume] = {} if contained is None else contained
 
     def verify(self, proof: PairProof) -> PairStatement:
@@ -175,17 +178,12 @@ class PairCheck:
         for volume, radius, side, sign in zip(proof.volumes, radii, proof.sides, (1, -1), strict=True):
             rows = [[sign * x for x in row] for row in plane]
             rows[3][0] -= radius * kappa + t
-            residuals.append(_residual(self._between(proof.frame, volume.body), volume, side, rows, weights))
+            residuals.append(_residual(self._numerators.between(self._kinematics, proof.frame, volume.body), volume, side, rows, weights))
         margin = t - max(residuals)
         if not margin > 0:
             eaten = f"the residual {arb(max(residuals)).str(3, radius=False)} eats up the margin {proof.t:.3g}"
             raise ProofError("proof_residual", f"{_names(proof)}: {eaten}")
         return PairStatement(pairs, _lower_root(4 * margin * margin / norm))
-
-    def _between(self, frame: str, body: str) -> Numerators:
-        if (frame, body) not in self._numerators:
-            self._numerators[frame, body] = Numerators.between(self._kinematics, frame, body)
-        return self._numerators[frame, body]
 
 
 def _residual(

@@ -6,6 +6,7 @@ Every pair of the scene is separated on the whole region, or ProofError says why
 from __future__ import annotations
 
 import itertools
+import json
 from collections import Counter
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ from certifier.verify.box import Halfspaces, within_limits
 from certifier.verify.decimals import exactly, rounded_down, rounded_up
 from certifier.verify.kinematics import exact
 from certifier.verify.pair import PairCheck, check_ground
+from certifier.verify.residual import NumeratorCache
 from certifier.verify.scene import check_scene
 from certifier.verify.volume import check_contained
 
@@ -52,7 +54,7 @@ class RegionStatement:
         """Returns the statement in plain words."""
         scene = self.scene
         joints = [
-            f"  {j.name}: {exactly(lower)} to {exactly(upper)} {'rad' if r else 'm'} (centre {exactly(q)})"
+            f"  '{j.name}': {exactly(lower)} to {exactly(upper)} {'rad' if r else 'm'} (centre {exactly(q)})"
             for j, r, lower, upper, q in zip(scene.moving, scene.revolute, scene.q_lower, scene.q_upper, scene.q_star, strict=True)
         ]
         unlisted = _unlisted(scene)
@@ -64,8 +66,8 @@ class RegionStatement:
             f"a bounded, non-empty polytope of {self.faces} half-spaces in tangent space; |s|^2 <= {rounded_up(self.N, 6)}",
             f"{len(self.gaps)} pairs of bodies separated at every configuration of it",
             f"padding {exactly(scene.padding)} m around every body",
-            *([f"least distance, padded, at least {rounded_down(self.gap)} m: {closest.a} and {closest.b}"] if closest else []),
-            *(f"not covered: {i.a} and {i.b} ({i.reason})" for i in scene.ignored),
+            *([f"least distance, padded, at least {rounded_down(self.gap)} m: '{closest.a}' and '{closest.b}'"] if closest else []),
+            *(f"not covered: '{i.a}' and '{i.b}', for the reason {json.dumps(i.reason, ensure_ascii=False)}" for i in scene.ignored),
             *([f"not covered, as the scene has no such pairs: {unlisted}"] if unlisted else []),
             "guarantee: exact (rigorous arithmetic; the parsed model taken at its word)",
         ]
@@ -86,7 +88,7 @@ def _unlisted(scene: Scene) -> str:
     listed = Counter(frozenset(map(body.__getitem__, names)) for names in pairs)
     moving = (bodies for two in itertools.combinations(parts.values(), 2) for bodies in itertools.product(*two))
     missing = ((a, b, held[a] * held[b] - listed[frozenset((a, b))]) for a, b in moving)
-    named = list(itertools.islice((f"{count} of {a} and {b}" for a, b, count in missing if count), NAMED + 1))
+    named = list(itertools.islice((f"{count} of '{a}' and '{b}'" for a, b, count in missing if count), NAMED + 1))
     return ", ".join(named[:NAMED]) + (", and more" if len(named) > NAMED else "")
 
 
@@ -111,6 +113,7 @@ def verify_region(data: bytes) -> RegionStatement:
     _check_implied(proof)
     checks: dict[int, PairCheck] = {}
     contained: dict[int, Volume] = {}
+    numerators = NumeratorCache()
     gaps: dict[Pair, float] = {}
     check_contained(scene, {id(volume): volume for part in proof.proofs for volume in part.volumes}.values())
     for part in proof.proofs:
@@ -118,7 +121,7 @@ def verify_region(data: bytes) -> RegionStatement:
         if id(ground) not in checks:
             check_ground(scene, ground)
             _check_inside(proof, ground)
-            checks[id(ground)] = PairCheck(scene, ground, contained)
+            checks[id(ground)] = PairCheck(scene, ground, contained, numerators)
         statement = checks[id(ground)].verify(part)
         for pair in statement.pairs:
             gaps[pair] = max(statement.gap, gaps.get(pair, 0.0))

@@ -31,6 +31,8 @@ from certifier.verify import limbs
 from certifier.verify.kinematics import ExactKinematics, exact
 
 POSITION_BITS = 128
+KEPT_BYTES = 256 << 20
+"""At most this many bytes of numerators are kept for proofs that may need them again."""
 MAX_CHAIN = 7
 """A chain may have this many joints, so that no sum rounds.
 
@@ -75,6 +77,30 @@ class Numerators:
                 values[places[powers]] = int(coefficient.p * scale.p // (coefficient.q * scale.q))
             columns[c] += values
         return cls(chain, limbs.of_rows(columns))
+
+
+class NumeratorCache:
+    """Keeps numerators that were needed before, up to KEPT_BYTES of them, the latest."""
+
+    def __init__(self) -> None:
+        self._held: dict[tuple[int, str, str], Numerators] = {}
+        self._bytes = 0
+
+    def between(self, kinematics: ExactKinematics, frame: str, body: str) -> Numerators:
+        """Returns the numerators from frame body F to body B.
+
+        Raises:
+            ProofError: as :meth:`Numerators.between`.
+        """
+        key = id(kinematics), frame, body
+        found = self._held.pop(key, None)
+        if found is None:
+            found = Numerators.between(kinematics, frame, body)
+            self._bytes += found.columns.nbytes
+        self._held[key] = found
+        while self._bytes > KEPT_BYTES and len(self._held) > 1:
+            self._bytes -= self._held.pop(next(iter(self._held))).columns.nbytes
+        return found
 
 
 def largest_residual(

@@ -25,14 +25,22 @@ Point = tuple[fmpq, ...]
 
 
 def check_contained(scene: Scene, volumes: Iterable[Volume]) -> None:
-    """Checks that the volumes stand for so few vertices that it is within limits to see whether they contain their geometries.
+    """Checks that it is within limits to see whether the volumes contain their geometries.
+
+    A vertex costs the square of the number of joints that it is taken through: numbers gain bits with each of them.
 
     Raises:
         ProofError: proof_too_large.
     """
-    larger = (volume.geometries for volume in volumes if _is_known(scene, volume) and not volume.is_geometry_of(scene))
-    if sum(len(scene.geometry(name).vertices) for names in larger for name in names) > limits.CONTAINED:
-        raise ProofError("proof_too_large", f"the proof's volumes stand for more than {limits.CONTAINED} vertices of geometries")
+    kinematics, cost = ExactKinematics.at(scene, []), 0
+    for volume in volumes:
+        if not _is_known(scene, volume) or volume.is_geometry_of(scene) or volume.body not in scene.bodies:
+            continue  # check_volume says what is wrong with it
+        for name in volume.geometries:
+            geometry = scene.geometry(name)
+            cost += (1 + len(geometry.vertices)) * (1 + len(kinematics.path(volume.body, geometry.body))) ** 2
+            if cost > limits.CONTAINED:
+                raise ProofError("proof_too_large", "the proof's volumes stand for more vertices, behind more welds, than are checked")
 
 
 def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> None:
@@ -64,8 +72,9 @@ def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> N
 
 
 def _is_known(scene: Scene, volume: Volume) -> bool:
-    """Returns whether the volume names only geometries of the scene, and at least one."""
-    return bool(volume.geometries) and all(map(scene.has_geometry, volume.geometries))
+    """Returns whether the volume names only geometries of the scene, each once, and at least one."""
+    names = volume.geometries
+    return bool(names) and len(set(names)) == len(names) and all(map(scene.has_geometry, names))
 
 
 def _vertices(kinematics: ExactKinematics, body: str, geometry: Geometry) -> list[Point]:

@@ -47,14 +47,14 @@ def test_a_region_names_what_its_scene_leaves_out():
     """A pair taken out of the scene is not proved, and the statement says that it is not covered; a reason to ignore it is quoted."""
     scene = planar_arm(2)
     assert [line for line in statement(scene) if line.startswith("not covered")] == [
-        "not covered, as the scene has no such pairs: 1 of arm/link1 and arm/link2"
+        "not covered, as the scene has no such pairs: 1 of 'arm/link1' and 'arm/link2'"
     ]
     dropped = replace(scene, pairs=scene.pairs[:1])
-    both = "1 of arm/link1 and arm/link2, 1 of arm/link2 and world"
+    both = "1 of 'arm/link1' and 'arm/link2', 1 of 'arm/link2' and 'world'"
     assert f"not covered, as the scene has no such pairs: {both}" in statement(dropped)
     bars = Ignored("arm/link1/bar", "arm/link2/bar", "neighbours")
     assert [line for line in statement(replace(scene, ignored=(bars,))) if line.startswith("not covered")] == [
-        "not covered: arm/link1/bar and arm/link2/bar (neighbours)"
+        "not covered: 'arm/link1/bar' and 'arm/link2/bar', for the reason \"neighbours\""
     ]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import io
 import json
 import struct
 import time
@@ -16,12 +17,13 @@ import numpy as np
 import pytest
 
 from certifier.errors import SceneError
-from certifier.model import WORLD, Scene, Volume
+from certifier.model import WORLD, Ignored, Pair, Scene, Volume
 from certifier.proof import limits
 from certifier.proof.container import npy, pack, unpack, with_scene
 from certifier.proof.pair import Ground, PairProof, Side
+from certifier.proof.region import RegionProof
 from certifier.verify.file import answer, verify_file
-from tests.certifier.proofs import files
+from tests.certifier.proofs import files, region
 from tests.certifier.scenes import planar_arm
 from tests.certifier.verify.hostile import fitting, members, saved, text_of, zipped
 
@@ -83,7 +85,7 @@ def test_reasons_and_substitutions_are_sentences(word):
     assert refusal(with_value(data, ("scene", "ignored"), ignored))["code"] == "proof_model"
     ignored[0]["reason"] = "neighbours"
     statement = answer(with_value(data, ("scene", "ignored"), ignored))["statement"]
-    assert "not covered: arm/link1/bar and arm/link2/bar (neighbours)" in statement
+    assert "not covered: 'arm/link1/bar' and 'arm/link2/bar', for the reason \"neighbours\"" in statement
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -413,3 +415,72 @@ def test_gram_matrices_are_checked_a_few_vertices_at_a_time_with_the_same_result
 
 def test_a_header_that_is_not_json_names_what_it_is_about():
     assert refusal(with_header(valid("pair"), "@deep@"))["field"] == "header"
+
+
+def test_nothing_hides_within_a_zip():
+    """Bytes behind a deflated stream, a header of a member that says something else, and the record of a larger zip are refused."""
+    data = region()
+    end = struct.Struct("<4s4H2LH")
+    *head, size, offset, comment = end.unpack(data[-end.size :])
+    locator = struct.pack("<4sLQL", b"PK\6\7", 0, 0, 1)
+    larger = data[: -end.size] + locator + end.pack(*head, size + len(locator), offset, comment)
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        info = next(i for i in archive.infolist() if i.compress_type == zipfile.ZIP_DEFLATED)
+        contents = {i.filename: (i, archive.read(i)) for i in archive.infolist()}
+    renamed = bytearray(data)
+    renamed[info.header_offset + 10] ^= 1  # the time in the member's own header
+    hidden = io.BytesIO()
+    with zipfile.ZipFile(hidden, "w") as archive:
+        for name, (entry, content) in contents.items():
+            archive.writestr(zipfile.ZipInfo(name, entry.date_time), content, entry.compress_type)
+        stretched = archive.getinfo(info.filename)
+        stretched.CRC, deflated = zlib.crc32(contents[info.filename][1]), zlib.compressobj(9, zlib.DEFLATED, -15)
+    assert answer(hidden.getvalue())["holds"]
+    stream = deflated.compress(contents[info.filename][1]) + deflated.flush() + b"what nobody reads"
+    for wrong in (larger, bytes(renamed), respliced(hidden.getvalue(), info.filename, stream)):
+        assert not answer(wrong)["holds"]
+
+
+def respliced(data: bytes, name: str, stream: bytes) -> bytes:
+    """The zip with another stream for a member, all sizes and offsets made to fit."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        entries, start = archive.infolist(), archive.start_dir
+        raw = {}
+        for entry, following in zip(entries, [*(e.header_offset for e in entries[1:]), start], strict=True):
+            raw[entry.filename] = data[entry.header_offset + len(entry.FileHeader(zip64=False)) : following]
+        body = b""
+        for entry in entries:
+            content = stream if entry.filename == name else raw[entry.filename]
+            entry.header_offset, entry.compress_size = len(body), len(content)
+            body += entry.FileHeader(zip64=False) + content
+        sink = io.BytesIO(body)
+        sink.seek(len(body))
+        with zipfile.ZipFile(io.BytesIO(), "w") as writer:
+            writer.fp, writer.filelist, writer.start_dir, writer._didModify = sink, entries, len(body), True
+            writer._write_end_record()
+            writer._didModify = False
+            found = sink.getvalue()
+    return found
+
+
+def test_a_volume_names_a_geometry_once():
+    proof = RegionProof.from_bytes(region())
+    part = next(p for p in proof.proofs if not p.volumes[0].is_geometry_of(proof.scene) or not p.volumes[1].is_geometry_of(proof.scene))
+    volumes = tuple(replace(volume, geometries=volume.geometries * 2) for volume in part.volumes)
+    twice = replace(proof, proofs=tuple(replace(p, volumes=volumes) if p is part else p for p in proof.proofs))
+    found = answer(twice.to_bytes())
+    assert not found["holds"]
+    assert found["error"]["code"] in ("proof_volume", "proof_malformed")
+
+
+def test_a_pair_stands_once_and_is_not_ignored_as_well():
+    proof = RegionProof.from_bytes(region())
+    pair = proof.scene.pairs[0]
+    for changed in (
+        {"pairs": (*proof.scene.pairs, Pair(pair.b, pair.a))},
+        {"ignored": (*proof.scene.ignored, Ignored(pair.a, pair.b, "as well"))},
+        {"ignored": (*proof.scene.ignored, Ignored(pair.b, pair.a, "as well"))},
+    ):
+        scene = replace(proof.scene, **changed)
+        found = answer(replace(proof, scene=scene, proofs=tuple(replace(p, scene=scene) for p in proof.proofs)).to_bytes())
+        assert found["error"]["code"] == "proof_model"
