@@ -258,7 +258,7 @@ def written(draw: Draw, array: np.ndarray) -> bytes:
         )
     if way == 7:
         with np.errstate(all="ignore"):
-            types = ["<f4", ">f8", "<i4", "<i8", ">i4", "<u8", "<i2", "|b1", "<c16", "|S8", "<f2"]
+            types = ["<f4", ">f8", "<i4", "<i8", ">i4", "<u8", "<i2", "|b1", "|S8", "<f2"]
             return saved(array.astype(draw(st.sampled_from(types))))
     if way == 8:
         return saved(array, version=draw(st.sampled_from([(2, 0), (3, 0)])))
