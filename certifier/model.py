@@ -181,19 +181,30 @@ class Scene:
 
     @cached_property
     def s_lower(self) -> Array:
-        return -self._outer(self.q_star, self.q_lower)
+        return self._limits_in_s(self.q_lower)
 
     @cached_property
     def s_upper(self) -> Array:
-        return self._outer(self.q_upper, self.q_star)
+        return self._limits_in_s(self.q_upper)
 
-    def _outer(self, q: Array, base: Array) -> Array:
-        """Returns the least doubles, (n,), that are no less than tan((q - base)/2) or q - base, the same on every machine.
+    def _limits_in_s(self, limits: Array) -> Array:
+        """Returns the tangent-space coordinates of joint limits, (n,), rounded to nearest, the same on every machine.
 
-        Proofs rest on the joint limits to the last bit. Rounded inwards, the limits would leave configurations out. NumPy's
-        tangent depends on the processor, so it is not used here.
+        NumPy's tangent depends on the processor; the tangent of ball arithmetic does not.
         """
-        return np.array([_not_less(*joint) for joint in zip(q.tolist(), base.tolist(), self.revolute, strict=True)])
+        delta = limits - self.q_star
+        return np.array([_tangent(x / 2) if revolute else x for x, revolute in zip(delta.tolist(), self.revolute, strict=True)])
+
+    @cached_property
+    def outer_limits(self) -> tuple[Array, Array]:
+        """The largest and the least doubles, (n,) each, beyond which s never is within the joint limits.
+
+        Whoever believes the joint limits must not believe them rounded inwards, which would leave configurations out.
+        """
+        q_star, revolute = self.q_star.tolist(), self.revolute.tolist()
+        lower = [-_not_less(*joint) for joint in zip(q_star, self.q_lower.tolist(), revolute, strict=True)]
+        upper = [_not_less(*joint) for joint in zip(self.q_upper.tolist(), q_star, revolute, strict=True)]
+        return np.array(lower), np.array(upper)
 
     def to_s(self, q: ArrayLike) -> Array:
         """Returns the tangent-space coordinates of positions q, (..., n) -> (..., n)."""
@@ -310,6 +321,15 @@ class Scene:
         if document.get("hash", scene.hash) != scene.hash:
             raise SceneError("scene_hash", "the scene's stored hash does not match its content")
         return scene
+
+
+def _tangent(angle: float) -> float:
+    precision = ctx.prec
+    ctx.prec = 256
+    try:
+        return float(arb(angle).tan().mid())
+    finally:
+        ctx.prec = precision
 
 
 def _not_less(q: float, base: float, revolute: bool) -> float:

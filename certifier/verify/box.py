@@ -18,8 +18,16 @@ from certifier.verify.kinematics import exact
 
 def within_limits(scene: Scene, point: Array) -> bool:
     """Whether s, (n,) doubles, is within the joint limits beyond the rounding of the limits in s, which are rounded outwards."""
-    lower, upper = np.nextafter(scene.s_lower, np.inf), np.nextafter(scene.s_upper, -np.inf)
+    outer_lower, outer_upper = scene.outer_limits
+    lower, upper = np.nextafter(outer_lower, np.inf), np.nextafter(outer_upper, -np.inf)
     return bool(np.all(lower <= point) and np.all(point <= upper))
+
+
+def limited(scene: Scene, C: Array, d: Array) -> Halfspaces:
+    """Returns {C s <= d}, C (m, n), within the joint limits rounded outwards, whose rows come last: upper limits, then lower ones."""
+    lower, upper = scene.outer_limits
+    eye = np.eye(scene.n)
+    return Halfspaces(np.concatenate([C, eye, -eye]), np.concatenate([d, upper, -lower]))
 
 
 class Halfspaces:

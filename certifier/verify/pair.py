@@ -26,7 +26,7 @@ from certifier.errors import ProofError
 from certifier.model import Array, Pair, Scene, Volume
 from certifier.proof import limits
 from certifier.proof.pair import Ground, PairProof, Side
-from certifier.verify.box import Halfspaces, within_limits
+from certifier.verify.box import limited, within_limits
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.residual import NumeratorCache, Numerators, largest_residual
 from certifier.verify.scene import check_scene
@@ -86,7 +86,7 @@ def check_ground(scene: Scene, ground: Ground) -> None:
             and exact(upper[i]) <= exact(ground.mid[i]) + exact(ground.half[i])
         ):
             raise ProofError("proof_box", "the box of a polytope cannot be represented")
-    if not _limited(scene, ground).lie_in_box(lower, upper, ground.Y_lower, ground.Y_upper):
+    if not limited(scene, ground.C, ground.d).lie_in_box(lower, upper, ground.Y_lower, ground.Y_upper):
         raise ProofError("proof_box", "the multipliers do not prove the box around the polytope")
 
 
@@ -98,14 +98,8 @@ def check_interior(scene: Scene, ground: Ground, point: Array) -> None:
     Raises:
         ProofError: the point is not in the ground, or not within the joint limits.
     """
-    if point.shape != (scene.n,) or not (within_limits(scene, point) and _limited(scene, ground).contains(point)):
+    if point.shape != (scene.n,) or not (within_limits(scene, point) and limited(scene, ground.C, ground.d).contains(point)):
         raise ProofError("proof_interior", "the point that should show that the polytope is not empty is not in it")
-
-
-def _limited(scene: Scene, ground: Ground) -> Halfspaces:
-    """Returns the ground's faces and the joint limits as half-spaces."""
-    polytope = scene.polytope(ground.C, ground.d)
-    return Halfspaces(polytope.C, polytope.d)
 
 
 def faces_of(ground: Ground) -> list[list[fmpq]]:

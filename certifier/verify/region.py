@@ -18,7 +18,7 @@ from certifier.proof import limits
 from certifier.proof.pair import Ground
 from certifier.proof.region import RegionProof
 from certifier.verify.archimedean import check_archimedean
-from certifier.verify.box import Halfspaces, within_limits
+from certifier.verify.box import Halfspaces, limited, within_limits
 from certifier.verify.decimals import exactly, rounded_down, rounded_up
 from certifier.verify.kinematics import exact
 from certifier.verify.pair import PairCheck, check_ground
@@ -138,8 +138,8 @@ def _check_polytope(proof: RegionProof) -> None:
         raise ProofError("proof_too_large", f"the region has more than {limits.FACES} half-spaces, or implies more")
     if proof.C.shape != (proof.d.size, n) or proof.d.ndim != 1 or proof.interior.shape != (n,):
         raise ProofError("proof_malformed", "the region's arrays do not fit the scene")
-    limited = scene.polytope(np.zeros((0, n)), np.zeros(0))
-    if not _among(proof.C, proof.d, limited.C, limited.d):
+    rows = limited(scene, np.zeros((0, n)), np.zeros(0))
+    if not _among(proof.C, proof.d, rows.C, rows.d):
         raise ProofError("proof_limits", "the joint limits are not among the region's half-spaces")
     if not within_limits(scene, proof.interior):
         raise ProofError("proof_interior", "the interior point is not within the joint limits")

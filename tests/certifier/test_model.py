@@ -47,7 +47,7 @@ def test_joint_limits_in_s_are_the_nearest_doubles_that_leave_nothing_out(limit,
     try:
         exactly = arb(limit) - arb(center)
         exactly = (exactly / 2).tan() if revolute else exactly
-        upper, lower = float(scene.s_upper[0]), float(scene.s_lower[0])
+        lower, upper = (float(limit[0]) for limit in scene.outer_limits)
         assert arb(lower) <= exactly <= arb(upper)
         assert not arb(math.nextafter(upper, -math.inf)) >= exactly
         assert not arb(math.nextafter(lower, math.inf)) <= exactly
