@@ -14,8 +14,9 @@ from certifier.model import SCHEMA_VERSION, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume
 from certifier.polytopes.polytope import chebyshev_center, support
-from certifier.proof.pair import PairProof, digest
+from certifier.proof.pair import PairProof
 from certifier.proof.region import Implied, RegionProof
+from certifier.proof.separation import digest
 from certifier.verify.region import RegionStatement, verify_region
 
 

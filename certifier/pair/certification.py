@@ -31,8 +31,9 @@ from certifier.pair.screen import Contact, Screen
 from certifier.pair.weakness import pull, weak_points
 from certifier.polytopes.polytope import bound_multipliers, chebyshev_center, drop_redundant
 from certifier.polytopes.sampling import hit_and_run
+from certifier.proof.ground import Ground
 from certifier.proof.negative import WitnessProof
-from certifier.proof.pair import BITS, Ground
+from certifier.proof.pair import BITS
 from certifier.verify.dual import verify_dual
 from certifier.verify.pair import PairCheck, check_ground
 from certifier.verify.witness import check_witness

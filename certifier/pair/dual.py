@@ -16,8 +16,8 @@ from certifier.conic.interior_point import Block
 from certifier.model import Array, Pair
 from certifier.pair.frames import Frame
 from certifier.pair.program import Sides
+from certifier.proof.ground import Ground
 from certifier.proof.negative import DualProof
-from certifier.proof.pair import Ground
 from certifier.verify.moments import monomials, table
 
 RANK_TOLERANCE = 1e-9

@@ -9,7 +9,8 @@ from certifier.conic.interior_point import Solution
 from certifier.model import Array, Volume
 from certifier.pair.frames import Frame
 from certifier.pair.program import Sides
-from certifier.proof.pair import Ground, PairProof, Side
+from certifier.proof.ground import Ground
+from certifier.proof.pair import PairProof, Side
 
 
 def pair_proof(sides: Sides, volumes: tuple[Volume, Volume], frame: Frame, ground: Ground, solution: Solution, kind: str) -> PairProof:

@@ -28,9 +28,9 @@ from certifier.proof import limits
 FORMAT = 3
 WORTH_DEFLATING = 1024
 """Members of at least this many bytes are deflated; a compressor takes longer to set up than a smaller member takes to write."""
-TYPES: dict[bytes, np.dtype[Any]] = {b"<f8": np.dtype("<f8"), b"<i4": np.dtype("<i4"), b"<i8": np.dtype("<i8")}
+TYPES: dict[bytes, np.dtype[Any]] = {code: np.dtype(code.decode()) for code in (b"<f4", b"<f8", b"|i1", b"<i2", b"<i4", b"<i8")}
 HEADER = "header.json"
-_NPY = re.compile(rb"\x93NUMPY\x01\x00..\{'descr': '(<..)', 'fortran_order': False, 'shape': \(([0-9, ]{0,60})\), \} *\n", re.DOTALL)
+_NPY = re.compile(rb"\x93NUMPY\x01\x00..\{'descr': '([<|]..)', 'fortran_order': False, 'shape': \(([0-9, ]{0,60})\), \} *\n", re.DOTALL)
 _END = struct.Struct("<4s4H2LH")
 """The end of a zip holds a signature, disks, members (twice), size and offset of the directory, and the length of the comment."""
 _LOCAL, _ENTRY, _LOCATOR = 30, 46, 20
@@ -191,7 +191,7 @@ def _content(data: bytes, info: zipfile.ZipInfo) -> bytes:
 def _array(name: str, data: bytes) -> np.ndarray:
     match = _NPY.match(data)
     if match is None or match[1] not in TYPES:
-        raise _malformed("it is no array of doubles, int32 or int64 in C's order", name)
+        raise _malformed("it is no array of float32, float64, int8, int16, int32 or int64 in C's order", name)
     dtype, shape = TYPES[match[1]], tuple(int(length) for length in match[2].replace(b",", b" ").split())
     if not data.startswith(_npy_header(dtype.str, shape)) or max(shape, default=0) > limits.DIMENSION:
         raise _malformed("its header is not the one that NumPy writes for such an array", name)

@@ -12,7 +12,8 @@ import numpy as np
 from certifier.errors import CirisError
 from certifier.model import Array, Pair, Scene
 from certifier.proof.container import FORMAT, Arrays, head, malformed, pack, unpack
-from certifier.proof.pair import Ground, ground_arrays, read_ground, same_scene
+from certifier.proof.ground import Ground, ground_arrays, read_ground
+from certifier.proof.separation import same_scene
 
 
 @dataclass(frozen=True)

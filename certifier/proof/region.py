@@ -10,7 +10,12 @@ import numpy as np
 from certifier.errors import CirisError
 from certifier.model import Array, Scene
 from certifier.proof.container import FORMAT, Arrays, head, malformed, pack, unpack
-from certifier.proof.pair import SHARED, PairProof, Pool, read_proofs
+from certifier.proof.pair import PairProof
+from certifier.proof.partition import PartitionProof
+from certifier.proof.separation import SHARED, Pool, Separation, read_proofs
+
+FORMS: dict[str, type[Separation]] = {form.KIND: form for form in (PairProof, PartitionProof)}
+"""The forms that the proofs of a region's pairs take, by the kinds of their files."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +73,7 @@ class RegionProof:
     interior: Array
     implied: Implied
     archimedean: Archimedean
-    proofs: tuple[PairProof, ...] = field(repr=False)
+    proofs: tuple[Separation, ...] = field(repr=False)
 
     def to_bytes(self) -> bytes:
         """Returns the proof as a file, which stores grounds and volumes that several proofs share once."""
@@ -101,7 +106,7 @@ class RegionProof:
                 interior=interior,
                 implied=Implied(*(arrays.floats(f"implied/{field.name}") for field in dataclasses.fields(Implied))),
                 archimedean=Archimedean(N.item(), *bounds),
-                proofs=read_proofs(scene, fields, arrays, interior),
+                proofs=read_proofs(scene, fields, arrays, interior, FORMS),
             )
             arrays.end()
             return proof

@@ -60,8 +60,8 @@ from flint import Ordering, arb, arb_mat, ctx, fmpq, fmpq_mpoly_ctx
 from certifier.errors import ProofError
 from certifier.model import Array, Pair, Scene, Volume
 from certifier.proof import limits
+from certifier.proof.ground import Ground
 from certifier.proof.negative import DualProof
-from certifier.proof.pair import Ground
 from certifier.verify import limbs
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.moments import localised, table

@@ -25,7 +25,8 @@ from flint import Ordering, arb, fmpq, fmpq_mpoly_ctx
 from certifier.errors import ProofError
 from certifier.model import Array, Pair, Scene, Volume
 from certifier.proof import limits
-from certifier.proof.pair import Ground, PairProof, Side
+from certifier.proof.ground import Ground
+from certifier.proof.pair import PairProof, Side
 from certifier.verify.box import limited, within_limits
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.residual import NumeratorCache, Numerators, largest_residual

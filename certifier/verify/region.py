@@ -15,7 +15,8 @@ import numpy as np
 from certifier.errors import ProofError
 from certifier.model import Pair, Scene, Volume
 from certifier.proof import limits
-from certifier.proof.pair import Ground
+from certifier.proof.ground import Ground
+from certifier.proof.pair import PairProof
 from certifier.proof.region import RegionProof
 from certifier.verify.archimedean import check_archimedean
 from certifier.verify.box import Halfspaces, limited, within_limits
@@ -122,6 +123,8 @@ def verify_region(data: bytes) -> RegionStatement:
             check_ground(scene, ground)
             _check_inside(proof, ground)
             checks[id(ground)] = PairCheck(scene, ground, contained, numerators)
+        if not isinstance(part, PairProof):
+            raise ProofError("proof_malformed", f"{part.title}: a proof of kind {part.KIND} cannot be checked")
         statement = checks[id(ground)].verify(part)
         for pair in statement.pairs:
             gaps[pair] = max(statement.gap, gaps.get(pair, 0.0))

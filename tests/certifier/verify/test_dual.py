@@ -26,8 +26,9 @@ from certifier.pair.frames import choose_frame
 from certifier.pair.primal import pair_proof
 from certifier.polytopes.sampling import hit_and_run
 from certifier.proof.container import with_scene
+from certifier.proof.ground import Ground
 from certifier.proof.negative import DualProof
-from certifier.proof.pair import Ground, PairProof
+from certifier.proof.pair import PairProof
 from certifier.verify.dual import _enclosed, _near_one, verify_dual
 from certifier.verify.file import verify_file
 from certifier.verify.moments import table

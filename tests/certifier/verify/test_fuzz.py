@@ -28,8 +28,9 @@ from certifier.model import WORLD, Pair, Scene
 from certifier.outcome import Outcome
 from certifier.pair.certification import Certification
 from certifier.proof.container import unpack
+from certifier.proof.ground import Ground
 from certifier.proof.negative import DualProof, WitnessProof
-from certifier.proof.pair import Ground, PairProof
+from certifier.proof.pair import PairProof
 from certifier.proof.region import RegionProof
 from certifier.scene.bundle import load_bundle, pack_bundle
 from certifier.verify.pair import verify_pair

@@ -8,8 +8,9 @@ from flint import arb, ctx
 
 from certifier.errors import ProofError
 from certifier.model import WORLD, Joint, JointKind, Pair, Scene, Volume
+from certifier.proof.ground import Ground
 from certifier.proof.negative import WitnessProof
-from certifier.proof.pair import Ground, PairProof, Side
+from certifier.proof.pair import PairProof, Side
 from certifier.verify.pair import verify_pair
 from certifier.verify.witness import verify_witness
 from tests.certifier.scenes import ball, pose

@@ -12,7 +12,8 @@ from certifier.errors import ProofError
 from certifier.jobs.region import certified_region
 from certifier.model import WORLD, Ignored, Joint, JointKind, Volume
 from certifier.pair.certification import Certification
-from certifier.proof.pair import Ground, PairProof, Side
+from certifier.proof.ground import Ground
+from certifier.proof.pair import PairProof, Side
 from certifier.verify.pair import PairCheck, verify_pair
 from certifier.verify.region import _unlisted, verify_region
 from tests.certifier.scenes import accepted, ball, cube, planar_arm, pose

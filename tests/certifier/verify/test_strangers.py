@@ -20,7 +20,8 @@ from certifier.errors import SceneError
 from certifier.model import WORLD, Ignored, Pair, Scene, Volume
 from certifier.proof import limits
 from certifier.proof.container import npy, pack, unpack, with_scene
-from certifier.proof.pair import Ground, PairProof, Side
+from certifier.proof.ground import Ground
+from certifier.proof.pair import PairProof, Side
 from certifier.proof.region import RegionProof
 from certifier.verify.file import answer, verify_file
 from tests.certifier.proofs import files, region

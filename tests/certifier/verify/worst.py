@@ -19,8 +19,9 @@ from certifier.isolation.child import run_in_child
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene, Volume
 from certifier.proof import limits
 from certifier.proof.container import pack, unpack, with_scene
+from certifier.proof.ground import Ground
 from certifier.proof.negative import DualProof
-from certifier.proof.pair import Ground, PairProof, Side
+from certifier.proof.pair import PairProof, Side
 from certifier.verify.moments import monomials
 from tests.certifier.proofs import region
 from tests.certifier.scenes import ball, pose
