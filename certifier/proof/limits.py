@@ -37,6 +37,20 @@ FACES = 4_096
 MULTIPLIERS = 2
 """A proof of a half-space has at most this many multipliers that are not 0 for each joint; one for each suffices (Caratheodory)."""
 
+CHAIN = 7
+"""At most this many joints are between the frame of a proof over a partition and a body: each makes four control values of one."""
+PLAY = 14
+"""A plane of such a proof moves with at most this many joints; its normal is bounded at 2^PLAY corners."""
+NODES = 1 << 22
+"""The tree of cuts of a proof over a partition has at most this many nodes."""
+PIECES = 1 << 24
+"""All trees of pieces of such a proof together have at most this many nodes."""
+TREE = 1 << 16
+"""The tree of pieces of one vertex in one cell has at most this many nodes."""
+CUT_DEPTH = 512
+"""A cell is cut at most this many times."""
+PIECE_DEPTH = 64
+"""A piece is halved at most this many times, because every halving rounds."""
 FACTORS = 1 << 22
 """The Gram matrices of one vertex have at most this many entries."""
 EXPONENT = 256

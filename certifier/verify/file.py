@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -16,11 +17,14 @@ from certifier.proof import limits
 from certifier.proof.container import header_of, malformed
 from certifier.proof.negative import DualProof, WitnessProof
 from certifier.proof.pair import PairProof
+from certifier.proof.partition import PartitionProof
 from certifier.proof.region import RegionProof
+from certifier.proof.separation import Separation
 from certifier.verify.decimals import exactly, rounded_down, rounded_up
 from certifier.verify.dual import verify_dual
-from certifier.verify.pair import verify_pair
+from certifier.verify.pair import PairStatement, verify_pair
 from certifier.verify.region import verify_region
+from certifier.verify.separations import Progress, verify_separation
 from certifier.verify.witness import TOLERANCE, verify_witness
 
 LONGEST = 500
@@ -32,7 +36,7 @@ class FileStatement:
     """States what a valid file proves.
 
     Attributes:
-        kind: ``region``, ``pair``, ``dual`` or ``witness``.
+        kind: ``region``, ``pair``, ``partition``, ``dual`` or ``witness``.
         lines: the statement in plain words, the guarantee last. It follows from the proof and from what the scene's hash covers.
     """
 
@@ -42,8 +46,12 @@ class FileStatement:
     guarantee: Guarantee
 
 
-def verify_file(data: bytes) -> FileStatement:
+def verify_file(data: bytes, processes: int = 1, progress: Progress | None = None) -> FileStatement:
     """Checks a proof file of any kind that carries its scene, and returns what it proves.
+
+    Args:
+        processes: how many processes check what can be divided among them.
+        progress: is told how far they have come.
 
     Raises:
         ProofError: the file is malformed, carries no scene, or its proof does not hold.
@@ -51,7 +59,7 @@ def verify_file(data: bytes) -> FileStatement:
     header = header_of(data)
     kind = header["kind"]
     if kind == "region":
-        statement = verify_region(data)
+        statement = verify_region(data, processes, progress)
         return FileStatement(kind, statement.scene, tuple(statement.lines()), Guarantee.EXACT)
     if kind not in _READERS:
         raise ProofError("proof_malformed", f"the file is a proof of kind {kind[:40]!r}, which is none", field="header.kind")
@@ -60,18 +68,18 @@ def verify_file(data: bytes) -> FileStatement:
         raise ProofError("proof_without_scene", "the file names its scene by its hash and does not carry it", hint=hint)
     with malformed():
         scene = Scene.from_document(header["scene"])
-    found, guarantee = _READERS[kind](data, scene)
+    found, guarantee = _READERS[kind](data, scene, processes, progress)
     about = (f"scene of hash {scene.hash}", f"padding {exactly(scene.padding)} m around every body")
     return FileStatement(kind, scene, (*about, *found, guarantee_line(guarantee)), guarantee)
 
 
-def answer(data: bytes) -> dict[str, Any]:
-    """Returns the statement of a proof file, or why there is none, as JSON-able data.
+def answer(data: bytes, processes: int = 1, progress: Progress | None = None) -> dict[str, Any]:
+    """Returns the statement of a proof file, or why there is none, as JSON-able data. The arguments are those of :func:`verify_file`.
 
     The keys are stable, and every text is printable. ``scene.name`` is what the file calls its scene; no proof is about that name.
     """
     try:
-        statement = verify_file(data)
+        statement = verify_file(data, processes, progress)
     except ProofError as error:
         return _refused(error)
     return {
@@ -102,16 +110,35 @@ def answer_about_region(payload: dict[str, Any]) -> dict[str, Any]:
 
 
 def answer_about_file(payload: dict[str, Any]) -> dict[str, Any]:
-    """Returns the answer about the file at ``path``. A child process runs this function.
+    """Returns the answer about a file. A child process runs this function.
+
+    Args:
+        payload: the ``path`` of the file; perhaps ``processes``, how many may check it, and ``progress``, the path of a file in which
+            two lines say how many of how many parts they have checked.
 
     Raises:
         CirisError: no_file, when the file cannot be read.
     """
     try:
         with open(payload["path"], "rb") as file:
-            return answer(file.read(limits.FILE_BYTES + 1))
+            data = file.read(limits.FILE_BYTES + 1)
     except OSError as error:
         raise CirisError("no_file", error.strerror or str(error)) from None
+    return answer(data, payload.get("processes", 1), _teller(payload["progress"]) if "progress" in payload else None)
+
+
+def _teller(path: str) -> Progress:
+    """Returns a function that writes progress to a file, ten times a second at most."""
+    told = 0.0
+
+    def tell(done: int, total: int) -> None:
+        nonlocal told
+        if done == total or time.monotonic() > told + 0.1:
+            told = time.monotonic()
+            with open(path, "w") as file:
+                file.write(f"{done}\n{total}\n")
+
+    return tell
 
 
 def _refused(error: ProofError) -> dict[str, Any]:
@@ -132,15 +159,23 @@ def guarantee_line(guarantee: Guarantee) -> str:
     return f"guarantee: {meaning[guarantee]}"
 
 
-def _pair(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
+def _pair(data: bytes, scene: Scene, *_: Any) -> tuple[list[str], Guarantee]:
     proof = PairProof.from_bytes(data, scene)
-    statement = verify_pair(proof)
+    return _apart(proof, verify_pair(proof)), Guarantee.EXACT
+
+
+def _partition(data: bytes, scene: Scene, processes: int, progress: Progress | None) -> tuple[list[str], Guarantee]:
+    proof = PartitionProof.from_bytes(data, scene)
+    return _apart(proof, verify_separation(proof, processes, progress)), Guarantee.EXACT
+
+
+def _apart(proof: Separation, statement: PairStatement) -> list[str]:
     polytope = f"a polytope of {len(proof.ground.d)} half-spaces within the joint limits, which is not empty,"
     lines = [f"at every configuration of {polytope} these padded bodies are at least {rounded_down(statement.gap)} m apart:"]
-    return lines + [f"  '{pair.a}' and '{pair.b}'" for pair in statement.pairs], Guarantee.EXACT
+    return lines + [f"  '{pair.a}' and '{pair.b}'" for pair in statement.pairs]
 
 
-def _dual(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
+def _dual(data: bytes, scene: Scene, *_: Any) -> tuple[list[str], Guarantee]:
     proof = DualProof.from_bytes(data, scene)
     statement = verify_dual(proof)
     ground = proof.ground
@@ -164,11 +199,16 @@ def _dual(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
     return lines, Guarantee.EXACT
 
 
-def _witness(data: bytes, scene: Scene) -> tuple[list[str], Guarantee]:
+def _witness(data: bytes, scene: Scene, *_: Any) -> tuple[list[str], Guarantee]:
     statement = verify_witness(WitnessProof.from_bytes(data, scene))
     s, q = (", ".join(map(exactly, values)) for values in (statement.s, scene.to_q(statement.s)))
     touching = f"'{statement.pair.a}' and '{statement.pair.b}', padded, touch at a configuration of the polytope"
     return [f"{touching}: s = {s}", f"  to rounding, q = {q}"], Guarantee.NUMERIC
 
 
-_READERS: dict[str, Callable[[bytes, Scene], tuple[list[str], Guarantee]]] = {"pair": _pair, "dual": _dual, "witness": _witness}
+_READERS: dict[str, Callable[[bytes, Scene, int, Progress | None], tuple[list[str], Guarantee]]] = {
+    "pair": _pair,
+    "partition": _partition,
+    "dual": _dual,
+    "witness": _witness,
+}

@@ -23,7 +23,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from flint import arb, ctx, fmpq, fmpq_mpoly, fmpq_mpoly_ctx
+from flint import arb, ctx, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpq_poly
 
 from certifier.model import WORLD, Array, Joint, JointKind, Scene
 
@@ -68,6 +68,11 @@ class ExactKinematics:
         """Returns the kinematics in numbers at the configuration s."""
         return cls(scene, s, fmpq)
 
+    @classmethod
+    def by_joint(cls, scene: Scene) -> ExactKinematics:
+        """Returns the kinematics for :meth:`factors`, in which every coordinate goes by the same letter."""
+        return cls(scene, [fmpq_poly([0, 1])] * scene.n, lambda x: fmpq_poly([x]))
+
     def path(self, frame: str, body: str) -> list[tuple[Joint, bool]]:
         """Returns the joints from the frame's body to the body, each with whether it is crossed upwards, from child to parent."""
         up, down = self._to_world(frame), self._to_world(body)
@@ -98,6 +103,28 @@ class ExactKinematics:
                 X, fixed = moved if X is None else _multiply(X, moved), _identity()
             fixed = _multiply(fixed, inner)
         return self._embedded(fixed) if X is None else _multiply(X, fixed)
+
+    def factors(self, frame: str, body: str) -> list[tuple[int | None, list[Numbers]]]:
+        """Returns X_FB times its denominator as a product, in path order, with one factor T0 + T1 s_i + T2 s_i^2 for each joint that moves.
+
+        A factor is the joint's position index i and its terms, each (4, 4). Welds are part of the factors, whose denominators, the
+        entries [3][3], are 1 + s_i^2 or 1. Where no joint moves there is one constant factor, whose index is None.
+        """
+        found: list[tuple[int | None, Any]] = []
+        fixed = _identity()
+        for joint, upwards in self.path(frame, body):
+            outer, middle, inner = self._joint(joint, upwards)
+            fixed = _multiply(fixed, outer)
+            if middle is not None:
+                found.append((joint.index, _multiply(fixed, middle)))
+                fixed = _identity()
+            fixed = _multiply(fixed, inner)
+        if found:
+            index, last = found.pop()
+            found.append((index, _multiply(last, fixed)))
+        else:
+            found.append((None, self._embedded(fixed)))
+        return [(index, [[[x[power] / X[3][3][0] for x in row] for row in X] for power in range(3)]) for index, X in found]
 
     def fixed_pose(self, frame: str, body: str) -> list[list[fmpq]] | None:
         """Returns X_FB, (4, 4), of two bodies that are welded together, perhaps through others; None if a joint between them moves."""

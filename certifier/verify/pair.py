@@ -146,7 +146,7 @@ class PairCheck:
             raise ProofError("proof_scene", "the proof is about another scene")
         pairs = proof.pairs
         if not pairs:
-            raise ProofError("proof_pair", f"{_names(proof)} are not a pair of the scene")
+            raise ProofError("proof_pair", f"{proof.title} are not a pair of the scene")
         if proof.frame not in scene.bodies:
             raise ProofError("proof_frame", f"the scene has no body {proof.frame!r}")
         if not all(0 <= j < len(self._faces) for j in proof.faces):
@@ -177,7 +177,7 @@ class PairCheck:
         margin = t - max(residuals)
         if not margin > 0:
             eaten = f"the residual {arb(max(residuals)).str(3, radius=False)} eats up the margin {proof.t:.3g}"
-            raise ProofError("proof_residual", f"{_names(proof)}: {eaten}")
+            raise ProofError("proof_residual", f"{proof.title}: {eaten}")
         return PairStatement(pairs, _lower_root(4 * margin * margin / norm))
 
 
@@ -198,10 +198,6 @@ def _residual(
         )
         for part in parts
     )
-
-
-def _names(proof: PairProof) -> str:
-    return " and ".join(", ".join(volume.geometries) for volume in proof.volumes)
 
 
 def _largest_square_norm(normal: Sequence[Sequence[fmpq]]) -> fmpq:

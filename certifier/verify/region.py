@@ -13,19 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from certifier.errors import ProofError
-from certifier.model import Pair, Scene, Volume
+from certifier.model import Pair, Scene
 from certifier.proof import limits
 from certifier.proof.ground import Ground
-from certifier.proof.pair import PairProof
 from certifier.proof.region import RegionProof
 from certifier.verify.archimedean import check_archimedean
 from certifier.verify.box import Halfspaces, limited, within_limits
 from certifier.verify.decimals import exactly, rounded_down, rounded_up
 from certifier.verify.kinematics import exact
-from certifier.verify.pair import PairCheck, check_ground
-from certifier.verify.residual import NumeratorCache
+from certifier.verify.pair import check_ground
 from certifier.verify.scene import check_scene
-from certifier.verify.volume import check_contained
+from certifier.verify.separations import Progress, statements
 
 NAMED = 20
 """A statement gives at most this many counts of pairs that the scene leaves out; each count is for two bodies."""
@@ -101,8 +99,12 @@ def _rigid_part(scene: Scene, body: str) -> str:
     return body
 
 
-def verify_region(data: bytes) -> RegionStatement:
+def verify_region(data: bytes, processes: int = 1, progress: Progress | None = None) -> RegionStatement:
     """Checks a region's proof file and returns what it proves.
+
+    Args:
+        processes: how many processes check the proofs of the pairs.
+        progress: is told how far they have come.
 
     Raises:
         ProofError: the file is malformed or the proof does not hold.
@@ -112,20 +114,11 @@ def verify_region(data: bytes) -> RegionStatement:
     check_scene(scene)
     _check_polytope(proof)
     _check_implied(proof)
-    checks: dict[int, PairCheck] = {}
-    contained: dict[int, Volume] = {}
-    numerators = NumeratorCache()
+    for ground in {id(part.ground): part.ground for part in proof.proofs}.values():
+        check_ground(scene, ground)
+        _check_inside(proof, ground)
     gaps: dict[Pair, float] = {}
-    check_contained(scene, {id(volume): volume for part in proof.proofs for volume in part.volumes}.values())
-    for part in proof.proofs:
-        ground = part.ground
-        if id(ground) not in checks:
-            check_ground(scene, ground)
-            _check_inside(proof, ground)
-            checks[id(ground)] = PairCheck(scene, ground, contained, numerators)
-        if not isinstance(part, PairProof):
-            raise ProofError("proof_malformed", f"{part.title}: a proof of kind {part.KIND} cannot be checked")
-        statement = checks[id(ground)].verify(part)
+    for statement in statements(scene, proof.proofs, processes, progress):
         for pair in statement.pairs:
             gaps[pair] = max(statement.gap, gaps.get(pair, 0.0))
     missing = next((pair for pair in scene.pairs if pair not in gaps), None)

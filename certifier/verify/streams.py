@@ -1,0 +1,262 @@
+"""The trees of a proof over a partition (certifier.proof.partition) are read strictly here: every stream to its end, and no further."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from certifier.errors import ProofError
+from certifier.model import Array
+from certifier.proof import limits
+from certifier.proof.ground import Ground
+from certifier.proof.partition import EMPTY, PLANE, STREAMS, PartitionProof
+
+_MULTIPLIED = 1 << 16
+"""About so many multipliers are added up at once."""
+
+
+def malformed(proof: PartitionProof, problem: str) -> ProofError:
+    """Returns the error that a proof's streams make no sense."""
+    return ProofError("proof_malformed", f"{proof.title}: {problem}")
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Holds some leaves of the tree of cuts, one after the other.
+
+    Attributes:
+        number: (B,) of each leaf among all leaves, in the order of the nodes.
+        plane: (B,) number of its plane, or of the planes before it where it has none.
+        empty: (B,) whether it has none.
+        lower: (B, k) least values of the joints in play.
+        upper: (B, k) largest values of the joints in play.
+    """
+
+    number: np.ndarray
+    plane: np.ndarray
+    empty: np.ndarray
+    lower: Array
+    upper: Array
+
+
+class Cuts:
+    """Holds the tree of cuts of a proof, which is checked to be one.
+
+    Args:
+        play: position indices of the joints in play, ascending.
+
+    Raises:
+        ProofError: the streams make no tree, or one that is too large.
+    """
+
+    def __init__(self, proof: PartitionProof, play: list[int]) -> None:
+        for name, kind in STREAMS.items():
+            array = getattr(proof, name)
+            if array.dtype != kind or array.ndim != (3 if name == "planes" else 1):
+                raise malformed(proof, f"{name} are {array.dtype} of shape {array.shape}")
+        nodes = proof.nodes
+        if len(nodes) > limits.NODES:
+            raise ProofError("proof_too_large", f"{proof.title}: {len(nodes)} nodes; at most {limits.NODES} are checked")
+        if not np.isin(nodes, [EMPTY, PLANE, *play]).all():
+            raise malformed(proof, "a node cuts a joint that does not move one of the bodies in the frame, or is of no kind")
+        if _ends(nodes).tolist() != [len(nodes)]:
+            raise malformed(proof, "the tree of cuts ends before or after its last node")
+        if len(proof.cuts) != np.count_nonzero(nodes >= 0):
+            raise malformed(proof, f"there are {len(proof.cuts)} cuts for {np.count_nonzero(nodes >= 0)} nodes that cut")
+        if proof.planes.shape != (np.count_nonzero(nodes == PLANE), 4, 1 + len(play)):
+            raise malformed(proof, f"the planes are {proof.planes.shape}")
+        if not (np.isfinite(proof.cuts).all() and np.isfinite(proof.planes).all()):
+            raise malformed(proof, "a cut or a plane is not finite")
+        self._proof, self._play = proof, play
+
+    def cells(self, lower: Array, upper: Array, most: int) -> Iterator[Cells]:
+        """Yields all leaves, at most ``most`` together.
+
+        Args:
+            lower: (k,) least values of the joints in play in the root's cell.
+            upper: (k,) largest values of them.
+
+        Raises:
+            ProofError: a cut is not inside the cell that it divides, or the tree is too deep.
+        """
+        proof, column = self._proof, {joint: i for i, joint in enumerate(self._play)}
+        cuts, planes, pending = iter(proof.cuts.tolist()), 0, [(0, lower, upper)]
+        found: list[tuple[int, int, bool, Array, Array]] = []
+        number = 0
+        for node in proof.nodes.tobytes():
+            depth, lower, upper = pending.pop()
+            if node < 128:  # an int8 that is not negative
+                i, cut = column[node], next(cuts)
+                if not lower[i] < cut < upper[i]:
+                    raise malformed(proof, f"joint {node} is cut at {cut:g}, outside of the cell from {lower[i]:g} to {upper[i]:g}")
+                if depth == limits.CUT_DEPTH:
+                    raise ProofError("proof_too_large", f"{proof.title}: a cell is cut more than {limits.CUT_DEPTH} times")
+                middle_upper, middle_lower = upper.copy(), lower.copy()
+                middle_upper[i] = middle_lower[i] = cut
+                pending += [(depth + 1, middle_lower, upper), (depth + 1, lower, middle_upper)]
+                continue
+            has_plane = node == PLANE + 256
+            found.append((number, planes, not has_plane, lower, upper))
+            planes += has_plane
+            number += 1
+            if len(found) == most:
+                yield _together(found)
+                found = []
+        if found:
+            yield _together(found)
+
+
+def _together(found: list[tuple[int, int, bool, Array, Array]]) -> Cells:
+    return Cells(*(np.array(column) for column in zip(*found, strict=True)))
+
+
+class Pieces:
+    """Holds the trees of pieces of a proof, which are checked to be trees.
+
+    Args:
+        vertices: numbers of vertices of the two volumes.
+        axes: numbers of axes, all of them in play, of which either volume's pieces may be halved along any.
+
+    Raises:
+        ProofError: the streams make no trees, or one that is too large.
+    """
+
+    def __init__(self, proof: PartitionProof, vertices: tuple[int, int], axes: int) -> None:
+        self._proof, self._vertices = proof, vertices
+        pieces = proof.pieces
+        if len(pieces) > limits.PIECES:
+            raise ProofError("proof_too_large", f"{proof.title}: {len(pieces)} nodes of pieces; at most {limits.PIECES} are checked")
+        if pieces.size and not (pieces.min() >= EMPTY and pieces.max() < axes):
+            raise malformed(proof, f"a piece is halved along an axis that is not there, or is of no kind; there are {axes}")
+        self._bounds = np.concatenate([np.zeros(1, dtype=np.int64), _ends(pieces)])
+        trees = len(proof.planes) * sum(vertices)
+        if len(self._bounds) != 1 + trees or self._bounds[-1] != len(pieces):
+            raise malformed(proof, f"the pieces are not {trees} trees, one for each vertex of each plane")
+        self._rank = np.cumsum(pieces < 0, dtype=np.int32)
+
+    def start(self, plane: np.ndarray, side: int) -> np.ndarray:
+        """Returns, (B, V), where the trees of a volume's vertices begin in the stream of pieces, for planes of these numbers, (B,)."""
+        first = plane * sum(self._vertices) + (self._vertices[0] if side else 0)
+        return self._bounds[first[:, None] + np.arange(self._vertices[side])]
+
+    def kind(self, at: np.ndarray) -> np.ndarray:
+        """Returns the nodes there: PLANE, EMPTY, or the axis that is halved."""
+        return self._proof.pieces[at]
+
+    def rank(self, at: np.ndarray) -> np.ndarray:
+        """Returns how many pieces come before the ones there."""
+        return self._rank[at] - 1
+
+    def before(self, plane: np.ndarray) -> np.ndarray:
+        """Returns how many pieces come before those of the planes of these numbers."""
+        begin = self._bounds[plane * sum(self._vertices)]
+        return np.where(begin > 0, self._rank[begin - 1] if self._rank.size else 0, 0)
+
+    def upper_parts(self, start: int) -> dict[int, int]:
+        """Returns, for every node that is halved of the tree that begins there, where its upper part begins; the lower one is next.
+
+        Raises:
+            ProofError: the tree is too large.
+        """
+        end = int(self._bounds[np.searchsorted(self._bounds, start, "right")])
+        if end - start > limits.TREE:
+            raise ProofError("proof_too_large", f"{self._proof.title}: a vertex has more than {limits.TREE} nodes of pieces")
+        found: dict[int, int] = {}
+        heads: list[int] = []
+        for at in range(end - 1, start - 1, -1):
+            if self._proof.pieces[at] >= 0:
+                heads.pop()
+                found[at] = heads.pop()
+            heads.append(at)
+        return found
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Holds lambda'd and lambda'C of the multipliers of some pieces, and the same of absolute values.
+
+    Attributes:
+        offset: (...) lambda'd.
+        slope: (..., n) lambda'C.
+        offset_size: (...) lambda'|d|.
+        slope_size: (..., n) lambda'|C|.
+        count: (...) numbers of multipliers.
+    """
+
+    offset: Array
+    slope: Array
+    offset_size: Array
+    slope_size: Array
+    count: np.ndarray
+
+
+class Multipliers:
+    """Holds the multipliers of a proof, of its pieces and of its EMPTY nodes, which are checked to be nonnegative and of faces there are.
+
+    Raises:
+        ProofError: they are not.
+    """
+
+    def __init__(self, proof: PartitionProof, ground: Ground) -> None:
+        counts = proof.counts
+        wanted = np.count_nonzero(proof.nodes == EMPTY) + np.count_nonzero(proof.pieces < 0)
+        if len(counts) != wanted or (counts.size and not (counts.min() >= 0 and counts.max() <= limits.FACES)):
+            raise malformed(proof, f"{len(counts)} counts of multipliers, for {wanted} pieces, or one that is none")
+        self._counts, self._start = counts, np.cumsum(counts, dtype=np.int32) - counts
+        total = int(self._start[-1]) + int(counts[-1]) if counts.size else 0
+        if not len(proof.faces) == len(proof.multipliers) == total:
+            raise malformed(proof, f"{len(proof.faces)} faces and {len(proof.multipliers)} multipliers where {total} belong")
+        if total and not (proof.faces.min() >= 0 and proof.faces.max() < len(ground.d)):
+            raise malformed(proof, f"a multiplier is of a face that is not there; there are {len(ground.d)}")
+        if total and not (proof.multipliers.min() >= 0 and np.isfinite(proof.multipliers).all()):
+            raise malformed(proof, "a multiplier is negative or not finite")
+        self._proof, self._ground = proof, ground
+        # EMPTY nodes and planes share the stream of counts, in the order of the nodes.
+        leaves = proof.nodes[proof.nodes < 0]
+        self._empty_before = np.cumsum(leaves == EMPTY, dtype=np.int32) - (leaves == EMPTY)
+
+    def of_pieces(self, number: np.ndarray, rank: np.ndarray) -> Sums:
+        """Returns the sums of pieces of leaves, (...), each given by its leaf's number and its rank among all pieces.
+
+        A rank of -1 stands for a piece without multipliers.
+        """
+        return self._sums(np.where(rank < 0, -1, rank + self._empty_before[number]))
+
+    def of_empty(self, number: np.ndarray, rank: np.ndarray) -> Sums:
+        """Returns the sums of EMPTY leaves, (...), each given by its number and the number of pieces before it."""
+        return self._sums(rank + self._empty_before[number])
+
+    def _sums(self, at: np.ndarray) -> Sums:
+        flat, C, d = at.reshape(-1), self._ground.C, self._ground.d
+        count = np.where(flat < 0, 0, self._counts[flat] if self._counts.size else 0).astype(np.int64)
+        sums: Array = np.zeros((len(flat), C.shape[1] + 1))
+        sizes = np.zeros_like(sums)
+        end = np.cumsum(count)
+        for part in np.split(np.arange(len(flat)), np.flatnonzero(np.diff(end // _MULTIPLIED)) + 1):
+            part = part[count[part] > 0]
+            if not part.size:
+                continue
+            first = end[part] - count[part]
+            index = np.repeat(self._start[flat[part]] - (first - first[0]), count[part]) + np.arange(count[part].sum())
+            face, weight = self._proof.faces[index], self._proof.multipliers[index].astype(float)[:, None]
+            terms = weight * np.column_stack([C[face], d[face]])
+            sums[part] = np.add.reduceat(terms, first - first[0], axis=0)
+            sizes[part] = np.add.reduceat(np.abs(terms), first - first[0], axis=0)
+        shape = at.shape
+        return Sums(
+            sums[:, -1].reshape(shape),
+            sums[:, :-1].reshape(*shape, -1),
+            sizes[:, -1].reshape(shape),
+            sizes[:, :-1].reshape(*shape, -1),
+            count.reshape(shape),
+        )
+
+
+def _ends(stream: np.ndarray) -> np.ndarray:
+    """Returns where each of the binary trees of a stream in preorder ends (behind its last node); an unfinished one has no end."""
+    open_ = np.cumsum(np.where(stream >= 0, np.int8(1), np.int8(-1)), dtype=np.int32)
+    least = np.minimum.accumulate(open_)
+    before = np.concatenate([np.zeros(1, dtype=np.int32), least[:-1]])
+    return np.flatnonzero(np.minimum(least, 0) < np.minimum(before[: len(least)], 0)) + 1
