@@ -82,7 +82,18 @@ def region_page(request: Request, region_id: str, db: Db) -> Response:
     region = regions.get_region(region_id, db)
     shape = np.array(region.manifest["inscribed_ellipsoid"]["shape"])
     reach = np.linalg.norm(shape, axis=1).tolist()
-    return page(request, "region.html", {"region": region, "manifest": region.manifest, "reach": reach})
+    # Regions that an earlier checkout stored have no ranges, and their units are not known.
+    ranges = [region.manifest.get("joint_ranges", {}).get(name) for name in region.manifest["space"]["joints"]]
+    limits = [_limits(*joint) for joint in zip(*(region.manifest["space"][name] for name in ("q_lower", "q_upper")), ranges, strict=True)]
+    context = {"region": region, "manifest": region.manifest, "reach": reach, "ranges": ranges, "limits": limits}
+    return page(request, "region.html", context)
+
+
+def _limits(lower: float, upper: float, range_: dict[str, Any] | None) -> dict[str, Any]:
+    """Returns a joint's limits, radians or metres, in the unit of its range."""
+    unit = range_["unit"] if range_ else ""
+    scale = math.degrees(1.0) if unit == "deg" else 1.0
+    return {"lower": scale * lower, "upper": scale * upper, "unit": unit}
 
 
 @router.get("/scenes/{scene_id}")
@@ -240,5 +251,10 @@ def growth_chart(curve: list[GrowthPoint]) -> Chart | None:
     xs = [pad + (width - 2 * pad) * point.seconds / end for point in curve]
     ys = [height - pad - (height - 2 * pad) * ((value - low) / spread if high > low else 0.5) for value in logs]
     line = f"M{xs[0]:.1f},{ys[0]:.1f}" + "".join(f"H{x:.1f}V{y:.1f}" for x, y in zip(xs[1:], ys[1:], strict=True))
-    labels = [f"iteration {p.iteration}: volume {p.ellipsoid_volume:.4g} after {p.seconds:.1f} s" for p in curve]
+    labels = [
+        f"iteration {p.iteration}: volume {p.ellipsoid_volume:.4g}"
+        + ("" if p.share is None else f", {100 * p.share:.3g} % of the proposal")
+        + f", after {p.seconds:.1f} s"
+        for p in curve
+    ]
     return Chart(width, height, line, list(zip(xs, ys, labels, strict=True)))

@@ -127,7 +127,7 @@ def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, 
         scene = service.known_scene(client, args.scene)
         requests = [{"kind": "grow", "scene": scene["id"], "seed": seed, "options": options} for seed in seeds]
         jobs = service.grow_many(client, requests, screen, args.watch)
-        volumes = {job["region"]: client.region(job["region"])["ellipsoid_volume"] for job in jobs if job["region"]}
+        grown = {job["region"]: client.region(job["region"]) for job in jobs if job["region"]}
     if args.json:
         print_json(jobs)
     else:
@@ -135,13 +135,14 @@ def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, 
             (
                 ", ".join(f"{x:g}" for x in seed["q"]),
                 job["region"] or "none",
-                f"{volumes[job['region']]:.4g}" if job["region"] else "",
+                f"{grown[job['region']]['ellipsoid_volume']:.4g}" if job["region"] else "",
+                output.share(grown[job["region"]]["share"]) if job["region"] else "",
                 job["reason"] or "",
             )
             for seed, job in zip(seeds, jobs, strict=True)
         ]
-        output.print_table(("q", "region", "ellipsoid", "ended"), rows, right="ellipsoid")
-    return OK if len(volumes) == len(jobs) else NO
+        output.print_table(("q", "region", "ellipsoid", "share", "ended"), rows, right="ellipsoid share")
+    return OK if len(grown) == len(jobs) else NO
 
 
 def file_name(name: str) -> str:
@@ -222,12 +223,13 @@ def region_ls(args: Namespace) -> int:
             names.get(r["scene"]) or r["scene"],
             str(r["faces"]),
             f"{r['ellipsoid_volume']:.4g}",
+            output.share(r["share"]),
             r["guarantee"],
             r["created_at"][:19],
         )
         for r in regions
     ]
-    output.print_table(("id", "scene", "faces", "volume", "guarantee", "created"), rows, right="faces volume")
+    output.print_table(("id", "scene", "faces", "volume", "share", "guarantee", "created"), rows, right="faces volume share")
     return OK
 
 

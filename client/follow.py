@@ -6,7 +6,7 @@ from typing import Any
 
 from certifier.outcome import Outcome
 from client.http import Client, Document
-from client.output import Screen, plain, seconds
+from client.output import Screen, plain, seconds, share
 
 _STEPS = {"propose": "seeding", "step": "polytope step", "accept": "assembling and verifying the region"}
 
@@ -59,7 +59,8 @@ class Teller:
             self._screen.status(f"iteration {data['iteration']}: {self._done}/{self._total} pairs, {text}")
 
     def _tell_region(self, data: dict[str, Any]) -> None:
-        self._screen.line(f"certified region of iteration {data['iteration']}: ellipsoid volume {data['ellipsoid_volume']:.4g}")
+        kept = f", {share(data['share'])} of the proposal" if data["share"] else ""
+        self._screen.line(f"certified region of iteration {data['iteration']}: ellipsoid volume {data['ellipsoid_volume']:.4g}{kept}")
 
 
 def follow(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:

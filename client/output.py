@@ -83,6 +83,13 @@ def margin(value: float | None) -> str:
     return "-" if value is None else at_least_mm(value)
 
 
+def share(document: dict[str, Any] | None) -> str:
+    """Returns how much of its proposal a region keeps, with the standard error, as a text for people."""
+    if document is None or document["value"] is None:
+        return "-"
+    return f"{100 * document['value']:.3g} +- {100 * document['stderr']:.1g} %"
+
+
 def print_pairs(pairs: Iterable[dict[str, Any]]) -> None:
     """Prints one line for each pair of a ``certify`` document or a manifest, failures last."""
     ordered = sorted(pairs, key=lambda pair: pair["outcome"] != "certified")
@@ -101,13 +108,17 @@ def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()
     faces = len(manifest["halfspace_offsets"])
     closest = min((p for p in pairs if p["margin"] is not None), key=lambda p: p["margin"], default=None)
     error = volume["polytope_stderr"]
+    # Regions that an earlier checkout stored have neither.
+    ranges, kept = manifest.get("joint_ranges", {}), manifest.get("share")
+    moves = [f"{name}: {r['lower']:.4g} to {r['upper']:.4g} {r['unit']}" for name, r in ranges.items()] or space["joints"]
     polytope = f"{volume['polytope']:.4g}" + ("" if error is None else f" +- {error:.1g}")
     print_facts(
         [
             ("scene", f"{manifest['scene']['name']} ({manifest['scene']['hash'][:16]})"),
-            ("joints", f"{len(space['joints'])}: {', '.join(space['joints'])}"),
+            *(("" if i else "joints", text) for i, text in enumerate(moves)),
             ("faces", f"{faces}, {limits} of them joint limits" if faces > limits else str(faces)),
             ("volume", f"inscribed ellipsoid {volume['ellipsoid']:.4g}, polytope {polytope} (in s)"),
+            *([("share", f"{share(kept)} of the proposal's collision-free part (in q)")] if kept else []),
             ("pairs", f"{sum(p['outcome'] == 'certified' for p in pairs)} of {len(pairs)} certified, {len(manifest['ignored'])} ignored"),
             *([("margin", f"at least {margin(closest['margin'])}: {closest['a']} - {closest['b']}")] if closest else []),
             ("guarantee", manifest["guarantee"]),

@@ -20,7 +20,7 @@ def emit(session: Session, job: JobRow, kind: str, data: dict[str, Any]) -> None
     - ``iteration``: index, label, state, pairs;
     - ``pairs``: iteration, and pairs (each with index, state, stage, margin, seconds);
     - ``step``: kind, state, seconds;
-    - ``region``: region_id, iteration, guarantee, ellipsoid_volume;
+    - ``region``: region_id, iteration, guarantee, ellipsoid_volume, share (as in the manifest);
     - ``lost``: worker, reason, and either iteration and pairs or step, which are open again.
     """
     job.event_seq += 1

@@ -246,6 +246,8 @@ class RegionRow(Base):
     """Number of faces, m."""
     proof_digest: Mapped[str] = mapped_column(ForeignKey("proofs.digest"))
     ellipsoid_volume: Mapped[float]
+    share: Mapped[Document | None]
+    """How much of the proposal the region keeps, as its manifest says it; None for a given polytope."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow, index=True)
 
 

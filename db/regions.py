@@ -35,13 +35,14 @@ def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any],
         faces=len(d),
         proof_digest=proofs.put(session, [proof])[proof],
         ellipsoid_volume=volume,
+        share=manifest["share"],
     )
     session.add(region)
     session.get_one(IterationRow, (job.id, iteration)).ellipsoid_volume = volume
     session.flush()
     job.region_id = session.scalar(_latest(job.id))
     data = {"region_id": region.id, "iteration": iteration, "guarantee": region.guarantee, "ellipsoid_volume": volume}
-    events.emit(session, job, "region", data)
+    events.emit(session, job, "region", data | {"share": region.share})
     return region
 
 

@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,11 @@ from structlog.contextvars import bound_contextvars
 
 from certifier.errors import CirisError
 from certifier.growth.actions import Candidate
+from certifier.growth.options import GrowthOptions
+from certifier.growth.state import GrowthState
 from certifier.isolation.child import run_in_child
 from certifier.jobs.region import certified_region, growth_point, versions
+from certifier.jobs.share import SampledProposal
 from certifier.model import Array, Polytope, Scene
 from certifier.step.step import step as polytope_step
 from db import jobs, leases, pairs, proofs, regions, steps
@@ -107,7 +111,7 @@ def _step(scene: Scene, claim: steps.Claim) -> Done:
 
 def _accept(scene: Scene, claim: steps.Claim) -> Done:
     """Assembles and verifies the proof of a region. If the verifier refuses it, its ProofError is raised and nothing is stored."""
-    accepted = claim.input
+    accepted, proposal = claim.input, _sampled_proposal(claim.scene_id, claim.job_id)
 
     def read() -> tuple[Candidate, dict[int, bytes], dict[str, Any]]:
         with database().read() as session:
@@ -121,15 +125,29 @@ def _accept(scene: Scene, claim: steps.Claim) -> Done:
                 proofs={int(index): iteration for index, iteration in accepted["proofs"].items()},
             )
             held = _proofs(session, claim.job_id, accepted["proofs"])
-            return candidate, held, _provenance(session, scene, jobs.get(session, claim.job_id))
+            return candidate, held, _provenance(session, scene, jobs.get(session, claim.job_id), proposal)
 
     candidate, held, provenance = persistently(read)
-    region = certified_region(scene, candidate, held, provenance)
+    region = certified_region(scene, candidate, held, provenance, proposal)
 
     def save(session: Session, job: JobRow) -> None:
         regions.add(session, job, candidate.iteration, region.manifest, region.proof)
 
     return Done({"iteration": candidate.iteration}, save)
+
+
+@lru_cache(maxsize=8)
+def _sampled_proposal(scene_id: str, job_id: str) -> SampledProposal | None:
+    """Returns what the job grows its regions from, sampled; None for a given polytope. It is kept, since a job may accept many regions."""
+
+    def read() -> GrowthState:
+        with database().read() as session:
+            job = jobs.get(session, job_id)
+            assert job.growth is not None, "a job with a certified polytope has begun to grow"
+            return GrowthState.from_document(job.growth, GrowthOptions.from_document(job.options))
+
+    start = persistently(read).start
+    return None if start is None else SampledProposal.of(load_scene(scene_id), start.rows)
 
 
 def _polytope(session: Session, job_id: str, iteration: int) -> tuple[Polytope, Array | None]:
@@ -147,19 +165,20 @@ def _proofs(session: Session, job_id: str, iteration_of: Mapping[str, int]) -> d
     return {index: proofs.get(session, rows[index].proof_digest or "") for index in map(int, iteration_of)}
 
 
-def _provenance(session: Session, scene: Scene, job: JobRow) -> dict[str, Any]:
+def _provenance(session: Session, scene: Scene, job: JobRow, proposal: SampledProposal | None) -> dict[str, Any]:
     started = job.started_at or job.created_at
     finished = {row.index: row.finished_at or started for row in pairs.iterations(session, job.id)}
-    accepted = [step.input for step in steps.accepted(session, job.id)]
     seeded = [step.report for step in steps.of_job(session, job.id) if step.kind == StepKind.PROPOSE and step.report is not None]
+
+    def point(iteration: int, ellipsoid_volume: float | None, **_: Any) -> dict[str, Any]:
+        share = None if proposal is None else proposal.share(_polytope(session, job.id, iteration)[0])["value"]
+        return growth_point(iteration, (finished[iteration] - started).total_seconds(), ellipsoid_volume, share)
+
     return {
         "job": job.id,
         "options": job.options,
         "versions": versions(scene),
-        "growth_curve": [
-            growth_point(found["iteration"], (finished[found["iteration"]] - started).total_seconds(), found["ellipsoid_volume"])
-            for found in accepted
-        ],
+        "growth_curve": [point(**step.input) for step in steps.accepted(session, job.id)],
         "seeding_seconds": sum(report["info"]["seconds"] for report in seeded),
         "pair_seconds": pairs.seconds(session, job.id),
         "seconds": (utcnow() - started).total_seconds(),

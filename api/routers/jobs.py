@@ -219,13 +219,19 @@ def _cell(scene: Scene, row: PairRow) -> PairCell:
 
 @router.get("/{job_id}/growth")
 def get_job_growth(job_id: str, db: Db) -> GrowthCurve:
-    """Returns the regions that were certified during the job, with their volumes."""
+    """Returns the regions that were certified during the job, with their volumes and shares of the proposal."""
     with db.read() as session:
         job = jobs.get(session, job_id)
         rows = regions.of_job(session, job_id)
     start = job.started_at or job.created_at
     points = [
-        GrowthPoint(iteration=r.iteration, region=r.id, ellipsoid_volume=r.ellipsoid_volume, seconds=(r.created_at - start).total_seconds())
-        for r in rows
+        GrowthPoint(
+            iteration=row.iteration,
+            region=row.id,
+            ellipsoid_volume=row.ellipsoid_volume,
+            share=None if row.share is None else row.share["value"],
+            seconds=(row.created_at - start).total_seconds(),
+        )
+        for row in rows
     ]
     return GrowthCurve(points=points)

@@ -289,6 +289,7 @@ class GrowthPoint(BaseModel):
     iteration: int
     region: str
     ellipsoid_volume: float
+    share: float | None = Field(description="Part of the proposal's collision-free configurations that the region contains, by q-volume.")
     seconds: float = Field(description="Seconds from the job's start to the region.")
 
 

@@ -14,6 +14,17 @@ from db.models import RegionRow
 MAX_POINTS = 10_000
 
 
+class Share(BaseModel):
+    """Says how much of the proposal that a region was grown from the region keeps, by volume in joint positions q."""
+
+    value: float | None = Field(
+        description="Part of the proposal's collision-free configurations that the region contains; null where no sample is free."
+    )
+    stderr: float | None = Field(description="Standard error of `value`, which is found by sampling.")
+    collision_free: float = Field(description="Part of the proposal's samples that is collision-free.")
+    samples: int = Field(description="Number of the proposal's samples, uniform in q.")
+
+
 class RegionSummary(BaseModel):
     """Describes a certified region in a list."""
 
@@ -24,6 +35,7 @@ class RegionSummary(BaseModel):
     guarantee: Guarantee
     faces: int = Field(description="Number of rows of C, joint limits included.")
     ellipsoid_volume: float
+    share: Share | None = Field(description="How much of the proposal the region keeps; null for a region that was not grown.")
     proof: str = Field(description="SHA-256 of the proof file.")
     created_at: datetime
 
@@ -37,6 +49,7 @@ class RegionSummary(BaseModel):
             guarantee=Guarantee(row.guarantee),
             faces=row.faces,
             ellipsoid_volume=row.ellipsoid_volume,
+            share=None if row.share is None else Share(**row.share),
             proof=row.proof_digest,
             created_at=row.created_at,
         )

@@ -11,7 +11,9 @@ from certifier.errors import CirisError
 from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Step
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
+from certifier.growth.state import Start
 from certifier.jobs.region import Region, certified_region, growth_point, versions
+from certifier.jobs.share import SampledProposal
 from certifier.jobs.verdict import Verdict
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee, Outcome
@@ -32,6 +34,8 @@ class _Run:
         results: iteration -> pair index -> result.
         seeding_seconds: how long the seeding took.
         candidate: the last accepted candidate; None before there is one.
+        proposal: what the region is grown from; None before there is a candidate.
+        curve: the growth curve of the manifest.
     """
 
     scene: Scene
@@ -40,6 +44,14 @@ class _Run:
     results: dict[int, dict[int, PairResult]] = field(default_factory=dict)
     seeding_seconds: float = 0.0
     candidate: Candidate | None = None
+    proposal: SampledProposal | None = None
+    curve: list[dict[str, Any]] = field(default_factory=list)
+
+    def accept(self, candidate: Candidate, start: Start, seconds: float) -> None:
+        self.proposal = self.proposal or SampledProposal.of(self.scene, start.rows)
+        share = self.proposal.share(candidate.polytope)["value"]
+        self.curve.append(growth_point(candidate.iteration, seconds, candidate.ellipsoid_volume, share))
+        self.candidate = candidate
 
     def certify(self, action: Certify) -> Outcomes:
         shared = Certification(self.scene, action.polytope, action.center, self.seed)
@@ -81,7 +93,6 @@ def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: No
     start = time.perf_counter()
     run = _Run(scene, options.random_seed, progress)
     transition = begin(scene, options)
-    curve: list[dict[str, Any]] = []
     while not isinstance(transition.action, Finish):
         failure: CirisError | None = None
         try:
@@ -92,20 +103,20 @@ def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: No
         if failure and run.candidate is None:
             raise failure
         if transition.candidate:
-            run.candidate = transition.candidate
-            curve.append(growth_point(run.candidate.iteration, time.perf_counter() - start, run.candidate.ellipsoid_volume))
+            assert transition.state.start is not None, "what is grown comes from a proposal"
+            run.accept(transition.candidate, transition.state.start, time.perf_counter() - start)
     if run.candidate is None:
         raise CirisError("not_grown", transition.action.reason, hint="try another seed, or look at the pair named")
     provenance = {
         "options": options.to_document(),
         "versions": versions(scene),
         "reason": transition.action.reason,
-        "growth_curve": curve,
+        "growth_curve": run.curve,
         "seeding_seconds": run.seeding_seconds,
         "pair_seconds": sum(result.seconds for found in run.results.values() for result in found.values()),
         "seconds": time.perf_counter() - start,
     }
-    return certified_region(scene, run.candidate, run.proofs(run.candidate), provenance)
+    return certified_region(scene, run.candidate, run.proofs(run.candidate), provenance, run.proposal)
 
 
 def certify(scene: Scene, polytope: Polytope, center: Array | None = None, progress: Progress = lambda _: None) -> Verdict:

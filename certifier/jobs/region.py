@@ -10,10 +10,11 @@ import numpy as np
 
 from certifier.growth.actions import Candidate
 from certifier.jobs.archimedean import archimedean
+from certifier.jobs.share import SampledProposal
 from certifier.model import SCHEMA_VERSION, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume
-from certifier.polytopes.polytope import chebyshev_center, support
+from certifier.polytopes.polytope import bounds, chebyshev_center, support
 from certifier.proof.pair import PairProof
 from certifier.proof.region import Implied, RegionProof
 from certifier.proof.separation import digest
@@ -35,12 +36,15 @@ class Region:
     statement: RegionStatement
 
 
-def certified_region(scene: Scene, candidate: Candidate, proofs: dict[int, bytes], provenance: dict[str, Any]) -> Region:
+def certified_region(
+    scene: Scene, candidate: Candidate, proofs: dict[int, bytes], provenance: dict[str, Any], proposal: SampledProposal | None = None
+) -> Region:
     """Assembles a region from its pairs' proofs, verifies the whole, and describes it.
 
     Args:
         proofs: pair index -> proof file, for every pair of the scene; a proof that covers several pairs stands at each of them.
         provenance: options, versions, growth curve, and the seconds of the whole job, of the seeding and of all pairs.
+        proposal: what the region was grown from; None for a given polytope.
 
     Raises:
         ProofError: the proof does not hold; nothing may be served as certified then.
@@ -67,11 +71,12 @@ def certified_region(scene: Scene, candidate: Candidate, proofs: dict[int, bytes
             "s_lower": scene.s_lower.tolist(),
             "s_upper": scene.s_upper.tolist(),
         },
-        "halfspace_normals": C.tolist(),
-        "halfspace_offsets": d.tolist(),
+        **_halfspaces(polytope),
         "interior_point": interior.tolist(),
         "inscribed_ellipsoid": {"center": ellipsoid.center.tolist(), "shape": ellipsoid.shape.tolist()},
+        "joint_ranges": _joint_ranges(scene, polytope),
         "volume": {"ellipsoid": ellipsoid.volume, "polytope": size, "polytope_stderr": error},
+        "share": None if proposal is None else proposal.share(polytope),
         "seed": None if candidate.seed is None else scene.to_q(candidate.seed).tolist(),
         "pairs": [
             {"a": p.a, "b": p.b, "outcome": "certified", "margin": statement.gaps[p], "proof_digest": digest(proofs[index])}
@@ -81,14 +86,30 @@ def certified_region(scene: Scene, candidate: Candidate, proofs: dict[int, bytes
         "padding": scene.padding,
         "archimedean": {"N": bound.N},
         "guarantee": Guarantee.EXACT.value,
-        "provenance": provenance,
+        "provenance": provenance | {"proposal": None if proposal is None else _halfspaces(proposal.polytope)},
     }
     return Region(manifest, data, statement)
 
 
-def growth_point(iteration: int, seconds: float, ellipsoid_volume: float | None) -> dict[str, Any]:
+def _joint_ranges(scene: Scene, polytope: Polytope) -> dict[str, dict[str, Any]]:
+    """Returns how far each joint moves within the polytope: name -> ``lower``, ``upper`` and their ``unit``, degrees or metres.
+
+    The bounds come from linear programs. A joint reaches them, though seldom all joints at once.
+
+    Raises:
+        RegionError: as :func:`certifier.polytopes.polytope.bounds`.
+    """
+    lower, upper = (scene.to_q(s) for s in bounds(polytope))
+    unit = np.where(scene.revolute, np.rad2deg(1.0), 1.0)
+    return {
+        joint.name: {"lower": low, "upper": high, "unit": "deg" if revolute else "m"}
+        for joint, low, high, revolute in zip(scene.moving, (lower * unit).tolist(), (upper * unit).tolist(), scene.revolute, strict=True)
+    }
+
+
+def growth_point(iteration: int, seconds: float, ellipsoid_volume: float | None, share: float | None) -> dict[str, Any]:
     """Returns a point of the manifest's growth curve: an iteration that came to a region ``seconds`` after the job began."""
-    return {"iteration": iteration, "seconds": seconds, "ellipsoid_volume": ellipsoid_volume}
+    return {"iteration": iteration, "seconds": seconds, "ellipsoid_volume": ellipsoid_volume, "share": share}
 
 
 def versions(scene: Scene) -> dict[str, Any]:
@@ -101,6 +122,10 @@ def versions(scene: Scene) -> dict[str, Any]:
             return None
 
     return {"ciris": of("ciris"), "drake": scene.provenance.get("drake") or of("drake"), "python-flint": of("python-flint")}
+
+
+def _halfspaces(polytope: Polytope) -> dict[str, Any]:
+    return {"halfspace_normals": polytope.C.tolist(), "halfspace_offsets": polytope.d.tolist()}
 
 
 def _implied(polytope: Polytope, proofs: tuple[PairProof, ...]) -> Implied:

@@ -13,6 +13,7 @@ from fastapi.testclient import TestClient
 
 from api.app import create_app
 from certifier.jobs.region import Region, certified_region
+from certifier.jobs.share import SampledProposal
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import Certification
@@ -81,13 +82,14 @@ def scene(database: Database) -> Scene:
 
 @pytest.fixture(scope="session")
 def certified() -> Region:
-    """A region of the slider: -0.3 <= s <= 0.2, both pairs certified and the proof verified."""
+    """A region of the slider, -0.3 <= s <= 0.2, as if grown from the joint limits: both pairs certified and the proof verified."""
     scene = slider(posts=2)
     polytope = scene.polytope([[1.0], [-1.0]], [0.2, 0.3])
     certification = Certification(scene, polytope, np.zeros(1))
     results = [certification.certify(index) for index in range(len(scene.pairs))]
     proofs = {index: result.proof or b"" for index, result in enumerate(results)}
-    return certified_region(scene, accepted(polytope, np.zeros(1)), proofs, {"seconds": 1.0})
+    proposal = SampledProposal.of(scene, scene.polytope([], []))
+    return certified_region(scene, accepted(polytope, np.zeros(1)), proofs, {"seconds": 1.0}, proposal)
 
 
 @pytest.fixture

@@ -23,6 +23,10 @@ def test_a_region_is_listed_and_shown_with_its_manifest(client: TestClient, regi
     for query in ("", "?scene=slider", f"?job={client.get('/v1/jobs').json()['jobs'][0]['id']}"):
         (summary,) = client.get(f"/v1/regions{query}").json()["regions"]
         assert (summary["id"], summary["guarantee"], summary["faces"]) == (region, "exact", 4)
+        assert summary["share"] == certified.manifest["share"]
+    assert summary["share"]["value"] == pytest.approx(0.25, abs=4 * summary["share"]["stderr"])
+    job = client.get("/v1/jobs").json()["jobs"][0]["id"]
+    assert client.get(f"/v1/jobs/{job}/growth").json()["points"][0]["share"] == summary["share"]["value"]
     assert client.get(f"/v1/regions/{region}").json()["manifest"] == certified.manifest
 
 

@@ -16,6 +16,7 @@ import pytest
 from certifier.jobs.region import Region
 from certifier.model import Scene
 from certifier.verify.region import verify_region
+from client import output
 from client.cli import _joined
 from client.commands import save_proof
 from client.find import data_dir
@@ -201,11 +202,24 @@ def test_regions_are_listed_shown_and_exported(ciris: Ciris, url: str, region: s
     assert [r["id"] for r in ciris("region", "ls", "--scene", "slider", "--json", CIRIS_URL=url).json] == [region]
     assert region in ciris("region", "ls", CIRIS_URL=url).stdout
     assert ciris("region", "show", region, "--json", CIRIS_URL=url).json == certified.manifest
-    assert "guarantee  exact" in ciris("region", "show", region, CIRIS_URL=url).stdout
+    shown = ciris("region", "show", region, CIRIS_URL=url).stdout
+    assert "guarantee  exact" in shown
+    assert "joints     model/slide: -0.3 to 0.2 m" in shown
+    kept = output.share(certified.manifest["share"])
+    assert f"share      {kept} of the proposal's" in shown
+    assert kept in ciris("region", "ls", CIRIS_URL=url).stdout
     assert ciris("region", "export", region, CIRIS_URL=url).json == certified.manifest
     with np.load(io.BytesIO(ciris("region", "export", region, "--format", "npz", CIRIS_URL=url).raw)) as arrays:
         assert arrays["C"].tolist() == certified.manifest["halfspace_normals"]
     assert verify_region(ciris("region", "export", region, "--format", "proof", CIRIS_URL=url).raw).faces == 4
+
+
+def test_a_region_that_was_stored_before_there_were_shares_is_shown(certified: Region, capsys: pytest.CaptureFixture[str]) -> None:
+    older = {name: value for name, value in certified.manifest.items() if name not in ("share", "joint_ranges")}
+    output.print_region(older)
+    lines = capsys.readouterr().out.splitlines()
+    assert "  joints     model/slide" in lines
+    assert not any("share" in line for line in lines)
 
 
 def test_contains_answers_by_its_exit_status(ciris: Ciris, url: str, region: str) -> None:

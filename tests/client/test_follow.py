@@ -27,6 +27,7 @@ def pair(index: int, state: str) -> dict[str, Any]:
     return {"index": index, "state": state, "stage": "sos", "margin": None, "seconds": 0.25}
 
 
+SHARE = {"value": 0.634, "stderr": 0.0052, "collision_free": 0.9, "samples": 10000}
 EVENTS: list[tuple[str, dict[str, Any]]] = [
     ("job", {"state": "running"}),
     ("step", {"kind": "propose", "state": "open"}),
@@ -37,7 +38,7 @@ EVENTS: list[tuple[str, dict[str, Any]]] = [
     ("iteration", {"index": 1, "label": "contract", "state": "running", "pairs": 1, "reused": 1}),
     ("pairs", {"iteration": 1, "pairs": [pair(1, "certified")]}),
     ("iteration", {"index": 1, "label": "contract", "state": "certified"}),
-    ("region", {"region_id": "r", "iteration": 1, "guarantee": "exact", "ellipsoid_volume": 0.5}),
+    ("region", {"region_id": "r", "iteration": 1, "guarantee": "exact", "ellipsoid_volume": 0.5, "share": SHARE}),
     ("something_new", {}),
 ]
 
@@ -55,7 +56,7 @@ def test_the_course_of_a_job_in_a_few_lines() -> None:
         "seeding: done after 4.80 s",
         "iteration 0 (contract): failed, 2 of 2 pairs settled; a - c: not certifiable",
         "iteration 1 (contract): certified, 1 of 1 pairs settled",
-        "certified region of iteration 1: ellipsoid volume 0.5",
+        "certified region of iteration 1: ellipsoid volume 0.5, 63.4 +- 0.5 % of the proposal",
     ]
 
 

@@ -12,7 +12,8 @@ from fastapi.testclient import TestClient
 from api.pages import growth_chart, matrix_rows, progress
 from api.schemas.jobs import GrowthPoint, Iteration, PairCell, PairMatrix
 from api.schemas.scenes import PairInfo
-from db import scenes
+from certifier.jobs.region import Region
+from db import regions, scenes
 from db.session import Database
 from db.states import IterationState, PairState
 from tests.scenes import slider
@@ -54,6 +55,32 @@ def test_the_job_page_shows_outcomes_regions_and_their_files(client: TestClient,
     for link in (f"/regions/{region}", f"/v1/regions/{region}/proof", f"/v1/regions/{region}/export?format=json"):
         assert f'href="{link}"' in text
     assert "data-events" not in text, "an ended job is not followed"
+
+
+def test_the_region_page_shows_the_share_and_the_ranges(client: TestClient, region: str, certified: Region, database: Database) -> None:
+    text = client.get(f"/regions/{region}").text
+    kept = certified.manifest["share"]
+    assert f'{100 * kept["value"]:.3g} <span class="small">± {100 * kept["stderr"]:.1g}</span> %' in text
+    assert "from 10000 samples, of which 100 % are collision-free" in text
+    assert "-0.3000 to 0.2000 m" in text
+    with database.write() as session:
+        row = regions.get(session, region)
+        turning = {"joint_ranges": {"model/slide": {"lower": -17.2, "upper": 11.5, "unit": "deg"}}}
+        row.manifest = row.manifest | turning
+    text = client.get(f"/regions/{region}").text
+    assert "-17.2° to 11.5°" in text
+    assert "-57.3° to 57.3°" in text
+
+
+def test_the_page_of_a_region_that_was_stored_before_there_were_shares(client: TestClient, region: str, database: Database) -> None:
+    with database.write() as session:
+        row = regions.get(session, region)
+        row.manifest = {name: value for name, value in row.manifest.items() if name not in ("share", "joint_ranges")}
+        row.share = None
+    text = client.get(f"/regions/{region}").text
+    assert "<dt>Share of proposal</dt><dd>\N{EN DASH}</dd>" in text
+    assert "samples" not in text
+    assert client.get("/v1/regions").json()["regions"][0]["share"] is None
 
 
 def test_an_empty_service_says_how_to_begin(client: TestClient) -> None:
@@ -111,10 +138,11 @@ def test_progress_counts_what_is_settled(matrix: PairMatrix) -> None:
 
 
 def test_the_chart_stays_inside_its_frame() -> None:
-    points = [GrowthPoint(iteration=i, region="r", ellipsoid_volume=10.0 ** (i - 20), seconds=float(i)) for i in range(5)]
+    points = [GrowthPoint(iteration=i, region="r", ellipsoid_volume=10.0 ** (i - 20), share=i / 10, seconds=float(i)) for i in range(5)]
     chart = growth_chart(points)
     assert chart is not None
     assert all(0 <= x <= chart.width and 0 <= y <= chart.height for x, y, _ in chart.dots)
     assert [y for _, y, _ in chart.dots] == sorted((y for _, y, _ in chart.dots), reverse=True)
+    assert chart.dots[3][2] == "iteration 3: volume 1e-17, 30 % of the proposal, after 3.0 s"
     assert growth_chart(points[:1]) is not None
     assert growth_chart([]) is None

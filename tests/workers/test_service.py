@@ -32,6 +32,11 @@ def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(plana
     statement = verify_region(proof)
     alone = grow(planar, GrowthOptions.from_document(options)).manifest
     assert (region.arrays["C"].tolist(), region.arrays["d"].tolist()) == (alone["halfspace_normals"], alone["halfspace_offsets"])
+    assert region.manifest["share"] == region.share == alone["share"]
+    assert region.manifest["joint_ranges"] == alone["joint_ranges"]
+    assert region.manifest["provenance"]["proposal"] == alone["provenance"]["proposal"]
+    curves = ([(p["iteration"], p["share"]) for p in manifest["provenance"]["growth_curve"]] for manifest in (region.manifest, alone))
+    assert next(curves) == next(curves)
     assert len(statement.gaps) == len(planar.pairs)
     assert np.all(region.arrays["C"] @ planar.to_s(SEED) <= region.arrays["d"])
     assert region.manifest["guarantee"] == region.guarantee == "exact"
