@@ -12,6 +12,8 @@ class Outcome(StrEnum):
     """A configuration inside the polytope is in collision, and the result names it."""
     NOT_CERTIFIABLE = "not_certifiable"
     """No certificate of the form of the program (11) exists, by a dual proof; a plane may separate the pair all the same."""
+    TOO_CLOSE = "too_close"
+    """The bodies come so close to each other that no plane is found in a narrow cell; the result names a configuration and the distance."""
     INCONCLUSIVE = "inconclusive"
     """A limit or numerical trouble stopped the search before either answer was found; the detail says which."""
     ERROR = "error"
@@ -25,6 +27,8 @@ class Stage(StrEnum):
     """A look at sampled configurations settled it, before any program was solved."""
     SOS = "sos"
     """The sums-of-squares program (11) settled it, or a contact that was looked for after it."""
+    CELLS = "cells"
+    """The search for a partition of the polytope settled it."""
 
 
 class Guarantee(StrEnum):
@@ -42,7 +46,7 @@ class Guarantee(StrEnum):
 
 def combine(outcomes: "list[Outcome]") -> Outcome:
     """Returns the outcome of a polytope from the outcomes of its pairs: the worst of them."""
-    for outcome in (Outcome.REFUTED, Outcome.NOT_CERTIFIABLE, Outcome.ERROR, Outcome.INCONCLUSIVE):
+    for outcome in (Outcome.REFUTED, Outcome.NOT_CERTIFIABLE, Outcome.TOO_CLOSE, Outcome.ERROR, Outcome.INCONCLUSIVE):
         if outcome in outcomes:
             return outcome
     return Outcome.CERTIFIED

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 from certifier.errors import CirisError
 from certifier.growth.state import GrowthState
-from certifier.model import Array, Polytope
+from certifier.model import Array, Box, Polytope
 from certifier.outcome import Outcome
 from certifier.pair.result import Weakness
 from certifier.seeding.proposal import Proposal
@@ -32,7 +32,7 @@ class Certify:
 
     Attributes:
         iteration: number of this certification within the job, from 0.
-        label: what it is for: ``given``, ``contract``, ``push`` or ``round``.
+        label: what it is for: ``given``, ``cells``, ``contract``, ``push`` or ``round``.
         polytope: its rows include the joint limits.
         center: (n,) interior point; None for the Chebyshev centre.
         pairs: indices into ``scene.pairs`` to certify, those most likely to fail first.
@@ -40,6 +40,10 @@ class Certify:
         hard: pairs that failed on a larger polytope; nothing less than all faces is tried for them.
         failures: end after this many failures, in the order of ``pairs`` (B.3); pairs not reached are left out of the report. None to
             certify all pairs.
+        cells: so many cells of each pair are looked at; 1 for the program (11) of the papers on all of the polytope.
+        box: the root cell of all partitions; None for the polytope's smallest box.
+        begun: pair index -> earlier iteration that left a partition to go on with.
+        ending: pairs whose open cells are going to be cut off.
     """
 
     kind: ClassVar[str] = "certify"
@@ -51,6 +55,10 @@ class Certify:
     reuse: dict[int, int]
     hard: list[int]
     failures: int | None
+    cells: int = 1
+    box: Box | None = None
+    begun: dict[int, int] = field(default_factory=dict)
+    ending: list[int] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from certifier.growth.state import Best, Bisection, GrowthState, Start
 from certifier.growth.targeted import contraction_starts, cut, next_contraction
 from certifier.growth.trials import certify
 from certifier.growth.uniform import bisect, shrink
+from certifier.growth.whole import after_cells, begin_stage
 from certifier.model import Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
@@ -43,7 +44,8 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
         raise RegionError("polytope_missing", "a polytope needs C and d", field="polytope")
     given, center = Polytope.given(options.seed["C"], options.seed["d"], scene.n), options.seed.get("center")
     limited = scene.polytope(given.C, given.d)
-    return certify(scene, state, "given", limited, None if center is None else np.array(center), failures=None)
+    center = None if center is None else np.array(center)
+    return certify(scene, state, "given", limited, center, failures=None, cells=options.cells)
 
 
 def advance(scene: Scene, state: GrowthState, report: Report) -> Transition:
@@ -68,8 +70,10 @@ def _proposed(scene: Scene, state: GrowthState, proposal: Proposal) -> Transitio
     norms = np.linalg.norm(limited.C, axis=1)
     rows = Polytope(limited.C / norms[:, None], limited.d / norms)
     given = proposal.info.get("method") in (Method.BOX, Method.POLYTOPE)
-    if state.options.contraction == "targeted":
+    if state.options.contraction != "uniform":
         start = Start(rows, proposal.center, np.concatenate([proposal.center[None], proposal.contain]), given)
+        if state.options.contraction == "whole":
+            return begin_stage(scene, replace(state, start=start), start)
         transition = next_contraction(scene, replace(state, start=start), start)
         assert transition is not None, "before there is a region every contraction is worth it"
         return transition
@@ -87,9 +91,9 @@ def _certified(scene: Scene, state: GrowthState, report: Outcomes) -> Transition
     if report.complete:
         volume = inscribed_ellipsoid(action.polytope).volume
         if state.best is None or volume > state.best.ellipsoid_volume:
-            assert action.center is not None
             candidate = _candidate(state, report, volume)
-            state = replace(state, best=Best(action.iteration, action.polytope, action.center, volume))
+            center = chebyshev_center(action.polytope)[0] if action.center is None else action.center
+            state = replace(state, best=Best(action.iteration, action.polytope, center, volume))
     assert state.start is not None, "what is certified comes from a proposal"
     return replace(_after(scene, state, state.start, report, candidate is not None), candidate=candidate)
 
@@ -103,6 +107,8 @@ def _candidate(state: GrowthState, report: Outcomes, volume: float | None) -> Ca
 def _after(scene: Scene, state: GrowthState, start: Start, report: Outcomes, accepted: bool) -> Transition:
     """Returns what follows a certification: more of the same phase, or else the next phase."""
     label = report.action.label
+    if label == "cells":
+        return after_cells(scene, state, start, report)
     if label == "round":
         return after_round(scene, _suspecting(state, report), start, accepted)
     if label == "contract" and state.options.contraction == "uniform":

@@ -28,6 +28,7 @@ WHOLE_NUMBERS = {
     "pushes": (0, 1000),
     "max_rounds": (0, 1000),
     "backoff": (0, 20),
+    "cells": (1, 10_000_000),
     "random_seed": (0, 2**63 - 1),
 }
 """Maps an option to its least and its greatest value."""
@@ -42,7 +43,10 @@ class GrowthOptions:
     Attributes:
         kind: ``grow`` a region from a seed, or ``certify`` a given polytope as it is.
         seed: the document of :class:`certifier.seeding.propose.SeedOptions`; for ``certify`` its ``C``, ``d`` and optional ``center``.
-        contraction: ``targeted`` or ``uniform``.
+        contraction: ``whole`` keeps the proposal and certifies it cell by cell; ``targeted`` and ``uniform`` shrink it until every pair has
+            one plane that moves with the joints (11).
+        cells: so many cells of each pair are looked at. Of ``grow``, what is open then is cut off; of ``certify``, 1 gives the program (11)
+            of the papers.
         contractions: how many targeted contractions of the proposal are tried; each is given up when it is smaller than the best so far.
             None, for this and for ``pushes`` and ``max_rounds``, takes the default that pays: see EFFORT.
         bisection_steps: certifications spent on uniform contraction after the two ends are known.
@@ -55,7 +59,8 @@ class GrowthOptions:
 
     kind: Literal["grow", "certify"] = "grow"
     seed: dict[str, Any] = field(default_factory=dict)
-    contraction: Literal["targeted", "uniform"] = "targeted"
+    contraction: Literal["whole", "targeted", "uniform"] = "targeted"
+    cells: int = 1
     contractions: int | None = None
     bisection_steps: int = 6
     pushes: int | None = None
@@ -84,8 +89,8 @@ class GrowthOptions:
         options = cls(**document)
         if options.kind not in ("grow", "certify"):
             raise RegionError("option_value", "kind is 'grow' or 'certify'", field="options.kind")
-        if options.contraction not in ("targeted", "uniform"):
-            raise RegionError("option_value", "contraction is 'targeted' or 'uniform'", field="options.contraction")
+        if options.contraction not in ("whole", "targeted", "uniform"):
+            raise RegionError("option_value", "contraction is 'whole', 'targeted' or 'uniform'", field="options.contraction")
         for name, (least, greatest) in WHOLE_NUMBERS.items():
             value = getattr(options, name)
             if name in EFFORT[0][1] and value is None:
@@ -93,7 +98,7 @@ class GrowthOptions:
             if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= greatest:
                 raise RegionError("option_value", f"{name} must be an integer from {least} to {greatest}", field=f"options.{name}")
         if options.contraction == "uniform" and options.seed.get("contain"):
-            raise RegionError("option_value", "only targeted contraction keeps points inside", field="options.contraction")
+            raise RegionError("option_value", "uniform contraction does not keep points inside", field="options.contraction")
         if not (isinstance(options.tolerance, (int, float)) and 0 < options.tolerance < LARGEST_TOLERANCE):
             raise RegionError("option_value", f"tolerance must be a number between 0 and {LARGEST_TOLERANCE:g}", field="options.tolerance")
         return options

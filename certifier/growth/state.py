@@ -5,7 +5,7 @@ It is JSON-able, so that a job can be resumed from its database rows alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -101,6 +101,28 @@ class Round:
 
 
 @dataclass(frozen=True, eq=False)
+class Whole:
+    """Says how far certifying the whole proposal has come.
+
+    Attributes:
+        stage: how much of the proposal is being certified (certifier.growth.whole).
+        polytope: what is left of it; faces are added before the joint limits, which are its last 2n rows, and none is dropped.
+        mid, half: (n,) of the box that is the root cell of all partitions of this stage.
+        holds: pair index -> iteration whose proof, on a larger polytope, holds on the present one.
+        begun: pair index -> iteration that left a partition to go on with.
+        spent: pair index -> how many cells were looked at.
+    """
+
+    stage: int
+    polytope: Polytope
+    mid: Array
+    half: Array
+    holds: dict[int, int] = field(default_factory=dict)
+    begun: dict[int, int] = field(default_factory=dict)
+    spent: dict[int, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
 class GrowthState:
     """Holds all that certifier.growth.machine knows between two actions.
 
@@ -122,6 +144,7 @@ class GrowthState:
     rounds: int = 0
     near: float = NEAR[0]
     reach: float = 1.0
+    whole: Whole | None = None
     cuts: Cuts = Cuts()
     bisection: Bisection | None = None
     round: Round | None = None
@@ -138,6 +161,7 @@ class GrowthState:
             "rounds": self.rounds,
             "near": self.near,
             "reach": self.reach,
+            "whole": None if self.whole is None else _document(self.whole),
             "cuts": _document(self.cuts),
             "bisection": None if self.bisection is None else _document(self.bisection),
             "round": None if self.round is None else _document(self.round),
@@ -155,6 +179,7 @@ class GrowthState:
             parts: dict[str, Any] = {
                 "best": _part(Best, document["best"]),
                 "start": _part(Start, document["start"]),
+                "whole": _whole(document["whole"]),
                 "cuts": Cuts(_by_pair(cuts["holds"]), _by_pair(cuts["attempts"])),
                 "bisection": _part(Bisection, document["bisection"]),
                 "round": _part(Round, document["round"]),
@@ -165,7 +190,14 @@ class GrowthState:
             raise CirisError("other_version", message, hint="retry it") from error
 
 
-def _document(part: Best | Start | Cuts | Bisection | Round) -> dict[str, Any]:
+def _whole(document: dict[str, Any] | None) -> Whole | None:
+    if document is None:
+        return None
+    counts = {name: _by_pair(document[name]) for name in ("holds", "begun", "spent")}
+    return replace(_part(Whole, {**document, **dict.fromkeys(counts, None)}), **counts)
+
+
+def _document(part: Best | Start | Whole | Cuts | Bisection | Round) -> dict[str, Any]:
     return {name: _plain(value) for name, value in vars(part).items()}
 
 

@@ -23,6 +23,7 @@ def certify(
     reuse: dict[int, int] | None = None,
     hard: Sequence[int] = (),
     failures: int | None = 1,
+    cells: int = 1,
 ) -> Transition:
     """Asks to certify a polytope.
 
@@ -30,8 +31,8 @@ def certify(
     """
     reuse = reuse or {}
     suspects = [i for i in state.suspects if i not in reuse]
-    others = [i for i in _by_joints(scene) if i not in reuse and i not in set(suspects)]
-    action = Certify(state.next, label, polytope, center, suspects + others, reuse, list(hard), failures)
+    others = [i for i in by_joints(scene) if i not in reuse and i not in set(suspects)]
+    action = Certify(state.next, label, polytope, center, suspects + others, reuse, list(hard), failures, cells)
     return Transition(replace(state, next=state.next + 1), action)
 
 
@@ -58,5 +59,6 @@ def effort(scene: Scene, state: GrowthState, option: str) -> int:
     return next(options for most, options in EFFORT if joints <= most)[option]
 
 
-def _by_joints(scene: Scene) -> list[int]:
+def by_joints(scene: Scene) -> list[int]:
+    """Returns the pairs' indices, those with few joints between their bodies first."""
     return sorted(range(len(scene.pairs)), key=lambda i: len(joints_between(scene, i)))

@@ -19,6 +19,7 @@ from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee, Outcome
 from certifier.pair.certification import Certification
 from certifier.pair.result import PairResult
+from certifier.partition.certification import CellCertification
 from certifier.seeding.options import SeedOptions
 from certifier.seeding.propose import propose
 from certifier.step.step import step
@@ -54,11 +55,11 @@ class _Run:
         self.candidate = candidate
 
     def certify(self, action: Certify) -> Outcomes:
-        shared = Certification(self.scene, action.polytope, action.center, self.seed)
+        certify = self._by_program(action) if action.cells == 1 else self._by_cells(action)
         found = self.results.setdefault(action.iteration, {})
         failures = 0
         for index in action.pairs:
-            found[index] = shared.certify(index, every_face=index in action.hard)
+            found[index] = certify(index)
             pair = self.scene.pairs[index]
             self.progress(
                 f"{action.label} {action.iteration}: {len(found)}/{len(action.pairs)} {pair.a} - {pair.b}: {found[index].outcome}"
@@ -68,6 +69,19 @@ class _Run:
                 break
         weaknesses = {index: result.weakness for index, result in found.items() if result.weakness is not None}
         return Outcomes(action, {index: result.outcome for index, result in found.items()}, weaknesses)
+
+    def _by_program(self, action: Certify) -> Callable[[int], PairResult]:
+        shared = Certification(self.scene, action.polytope, action.center, self.seed)
+        return lambda index: shared.certify(index, every_face=index in action.hard)
+
+    def _by_cells(self, action: Certify) -> Callable[[int], PairResult]:
+        shared = CellCertification(self.scene, action.polytope, self.seed, action.box)
+
+        def certify(index: int) -> PairResult:
+            begun = self.results[action.begun[index]][index].proof if index in action.begun else None
+            return shared.certify(index, action.cells, begun, index in action.ending)
+
+        return certify
 
     def proofs(self, candidate: Candidate) -> dict[int, bytes]:
         return {index: self.results[iteration][index].proof or b"" for index, iteration in candidate.proofs.items()}

@@ -14,10 +14,9 @@ from certifier.jobs.share import SampledProposal
 from certifier.model import SCHEMA_VERSION, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume
-from certifier.polytopes.polytope import bounds, chebyshev_center, support
-from certifier.proof.pair import PairProof
-from certifier.proof.region import Implied, RegionProof
-from certifier.proof.separation import digest
+from certifier.polytopes.polytope import bounds, chebyshev_center, drop_redundant, support
+from certifier.proof.region import Implied, RegionProof, read_separation
+from certifier.proof.separation import Separation, digest
 from certifier.verify.region import RegionStatement, verify_region
 
 
@@ -50,11 +49,12 @@ def certified_region(
         ProofError: the proof does not hold; nothing may be served as certified then.
         RegionError: the polytope is empty or unbounded.
     """
-    polytope = candidate.polytope
+    kept = drop_redundant(candidate.polytope, fixed=2 * scene.n)
+    polytope = Polytope(candidate.polytope.C[kept], candidate.polytope.d[kept])
     C, d = polytope.C, polytope.d
     interior = chebyshev_center(polytope)[0] if candidate.center is None else candidate.center
     bound = archimedean(polytope)
-    parts = tuple(PairProof.from_bytes(data, scene) for data in dict.fromkeys(proofs[index] for index in range(len(scene.pairs))))
+    parts = tuple(read_separation(data, scene) for data in dict.fromkeys(proofs[index] for index in range(len(scene.pairs))))
     data = RegionProof(scene, C, d, interior, _implied(polytope, parts), bound, parts).to_bytes()
     statement = verify_region(data)
     ellipsoid = inscribed_ellipsoid(polytope)
@@ -128,7 +128,7 @@ def _halfspaces(polytope: Polytope) -> dict[str, Any]:
     return {"halfspace_normals": polytope.C.tolist(), "halfspace_offsets": polytope.d.tolist()}
 
 
-def _implied(polytope: Polytope, proofs: tuple[PairProof, ...]) -> Implied:
+def _implied(polytope: Polytope, proofs: tuple[Separation, ...]) -> Implied:
     """Returns the faces of the proofs' polytopes that are not, or no longer, faces of the region, with their bounds and multipliers.
 
     A face that is gone may share its normal with a joint limit, so offsets are compared as well.

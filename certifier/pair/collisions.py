@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from certifier.kinematics import Kinematics
-from certifier.model import Array, Geometry, Pair, Scene
+from certifier.model import Array, Geometry, Pair, Scene, Volume
 from certifier.pair.closest import closest
 
 
@@ -33,7 +33,15 @@ def in_collision(scene: Scene, s: Array) -> NDArray[np.bool_]:
     return collides
 
 
-def _touching(a: Geometry, b: Geometry, R: Array, p: Array, padding: float) -> NDArray[np.int64]:
+def touching(kinematics: Kinematics, volumes: tuple[Volume, Volume], s: Array) -> NDArray[np.bool_]:
+    """Returns at which of the points s, (N, n), two volumes are not shown to be apart, padding included; (N,)."""
+    a, b = volumes
+    X = kinematics.numerators(a.body, b.body, s)
+    R, p = X[:, :3, :3] / X[:, 3, 3, None, None], X[:, :3, 3] / X[:, 3, 3, None]
+    return np.isin(np.arange(len(s)), _touching(a, b, R, p, 2 * kinematics.scene.padding))
+
+
+def _touching(a: Geometry | Volume, b: Geometry | Volume, R: Array, p: Array, padding: float) -> NDArray[np.int64]:
     """Returns the indices of the poses of b's body in the frame of a's, R (k, 3, 3) and p (k, 3), at which the geometries touch.
 
     Args:

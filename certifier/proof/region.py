@@ -7,15 +7,27 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from certifier.errors import CirisError
+from certifier.errors import CirisError, ProofError
 from certifier.model import Array, Scene
-from certifier.proof.container import FORMAT, Arrays, head, malformed, pack, unpack
+from certifier.proof.container import FORMAT, Arrays, head, header_of, malformed, pack, unpack
 from certifier.proof.pair import PairProof
 from certifier.proof.partition import PartitionProof
 from certifier.proof.separation import SHARED, Pool, Separation, read_proofs
 
 FORMS: dict[str, type[Separation]] = {form.KIND: form for form in (PairProof, PartitionProof)}
 """The forms that the proofs of a region's pairs take, by the kinds of their files."""
+
+
+def read_separation(data: bytes, scene: Scene) -> Separation:
+    """Reads the proof of one pair, or of the pairs of two volumes, whatever its form.
+
+    Raises:
+        ProofError: the file is no such proof, or one about another scene.
+    """
+    kind = header_of(data)["kind"]
+    if kind not in FORMS:
+        raise ProofError("proof_malformed", f"a proof of kind {kind} does not separate a pair", field="header.kind")
+    return FORMS[kind].from_bytes(data, scene)
 
 
 @dataclass(frozen=True)

@@ -130,7 +130,10 @@ class ExactKinematics:
         """Returns X_FB, (4, 4), of two bodies that are welded together, perhaps through others; None if a joint between them moves."""
         if any(joint.index is not None for joint, _ in self.path(frame, body)):
             return None
-        X = [[entry.coefficient(0) if entry != 0 else fmpq(0) for entry in row] for row in self.pose(frame, body)]
+        X = [
+            [entry if isinstance(entry, fmpq) else entry.coefficient(0) if entry != 0 else fmpq(0) for entry in row]
+            for row in self.pose(frame, body)
+        ]
         return [[x / X[3][3] for x in row] for row in X]
 
     def scale(self, frame: str, body: str) -> fmpq:

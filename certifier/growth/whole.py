@@ -1,0 +1,76 @@
+"""The whole proposal is certified cell by cell, and what cannot be is cut off by faces that lose least (certifier.growth.cutting).
+
+One round looks at so many cells of every pair that is not certified yet. Then faces are added where bodies touch, or come too close.
+What is proved stays proved, because the polytope only shrinks. The rounds go on until every pair is certified. When the effort is spent,
+all cells that are open still are cut off as well.
+
+The first region comes from a smaller copy of the proposal about the seed, so there is a certified region early.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from certifier.growth.actions import Certify, Finish, Outcomes, Transition
+from certifier.growth.cutting import cut
+from certifier.growth.state import GrowthState, Start, Whole
+from certifier.growth.targeted import pushed
+from certifier.growth.trials import by_joints, joints_between
+from certifier.model import Box, Scene
+from certifier.outcome import Outcome, combine
+from certifier.polytopes.polytope import bounds
+
+STAGES = (0.5, 1.0)
+"""The faces of the proposal lie this part of their distance from the seed, in one stage after the other."""
+SLICE = 300
+"""So many cells of every open pair are looked at in one round."""
+
+
+def begin_stage(scene: Scene, state: GrowthState, start: Start, stage: int = 0) -> Transition:
+    """Asks to certify the proposal, or a smaller copy of it."""
+    polytope = pushed(scene, start.rows, start.seed, STAGES[stage], scene.polytope([], []))
+    box = Box.around(*bounds(polytope))
+    return _next(scene, replace(state, whole=Whole(stage, polytope, box.mid, box.half)))
+
+
+def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes) -> Transition:
+    """Cuts off what cannot be certified, and goes on with what is open."""
+    whole, action = state.whole, report.action
+    assert whole is not None
+    holds = whole.holds | {i: action.iteration for i, outcome in report.outcomes.items() if outcome is Outcome.CERTIFIED}
+    begun = dict.fromkeys(report.failures, action.iteration)
+    spent = whole.spent | {i: whole.spent.get(i, 0) + SLICE for i in action.pairs}
+    whole = replace(whole, holds=holds, begun=begun, spent=spent)
+    if report.complete:
+        if whole.stage + 1 < len(STAGES):
+            return begin_stage(scene, state, start, whole.stage + 1)
+        return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
+    corners = [(joints_between(scene, i), report.weaknesses[i].points) for i in report.failures if i in report.weaknesses]
+    smaller = cut(scene, whole.polytope, start.keep, corners, action.iteration)
+    if smaller is None:
+        pair = scene.pairs[report.failures[0]]
+        reason = f"{pair.a} and {pair.b} touch, or come too close, at or between configurations that have to stay inside"
+        outcome = Outcome.CERTIFIED if state.best is not None else combine(list(report.outcomes.values()))
+        return Transition(state, Finish(outcome, f"certified; growth ended early: {reason}" if state.best is not None else reason))
+    return _next(scene, replace(state, whole=replace(whole, polytope=smaller)))
+
+
+def _next(scene: Scene, state: GrowthState) -> Transition:
+    whole = state.whole
+    assert whole is not None
+    pairs = [i for i in by_joints(scene) if i not in whole.holds]
+    action = Certify(
+        state.next,
+        "cells",
+        whole.polytope,
+        None,
+        pairs,
+        reuse=dict(whole.holds),
+        hard=[],
+        failures=None,
+        cells=SLICE,
+        box=Box(whole.mid, whole.half),
+        begun=dict(whole.begun),
+        ending=[i for i in pairs if whole.spent.get(i, 0) >= state.options.cells],
+    )
+    return Transition(replace(state, next=state.next + 1), action)

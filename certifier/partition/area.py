@@ -1,0 +1,53 @@
+"""What the pairs of one polytope share: its faces in their order, the root cell, a point inside, and samples uniform in q."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from certifier.kinematics import Kinematics
+from certifier.model import Array, Box, Polytope, Scene
+from certifier.polytopes.gibbs import uniform_in_q
+from certifier.polytopes.polytope import bound_multipliers, chebyshev_center
+from certifier.proof.ground import Ground
+
+CHAINS, EACH = 100, 20
+"""So many chains give so many samples each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Area:
+    """An area is a polytope as the search for its partitions sees it.
+
+    Attributes:
+        polytope: its faces, in an order that the proofs refer to; joint limits included.
+        lower, upper: (n,) the root cell, which contains the polytope.
+        center: (n,) a point inside.
+        samples: (S, n) points of the polytope, uniform in q.
+        ground: the polytope as proofs hold it, with the root cell as its box.
+    """
+
+    scene: Scene
+    kinematics: Kinematics
+    polytope: Polytope
+    lower: Array
+    upper: Array
+    center: Array
+    samples: Array
+    ground: Ground
+
+    @classmethod
+    def of(cls, scene: Scene, polytope: Polytope, seed: int, box: Box | None = None) -> Area:
+        """Looks at a polytope.
+
+        Args:
+            box: a box around the polytope; None for the smallest one.
+
+        Raises:
+            RegionError: the polytope is empty or unbounded.
+        """
+        center = chebyshev_center(polytope, tuple(joint.name for joint in scene.moving))[0]
+        lower, upper, Y_lower, Y_upper = bound_multipliers(scene.polytope(polytope.C, polytope.d), center)
+        box = Box.around(lower, upper) if box is None else box
+        ground = Ground(polytope.C, polytope.d, box.mid, box.half, Y_lower, Y_upper)
+        samples = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, seed).reshape(-1, scene.n)
+        return cls(scene, Kinematics.of(scene), polytope, box.lower, box.upper, center, samples, ground)

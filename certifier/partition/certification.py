@@ -1,0 +1,153 @@
+"""Pairs are certified over partitions of a polytope here; what was begun on a larger polytope can be gone on with.
+
+What was found                                     -> the outcome and what comes with it
+every cell has a plane, or misses the polytope     -> certified, with the proof, which the verifier has checked
+a configuration in contact                         -> refuted, with the configuration and what is proved already
+a narrow cell in which no plane keeps them apart   -> too_close, with a configuration, their distance there, and what is proved already
+so many cells were looked at                       -> inconclusive, with what is proved already and where open cells are
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from certifier.errors import ProofError
+from certifier.kinematics import Kinematics
+from certifier.model import Array, Box, Polytope, Scene, Volume
+from certifier.outcome import Outcome, Stage
+from certifier.pair.broad_phase import BroadPhase, Volumes
+from certifier.pair.closest import closest
+from certifier.pair.collisions import touching
+from certifier.pair.result import PairResult, Weakness
+from certifier.partition.area import Area
+from certifier.partition.search import Report, Search
+from certifier.partition.tree import Node
+from certifier.proof.partition import STREAMS, PartitionProof
+from certifier.verify.pair import check_ground, check_interior
+from certifier.verify.separations import statements
+
+GROUP_CELLS = 8
+"""Volumes of several geometries are given up after this many cells."""
+NEAR_CONTACTS = 48
+"""So many configurations about a contact are looked at, at each of SCALES, to see how far it reaches."""
+SCALES = (0.5, 0.2, 0.07, 0.02)
+MOST_POINTS = 400
+"""A result names at most this many configurations."""
+
+
+class CellCertification:
+    """Holds everything that the pairs of one polytope share.
+
+    Args:
+        polytope: its last 2n rows are the joint limits.
+        seed: seeds the samples.
+        box: the root cell, which contains P; None for P's smallest box. What was begun must have had the same one.
+
+    Raises:
+        RegionError: the polytope is empty or unbounded.
+    """
+
+    def __init__(self, scene: Scene, polytope: Polytope, seed: int = 0, box: Box | None = None) -> None:
+        self._scene = scene
+        self._area = Area.of(scene, polytope, seed, box)
+        check_ground(scene, self._area.ground)
+        check_interior(scene, self._area.ground, self._area.center)
+        self._covariance = np.cov(self._area.samples.T).reshape(scene.n, scene.n)
+        self._broad_phase = BroadPhase(Kinematics.of(scene), self._together)
+
+    def certify(self, index: int, cells: int, begun: bytes | None = None, ending: bool = False) -> PairResult:
+        """Certifies pair ``scene.pairs[index]``, alone or with others that the same proof covers.
+
+        Args:
+            cells: end after so many cells.
+            begun: the ``proof`` of an earlier result of this pair that was not certified, on a polytope of which this one is a part.
+            ending: what is still open will be cut off, so the result names points of all open cells.
+        """
+        start, pair = time.perf_counter(), self._scene.pairs[index]
+        result = None if begun else self._broad_phase.find(pair)
+        if result is None:
+            volumes = (Volume.of(self._scene.geometry(pair.a)), Volume.of(self._scene.geometry(pair.b)))
+            result = self._certify(volumes, cells, begun, ending)
+        return replace(result, seconds=time.perf_counter() - start)
+
+    def _together(self, volumes: Volumes) -> PairResult | None:
+        result = self._certify(volumes, GROUP_CELLS, None, False)
+        return result if result.outcome is Outcome.CERTIFIED else None
+
+    def _certify(self, volumes: Volumes, cells: int, begun: bytes | None, ending: bool) -> PairResult:
+        search = Search(self._area, volumes)
+        root = Node() if begun is None else self._begun(begun, volumes)
+        report = search.run(root, cells)
+        proof = PartitionProof(
+            self._scene, volumes, search.frame, self._area.ground, self._area.center, **root.to_streams(len(search.joints))
+        )
+        still_open = root.open_cells(self._area.lower, self._area.upper)
+        if not still_open:
+            try:
+                statement = statements(self._scene, [proof])[0]
+            except ProofError as error:
+                return PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, detail=f"the proof found does not hold: {error}")
+            return PairResult(Outcome.CERTIFIED, Stage.CELLS, margin=statement.gap, proof=proof.to_bytes())
+        return self._open(search, volumes, report, [(lower, upper) for _, lower, upper in still_open], proof.to_bytes(), ending)
+
+    def _begun(self, data: bytes, volumes: Volumes) -> Node:
+        """Returns the tree that was begun; faces were added since before the joint limits, so the limits have other numbers now."""
+        proof = PartitionProof.from_bytes(data, self._scene)
+        added, limits = len(self._area.ground.d) - len(proof.ground.d), len(proof.ground.d) - 2 * self._scene.n
+        arrays = {name: getattr(proof, name) for name in STREAMS}
+        arrays["faces"] = np.where(proof.faces >= limits, proof.faces + added, proof.faces).astype(np.int16)
+        return Node.of_streams(arrays, sum(len(volume.vertices) for volume in volumes))
+
+    def _open(
+        self, search: Search, volumes: Volumes, report: Report, cells: list[tuple[Array, Array]], begun: bytes, ending: bool
+    ) -> PairResult:
+        points = self._contacts(search, volumes, report.contacts)
+        if ending:
+            points += self._of_cells(cells)
+        points += report.narrow
+        weakness = Weakness(np.array(points[:MOST_POINTS]).reshape(-1, self._scene.n), np.zeros(self._scene.n))
+        if report.contacts:
+            return PairResult(Outcome.REFUTED, Stage.CELLS, witness_s=report.contacts[0], proof=begun, weakness=weakness)
+        if report.narrow:
+            s, distance = self._nearest(search, report.narrow)
+            detail = f"the padded bodies are {distance:.3g} m apart at the configuration named, too close for a plane"
+            return PairResult(Outcome.TOO_CLOSE, Stage.CELLS, witness_s=s, detail=detail, proof=begun, weakness=weakness)
+        inside = sum(((self._area.samples >= low) & (self._area.samples <= up)).all(axis=1).mean() for low, up in cells)
+        detail = f"{len(cells)} cells, {100 * float(inside):.2g} % of the polytope, are open after {report.cells} cells"
+        return PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, detail=detail, proof=begun, weakness=weakness)
+
+    def _contacts(self, search: Search, volumes: Volumes, contacts: list[Array]) -> list[Array]:
+        """Returns the contacts with others about them, which show how far a contact reaches."""
+        found: list[Array] = []
+        rng = np.random.default_rng(len(contacts))
+        polytope, J = self._area.polytope, search.joints
+        root = np.linalg.cholesky(self._covariance[np.ix_(J, J)] + 1e-12 * np.eye(len(J)))
+        for contact in contacts:
+            near = np.tile(contact, (len(SCALES) * NEAR_CONTACTS, 1))
+            scales = np.repeat(SCALES, NEAR_CONTACTS)[:, None]
+            near[:, J] += scales * rng.normal(size=(len(near), len(J))) @ root.T / np.sqrt(len(J))
+            near = near[polytope.contains(near)]
+            found += [contact, *near[touching(self._area.kinematics, volumes, near)]]
+        return found
+
+    def _of_cells(self, cells: Iterable[tuple[Array, Array]]) -> list[Array]:
+        """Returns points of the polytope that lie in the cells, the samples that are there or else points near their corners."""
+        found: list[Array] = []
+        rng = np.random.default_rng(0)
+        for lower, upper in cells:
+            inside = self._area.samples[((self._area.samples >= lower) & (self._area.samples <= upper)).all(axis=1)]
+            corners = np.where(rng.random((8, len(lower))) < 0.5, lower, upper)
+            found += [*inside[:8], *corners[self._area.polytope.contains(corners)]]
+        return found
+
+    def _nearest(self, search: Search, configurations: list[Array]) -> tuple[Array, float]:
+        """Returns the configuration at which the bodies are nearest, and their distance there in metres, padding subtracted."""
+        A, B = search.vertices(np.array(configurations))
+        reach = search.reach
+        distances = [closest(a, b).distance - reach for a, b in zip(A, B, strict=True)]
+        place = int(np.argmin(distances))
+        return configurations[place], max(distances[place], 0.0)

@@ -1,0 +1,123 @@
+"""The polynomials of one volume on one cell in Bernstein form; certifier.verify.partition describes this form, and checks it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from certifier.model import Array, Volume
+from certifier.partition import kernels
+from certifier.partition.area import Area
+from certifier.partition.tree import Streams, joined
+
+PRECISION = 1e-10
+"""Control values have to be this much larger than 0, relative to what they are made of. The verifier asks for less."""
+ROOM = 4096
+"""So many pieces are stored for a vertex at most, and ten times as many multipliers."""
+
+
+class Side:
+    """One volume of a pair, in the frame of the plane.
+
+    Args:
+        joints: position indices of the joints in play, ascending.
+        sign: 1 for the positive side of the plane, -1 for the other.
+        radius: metres, padding included.
+    """
+
+    def __init__(self, area: Area, frame: str, volume: Volume, joints: list[int], sign: float, radius: float) -> None:
+        self.volume, self.sign, self.radius = volume, sign, radius
+        self._path, self._joints = area.kinematics.path(frame, volume.body), joints
+        self._order = [factor.index for factor in self._path if factor.index is not None]
+        self.own = sorted(self._order)
+        self.outside = [j for j in joints if j not in self.own]
+        self._revolute = area.scene.revolute[self.own]
+        self._vertices = np.column_stack([volume.vertices, np.ones(len(volume.vertices))])
+
+    def control_matrices(self, lower: Array, upper: Array) -> Array:
+        """Returns the control matrices of the volume's pose on a cell, (3^k, 4, 4), the first own joint slowest."""
+        X = np.eye(4)[None]
+        for factor in self._path:
+            T = factor.terms
+            if factor.index is None:
+                X = X @ T[0]
+                continue
+            l, u = lower[factor.index], upper[factor.index]
+            w, v = (1 / np.sqrt(1 + l * l), 1 / np.sqrt(1 + u * u)) if factor.revolute else (1.0, 1.0)
+            ends = [
+                w * w * (T[0] + l * (T[1] + l * T[2])),
+                w * v * (T[0] + (l + u) / 2 * T[1] + l * u * T[2]),
+                v * v * (T[0] + u * (T[1] + u * T[2])),
+            ]
+            X = (X[:, None] @ np.array(ends)).reshape(-1, 4, 4)
+        k = len(self.own)
+        if self._order != self.own:
+            X = X.reshape((3,) * k + (4, 4)).transpose([self._order.index(j) for j in self.own] + [k, k + 1]).reshape(-1, 4, 4)
+        return np.ascontiguousarray(X)
+
+    def prove(
+        self, plane: Array, kappa: float, lower: Array, upper: Array, C: Array, d: Array, faces: Array, most: int
+    ) -> Streams | Array | int:
+        """Proves that the volume is on its side of the plane on the polytope and a cell.
+
+        Args:
+            plane: (4, 1 + k), affine in s.
+            kappa: bound of the plane's normal on the cell.
+            C, d: the polytope's faces that cut the cell; ``faces`` are their numbers.
+            most: so many pieces are tried for one vertex.
+
+        Returns:
+            The streams of the proof; or a point (n,) of the polytope and the cell where a vertex is not on its side; or the joint along
+            which the pieces were halved most often when they were too many.
+        """
+        mid, half = (lower + upper) / 2, (upper - lower) / 2
+        own, outside = self.own, self.outside
+        rest = [i for i in range(len(mid)) if i not in own and i not in outside]
+        X = self.control_matrices(lower, upper)
+        plane = self.sign * plane
+        slope = {joint: plane[:, 1 + place] for place, joint in enumerate(self._joints)}
+        l, u = lower[own], upper[own]
+        w, v = (np.where(self._revolute, 1 / np.sqrt(1 + ends * ends), 1.0) for ends in (l, u))
+        forms = [(np.where(np.arange(len(own)) == i, w * l, w), np.where(np.arange(len(own)) == i, v * u, v)) for i in range(len(own))]
+        den = np.ascontiguousarray(X[:, 3, 3])
+        T = np.array([kernels.elevate(den, w, v), *(kernels.elevate(den, *form) for form in forms)])
+        p = np.einsum("tij,vj->vti", X, self._vertices)
+        base = plane[:, 0] + sum((slope[j] * mid[j] for j in outside), np.zeros(4))
+        constant = p @ base - self.radius * kappa * den
+        c = np.empty((len(p), 1 + len(outside), 4 ** len(own)))
+        for vertex in range(len(p)):
+            c[vertex, 0] = kernels.elevate(constant[vertex], w, v)
+        for joint, form in zip(own, forms, strict=True):
+            values = p @ slope[joint]
+            for vertex in range(len(p)):
+                c[vertex, 0] += kernels.elevate(values[vertex], *form)
+        for place, joint in enumerate(outside):
+            values = p @ (slope[joint] * half[joint])
+            for vertex in range(len(p)):
+                c[vertex, 1 + place] = kernels.elevate(values[vertex], w, v)
+        offset = d - C[:, outside] @ mid[outside] - C[:, rest] @ mid[rest]
+        g = (
+            np.ascontiguousarray(offset),
+            np.ascontiguousarray(-C[:, own]),
+            np.ascontiguousarray(-C[:, outside] * half[outside]),
+            np.ascontiguousarray(-C[:, rest] * half[rest]),
+        )
+        found: dict[int, Streams] = {}
+        for vertex in np.argsort((c[:, 0] - np.abs(c[:, 1:]).sum(axis=1)).min(axis=1)):
+            codes, counts = np.empty(ROOM, np.int8), np.empty(ROOM, np.int16)
+            numbers, values = np.empty(10 * ROOM, np.int16), np.empty(10 * ROOM, np.float32)
+            lengths, point, halvings = np.zeros(3, np.int64), np.zeros(len(mid)), np.zeros(len(own) + len(outside), np.int64)
+            status = kernels.prove(
+                c[vertex], T, np.array([l, u, w, v]), *g, PRECISION, most, codes, counts, numbers, values, lengths, point, halvings
+            )
+            if status == kernels.REFUTED:
+                s = mid.copy()
+                place = len(own) + len(outside)
+                s[own] = point[: len(own)]
+                s[outside] = mid[outside] + half[outside] * point[len(own) : place]
+                s[rest] = mid[rest] + half[rest] * point[place:]
+                return s
+            if status == kernels.UNDECIDED:
+                return int([*own, *outside][int(halvings.argmax())])
+            a, b, e = lengths
+            found[int(vertex)] = Streams(codes[:a].copy(), counts[:b].copy(), faces[numbers[:e]].astype(np.int16), values[:e].copy())
+        return joined([found[vertex] for vertex in range(len(p))])
