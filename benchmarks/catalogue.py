@@ -16,7 +16,7 @@ from certifier.model import Array, Scene
 from certifier.scene import load_scene
 
 ROOT = Path(__file__).parents[1]
-EXAMPLES = ("planar_2dof", "arm_3dof", "ur3e_bin", "iiwa_shelf", "dual_ur3e")
+EXAMPLES = ("planar_2dof", "arm_3dof", "ur3e_bin", "iiwa_shelf", "dual_ur3e", "sphere_arm")
 """The examples are in the order of their cost."""
 FILES = {name: ROOT / "examples" / name / "scene.yaml" for name in EXAMPLES} | {"rail_arm": ROOT / "benchmarks/scenes/rail_arm/scene.yaml"}
 VARIANTS = {

@@ -15,8 +15,8 @@ from certifier.scene.drake_model import build_diagram, geometry_name
 from certifier.scene.file import read_scene_file
 from tests.certifier.scene.workshop import EXAMPLES, NAMES, SCENE, parsed, write
 
-PAIRS = {"planar_2dof": 6, "arm_3dof": 12, "iiwa_shelf": 70, "ur3e_bin": 51, "dual_ur3e": 102}
-JOINTS = {"planar_2dof": 2, "arm_3dof": 3, "iiwa_shelf": 7, "ur3e_bin": 6, "dual_ur3e": 12}
+PAIRS = {"planar_2dof": 6, "arm_3dof": 12, "iiwa_shelf": 70, "ur3e_bin": 51, "dual_ur3e": 102, "sphere_arm": 1374}
+JOINTS = {"planar_2dof": 2, "arm_3dof": 3, "iiwa_shelf": 7, "ur3e_bin": 6, "dual_ur3e": 12, "sphere_arm": 7}
 
 CROOKED = """<sdf version="1.7"><model name="crooked">
   <link name="base"/>
@@ -149,6 +149,21 @@ def test_crooked_frames_and_trees_held_by_any_link(tmp_path, held):
 def test_only_the_scenes_pairs_can_collide_in_the_drake_model(examples):
     scene = examples["ur3e_bin"]
     assert set(signed_distances(scene, scene.q_star)) == {(p.a, p.b) for p in scene.pairs}
+
+
+def test_the_sphere_arm_is_balls_and_may_touch_itself_the_rack_and_the_table(examples):
+    """Its scene is clean without ignoring a pair, and not because nothing in it can collide."""
+    scene = examples["sphere_arm"]
+    assert scene.warnings == ()
+    assert {g.shape["kind"] for g in scene.geometries if g.body.startswith("arm/")} == {"sphere"}
+    assert sum(g.body.startswith("arm/") for g in scene.geometries) == 58
+    touching = {
+        ("arm/link_3/", "arm/link_5/"): [0, 0, 1.57, 2.5, 0, 0, 0],
+        ("arm/link_6/", "rack/boards/table"): [0, 1.9, 0, 0.2, 0, 0, 0],
+        ("arm/link_6/", "rack/boards/middle"): [0, 1.1, 0, 0.1, 0, 0, 0],
+    }
+    for (a, b), q in touching.items():
+        assert min(gap for pair, gap in signed_distances(scene, q).items() if pair[0].startswith(a) and pair[1].startswith(b)) < 0
 
 
 def test_the_iiwas_flange_is_where_its_data_sheet_says(examples):
