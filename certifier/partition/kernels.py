@@ -12,6 +12,8 @@ from certifier.model import Array
 
 NOTHING = 1e-12
 """A weight below this counts as 0."""
+FEW = 24
+"""So many configurations are looked at in each step for a plane, as long as one of them is on its wrong side."""
 
 
 @njit(cache=True)
@@ -62,6 +64,27 @@ def chords(C: Array, d: Array, start: Array, targets: Array, steps: int, seed: i
 
 
 @njit(cache=True)
+def _solved(A: Array) -> Array:
+    """Returns A^-1 times ones for a positive definite matrix, by Cholesky's method; A is overwritten."""
+    m = len(A)
+    x = np.ones(m)
+    for j in range(m):
+        for i in range(j, m):
+            t = A[i, j]
+            for a in range(j):
+                t -= A[i, a] * A[j, a]
+            A[i, j] = np.sqrt(max(t, 1e-300)) if i == j else t / A[j, j]
+        for a in range(j):
+            x[j] -= A[j, a] * x[a]
+        x[j] /= A[j, j]
+    for j in range(m - 1, -1, -1):
+        for a in range(j + 1, m):
+            x[j] -= A[a, j] * x[a]
+        x[j] /= A[j, j]
+    return x
+
+
+@njit(cache=True)
 def weigh(G: Array, w: Array, rows: Array, m: int) -> int:
     """Moves the weights w of m points to the point of their hull that is nearest to 0, and drops points that get none.
 
@@ -82,7 +105,7 @@ def weigh(G: Array, w: Array, rows: Array, m: int) -> int:
             for j in range(m):
                 A[i, j] = G[i, j] + trace / m
             A[i, i] += 1e-13 * trace
-        best = np.linalg.solve(A, np.ones(m))
+        best = _solved(A)
         best /= best.sum()
         if best.min() > NOTHING:
             w[:m] = best
@@ -112,6 +135,43 @@ def weigh(G: Array, w: Array, rows: Array, m: int) -> int:
 
 
 @njit(cache=True)
+def _worst(
+    A: Array, B: Array, u: Array, radius_a: float, radius_b: float, rows: Array, z: Array, values: Array
+) -> tuple[int, int, int, float]:
+    """Returns the configuration, the vertex and the side (1 for A, -1 for B) that are farthest on the wrong side of a plane, and how far.
+
+    Args:
+        values: gets the least value at each of the rows, which is positive on the right side.
+    """
+    k = u.shape[1]
+    plane = np.zeros(4)
+    lowest, row, vertex, side = np.inf, 0, 0, 1
+    for i in range(len(rows)):
+        r = rows[i]
+        for c in range(4):
+            t = z[c * (k + 1)]
+            for e in range(k):
+                t += z[c * (k + 1) + 1 + e] * u[r, e]
+            plane[c] = t
+        norm = np.sqrt(plane[0] ** 2 + plane[1] ** 2 + plane[2] ** 2)
+        least = np.inf
+        for v in range(A.shape[1]):
+            t = plane[0] * A[r, v, 0] + plane[1] * A[r, v, 1] + plane[2] * A[r, v, 2] + plane[3] - radius_a * norm
+            if t < least:
+                least = t
+                if t < lowest:
+                    lowest, row, vertex, side = t, r, v, 1
+        for v in range(B.shape[1]):
+            t = -(plane[0] * B[r, v, 0] + plane[1] * B[r, v, 1] + plane[2] * B[r, v, 2] + plane[3]) - radius_b * norm
+            if t < least:
+                least = t
+                if t < lowest:
+                    lowest, row, vertex, side = t, r, v, -1
+        values[i] = least
+    return row, vertex, side, lowest
+
+
+@njit(cache=True)
 def separate(
     A: Array, B: Array, u: Array, radius_a: float, radius_b: float, rows: Array, least: float, enough: float
 ) -> tuple[int, Array, Array, Array]:
@@ -135,30 +195,16 @@ def separate(
     points, G, w = np.zeros((D + 2, D)), np.zeros((D + 2, D + 2)), np.zeros(D + 2)
     places = np.zeros(D + 2, np.int64)
     origin = np.zeros(D + 2, np.int64)
-    z, plane, point = np.zeros(D), np.zeros(4), np.zeros(D)
+    z, direction, point = np.zeros(D), np.zeros(3), np.zeros(D)
     m = 0
+    values = np.empty(len(rows))
+    few = rows[:0]
     for _ in range(8 * D):
-        lowest, row, vertex, side = np.inf, 0, 0, 0
-        direction = np.zeros(3)
-        for r in rows:
-            for c in range(4):
-                t = z[c * (k + 1)]
-                for e in range(k):
-                    t += z[c * (k + 1) + 1 + e] * u[r, e]
-                plane[c] = t
-            norm = np.sqrt(plane[0] ** 2 + plane[1] ** 2 + plane[2] ** 2)
-            for v in range(A.shape[1]):
-                t = plane[0] * A[r, v, 0] + plane[1] * A[r, v, 1] + plane[2] * A[r, v, 2] + plane[3] - radius_a * norm
-                if t < lowest:
-                    lowest, row, vertex, side = t, r, v, 1
-                    for c in range(3):
-                        direction[c] = plane[c] / max(norm, 1e-300)
-            for v in range(B.shape[1]):
-                t = -(plane[0] * B[r, v, 0] + plane[1] * B[r, v, 1] + plane[2] * B[r, v, 2] + plane[3]) - radius_b * norm
-                if t < lowest:
-                    lowest, row, vertex, side = t, r, v, -1
-                    for c in range(3):
-                        direction[c] = plane[c] / max(norm, 1e-300)
+        row, vertex, side, lowest = _worst(A, B, u, radius_a, radius_b, few, z, values)
+        if m == 0 or lowest >= enough * (z @ z):
+            # No point of those that mattered last is on its wrong side, so all are looked at.
+            row, vertex, side, lowest = _worst(A, B, u, radius_a, radius_b, rows, z, values)
+            few = rows[np.argsort(values)[:FEW]]
         if m > 0:
             square = 0.0
             for i in range(D):
@@ -169,6 +215,11 @@ def separate(
                 return 1, z, places[:m].copy(), w[:m].copy()
             if m > D:
                 return (1 if lowest > 0 else 0), z, places[:m].copy(), w[:m].copy()
+        for c in range(3):
+            direction[c] = z[c * (k + 1)]
+            for e in range(k):
+                direction[c] += z[c * (k + 1) + 1 + e] * u[row, e]
+        direction /= max(np.sqrt(direction @ direction), 1e-300)
         for c in range(4):
             t = 1.0
             if c < 3:
@@ -236,6 +287,50 @@ def elevate(values: Array, first: Array, last: Array) -> Array:
         values = out
         left *= 4
     return values
+
+
+@njit(cache=True)
+def polynomials(X: Array, vertices: Array, base: Array, own: Array, outside: Array, radius: float, ends: Array) -> tuple[Array, Array]:
+    """Returns the Bernstein coefficients of f den of all vertices, (V, 1 + o, 4^k), and of den and den s_i, (1 + k, 4^k).
+
+    Args:
+        X: (3^k, 4, 4) control matrices of the pose.
+        vertices: (V, 3) metres.
+        base: (4,) the plane at the middle of the outside coordinates.
+        own, outside: (k, 4), (o, 4) what the own coordinates s_i and the outside coordinates, which are in [-1, 1], add to it.
+        radius: metres times the bound of the normal.
+        ends: (4, k) both ends of the own coordinates and their weights.
+    """
+    N, k, o, V = len(X), len(own), len(outside), len(vertices)
+    first, last = ends[2].copy(), ends[3].copy()
+    den = X[:, 3, 3].copy()
+    T = np.empty((1 + k, 4**k))
+    T[0] = elevate(den, first, last)
+    for i in range(k):
+        first[i] *= ends[0, i]
+        last[i] *= ends[1, i]
+        T[1 + i] = elevate(den, first, last)
+        first[i], last[i] = ends[2, i], ends[3, i]
+    c = np.empty((V, 1 + o, 4**k))
+    p, values = np.empty((N, 4)), np.empty(N)
+    for v in range(V):
+        for a in range(N):
+            for e in range(4):
+                p[a, e] = X[a, e, 0] * vertices[v, 0] + X[a, e, 1] * vertices[v, 1] + X[a, e, 2] * vertices[v, 2] + X[a, e, 3]
+            values[a] = p[a, 0] * base[0] + p[a, 1] * base[1] + p[a, 2] * base[2] + p[a, 3] * base[3] - radius * p[a, 3]
+        c[v, 0] = elevate(values, first, last)
+        for i in range(k):
+            for a in range(N):
+                values[a] = p[a, 0] * own[i, 0] + p[a, 1] * own[i, 1] + p[a, 2] * own[i, 2] + p[a, 3] * own[i, 3]
+            first[i] *= ends[0, i]
+            last[i] *= ends[1, i]
+            c[v, 0] += elevate(values, first, last)
+            first[i], last[i] = ends[2, i], ends[3, i]
+        for i in range(o):
+            for a in range(N):
+                values[a] = p[a, 0] * outside[i, 0] + p[a, 1] * outside[i, 1] + p[a, 2] * outside[i, 2] + p[a, 3] * outside[i, 3]
+            c[v, 1 + i] = elevate(values, first, last)
+    return c, T
 
 
 @njit(cache=True)

@@ -42,7 +42,7 @@ ROUNDS = 8
 PIECES = {4: 10, 5: 12}
 MANY_PIECES = 25
 """A vertex may take this many pieces: PIECES by the number of joints in play, MANY_PIECES with more."""
-DESCENT = 5
+DESCENT = 3
 
 
 @dataclass
@@ -257,7 +257,8 @@ class Search:
             ends = kernels.chords(C, d, found[-1], found[-1] + 2 * ways, 0, 0)
             X = np.concatenate([ends, (ends + found[-1]) / 2])
             normals = np.einsum("ie,ne->ni", plane, np.column_stack([np.ones(len(X)), X[:, self.joints]]))
-            points = self.vertices(X)[self._sides.index(self._last)]
+            volume = self._last.volume
+            points = self._area.kinematics.points(self.frame, volume.body, volume.vertices, X)
             values = self._last.sign * (np.einsum("nvc,nc->nv", points, normals[:, :3]) + normals[:, 3, None])
             reach = self._last.radius * np.linalg.norm(normals[:, :3], axis=1)
             worst = values.min(axis=1) - reach

@@ -30,8 +30,8 @@ class Side:
         self._order = [factor.index for factor in self._path if factor.index is not None]
         self.own = sorted(self._order)
         self.outside = [j for j in joints if j not in self.own]
+        self._room = (np.empty(ROOM, np.int8), np.empty(ROOM, np.int16), np.empty(10 * ROOM, np.int16), np.empty(10 * ROOM, np.float32))
         self._revolute = area.scene.revolute[self.own]
-        self._vertices = np.column_stack([volume.vertices, np.ones(len(volume.vertices))])
 
     def control_matrices(self, lower: Array, upper: Array) -> Array:
         """Returns the control matrices of the volume's pose on a cell, (3^k, 4, 4), the first own joint slowest."""
@@ -74,26 +74,19 @@ class Side:
         rest = [i for i in range(len(mid)) if i not in own and i not in outside]
         X = self.control_matrices(lower, upper)
         plane = self.sign * plane
-        slope = {joint: plane[:, 1 + place] for place, joint in enumerate(self._joints)}
+        slopes = {joint: plane[:, 1 + place] for place, joint in enumerate(self._joints)}
         l, u = lower[own], upper[own]
         w, v = (np.where(self._revolute, 1 / np.sqrt(1 + ends * ends), 1.0) for ends in (l, u))
-        forms = [(np.where(np.arange(len(own)) == i, w * l, w), np.where(np.arange(len(own)) == i, v * u, v)) for i in range(len(own))]
-        den = np.ascontiguousarray(X[:, 3, 3])
-        T = np.array([kernels.elevate(den, w, v), *(kernels.elevate(den, *form) for form in forms)])
-        p = np.einsum("tij,vj->vti", X, self._vertices)
-        base = plane[:, 0] + sum((slope[j] * mid[j] for j in outside), np.zeros(4))
-        constant = p @ base - self.radius * kappa * den
-        c = np.empty((len(p), 1 + len(outside), 4 ** len(own)))
-        for vertex in range(len(p)):
-            c[vertex, 0] = kernels.elevate(constant[vertex], w, v)
-        for joint, form in zip(own, forms, strict=True):
-            values = p @ slope[joint]
-            for vertex in range(len(p)):
-                c[vertex, 0] += kernels.elevate(values[vertex], *form)
-        for place, joint in enumerate(outside):
-            values = p @ (slope[joint] * half[joint])
-            for vertex in range(len(p)):
-                c[vertex, 1 + place] = kernels.elevate(values[vertex], w, v)
+        ends = np.array([l, u, w, v])
+        c, T = kernels.polynomials(
+            X,
+            self.volume.vertices,
+            plane[:, 0] + sum((slopes[j] * mid[j] for j in outside), np.zeros(4)),
+            np.array([slopes[j] for j in own]).reshape(-1, 4),
+            np.array([slopes[j] * half[j] for j in outside]).reshape(-1, 4),
+            self.radius * kappa,
+            ends,
+        )
         offset = d - C[:, outside] @ mid[outside] - C[:, rest] @ mid[rest]
         g = (
             np.ascontiguousarray(offset),
@@ -103,11 +96,10 @@ class Side:
         )
         found: dict[int, Streams] = {}
         for vertex in np.argsort((c[:, 0] - np.abs(c[:, 1:]).sum(axis=1)).min(axis=1)):
-            codes, counts = np.empty(ROOM, np.int8), np.empty(ROOM, np.int16)
-            numbers, values = np.empty(10 * ROOM, np.int16), np.empty(10 * ROOM, np.float32)
+            codes, counts, numbers, values = self._room
             lengths, point, halvings = np.zeros(3, np.int64), np.zeros(len(mid)), np.zeros(len(own) + len(outside), np.int64)
             status = kernels.prove(
-                c[vertex], T, np.array([l, u, w, v]), *g, PRECISION, most, codes, counts, numbers, values, lengths, point, halvings
+                c[vertex], T, ends, *g, PRECISION, most, codes, counts, numbers, values, lengths, point, halvings
             )
             if status == kernels.REFUTED:
                 s = mid.copy()
@@ -120,4 +112,4 @@ class Side:
                 return int([*own, *outside][int(halvings.argmax())])
             a, b, e = lengths
             found[int(vertex)] = Streams(codes[:a].copy(), counts[:b].copy(), faces[numbers[:e]].astype(np.int16), values[:e].copy())
-        return joined([found[vertex] for vertex in range(len(p))])
+        return joined([found[vertex] for vertex in range(len(c))])
