@@ -14,9 +14,8 @@ from certifier.model import SCHEMA_VERSION, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume
 from certifier.polytopes.polytope import chebyshev_center, support
-from certifier.proof.pair import PairProof
-from certifier.proof.region import Implied, RegionProof
-from certifier.proof.separation import digest
+from certifier.proof.region import Implied, RegionProof, read_part
+from certifier.proof.separation import Separation, digest
 from certifier.verify.region import RegionStatement, verify_region
 
 
@@ -50,7 +49,7 @@ def certified_region(scene: Scene, candidate: Candidate, proofs: dict[int, bytes
     C, d = polytope.C, polytope.d
     interior = chebyshev_center(polytope)[0] if candidate.center is None else candidate.center
     bound = archimedean(polytope)
-    parts = tuple(PairProof.from_bytes(data, scene) for data in dict.fromkeys(proofs[index] for index in range(len(scene.pairs))))
+    parts = tuple(read_part(data, scene) for data in dict.fromkeys(proofs[index] for index in range(len(scene.pairs))))
     data = RegionProof(scene, C, d, interior, _implied(polytope, parts), bound, parts).to_bytes()
     statement = verify_region(data)
     ellipsoid = inscribed_ellipsoid(polytope)
@@ -103,7 +102,7 @@ def versions(scene: Scene) -> dict[str, Any]:
     return {"ciris": of("ciris"), "drake": scene.provenance.get("drake") or of("drake"), "python-flint": of("python-flint")}
 
 
-def _implied(polytope: Polytope, proofs: tuple[PairProof, ...]) -> Implied:
+def _implied(polytope: Polytope, proofs: tuple[Separation, ...]) -> Implied:
     """Returns the faces of the proofs' polytopes that are not, or no longer, faces of the region, with their bounds and multipliers.
 
     A face that is gone may share its normal with a joint limit, so offsets are compared as well.

@@ -9,13 +9,23 @@ import numpy as np
 
 from certifier.errors import CirisError
 from certifier.model import Array, Scene
-from certifier.proof.container import FORMAT, Arrays, head, malformed, pack, unpack
+from certifier.proof.container import FORMAT, Arrays, head, header_of, malformed, pack, unpack
 from certifier.proof.pair import PairProof
 from certifier.proof.partition import PartitionProof
 from certifier.proof.separation import SHARED, Pool, Separation, read_proofs
 
 FORMS: dict[str, type[Separation]] = {form.KIND: form for form in (PairProof, PartitionProof)}
 """The forms that the proofs of a region's pairs take, by the kinds of their files."""
+
+
+def read_part(data: bytes, scene: Scene) -> Separation:
+    """Reads the file of one pair's proof, of any of these forms.
+
+    Raises:
+        ProofError: the file is no such proof, or one about another scene.
+    """
+    kind = header_of(data)["kind"]
+    return FORMS.get(kind, PairProof).from_bytes(data, scene)
 
 
 @dataclass(frozen=True)

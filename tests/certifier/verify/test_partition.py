@@ -12,13 +12,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from certifier.errors import ProofError
+from certifier.jobs.region import certified_region
 from certifier.model import WORLD, JointKind, Pair
+from certifier.pair.certification import Certification
 from certifier.proof import limits
 from certifier.proof.container import pack, unpack, with_scene
 from certifier.proof.partition import EMPTY, PLANE, STREAMS, PartitionProof
+from certifier.proof.region import RegionProof
 from certifier.verify.file import answer, verify_file
+from certifier.verify.region import verify_region
 from certifier.verify.separations import verify_separation
-from tests.certifier.scenes import ball, box, planar_arm, two_arms
+from tests.certifier.scenes import accepted, ball, box, cube, planar_arm, two_arms
 from tests.certifier.truth import distances
 from tests.certifier.verify.partitions import Producer
 
@@ -92,7 +96,7 @@ def test_the_proofs_use_every_kind_of_node():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_any_number_of_processes_finds_the_same(name, monkeypatch):
-    monkeypatch.setattr("certifier.verify.partition.CELLS", 1)
+    monkeypatch.setattr("certifier.verify.separations.CELLS", 1)
     told = []
     assert verify_separation(proof(name), 2, lambda done, total: told.append((done, total))) == verify_separation(proof(name))
     leaves = np.count_nonzero(proof(name).nodes < 0)
@@ -100,7 +104,7 @@ def test_any_number_of_processes_finds_the_same(name, monkeypatch):
 
 
 def test_any_number_of_processes_finds_the_same_error(monkeypatch):
-    monkeypatch.setattr("certifier.verify.partition.CELLS", 1)
+    monkeypatch.setattr("certifier.verify.separations.CELLS", 1)
     true = proof("cells")
     planes = true.planes.copy()
     planes[[2, 5]] *= -1
@@ -214,7 +218,7 @@ def test_a_polytope_that_is_said_to_be_empty_is_not():
 @pytest.mark.parametrize("scale", [1e100, 1e90, 1e6, 1e-3, 1e-30, 1e-150, 5e-324, 0.0])
 def test_planes_of_any_size_are_refused_or_true(scale):
     codes = set()
-    for name in ("tip", "slides"):  # which need no multipliers
+    for name in [name for name in NAMES if not proof(name).multipliers.size]:
         try:
             statement = verify_separation(replace(proof(name), planes=proof(name).planes * scale))
         except ProofError as error:
@@ -329,3 +333,24 @@ def test_files_are_read_strictly():
         multipliers = arrays["proof/0/multipliers"].copy()
         multipliers[0] = value
         read(header, {**arrays, "proof/0/multipliers": multipliers})
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_a_region_may_hold_proofs_of_both_forms(processes):
+    scene = arm(padding=0.01)
+    polytope = cube(scene, [-0.2, -0.1], 0.2)
+    sums_of_squares = Certification(scene, polytope, np.array([-0.2, -0.1])).certify(0).proof
+    over_cells = Producer(scene, scene.pairs[1], WORLD, [-0.2, -0.1], 0.21).proof(least=3)
+    region = certified_region(scene, accepted(polytope, [-0.2, -0.1]), {0: sums_of_squares, 1: over_cells.to_bytes()}, {})
+    assert [part.KIND for part in RegionProof.from_bytes(region.proof).proofs] == ["pair", "partition"]
+    told = []
+    statement = verify_region(region.proof, processes, lambda done, total: told.append((done, total)))
+    assert list(statement.gaps.values()) == list(region.statement.gaps.values())
+    assert told[-1] == (9, 9)
+    least = distances(scene, polytope.C, polytope.d, 200)
+    assert all(0 < statement.gaps[pair] <= least[pair] + TOLERANCE for pair in least)
+    other = Producer(scene, scene.pairs[1], WORLD, [-0.2, -0.1], 0.15).proof()
+    parts = RegionProof.from_bytes(region.proof)
+    smaller = replace(parts, proofs=(parts.proofs[0], replace(other, interior=parts.interior)))
+    with pytest.raises(ProofError, match="does not contain the region"):
+        verify_region(smaller.to_bytes(), processes)
