@@ -48,6 +48,11 @@ def verify(args: Namespace) -> int:
     return DOES_NOT
 
 
+def cores() -> int:
+    """Returns how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 @contextmanager
 def _readable(path: Path) -> Iterator[Path]:
     """Yields a path at which a child process finds the proof: the file itself, or a copy of what comes from a pipe.
@@ -75,7 +80,7 @@ def _answer(path: Path) -> dict[str, Any]:
     """Returns what :func:`certifier.verify.file.answer` says of the file, or which error ended the child process that checked it."""
     try:
         with _progress() as told:
-            payload = {"path": str(path.absolute()), "processes": os.cpu_count() or 1, "progress": str(told)}
+            payload = {"path": str(path.absolute()), "processes": cores(), "progress": str(told)}
             found: dict[str, Any] = run_in_child(
                 "certifier.verify.file:answer_about_file", payload, timeout_s=TIMEOUT_S, memory_bytes=MEMORY_BYTES
             )
