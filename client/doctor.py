@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from certifier.errors import CirisError
 from client.find import api_key, data_dir, service_url
 from client.http import Client
+from client.verify import cores
 
 PACKAGES = ("drake", "python-flint", "numpy", "scipy", "numba", "fastapi", "celery", "redis", "sqlalchemy")
 
@@ -29,17 +30,13 @@ def examine(url: str | None) -> list[Finding]:
     """Looks at everything, and returns the findings in an order for people."""
     return [
         Finding("python", f"{platform.python_version()} on {platform.platform()}", sys.version_info >= (3, 11)),
-        Finding("machine", f"{_cores()} cores, {_memory_gib():.1f} GiB of memory"),
+        Finding("machine", f"{cores()} cores, {_memory_gib():.1f} GiB of memory"),
         *map(_package, PACKAGES),
         _tried("drake solvers", _solvers),
         _tried("exact arithmetic", _flint),
         Finding("data directory", str(data_dir())),
         _service(url),
     ]
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _memory_gib() -> float:

@@ -5,9 +5,11 @@ Files come from strangers, so a child process checks them, with limits on its ti
 
 from __future__ import annotations
 
+import os
 import stat
 import sys
 import tempfile
+import threading
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,10 +20,11 @@ from certifier.errors import CirisError
 from certifier.isolation.child import run_in_child
 from certifier.model import escaped
 from certifier.proof.limits import FILE_BYTES
-from client.output import print_json
+from client.output import Screen, print_json
 
 HOLDS, DOES_NOT = 0, 1
 MEMORY_BYTES = 4 << 30
+"""This is the limit of each process, of which there is one for each core."""
 TIMEOUT_S = 3600.0
 
 
@@ -43,6 +46,11 @@ def verify(args: Namespace) -> int:
     what = "could not be checked" if problem.code.startswith("child_") or problem.code == "proof_too_large" else "does not hold"
     print("error:", escaped(f"{args.proof}: the proof {what}: ") + " ".join(str(problem).split()), file=sys.stderr)
     return DOES_NOT
+
+
+def cores() -> int:
+    """Returns how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager
@@ -70,13 +78,36 @@ def _readable(path: Path) -> Iterator[Path]:
 
 def _answer(path: Path) -> dict[str, Any]:
     """Returns what :func:`certifier.verify.file.answer` says of the file, or which error ended the child process that checked it."""
-    payload = {"path": str(path.absolute())}
     try:
-        found: dict[str, Any] = run_in_child(
-            "certifier.verify.file:answer_about_file", payload, timeout_s=TIMEOUT_S, memory_bytes=MEMORY_BYTES
-        )
+        with _progress() as told:
+            payload = {"path": str(path.absolute()), "processes": cores(), "progress": str(told)}
+            found: dict[str, Any] = run_in_child(
+                "certifier.verify.file:answer_about_file", payload, timeout_s=TIMEOUT_S, memory_bytes=MEMORY_BYTES
+            )
     except CirisError as error:
         if error.code == "no_file":
             raise CirisError(error.code, error.message) from None
         return {"holds": False, "error": {**error.to_document(), "message": escaped(error.message)}}
     return found
+
+
+@contextmanager
+def _progress() -> Iterator[Path]:
+    """Yields a file in which the child process says how far it has come; a terminal shows it in its status line."""
+    screen, ended = Screen(), threading.Event()
+
+    def show(told: Path) -> None:
+        while not ended.wait(0.2):
+            numbers = told.read_text().split()
+            if len(numbers) == 2:
+                screen.status("checked {} of {} cells and proofs".format(*numbers))
+
+    with tempfile.NamedTemporaryFile(prefix="ciris-") as file:
+        thread = threading.Thread(target=show, args=(Path(file.name),), daemon=True)
+        thread.start()
+        try:
+            yield Path(file.name)
+        finally:
+            ended.set()
+            thread.join()
+            screen.clear()

@@ -15,7 +15,7 @@ from certifier.model import SCHEMA_VERSION, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume
 from certifier.polytopes.polytope import bounds, chebyshev_center, drop_redundant, support
-from certifier.proof.region import Implied, RegionProof, read_separation
+from certifier.proof.region import Implied, RegionProof, read_part
 from certifier.proof.separation import Separation, digest
 from certifier.verify.region import RegionStatement, verify_region
 
@@ -54,7 +54,7 @@ def certified_region(
     C, d = polytope.C, polytope.d
     interior = chebyshev_center(polytope)[0] if candidate.center is None else candidate.center
     bound = archimedean(polytope)
-    parts = tuple(read_separation(data, scene) for data in dict.fromkeys(proofs[index] for index in range(len(scene.pairs))))
+    parts = tuple(read_part(data, scene) for data in dict.fromkeys(proofs[index] for index in range(len(scene.pairs))))
     data = RegionProof(scene, C, d, interior, _implied(polytope, parts), bound, parts).to_bytes()
     statement = verify_region(data)
     ellipsoid = inscribed_ellipsoid(polytope)

@@ -98,9 +98,7 @@ class Side:
         for vertex in np.argsort((c[:, 0] - np.abs(c[:, 1:]).sum(axis=1)).min(axis=1)):
             codes, counts, numbers, values = self._room
             lengths, point, halvings = np.zeros(3, np.int64), np.zeros(len(mid)), np.zeros(len(own) + len(outside), np.int64)
-            status = kernels.prove(
-                c[vertex], T, ends, *g, PRECISION, most, codes, counts, numbers, values, lengths, point, halvings
-            )
+            status = kernels.prove(c[vertex], T, ends, *g, PRECISION, most, codes, counts, numbers, values, lengths, point, halvings)
             if status == kernels.REFUTED:
                 s = mid.copy()
                 place = len(own) + len(outside)

@@ -198,7 +198,7 @@ def _array(name: str, data: bytes) -> np.ndarray:
     if math.prod(shape) * dtype.itemsize != len(data) - match.end():
         raise _malformed(f"an array of {dtype} of shape {shape} has not {len(data) - match.end()} bytes", name)
     array = np.frombuffer(data, dtype, offset=match.end()).reshape(shape)
-    if dtype.kind == "f" and array.size and not (array.min() >= -LARGEST and array.max() <= LARGEST):
+    if dtype.kind == "f" and array.size and not (float(array.min()) >= -LARGEST and float(array.max()) <= LARGEST):
         raise _malformed(f"a number is not finite, or larger than {LARGEST:g}", name)
     return array
 

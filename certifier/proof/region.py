@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from certifier.errors import CirisError, ProofError
+from certifier.errors import CirisError
 from certifier.model import Array, Scene
 from certifier.proof.container import FORMAT, Arrays, head, header_of, malformed, pack, unpack
 from certifier.proof.pair import PairProof
@@ -18,16 +18,14 @@ FORMS: dict[str, type[Separation]] = {form.KIND: form for form in (PairProof, Pa
 """The forms that the proofs of a region's pairs take, by the kinds of their files."""
 
 
-def read_separation(data: bytes, scene: Scene) -> Separation:
-    """Reads the proof of one pair, or of the pairs of two volumes, whatever its form.
+def read_part(data: bytes, scene: Scene) -> Separation:
+    """Reads the file of one pair's proof, of any of these forms.
 
     Raises:
         ProofError: the file is no such proof, or one about another scene.
     """
     kind = header_of(data)["kind"]
-    if kind not in FORMS:
-        raise ProofError("proof_malformed", f"a proof of kind {kind} does not separate a pair", field="header.kind")
-    return FORMS[kind].from_bytes(data, scene)
+    return FORMS.get(kind, PairProof).from_bytes(data, scene)
 
 
 @dataclass(frozen=True)

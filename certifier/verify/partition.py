@@ -32,8 +32,6 @@ from certifier.verify.volume import check_volume
 
 TOGETHER = 1 << 18
 """About so many control values are computed at once."""
-CELLS = 256
-"""At most so many cells are checked together."""
 _DOWN, _UP = 1 - 2.0**-40, 1 + 2.0**-40
 """These factors round a few operations down and up."""
 
@@ -95,13 +93,13 @@ class CellCheck:
         )
         self._sides = first, second
 
-    def cells(self) -> Iterator[Cells]:
-        """Yields all cells, some at a time, which :meth:`gap` checks.
+    def cells(self, most: int) -> Iterator[Cells]:
+        """Yields all cells, at most ``most`` at a time, which :meth:`gap` checks.
 
         Raises:
             ProofError: the cuts do not divide the box.
         """
-        return self._cuts.cells(self._lower[self._play], self._upper[self._play], CELLS)
+        return self._cuts.cells(self._lower[self._play], self._upper[self._play], most)
 
     def gap(self, cells: Cells) -> float:
         """Checks some cells and returns a lower bound in metres of the bodies' distance in them; infinity where they all miss the polytope.

@@ -28,6 +28,8 @@ from certifier.verify.volume import check_contained
 
 Progress = Callable[[int, int], None]
 """A function of this kind is told how many of how many parts are checked: cells, and proofs without any."""
+CELLS = 256
+"""A part has at most so many cells."""
 WAITING = 4
 """At most so many parts wait or run for each process."""
 
@@ -52,7 +54,9 @@ def statements(scene: Scene, proofs: Sequence[Separation], processes: int = 1, p
     check_contained(scene, {id(volume): volume for proof in proofs for volume in proof.volumes}.values())
     check = _Check(scene, proofs)
     gaps = [np.inf] * len(proofs)
-    done, total = 0, sum(int(np.count_nonzero(proof.nodes < 0)) if isinstance(proof, PartitionProof) else 1 for proof in proofs)
+    sizes = [int(np.count_nonzero(proof.nodes < 0)) if isinstance(proof, PartitionProof) else 1 for proof in proofs]
+    done, total = 0, sum(sizes)
+    processes = max(1, min(processes, sum(-(-size // CELLS) for size in sizes)))
     for part, gap in _results(check, processes):
         gaps[part.proof] = min(gap, gaps[part.proof])
         done += 1 if part.cells is None else len(part.cells.number)
@@ -91,7 +95,7 @@ class _Check:
         """
         for number, proof in enumerate(self._proofs):
             if isinstance(proof, PartitionProof):
-                for cells in self._cell_check(number, proof).cells():
+                for cells in self._cell_check(number, proof).cells(CELLS):
                     yield Part(number, cells)
             else:
                 yield Part(number, None)
@@ -144,10 +148,11 @@ def _results(check: _Check, processes: int) -> Iterator[tuple[Part, float]]:
         parts, wrong = check.parts(), None
         while True:
             try:
-                part = next(parts, None)
+                part = next(parts)
+            except StopIteration:
+                break
             except ProofError as error:  # a part before this one may be wrong as well
-                part, wrong = None, error
-            if part is None:
+                wrong = error
                 break
             waiting.append((part, executor.submit(_run, part)))
             if len(waiting) == WAITING * processes:

@@ -204,8 +204,7 @@ class Multipliers:
         wanted = np.count_nonzero(proof.nodes == EMPTY) + np.count_nonzero(proof.pieces < 0)
         if len(counts) != wanted or (counts.size and not (counts.min() >= 0 and counts.max() <= limits.FACES)):
             raise malformed(proof, f"{len(counts)} counts of multipliers, for {wanted} pieces, or one that is none")
-        self._counts, self._start = counts, np.cumsum(counts, dtype=np.int32) - counts
-        total = int(self._start[-1]) + int(counts[-1]) if counts.size else 0
+        total = int(counts.sum(dtype=np.int64))
         if not len(proof.faces) == len(proof.multipliers) == total:
             raise malformed(proof, f"{len(proof.faces)} faces and {len(proof.multipliers)} multipliers where {total} belong")
         if total and not (proof.faces.min() >= 0 and proof.faces.max() < len(ground.d)):
@@ -213,6 +212,7 @@ class Multipliers:
         if total and not (proof.multipliers.min() >= 0 and np.isfinite(proof.multipliers).all()):
             raise malformed(proof, "a multiplier is negative or not finite")
         self._proof, self._ground = proof, ground
+        self._counts, self._start = counts, np.cumsum(counts, dtype=np.int64) - counts
         # EMPTY nodes and planes share the stream of counts, in the order of the nodes.
         leaves = proof.nodes[proof.nodes < 0]
         self._empty_before = np.cumsum(leaves == EMPTY, dtype=np.int32) - (leaves == EMPTY)

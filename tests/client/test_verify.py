@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import subprocess
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from certifier.model import Ignored, Pair
+from certifier.model import WORLD, Ignored, Pair
 from certifier.proof import limits
-from certifier.proof.container import pack, unpack
+from certifier.proof.container import pack, unpack, with_scene
 from certifier.proof.region import RegionProof
+from certifier.verify.file import answer
+from client.output import Screen
+from client.verify import _progress
 from tests.certifier.proofs import region
+from tests.certifier.scenes import planar_arm
+from tests.certifier.verify.partitions import Producer
 from tests.client.conftest import Ciris, command, surroundings
 
 
@@ -99,3 +105,31 @@ def test_a_letter_that_the_terminal_lacks_is_escaped(tmp_path: Path) -> None:
     done = subprocess.run(command("verify", "region"), cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert "\\xfcber ein Gelenk" in done.stdout
+
+
+def test_a_proof_over_a_partition_is_checked_by_all_cores(ciris: Ciris, tmp_path: Path) -> None:
+    scene = planar_arm(2)
+    proof = Producer(scene, scene.pairs[1], WORLD, [-0.2, -0.1], [0.3, 0.3]).proof(least=3)
+    data = with_scene(proof.to_bytes(), scene)
+    (tmp_path / "cells").write_bytes(data)
+    done = ciris("verify", "cells")
+    assert done.status == 0
+    assert "'arm/link2/bar' and 'world/obstacle'" in done.stdout
+    assert ciris("verify", "cells", "--json").json == answer(data)
+    header, arrays = unpack(data, "partition")
+    (tmp_path / "turned").write_bytes(pack(header, {**arrays, "proof/0/planes": -arrays["proof/0/planes"]}))
+    done = ciris("verify", "turned")
+    assert (done.status, done.raw) == (1, b"")
+    assert "cell 0, vertex 0 of arm/link2/bar" in done.error
+
+
+def test_the_progress_of_a_check_is_a_status_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[str] = []
+    monkeypatch.setattr(Screen, "status", lambda _, text: shown.append(text))
+    with _progress() as told:
+        told.write_text("256\n1000\n")
+        for _ in range(100):
+            if shown:
+                break
+            time.sleep(0.05)
+    assert shown[0] == "checked 256 of 1000 cells and proofs"

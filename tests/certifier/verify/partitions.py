@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import linprog
 
+from certifier.errors import RegionError
 from certifier.kinematics import Kinematics
 from certifier.model import Pair, Polytope, Scene, Volume
 from certifier.polytopes.polytope import chebyshev_center
@@ -72,13 +73,14 @@ class Producer:
         self.play = sorted({*self.chains[0], *self.chains[1]})
         self.radii = [v.radius + scene.padding for v in self.volumes]
 
-    def proof(self, depth: int = DEPTH) -> PartitionProof | None:
-        """The proof, or None where cutting as often as that is not enough."""
-        found = self._cell(self.lower, self.upper, depth)
+    def proof(self, depth: int = DEPTH, least: int = 0, halvings: int = 0) -> PartitionProof | None:
+        """The proof, with cells cut and pieces halved at least so many times; None where ``depth`` cuts are not enough."""
+        self._halvings = halvings
+        found = self._cell(self.lower, self.upper, depth, least)
         return found and found.proof(self.scene, self.volumes, self.frame, self.ground, self.interior, self.play)
 
-    def _cell(self, lower, upper, depth: int, turn: int = 0) -> Streams | None:
-        leaf = self._leaf(lower, upper)
+    def _cell(self, lower, upper, depth: int, least: int, turn: int = 0) -> Streams | None:
+        leaf = self._leaf(lower, upper) if turn >= least else None
         if leaf is not None or depth == 0:
             return leaf
         joint = self.play[turn % len(self.play)]
@@ -87,7 +89,7 @@ class Producer:
         for side in (0, 1):
             low, up = lower.copy(), upper.copy()
             (low if side else up)[joint] = cut
-            part = self._cell(low, up, depth - 1, turn + 1)
+            part = self._cell(low, up, depth - 1, least, turn + 1)
             if part is None:
                 return None
             streams.extend(part)
@@ -98,7 +100,7 @@ class Producer:
         rows, ends = np.concatenate([C, np.eye(n), -np.eye(n)]), np.concatenate([d, upper, -lower])
         try:
             center, radius = chebyshev_center(Polytope(rows, ends))
-        except Exception:
+        except RegionError:
             radius = -1.0
         if not radius > 1e-9:
             return self._missing(lower, upper)
@@ -169,7 +171,7 @@ class Producer:
         return (s, 1 / np.sqrt(1 + s * s)) if self.scene.revolute[j] else (s, 1.0)
 
     def _piece(self, streams: Streams, vertex, axes, parts, ranges, outs, depth: int) -> bool:
-        for z0 in (1, 0):
+        for z0 in (0, 1) if depth <= DEPTH - self._halvings else ():
             entries = self._multipliers(vertex, parts, ranges, outs, z0)
             if entries is not None:
                 streams.pieces.append(PLANE if z0 else EMPTY)
@@ -212,7 +214,10 @@ class Producer:
             basis = np.kron(basis, line)
         den = X[:, 3, 3] * scale
         # den is of degree 2 in each own joint after the weights' squares; the third power of the weight makes degree 3.
-        control = lambda values: np.linalg.solve(basis, values)  # noqa: E731
+
+        def control(values):
+            return np.linalg.solve(basis, values)
+
         p = (X @ np.append(v, 1.0)) * scale[:, None]
         sign = 1 - 2 * side
         column = {j: 1 + i for i, j in enumerate(self.play)}
