@@ -21,8 +21,8 @@ CORNER = 0.6
 MOST_POINTS = 64
 MOST_FACES = 8
 """A pair gets at most this many faces in one round."""
-CLEAR = 0.03
-"""A face is moved by this part of the distance to the first point to keep, away from the points that it cuts off."""
+CLEAR, CLEARER = 0.005, 0.2
+"""A face is moved away from what it cuts off, by CLEAR standard deviations and by CLEARER of the depth of what it cuts off."""
 
 
 def cut(scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[tuple[int, ...], Array]], seed: int) -> Polytope | None:
@@ -79,6 +79,8 @@ def _face(beyond: Array, keep: Array, samples: Array, scale: Array) -> tuple[Arr
     if found.status != 0:
         return None
     normal, offset = found.x[:k] / scale, float(found.x[k])
-    offset -= CLEAR * (offset - float((near @ found.x[:k]).max()))
+    depth = float((far @ found.x[:k]).max()) - offset
+    room = offset - float((near @ found.x[:k]).max())
+    offset -= min(CLEAR * float(np.linalg.norm(found.x[:k])) + CLEARER * depth, 0.5 * room)
     length = float(np.linalg.norm(normal))
     return normal / length, float((offset + normal @ middle) / length)

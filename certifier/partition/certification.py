@@ -108,12 +108,12 @@ class CellCertification:
         points = self._contacts(search, volumes, report.contacts)
         if ending:
             points += self._of_cells(cells)
-        points += report.narrow
+        points += [point for cell in report.narrow for point in cell]
         weakness = Weakness(np.array(points[:MOST_POINTS]).reshape(-1, self._scene.n), np.zeros(self._scene.n))
         if report.contacts:
             return PairResult(Outcome.REFUTED, Stage.CELLS, witness_s=report.contacts[0], proof=begun, weakness=weakness)
         if report.narrow:
-            s, distance = self._nearest(search, report.narrow)
+            s, distance = self._nearest(search, np.concatenate(report.narrow))
             detail = f"the padded bodies are {distance:.3g} m apart at the configuration named, too close for a plane"
             return PairResult(Outcome.TOO_CLOSE, Stage.CELLS, witness_s=s, detail=detail, proof=begun, weakness=weakness)
         inside = sum(((self._area.samples >= low) & (self._area.samples <= up)).all(axis=1).mean() for low, up in cells)
@@ -144,9 +144,9 @@ class CellCertification:
             found += [*inside[:8], *corners[self._area.polytope.contains(corners)]]
         return found
 
-    def _nearest(self, search: Search, configurations: list[Array]) -> tuple[Array, float]:
+    def _nearest(self, search: Search, configurations: Array) -> tuple[Array, float]:
         """Returns the configuration at which the bodies are nearest, and their distance there in metres, padding subtracted."""
-        A, B = search.vertices(np.array(configurations))
+        A, B = search.vertices(configurations)
         reach = search.reach
         distances = [closest(a, b).distance - reach for a, b in zip(A, B, strict=True)]
         place = int(np.argmin(distances))

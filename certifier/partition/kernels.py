@@ -219,7 +219,8 @@ def separate(
             direction[c] = z[c * (k + 1)]
             for e in range(k):
                 direction[c] += z[c * (k + 1) + 1 + e] * u[row, e]
-        direction /= max(np.sqrt(direction @ direction), 1e-300)
+        length = np.sqrt(direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2)
+        direction /= length if length > 0 else 1.0
         for c in range(4):
             t = 1.0
             if c < 3:
@@ -290,15 +291,14 @@ def elevate(values: Array, first: Array, last: Array) -> Array:
 
 
 @njit(cache=True)
-def polynomials(X: Array, vertices: Array, base: Array, own: Array, outside: Array, radius: float, ends: Array) -> tuple[Array, Array]:
+def polynomials(X: Array, vertices: Array, base: Array, own: Array, outside: Array, ends: Array) -> tuple[Array, Array]:
     """Returns the Bernstein coefficients of f den of all vertices, (V, 1 + o, 4^k), and of den and den s_i, (1 + k, 4^k).
 
     Args:
         X: (3^k, 4, 4) control matrices of the pose.
         vertices: (V, 3) metres.
-        base: (4,) the plane at the middle of the outside coordinates.
+        base: (4,) the plane at the middle of the outside coordinates; the radius is subtracted from its offset already.
         own, outside: (k, 4), (o, 4) what the own coordinates s_i and the outside coordinates, which are in [-1, 1], add to it.
-        radius: metres times the bound of the normal.
         ends: (4, k) both ends of the own coordinates and their weights.
     """
     N, k, o, V = len(X), len(own), len(outside), len(vertices)
@@ -317,7 +317,7 @@ def polynomials(X: Array, vertices: Array, base: Array, own: Array, outside: Arr
         for a in range(N):
             for e in range(4):
                 p[a, e] = X[a, e, 0] * vertices[v, 0] + X[a, e, 1] * vertices[v, 1] + X[a, e, 2] * vertices[v, 2] + X[a, e, 3]
-            values[a] = p[a, 0] * base[0] + p[a, 1] * base[1] + p[a, 2] * base[2] + p[a, 3] * base[3] - radius * p[a, 3]
+            values[a] = p[a, 0] * base[0] + p[a, 1] * base[1] + p[a, 2] * base[2] + p[a, 3] * base[3]
         c[v, 0] = elevate(values, first, last)
         for i in range(k):
             for a in range(N):

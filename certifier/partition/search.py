@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from certifier.model import Array, Volume
-from certifier.pair.closest import first_within
+from certifier.pair.closest import closest
 from certifier.pair.frames import choose_frame
 from certifier.partition import kernels
 from certifier.partition.area import Area
@@ -37,12 +37,20 @@ KEPT = 200
 """A cell inherits at most this many points."""
 LEAST, ENOUGH = 3e-4, 0.8
 """A plane's margin is at least LEAST, relative to the bodies' extent, and at least ENOUGH of the widest one."""
+CALM = 0.3
+"""Where a radius is involved, this much less weight is on the slopes of the plane: its normal's length must have a tight affine bound."""
 ROUNDS = 8
 """A plane is looked for this many times before its cell is cut."""
 PIECES = {4: 10, 5: 12}
 MANY_PIECES = 25
 """A vertex may take this many pieces: PIECES by the number of joints in play, MANY_PIECES with more."""
 DESCENT = 3
+FEW = 16
+"""So many points of a narrow cell are reported."""
+CLOSE = 0.05
+"""From bodies that come as close as this, relative to their extent, a contact is looked for."""
+STEPS = 6
+"""A contact is looked for in so many steps."""
 
 
 @dataclass
@@ -52,7 +60,7 @@ class Report:
     Attributes:
         cells: how many cells were looked at.
         contacts: points (n,) at which the bodies touch.
-        narrow: points (n,), one of each cell that is too narrow to be cut.
+        narrow: points (w, n) of each cell that is too narrow to be cut.
     """
 
     cells: int = 0
@@ -86,6 +94,7 @@ class Search:
         self.frame, self.joints = frame.body, list(frame.path)
         self._radii = [volume.radius + area.scene.padding for volume in volumes]
         self.reach = sum(self._radii)
+        self._calm = CALM
         self._sides = [
             Side(area, frame.body, volume, self.joints, sign, radius)
             for volume, sign, radius in zip(volumes, (1.0, -1.0), self._radii, strict=True)
@@ -122,7 +131,7 @@ class Search:
             joint, points = cut
             value = self._middle_of(cell, joint)
             if value is None:
-                report.narrow.append(points[0])
+                report.narrow.append(points[:FEW])
                 continue
             cell.node.kind, cell.node.value, cell.node.children = joint, value, (Node(), Node())
             for child, below in zip(cell.node.children, (True, False), strict=True):
@@ -131,6 +140,11 @@ class Search:
                 of_points, of_samples = ((X[:, joint] <= value) == below for X in (points, cell.samples))
                 push(child, lower, upper, points[of_points][:KEPT], cell.samples[of_samples])
         return report
+
+    def _faces(self, cell: _Cell) -> tuple[Array, Array]:
+        """Returns the faces of the polytope, then those of the cell."""
+        polytope, eye = self._area.polytope, np.eye(len(cell.lower))
+        return np.concatenate([polytope.C, eye, -eye]), np.concatenate([polytope.d, cell.upper, -cell.lower])
 
     def _middle_of(self, cell: _Cell, joint: int) -> float | None:
         """Returns where to cut a cell, in the middle of its angle; None where it is narrow in all joints."""
@@ -149,8 +163,7 @@ class Search:
     def _settle(self, cell: _Cell, report: Report, seed: int) -> tuple[int, Array] | None:
         """Settles a cell, or returns the joint to cut it in and its points."""
         polytope, n = self._area.polytope, len(cell.lower)
-        eye = np.eye(n)
-        C, d = np.concatenate([polytope.C, eye, -eye]), np.concatenate([polytope.d, cell.upper, -cell.lower])
+        C, d = self._faces(cell)
         start = cell.points.mean(axis=0) if len(cell.points) > n else None
         if start is None or (d - C @ start).min() < 1e-7 * cell.half.min():
             start = self._inside(cell, C, d)
@@ -163,13 +176,13 @@ class Search:
         X = np.concatenate([start[None], kernels.chords(C, d, start, targets, CHORDS, seed), cell.points])
         A, B = self._points(X)
         for _ in range(ROUNDS):
-            u = np.ascontiguousarray(((X - cell.mid) / cell.half)[:, self.joints])
+            u = np.ascontiguousarray((self._calm * (X - cell.mid) / cell.half)[:, self.joints])
             found, z, places, weights = kernels.separate(
                 A, B, u, self._radii[0] / self._extent, self._radii[1] / self._extent, np.arange(len(X)), LEAST, ENOUGH
             )
             if not found:
                 return self._inseparable(cell, report, X, X[places], weights)
-            plane = self._in_s(cell, z)
+            plane = self._bounded(cell, self._in_s(cell, z))
             result = self._prove(cell, plane, polytope.C, polytope.d)
             if isinstance(result, Streams):
                 cell.node.kind, cell.node.plane, cell.node.streams = PLANE, plane, result
@@ -184,11 +197,46 @@ class Search:
 
     def _inseparable(self, cell: _Cell, report: Report, X: Array, support: Array, weights: Array) -> tuple[int, Array] | None:
         """Keeps the cell open where the bodies touch; otherwise returns how to cut it."""
-        touching = first_within(*self.vertices(support), self.reach)
-        if touching is not None:
-            report.contacts.append(support[touching[0]])
+        contact = self._contact(cell, support)
+        if contact is not None:
+            report.contacts.append(contact)
             return None
         return self._spread(cell, support, weights), X
+
+    def _contact(self, cell: _Cell, configurations: Array) -> Array | None:
+        """Returns a contact in the cell, looked for from the configuration (of some, (w, n)) at which the bodies are nearest.
+
+        In every step a linear program moves to where the bodies would be nearest if the points that are nearest now stayed so.
+        """
+        kinematics, n = self._area.kinematics, len(cell.lower)
+        pairs = [closest(a, b) for a, b in zip(*self.vertices(configurations), strict=True)]
+        place = int(np.argmin([pair.distance for pair in pairs]))
+        s, nearest = configurations[place], pairs[place]
+        if nearest.distance > self.reach + CLOSE * self._extent:
+            return None
+        (a, b), (C, d), reach = self._volumes, self._faces(cell), cell.half.copy()
+        for _ in range(STEPS):
+            if nearest.distance <= self.reach:
+                return s
+            step = 1e-6 * cell.half
+            around = np.concatenate([s + np.diag(step), s - np.diag(step)])
+            p_a, p_b = (
+                np.einsum("v,nvi->ni", w / w.sum(), kinematics.points(self.frame, volume.body, volume.vertices, around))
+                for volume, w in zip((a, b), nearest.weights, strict=True)
+            )
+            gap = (p_a - p_b) @ nearest.normal
+            slope = np.where(np.isin(np.arange(n), self.joints), (gap[:n] - gap[n:]) / (2 * step), 0.0)
+            bounds = np.column_stack([np.maximum(cell.lower, s - reach), np.minimum(cell.upper, s + reach)])
+            found = linprog(slope, A_ub=C[: -2 * n], b_ub=d[: -2 * n], bounds=bounds, method="highs")
+            if found.status != 0:
+                return None
+            tried = s + np.linspace(1.0, 0.2, 5)[:, None] * (found.x - s)
+            further = [closest(*points) for points in zip(*self.vertices(tried), strict=True)]
+            best = int(np.argmin([pair.distance for pair in further]))
+            if further[best].distance >= nearest.distance - 1e-4 * self._extent:
+                return None
+            s, nearest, reach = tried[best], further[best], reach / 2
+        return s if nearest.distance <= self.reach else None
 
     def _spread(self, cell: _Cell, support: Array, weights: Array) -> int:
         """Returns the joint in which the points that no plane separates lie farthest apart."""
@@ -222,31 +270,36 @@ class Search:
         plane = z.reshape(4, -1).copy()
         plane[:3] /= self._extent
         plane[3] -= self._middle @ plane[:3]
-        plane[:, 1:] /= cell.half[self.joints]
+        plane[:, 1:] *= self._calm / cell.half[self.joints]
         plane[:, 0] -= plane[:, 1:] @ cell.mid[self.joints]
         return plane / np.abs(plane[:3]).max()
 
     def _prove(self, cell: _Cell, plane: Array, C: Array, d: Array) -> Streams | Array | int:
         cutting = np.flatnonzero(d - C @ cell.mid - np.abs(C) @ cell.half < 0)
-        kappa = self._largest_normal(cell, plane) if max(self._radii) > 0 else 0.0
         found = []
         for side in self._sides:
             self._last = side
-            result = side.prove(plane, kappa, cell.lower, cell.upper, C[cutting], d[cutting], cutting, self._pieces)
+            result = side.prove(plane, cell.lower, cell.upper, C[cutting], d[cutting], cutting, self._pieces)
             if not isinstance(result, Streams):
                 return result
             found.append(result)
         return joined(found)
 
-    def _largest_normal(self, cell: _Cell, plane: Array) -> float:
-        """Returns a bound of the length of the plane's normal on the cell, which it takes at a corner."""
-        J = self.joints
-        lower, upper = cell.lower[J], cell.upper[J]
-        normals = plane[:3, :1]
-        for place in range(len(J)):
-            slope = plane[:3, 1 + place, None]
-            normals = np.concatenate([normals + slope * lower[place], normals + slope * upper[place]], axis=1)
-        return float(np.linalg.norm(normals, axis=0).max()) * (1 + 1e-12)
+    def _bounded(self, cell: _Cell, plane: Array) -> Array:
+        """Returns the plane with a bound of its normal's length below, (5, 1 + k), which is affine in s and holds on the cell.
+
+        The length is convex, so a bound of it at the corners is enough. Its slopes are the mean differences between the corners.
+        """
+        bound = np.zeros(plane.shape[1])
+        if max(self._radii) > 0:
+            J = self.joints
+            corners = np.array(list(itertools.product((-1.0, 1.0), repeat=len(J)))).reshape(-1, len(J))
+            s = cell.mid[J] + corners * cell.half[J]
+            lengths = np.linalg.norm(plane[:3, :1] + plane[:3, 1:] @ s.T, axis=0) * (1 + 1e-9)
+            slopes = lengths @ corners / len(corners)
+            bound[1:] = slopes / cell.half[J]
+            bound[0] = (lengths - s @ bound[1:]).max() + 1e-12 * (lengths.max() + np.abs(s @ bound[1:]).max())
+        return np.vstack([plane, bound])
 
     def _descend(self, plane: Array, C: Array, d: Array, cell: _Cell, start: Array, rng: np.random.Generator) -> Array:
         """Returns points of the polytope and the cell that lie ever farther on the wrong side, beginning at one that does."""
@@ -256,7 +309,7 @@ class Search:
             ways = np.concatenate([np.diag(cell.half), -np.diag(cell.half), rng.normal(size=(12, n)) * cell.half])
             ends = kernels.chords(C, d, found[-1], found[-1] + 2 * ways, 0, 0)
             X = np.concatenate([ends, (ends + found[-1]) / 2])
-            normals = np.einsum("ie,ne->ni", plane, np.column_stack([np.ones(len(X)), X[:, self.joints]]))
+            normals = np.einsum("ie,ne->ni", plane[:4], np.column_stack([np.ones(len(X)), X[:, self.joints]]))
             volume = self._last.volume
             points = self._area.kinematics.points(self.frame, volume.body, volume.vertices, X)
             values = self._last.sign * (np.einsum("nvc,nc->nv", points, normals[:, :3]) + normals[:, 3, None])

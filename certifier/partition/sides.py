@@ -54,14 +54,11 @@ class Side:
             X = X.reshape((3,) * k + (4, 4)).transpose([self._order.index(j) for j in self.own] + [k, k + 1]).reshape(-1, 4, 4)
         return np.ascontiguousarray(X)
 
-    def prove(
-        self, plane: Array, kappa: float, lower: Array, upper: Array, C: Array, d: Array, faces: Array, most: int
-    ) -> Streams | Array | int:
+    def prove(self, plane: Array, lower: Array, upper: Array, C: Array, d: Array, faces: Array, most: int) -> Streams | Array | int:
         """Proves that the volume is on its side of the plane on the polytope and a cell.
 
         Args:
-            plane: (4, 1 + k), affine in s.
-            kappa: bound of the plane's normal on the cell.
+            plane: (5, 1 + k), affine in s: the normal, the offset, and a bound of the normal's length.
             C, d: the polytope's faces that cut the cell; ``faces`` are their numbers.
             most: so many pieces are tried for one vertex.
 
@@ -73,7 +70,8 @@ class Side:
         own, outside = self.own, self.outside
         rest = [i for i in range(len(mid)) if i not in own and i not in outside]
         X = self.control_matrices(lower, upper)
-        plane = self.sign * plane
+        plane, bound = self.sign * plane[:4], plane[4]
+        plane[3] -= self.radius * bound
         slopes = {joint: plane[:, 1 + place] for place, joint in enumerate(self._joints)}
         l, u = lower[own], upper[own]
         w, v = (np.where(self._revolute, 1 / np.sqrt(1 + ends * ends), 1.0) for ends in (l, u))
@@ -84,7 +82,6 @@ class Side:
             plane[:, 0] + sum((slopes[j] * mid[j] for j in outside), np.zeros(4)),
             np.array([slopes[j] for j in own]).reshape(-1, 4),
             np.array([slopes[j] * half[j] for j in outside]).reshape(-1, 4),
-            self.radius * kappa,
             ends,
         )
         offset = d - C[:, outside] @ mid[outside] - C[:, rest] @ mid[rest]

@@ -33,7 +33,7 @@ class Node:
         kind: the joint that is cut, or PLANE, EMPTY or OPEN.
         value: where it is cut, in s.
         children: the lower and the upper part of a cell that is cut.
-        plane: (4, 1 + k) of a cell with a plane.
+        plane: (5, 1 + k) of a cell with a plane, as a proof holds it.
         streams: the pieces and multipliers of a cell with a plane, or the multipliers of one that misses the polytope.
     """
 
@@ -71,7 +71,7 @@ class Node:
         found = {
             "nodes": [node.kind for node in nodes],
             "cuts": [node.value for node in nodes if node.children],
-            "planes": np.array([node.plane for node in nodes if node.plane is not None]).reshape(-1, 4, 1 + k),
+            "planes": np.array([node.plane for node in nodes if node.plane is not None]).reshape(-1, 5, 1 + k),
             **{
                 name: np.concatenate([getattr(part, name) for part in held] or [[]])
                 for name in ("pieces", "counts", "faces", "multipliers")

@@ -51,7 +51,8 @@ class PartitionProof(Separation):
     Attributes:
         nodes: int8, the tree of cuts: the position index of the joint that is cut, or PLANE, or EMPTY.
         cuts: where each cut is, in s, in the order of the nodes.
-        planes: (leaves with a plane, 4, 1 + k), Z of each, in the order of the nodes.
+        planes: (leaves with a plane, 5, 1 + k), the four rows of Z of each and then kappa, in the order of the nodes. kappa is affine in s
+            as well, and bounds |a| on the cell; it counts where a radius is positive.
         pieces: int8, the trees of pieces: for every leaf with a plane, for either volume, for every vertex in order. An axis that is
             halved is numbered: first the joints between the frame and the volume's body, ascending, then the others in play, ascending.
         counts: int16, the number of multipliers of every piece and of every EMPTY node, in the order of the nodes.

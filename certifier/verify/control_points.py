@@ -30,9 +30,9 @@ operations, has m roundings at most. Absolute values change none of that. So it 
 is the same expression in absolute values. The kinematics have
 
     K(l l) = K(w w) = K((l + u)/2) = 1,  K(control matrix) <= 7,  K(X) <= 7 + 11 (k - 1) <= 73 for k <= 7 (each product adds 7 + 1 + 3),
-    K(vertex) <= K(X) + 4,  K(Z_0 + sum Z_o m_o) <= 15,  K(a'p + b) <= 15 + 77 + 4 = 96,  K(r kappa den) <= 76,  with both 97,
-    degree 3: at most 5 for every own joint (w l, product, sum, division, sum), hence K(C), K(D), K(T) <= 97 + 35 = 132,
-    64 halvings of 3 roundings each: K <= 324,
+    K(vertex) <= K(X) + 4,  K(b - r kappa) <= 2,  K(Z_0 + sum Z_o m_o) <= 17,  K(a'p + b - r kappa) <= 17 + 77 + 4 = 98,
+    degree 3: at most 5 for every own joint (w l, product, sum, division, sum), hence K(C), K(D), K(T) <= 98 + 35 = 133,
+    64 halvings of 3 roundings each: K <= 325,
     L and S of M multipliers: M + 1; times m_o (64 halvings), and the sum over n <= 64 joints: M + 1 + 65 + 66 = M + 132,
     times D: M + 457; the sum of at most 8 + 14 + 2 terms: M + 481.
 
@@ -168,20 +168,20 @@ class Side:
         """Returns how many control values one vertex has in one cell."""
         return (1 + len(self._play)) * 4 ** len(self.own)
 
-    def control(self, lower: Array, upper: Array, plane: Array, kappa: Array, vertices: slice) -> Control:
+    def control(self, lower: Array, upper: Array, plane: Array, vertices: slice) -> Control:
         """Returns the control values of some vertices on B cells.
 
         Args:
             lower: (B, k) least values of the joints in play.
             upper: (B, k) largest values of the joints in play.
-            plane: (B, 4, 1 + k) Z.
-            kappa: (B,) bounds of |a|.
+            plane: (B, 5, 1 + k) Z, and below it kappa, which bounds |a| on the cells.
         """
         B, k = len(lower), len(self.own)
         l, u = lower[:, self.own], upper[:, self.own]
         w = np.stack([_weight(l, self._turns), _weight(u, self._turns)])
         mid, half = _mid_half(lower[:, self.outside], upper[:, self.outside])
-        Z = self._sign * plane
+        Z = self._sign * plane[:, :4]
+        Z[:, 3] -= self._radius * plane[:, 4]
         slopes = Z[:, :, [1 + o for o in self.outside]]
         constant = Z[:, :, 0] + np.einsum("bro,bo->br", slopes, mid)
         own = Z[:, :, [1 + i for i in self.own]]
@@ -190,14 +190,13 @@ class Side:
         h = self._vertices[vertices]
         q = np.moveaxis((rows[:, None] @ X) @ h.T, 1, 3).swapaxes(1, 2)  # (B, V, 1 + k, 3^k)
         D = X[..., 3, 3]
-        q[:, :, 0] -= (self._radius * kappa)[:, None, None] * D[:, None]
         one, s = w, np.stack([w[0] * l, w[1] * u])
         c = _elevated(q.reshape(*q.shape[:3], *[3] * k), one, s, k)
         dt = D.reshape(B, 1, 1, *[3] * k)
         for i in range(k):
             dt = np.concatenate([_times(dt, 3 + i, one[:, :, i]), _times(dt[:, :, :1], 3 + i, s[:, :, i])], axis=2)
         dt = dt.reshape(B, 1 + k, -1)
-        return Control(c, dt, mid, half, *self._sizes(l, u, w, lower, upper, plane, kappa, h))
+        return Control(c, dt, mid, half, *self._sizes(l, u, w, lower, upper, plane, h))
 
     def _pose(self, matrices: Array) -> Array:
         """Returns the control matrices of X_FB, (B, 3^k, 4, 4), whose axes are the own joints in ascending order."""
@@ -208,7 +207,7 @@ class Side:
         X = X.reshape(B, *[3] * k, 4, 4).transpose(0, *(1 + np.argsort(self._path)), 1 + k, 2 + k) if k else X
         return X.reshape(B, 3**k, 4, 4)
 
-    def _sizes(self, l: Array, u: Array, w: Array, lower: Array, upper: Array, plane: Array, kappa: Array, h: Array) -> tuple[Array, ...]:
+    def _sizes(self, l: Array, u: Array, w: Array, lower: Array, upper: Array, plane: Array, h: Array) -> tuple[Array, ...]:
         k = len(self.own)
         one = np.maximum(w.max(axis=0), LEAST)
         s = np.maximum(np.maximum(w[0] * np.abs(l), w[1] * np.abs(u)), LEAST)
@@ -219,13 +218,14 @@ class Side:
             for i in self._path[1:]:
                 X = X @ factors[:, i]
         size = np.maximum(np.maximum(np.abs(lower), np.abs(upper)), LEAST)
-        Z = np.maximum(np.abs(plane), LEAST)
+        Z = np.maximum(np.abs(plane[:, :4]), LEAST)
+        Z[:, 3] += max(self._radius, LEAST) * np.maximum(np.abs(plane[:, 4]), LEAST)
         points = np.maximum(np.abs(h), LEAST) @ X.swapaxes(1, 2)  # (B, V, 4)
         terms = points @ Z  # (B, V, 1 + k)
         D = X[:, 3, 3]
         mid_size = 2.0 * size[:, self.outside]
         outside = terms[:, :, [1 + o for o in self.outside]] * mid_size[:, None]
-        constant = terms[:, :, 0] + outside.sum(axis=-1) + (max(self._radius, LEAST) * np.maximum(kappa, LEAST) * D)[:, None]
+        constant = terms[:, :, 0] + outside.sum(axis=-1)
         whole = one.prod(axis=1)
         ratio = s / one
         own = (terms[:, :, [1 + i for i in self.own]] * ratio[:, None]).sum(axis=-1)

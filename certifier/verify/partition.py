@@ -7,10 +7,10 @@ planes separate the volumes on P in every cell. The verifier shows, for every ve
 
 by control values that are larger than the bound of their rounding errors (certifier.verify.control_points). With z0 = 1, f > 0 wherever the
 piece meets P; with z0 = 0, it does not meet P, because there -sum_j lambda_j g_j <= 0. Halvings cover the cell with pieces, so every vertex
-with its ball is on its side of the plane, as kappa >= |a| on the cell. |a| is convex, so its largest value is at a corner; what is computed
-there is rounded up in the same manner. A leaf without a plane is a cell that misses P: over its box, -sum_j lambda_j g_j > 0.
+with its ball is on its side of the plane, as kappa >= |a| on the cell: kappa is affine and |a| is convex, so it is enough to compare them at
+the corners, where what is computed is rounded in the same manner. A leaf without a plane is a cell that misses P: over its box, -sum_j lambda_j g_j > 0.
 
-If F(alpha) >= t D(alpha) for all alpha and t >= 0, the same argument gives f >= t on the piece. The volumes are (t_A + t_B)/kappa apart
+If F(alpha) >= t D(alpha) for all alpha and t >= 0, the same argument gives f >= t on the piece. The volumes are (t_A + t_B)/max |a| apart
 then.
 """
 
@@ -92,6 +92,7 @@ class CellCheck:
             for volume, sign in zip(proof.volumes, (1.0, -1.0), strict=True)
         )
         self._sides = first, second
+        self._rounded = any(volume.radius > 0 for volume in proof.volumes) or scene.padding > 0
 
     def cells(self, most: int) -> Iterator[Cells]:
         """Yields all cells, at most ``most`` at a time, which :meth:`gap` checks.
@@ -137,9 +138,12 @@ class CellCheck:
         """Checks some cells with planes and returns their least gap."""
         lower, upper, number, plane = cells.lower[some], cells.upper[some], cells.number[some], cells.plane[some]
         Z = self._proof.planes[plane]
-        kappa = _largest_norms(Z[:, :3], lower, upper)
-        if not np.isfinite(kappa).all():
-            raise self._refused(f"cell {number[np.argmin(np.isfinite(kappa))]}", "the plane's numbers are too large")
+        norms, room = _norms(Z, lower, upper)
+        for cell in np.flatnonzero(~np.isfinite(norms)):
+            raise self._refused(f"cell {number[cell]}", "the plane's numbers are too large")
+        if self._rounded:
+            for cell in np.flatnonzero(~(room >= 0)):
+                raise self._refused(f"cell {number[cell]}", "kappa does not bound the plane's normal")
         margins = np.zeros(len(some))
         for i, side in enumerate(self._sides):
             start = self._pieces.start(plane, i)
@@ -147,10 +151,10 @@ class CellCheck:
             margin = np.full(len(some), np.inf)
             for first in range(0, side.vertices, step):
                 part = slice(first, first + step)
-                control = side.control(lower, upper, Z, kappa, part)
+                control = side.control(lower, upper, Z, part)
                 margin = np.minimum(margin, self._side_margins(i, control, number, start[:, part], first))
             margins += margin
-        return float((margins / kappa).min() * _DOWN)
+        return float((margins / norms).min() * _DOWN)
 
     def _side_margins(self, side: int, control: Control, number: np.ndarray, start: np.ndarray, vertex: int) -> Array:
         """Checks some vertices of a volume in B cells and returns, (B,), t with f >= t, infinite where a cell misses the polytope.
@@ -208,18 +212,25 @@ class CellCheck:
         return ProofError("proof_cell", f"{self._proof.title}: {where}: {why}")
 
 
-def _largest_norms(normal: Array, lower: Array, upper: Array) -> Array:
-    """Returns upper bounds, (B,), of |a| over boxes, where a = normal [1; s], (B, 3, 1 + k), at least LEAST."""
-    moving = np.flatnonzero((normal[:, :, 1:] != 0).any(axis=(0, 1)))
-    values, size = normal[:, :, :1], np.abs(normal[:, :, :1])
+def _norms(plane: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Returns of B boxes an upper bound of |a|, at least LEAST, and a lower bound of kappa - |a| over the corners.
+
+    Both |a| and |a| - kappa are convex, so what holds at the corners holds on the box.
+
+    Args:
+        plane: (B, 5, 1 + k), the three rows of a, that of b, and kappa, all affine in s.
+    """
+    plane = plane[:, [0, 1, 2, 4]]
+    moving = np.flatnonzero((plane[:, :, 1:] != 0).any(axis=(0, 1)))
+    values, size = plane[:, :, :1], np.abs(plane[:, :, :1])
     for i in moving:
-        a = normal[:, :, 1 + i, None]
+        a = plane[:, :, 1 + i, None]
         l, u = lower[:, None, i, None], upper[:, None, i, None]
         values = np.concatenate([values + a * l, values + a * u], axis=2)
         size = size + np.abs(a) * np.maximum(np.abs(l), np.abs(u))
-    largest = np.abs(values) + rounding(size + LEAST, np.zeros(1))
-    norms: Array = np.sqrt((largest**2).sum(axis=1)).max(axis=1) * _UP
-    return norms
+    error = rounding(size + LEAST, np.zeros(1))
+    norms: Array = np.sqrt(((np.abs(values) + error)[:, :3] ** 2).sum(axis=1)) * _UP
+    return norms.max(axis=1), (values[:, 3] - error[:, 3] - norms).min(axis=1)
 
 
 def _not_less(radius: float, padding: float) -> float:

@@ -65,7 +65,7 @@ class Cuts:
             raise malformed(proof, "the tree of cuts ends before or after its last node")
         if len(proof.cuts) != np.count_nonzero(nodes >= 0):
             raise malformed(proof, f"there are {len(proof.cuts)} cuts for {np.count_nonzero(nodes >= 0)} nodes that cut")
-        if proof.planes.shape != (np.count_nonzero(nodes == PLANE), 4, 1 + len(play)):
+        if proof.planes.shape != (np.count_nonzero(nodes == PLANE), 5, 1 + len(play)):
             raise malformed(proof, f"the planes are {proof.planes.shape}")
         if not (np.isfinite(proof.cuts).all() and np.isfinite(proof.planes).all()):
             raise malformed(proof, "a cut or a plane is not finite")

@@ -45,7 +45,7 @@ class Streams:
             interior,
             np.array(self.nodes, dtype=np.int8),
             np.array(self.cuts, dtype=float),
-            np.array(self.planes, dtype=float).reshape(-1, 4, 1 + len(play)),
+            np.array(self.planes, dtype=float).reshape(-1, 5, 1 + len(play)),
             np.array(self.pieces, dtype=np.int8),
             np.array([len(entries) for entries in self.multipliers], dtype=np.int16),
             np.array([face for face, _ in flat], dtype=np.int16),
