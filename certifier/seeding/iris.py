@@ -5,6 +5,9 @@ The algorithms are Drake's, and both grow in s through q = q* + 2 atan(s):
 - IrisNp2 finds the closest collision by nonlinear programming (program (14)), then takes the tangent plane of the inscribed ellipsoid;
 - IrisZo bisects towards sampled collisions instead.
 
+Both draw the more samples the smaller epsilon is. So they run with a coarse epsilon first, and a last round with the small one begins
+with that polytope, where few collisions are left to find.
+
 Werner et al., "Faster Algorithms for Growing Collision-Free Convex Polytopes in Robot Configuration Space", 2024.
 """
 
@@ -12,7 +15,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from enum import StrEnum
@@ -21,7 +24,7 @@ from typing import Any
 import numpy as np
 from pydrake.common import Parallelism
 from pydrake.geometry.optimization import HPolyhedron, Hyperellipsoid
-from pydrake.math import atan
+from pydrake.multibody.rational import RationalForwardKinematics
 from pydrake.planning import IrisNp2, IrisNp2Options, IrisParameterizationFunction, IrisZo, IrisZoOptions, SceneGraphCollisionChecker
 
 from certifier.errors import RegionError
@@ -32,6 +35,8 @@ from certifier.scene.drake_model import build_diagram
 from certifier.seeding.options import Method, SeedOptions
 
 _START_RADIUS = 1e-2
+_COARSE = 0.01
+"""The alternation between faces and ellipsoid has an epsilon of at least this."""
 
 
 class Termination(StrEnum):
@@ -58,29 +63,17 @@ def iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Arra
         points: (k, n) points in s, the seed first.
 
     Returns:
-        (C, d, account); the account's keys are guarantee, termination, iterations, epsilon, delta, warnings.
+        (C, d, account); the account's keys are guarantee, termination, iterations, epsilon, delta, warnings. The epsilon is the coarse one
+        where the last round would have cut a point off.
 
     Raises:
         RegionError: ``seeding_failed`` with Drake's words.
     """
-    function, iris_options = (IrisNp2, IrisNp2Options()) if options.method is Method.IRIS_NP2 else (IrisZo, IrisZoOptions())
-    iris_options.parameterization = IrisParameterizationFunction(_positions(scene), scene.n)
-    sampled = iris_options.sampled_iris_options
-    sampled.epsilon, sampled.delta = options.epsilon, options.delta
-    sampled.max_iterations = options.max_iterations
-    sampled.max_iterations_separating_planes = options.max_iterations_separating_planes
-    sampled.relative_termination_threshold, sampled.termination_threshold = options.tolerance, -math.inf
-    sampled.configuration_space_margin, sampled.relax_margin = options.margin, True
-    sampled.random_seed = options.random_seed
-    if len(points) > 1:
-        sampled.containment_points = points.T
-    sampled.parallelism = Parallelism(num_threads=1)
-    sampled.verbose = True
-    start = Hyperellipsoid.MakeHypersphere(_START_RADIUS, points[0])
-    limits = HPolyhedron.MakeBox(scene.s_lower, scene.s_upper)
+    drake = _Iris(scene, options)
     try:
-        with _listening() as records:
-            region = function(_checker(scene), start, limits, iris_options)
+        region, account = _coarse(drake, scene, points, options)
+        if options.epsilon < account["epsilon"]:
+            region, account = _refined(drake, region, account, points, options.epsilon)
     except (RuntimeError, ValueError) as error:
         raise RegionError(
             "seeding_failed", f"{options.method}: {error}", field="seed", hint="try another method, or move the seed"
@@ -89,7 +82,78 @@ def iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Arra
     norms = np.linalg.norm(C, axis=1)
     C, d = C / norms[:, None], d / norms
     kept = drop_redundant(scene.polytope(C, d), fixed=2 * scene.n)[: -2 * scene.n]
-    return C[kept], d[kept], {"epsilon": options.epsilon, "delta": options.delta, **_account(records)}
+    return C[kept], d[kept], {"delta": options.delta, **account}
+
+
+def _coarse(drake: _Iris, scene: Scene, points: Array, options: SeedOptions) -> tuple[HPolyhedron, dict[str, Any]]:
+    """Alternates between faces and ellipsoid from a small ball around the seed, within the joint limits."""
+    limits = HPolyhedron.MakeBox(scene.s_lower, scene.s_upper)
+    start = Hyperellipsoid.MakeHypersphere(_START_RADIUS, points[0])
+    contain = points if len(points) > 1 else None
+    return drake.grow(limits, start, max(options.epsilon, _COARSE), options.max_iterations, contain)
+
+
+def _refined(
+    drake: _Iris, region: HPolyhedron, account: dict[str, Any], points: Array, epsilon: float
+) -> tuple[HPolyhedron, dict[str, Any]]:
+    """Adds faces to a region until it passes the test with a smaller epsilon; one that would lose a point is left as it is.
+
+    The faces are those nearest to the centre of the inscribed ellipsoid, which cost least of its volume, or to the seed if that centre
+    is in collision.
+    """
+    inscribed = region.MaximumVolumeInscribedEllipsoid()
+    if drake.is_free(inscribed.center()):
+        contain = np.concatenate([points, inscribed.center()[None]])
+    else:
+        inscribed, contain = Hyperellipsoid(inscribed.A(), points[0]), points
+    refined, said = drake.grow(region, inscribed, epsilon, 1, contain)
+    warnings = account["warnings"] + said["warnings"]
+    if not (refined.A() @ points.T < refined.b()[:, None]).all():
+        return region, {**account, "warnings": warnings}
+    return refined, {**account, "warnings": warnings, "guarantee": said["guarantee"], "epsilon": epsilon}
+
+
+class _Iris:
+    """Runs Drake's function on one scene.
+
+    It uses as many threads as ``OMP_NUM_THREADS`` allows, which is one in the service's children. The result is the same for any number.
+    """
+
+    def __init__(self, scene: Scene, options: SeedOptions) -> None:
+        self._function, self._options = (IrisNp2, IrisNp2Options()) if options.method is Method.IRIS_NP2 else (IrisZo, IrisZoOptions())
+        self._scene, self._checker = scene, _checker(scene)
+        self._kinematics = RationalForwardKinematics(self._checker.plant())  # Drake's parameterization does not keep it alive
+        self._options.parameterization = IrisParameterizationFunction(self._kinematics, scene.q_star)
+        sampled = self._options.sampled_iris_options
+        sampled.delta = options.delta
+        sampled.max_iterations_separating_planes = options.max_iterations_separating_planes
+        sampled.relative_termination_threshold, sampled.termination_threshold = options.tolerance, -math.inf
+        sampled.configuration_space_margin, sampled.relax_margin = options.margin, True
+        sampled.random_seed = options.random_seed
+        sampled.parallelism = Parallelism.Max()
+        sampled.sample_particles_in_parallel = False  # otherwise the samples would depend on the number of threads
+        sampled.verbose = True
+
+    def is_free(self, s: Array) -> bool:
+        """Returns whether nothing collides at a point of s."""
+        return bool(self._checker.CheckConfigCollisionFree(self._scene.to_q(s)))
+
+    def grow(
+        self, domain: HPolyhedron, start: Hyperellipsoid, epsilon: float, max_iterations: int, points: Array | None
+    ) -> tuple[HPolyhedron, dict[str, Any]]:
+        """Returns Drake's region within the domain, whose faces come first, the epsilon, and the account of :func:`_account`.
+
+        Args:
+            start: its centre is kept inside, and its shape says which collisions are near.
+            points: (k, n) in s, kept inside where their convex hull is free, with the start's centre among them or in their hull; None for
+                that centre alone.
+        """
+        sampled = self._options.sampled_iris_options
+        sampled.epsilon, sampled.max_iterations = epsilon, max_iterations
+        sampled.containment_points = None if points is None else points.T
+        with _listening() as records:
+            region = self._function(self._checker, start, domain, self._options)
+        return region, {"epsilon": epsilon, **_account(records)}
 
 
 def _checker(scene: Scene) -> SceneGraphCollisionChecker:
@@ -107,29 +171,19 @@ def _checker(scene: Scene) -> SceneGraphCollisionChecker:
 
 
 def _apart(scene: Scene) -> Scene:
-    """Returns the same scene with every geometry on a body of its own.
+    """Returns the same scene with every geometry on a body of its own, and the moving bodies in the order of their joints' positions.
 
-    Drake's checker knows collision filters between bodies only.
+    Drake's checker knows collision filters between bodies only. Drake's rational kinematics numbers s by bodies, not by positions.
     """
     eye = np.eye(4)
     welds = tuple(Joint(f"{g.name}/weld", JointKind.WELD, g.body, f"{g.name}/body", np.zeros(3), eye, eye) for g in scene.geometries)
+    moving = tuple(joint.child for joint in scene.moving)
     return replace(
         scene,
         joints=scene.joints + welds,
-        bodies=scene.bodies + tuple(weld.child for weld in welds),
+        bodies=tuple(body for body in scene.bodies if body not in moving) + moving + tuple(weld.child for weld in welds),
         geometries=tuple(replace(g, body=weld.child) for g, weld in zip(scene.geometries, welds, strict=True)),
     )
-
-
-def _positions(scene: Scene) -> Callable[[Any], Any]:
-    """Returns the function s -> q for doubles, Drake's AutoDiffXd and Expression."""
-
-    def q(s: Any) -> Any:
-        if s.dtype == float:
-            return scene.to_q(s)
-        return np.array([c + (2 * atan(x) if r else x) for c, x, r in zip(scene.q_star, s, scene.revolute, strict=True)])
-
-    return q
 
 
 class _Recorder(logging.Handler):

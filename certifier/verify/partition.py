@@ -7,8 +7,9 @@ planes separate the volumes on P in every cell. The verifier shows, for every ve
 
 by control values that are larger than the bound of their rounding errors (certifier.verify.control_points). With z0 = 1, f > 0 wherever the
 piece meets P; with z0 = 0, it does not meet P, because there -sum_j lambda_j g_j <= 0. Halvings cover the cell with pieces, so every vertex
-with its ball is on its side of the plane, as kappa >= |a| on the cell: kappa is affine and |a| is convex, so it is enough to compare them at
-the corners, where what is computed is rounded in the same manner. A leaf without a plane is a cell that misses P: over its box, -sum_j lambda_j g_j > 0.
+with its ball is on its side of the plane, as kappa >= |a| on the cell: kappa is affine and |a| is convex, so it is enough to compare them
+at the corners, where what is computed is rounded in the same manner. A leaf without a plane is a cell that misses P: over its box,
+-sum_j lambda_j g_j > 0.
 
 If F(alpha) >= t D(alpha) for all alpha and t >= 0, the same argument gives f >= t on the piece. The volumes are (t_A + t_B)/max |a| apart
 then.
