@@ -80,10 +80,16 @@ class CellCertification:
 
     def _certify(self, volumes: Volumes, cells: int, begun: bytes | None, ending: bool) -> PairResult:
         search = Search(self._area, volumes)
-        root = Node() if begun is None else self._begun(begun, volumes)
+        root = Node() if begun is None else self._begun(begun)
         report = search.run(root, cells)
         proof = PartitionProof(
-            self._scene, volumes, search.frame, self._area.ground, self._area.center, **root.to_streams(len(search.joints))
+            self._scene,
+            volumes,
+            search.frame,
+            self._area.ground,
+            self._area.center,
+            (None, None),
+            **root.to_streams(len(search.joints)),
         )
         still_open = root.open_cells(self._area.lower, self._area.upper)
         if not still_open:
@@ -94,13 +100,13 @@ class CellCertification:
             return PairResult(Outcome.CERTIFIED, Stage.CELLS, margin=statement.gap, proof=proof.to_bytes())
         return self._open(search, volumes, report, [(lower, upper) for _, lower, upper in still_open], proof.to_bytes(), ending)
 
-    def _begun(self, data: bytes, volumes: Volumes) -> Node:
+    def _begun(self, data: bytes) -> Node:
         """Returns the tree that was begun; faces were added since before the joint limits, so the limits have other numbers now."""
         proof = PartitionProof.from_bytes(data, self._scene)
         added, limits = len(self._area.ground.d) - len(proof.ground.d), len(proof.ground.d) - 2 * self._scene.n
         arrays = {name: getattr(proof, name) for name in STREAMS}
         arrays["faces"] = np.where(proof.faces >= limits, proof.faces + added, proof.faces).astype(np.int16)
-        return Node.of_streams(arrays, sum(len(volume.vertices) for volume in volumes))
+        return Node.of_streams(arrays, {choice: sum(len(volume.vertices) for volume in both) for choice, both in proof.chosen.items()})
 
     def _open(
         self, search: Search, volumes: Volumes, report: Report, cells: list[tuple[Array, Array]], begun: bytes, ending: bool

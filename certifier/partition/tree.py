@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,6 +34,7 @@ class Node:
         value: where it is cut, in s.
         children: the lower and the upper part of a cell that is cut.
         plane: (5, 1 + k) of a cell with a plane, as a proof holds it.
+        choice: which volumes the plane separates, as a proof says it.
         streams: the pieces and multipliers of a cell with a plane, or the multipliers of one that misses the polytope.
     """
 
@@ -41,6 +42,7 @@ class Node:
     value: float = 0.0
     children: tuple[Node, ...] = ()
     plane: Array | None = None
+    choice: int = 0
     streams: Streams | None = None
 
     def preorder(self) -> Iterator[Node]:
@@ -72,6 +74,7 @@ class Node:
             "nodes": [node.kind for node in nodes],
             "cuts": [node.value for node in nodes if node.children],
             "planes": np.array([node.plane for node in nodes if node.plane is not None]).reshape(-1, 5, 1 + k),
+            "choices": [node.choice for node in nodes if node.plane is not None],
             **{
                 name: np.concatenate([getattr(part, name) for part in held] or [[]])
                 for name in ("pieces", "counts", "faces", "multipliers")
@@ -80,15 +83,16 @@ class Node:
         return {name: np.asarray(found[name], dtype=kind) for name, kind in STREAMS.items()}
 
     @staticmethod
-    def of_streams(arrays: dict[str, np.ndarray], vertices: int) -> Node:
-        """Does the inverse of :meth:`to_streams`; ``vertices`` is the number of vertices of both volumes together."""
+    def of_streams(arrays: dict[str, np.ndarray], vertices: Mapping[int, int]) -> Node:
+        """Does the inverse of :meth:`to_streams`; ``vertices`` maps every choice to the number of vertices of both its volumes together."""
         return _Reader(arrays, vertices).node()
 
 
 class _Reader:
-    def __init__(self, arrays: dict[str, np.ndarray], vertices: int) -> None:
+    def __init__(self, arrays: dict[str, np.ndarray], vertices: Mapping[int, int]) -> None:
         self._vertices = vertices
         self._nodes, self._cuts, self._planes = iter(arrays["nodes"].tolist()), iter(arrays["cuts"].tolist()), iter(arrays["planes"])
+        self._choices = iter(arrays["choices"].tolist())
         self._pieces, self._counts = arrays["pieces"], arrays["counts"]
         self._faces, self._multipliers = arrays["faces"], arrays["multipliers"]
         self._at = [0, 0, 0]
@@ -104,16 +108,17 @@ class _Reader:
                 node.value, node.children = next(self._cuts), (Node(), Node())
                 waiting += reversed(node.children)
             elif node.kind == PLANE:
-                node.plane, node.streams = next(self._planes), self._take(self._trees())
+                node.plane, node.choice = next(self._planes), next(self._choices)
+                node.streams = self._take(self._trees(self._vertices[node.choice]))
             elif node.kind == EMPTY:
                 node.streams = self._take((0, 1))
         return root
 
-    def _trees(self) -> tuple[int, int]:
-        """Returns how many codes and how many leaves the trees of pieces of the next leaf have."""
+    def _trees(self, vertices: int) -> tuple[int, int]:
+        """Returns how many codes and how many leaves the trees of pieces of the next leaf have, which has so many vertices."""
         begin = at = self._at[0]
         leaves = 0
-        for _ in range(self._vertices):
+        for _ in range(vertices):
             left = 1
             while left:
                 split = self._pieces[at] >= 0

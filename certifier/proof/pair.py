@@ -16,6 +16,7 @@ Nothing here decides whether a proof holds: certifier.verify does. docs/proofs.m
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar, Self
@@ -24,7 +25,7 @@ import numpy as np
 
 from certifier.document import Node
 from certifier.errors import CirisError
-from certifier.model import Array
+from certifier.model import Array, Volume
 from certifier.proof.container import Arrays
 from certifier.proof.ground import Ground
 from certifier.proof.separation import Common, Separation
@@ -103,14 +104,14 @@ class PairProof(Separation):
         shift = len(ground.d) - len(self.ground.d)
         return replace(self, ground=ground, faces=tuple(j + shift for j in self.faces))
 
-    def own(self) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    def own(self, number: Callable[[Volume], int]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         arrays = {"plane": self.plane, "scalars": np.array([self.t, self.kappa])}
         for i, side in enumerate(self.sides):
             arrays |= {f"mantissa{i}": side.mantissa, f"exponent{i}": side.exponent}
         return {"faces": list(self.faces), "chains": [list(side.chain) for side in self.sides]}, arrays
 
     @classmethod
-    def read(cls, common: Common, header: dict[str, Node], arrays: Arrays, prefix: str) -> Self:
+    def read(cls, common: Common, header: dict[str, Node], volumes: Sequence[Volume], arrays: Arrays, prefix: str) -> Self:
         scalars = arrays.floats(f"{prefix}/scalars")
         if scalars.shape != (2,):
             raise CirisError("document", f"it is {scalars.shape}, not (2,)", field=f"{prefix}/scalars.npy")

@@ -12,20 +12,25 @@ halved into *pieces*. Every piece has multipliers lambda_j >= 0 of the polytope'
 
 visible (certifier.verify.partition says how). Trees are streams in preorder, the lower part first.
 
+A leaf may choose a *coarse volume* in the place of either volume. This is a ball or a capsule, fixed to another body, that contains the
+volume's geometries whatever the angles of the joints between this body and theirs are (certifier.verify.coarse). These joints do not move
+it, so few cells are enough where the bodies are not close.
+
 Nothing here decides whether a proof holds: certifier.verify does. docs/proofs.md describes the file.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from certifier.document import Node
-from certifier.model import Array
+from certifier.model import Array, Volume
 from certifier.proof.container import Arrays
-from certifier.proof.separation import Common, Separation
+from certifier.proof.separation import Common, Separation, item
 
 PLANE = -1
 """This node of the tree of cuts is a leaf with a plane; this node of a tree of pieces is a piece with z0 = 1."""
@@ -36,6 +41,7 @@ STREAMS = {
     "nodes": "int8",
     "cuts": "float64",
     "planes": "float64",
+    "choices": "int8",
     "pieces": "int8",
     "counts": "int16",
     "faces": "int16",
@@ -49,31 +55,53 @@ class PartitionProof(Separation):
     """Holds planes that separate two volumes on the cells of a partition, with the multipliers that prove it.
 
     Attributes:
+        coarse: a coarse volume for the first volume and one for the second, or None; its geometries are those of the volume.
         nodes: int8, the tree of cuts: the position index of the joint that is cut, or PLANE, or EMPTY.
         cuts: where each cut is, in s, in the order of the nodes.
         planes: (leaves with a plane, 5, 1 + k), the four rows of Z of each and then kappa, in the order of the nodes. kappa is affine in s
             as well, and bounds |a| on the cell; it counts where a radius is positive.
-        pieces: int8, the trees of pieces: for every leaf with a plane, for either volume, for every vertex in order. An axis that is
-            halved is numbered: first the joints between the frame and the volume's body, ascending, then the others in play, ascending.
+        choices: int8, of each leaf with a plane: 0, plus 1 where the plane separates ``coarse[0]`` instead of the first volume, plus 2
+            where it separates ``coarse[1]`` instead of the second.
+        pieces: int8, the trees of pieces: for every leaf with a plane, for either volume chosen, for every vertex in order. An axis that
+            is halved is numbered: first the joints between the frame and the volume's body, ascending, then the others in play, ascending.
         counts: int16, the number of multipliers of every piece and of every EMPTY node, in the order of the nodes.
         faces: int16, the face of every multiplier, a row of the ground's C.
         multipliers: float32, the multipliers themselves.
     """
 
     KIND: ClassVar[str] = "partition"
-    HEADER: ClassVar[tuple[str, ...]] = ()
+    HEADER: ClassVar[tuple[str, ...]] = ("coarse",)
 
+    coarse: tuple[Volume | None, Volume | None]
     nodes: np.ndarray
     cuts: Array
     planes: Array
+    choices: np.ndarray
     pieces: np.ndarray
     counts: np.ndarray
     faces: np.ndarray
     multipliers: np.ndarray
 
-    def own(self) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-        return {}, {name: getattr(self, name) for name in STREAMS}
+    @property
+    def all_volumes(self) -> tuple[Volume, ...]:
+        return (*self.volumes, *(volume for volume in self.coarse if volume is not None))
+
+    @property
+    def chosen(self) -> dict[int, tuple[Volume, Volume]]:
+        """Maps every choice that a leaf has to the two volumes that its plane separates."""
+        (first, second), (coarse_first, coarse_second) = self.volumes, self.coarse
+        return {
+            i + 2 * j: (a, b)
+            for j, b in enumerate((second, coarse_second))
+            for i, a in enumerate((first, coarse_first))
+            if a is not None and b is not None
+        }
+
+    def own(self, number: Callable[[Volume], int]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+        coarse = [None if volume is None else number(volume) for volume in self.coarse]
+        return {"coarse": coarse}, {name: getattr(self, name) for name in STREAMS}
 
     @classmethod
-    def read(cls, common: Common, header: dict[str, Node], arrays: Arrays, prefix: str) -> Self:
-        return cls(*common, *(arrays.take(f"{prefix}/{name}", kind) for name, kind in STREAMS.items()))
+    def read(cls, common: Common, header: dict[str, Node], volumes: Sequence[Volume], arrays: Arrays, prefix: str) -> Self:
+        first, second = (None if node.value is None else item(node, volumes) for node in header["coarse"].two())
+        return cls(*common, (first, second), *(arrays.take(f"{prefix}/{name}", kind) for name, kind in STREAMS.items()))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Self, TypeVar
 
@@ -69,13 +69,25 @@ class Separation:
         """Returns the names of the volumes' geometries, for errors."""
         return " and ".join(", ".join(volume.geometries) for volume in self.volumes)
 
-    def own(self) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-        """Returns the members of HEADER and the arrays that are this form's own."""
+    @property
+    def all_volumes(self) -> tuple[Volume, ...]:
+        """Returns the two volumes, and what else of the file's volumes the proof holds."""
+        return self.volumes
+
+    def own(self, number: Callable[[Volume], int]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+        """Returns the members of HEADER and the arrays that are this form's own.
+
+        Args:
+            number: gives a volume its number among those of the file.
+        """
         raise NotImplementedError
 
     @classmethod
-    def read(cls, common: Common, header: dict[str, Node], arrays: Arrays, prefix: str) -> Self:
+    def read(cls, common: Common, header: dict[str, Node], volumes: Sequence[Volume], arrays: Arrays, prefix: str) -> Self:
         """Reads what :meth:`own` returns; the names of the arrays begin with the prefix and a slash.
+
+        Args:
+            volumes: those of the file, in the order of their numbers.
 
         Raises:
             CirisError: something is missing, or not of its kind.
@@ -124,10 +136,11 @@ class Pool:
         """Takes the proof's arrays in and returns its header."""
         ground, prefix = self._ground(proof.ground), f"proof/{self._proofs}"
         self._proofs += 1
-        own, arrays = proof.own()
+        volumes = [self._volume(v) for v in proof.volumes]
+        own, arrays = proof.own(self._volume)
         self.arrays |= {f"{prefix}/{name}": array for name, array in arrays.items()}
         form = {} if proof.KIND == DEFAULT_FORM else {"form": proof.KIND}
-        return {"volumes": [self._volume(v) for v in proof.volumes], "frame": proof.frame, "ground": ground, **form, **own}
+        return {"volumes": volumes, "frame": proof.frame, "ground": ground, **form, **own}
 
     def header(self) -> dict[str, Any]:
         """Returns the number of grounds and the volumes, for the file's header."""
@@ -181,10 +194,10 @@ def read_proofs(scene: Scene, header: dict[str, Node], arrays: Arrays, interior:
     for i, node in enumerate(header["proofs"].items(limits.PROOFS)):
         form = _form(node, forms)
         fields = node.fields("volumes", "frame", "ground", *(["form"] if form.KIND != DEFAULT_FORM else []), *form.HEADER)
-        first, second = (_item(volume, volumes) for volume in fields["volumes"].two())
-        common = Common(scene, (first, second), fields["frame"].text(), _item(fields["ground"], grounds), interior)
-        proofs.append(form.read(common, fields, arrays, f"proof/{i}"))
-    used = {id(part) for proof in proofs for part in (proof.ground, *proof.volumes)}
+        first, second = (item(volume, volumes) for volume in fields["volumes"].two())
+        common = Common(scene, (first, second), fields["frame"].text(), item(fields["ground"], grounds), interior)
+        proofs.append(form.read(common, fields, volumes, arrays, f"proof/{i}"))
+    used = {id(part) for proof in proofs for part in (proof.ground, *proof.all_volumes)}
     if not all(id(part) in used for part in (*grounds, *volumes)):
         raise CirisError("document", "a polytope or a volume of it belongs to no proof", field="header")
     return tuple(proofs)
@@ -212,8 +225,12 @@ def _volume(scene: Scene, arrays: Arrays, i: int, node: Node) -> Volume:
     return Volume.of(scene.geometry(names[0]))
 
 
-def _item(node: Node, items: list[_T]) -> _T:
-    """Returns the item whose number the node holds."""
+def item(node: Node, items: Sequence[_T]) -> _T:
+    """Returns the item whose number the node holds.
+
+    Raises:
+        CirisError: there is none.
+    """
     number = node.count()
     if number >= len(items):
         raise CirisError("document", f"there is no number {number}, only {len(items)}", field=node.where)

@@ -136,6 +136,27 @@ class ExactKinematics:
         ]
         return [[x / X[3][3] for x in row] for row in X]
 
+    def linkage(self, frame: str, body: str) -> tuple[list[tuple[fmpq, ...]], list[Numbers]]:
+        """Returns the axes of the joints that move between two bodies, in path order, and the constant poses between their frames.
+
+        A joint's axis goes through the origin of its frame, and its motion moves no point of its axis. So a joint's frames on either side
+        of the motion count as one.
+
+        Returns:
+            the m axes as unit vectors, and m + 1 poses, (4, 4): of the first joint's frame in F, of each further joint's frame in that of
+            the joint before it, and of B in the last joint's.
+        """
+        axes, poses, fixed = [], [], _identity()
+        for joint, upwards in self.path(frame, body):
+            outer, inner = self._fixed_frames(joint, upwards)
+            fixed = _multiply(fixed, outer)
+            if joint.index is not None:
+                axes.append(tuple(unit(_doubles(joint.axis))))
+                poses.append(fixed)
+                fixed = _identity()
+            fixed = _multiply(fixed, inner)
+        return axes, [[[x / X[3][3] for x in row] for row in X] for X in (*poses, fixed)]
+
     def scale(self, frame: str, body: str) -> fmpq:
         """Returns the least value of the denominator, which is its value at s = 0."""
         product = fmpq(1)
@@ -150,8 +171,7 @@ class ExactKinematics:
 
     def _joint(self, joint: Joint, upwards: bool) -> tuple[Numbers, Matrix | None, Numbers]:
         """Returns the joint's first fixed frame, its motion (None for a weld), and its last fixed frame, in the order of the path."""
-        first, last = (joint.X_BM, joint.X_PF) if upwards else (joint.X_PF, joint.X_BM)
-        outer, inner = rigid(_doubles(first)), _inverse(_doubles(last))
+        outer, inner = self._fixed_frames(joint, upwards)
         if joint.index is None:
             return outer, None, inner
         axis = [-x if upwards else x for x in unit(_doubles(joint.axis))]
@@ -164,6 +184,12 @@ class ExactKinematics:
             tau = half_tangent(q)
             middle = self._rotation(axis, 1 - tau * s, tau + s)
         return outer, middle, inner
+
+    @staticmethod
+    def _fixed_frames(joint: Joint, upwards: bool) -> tuple[Numbers, Numbers]:
+        """Returns the poses before and behind the joint's motion on the path, each times its entry [3][3]."""
+        first, last = (joint.X_BM, joint.X_PF) if upwards else (joint.X_PF, joint.X_BM)
+        return rigid(_doubles(first)), _inverse(_doubles(last))
 
     def _rotation(self, axis: list[fmpq], cosine: fmpq_mpoly, sine: fmpq_mpoly) -> Matrix:
         """Returns (c^2 + s^2) R = (c^2 + s^2) I + 2 c s [u] + 2 s^2 [u]^2 for the half-angle cosine c and sine s.

@@ -19,7 +19,7 @@ from flint import fmpq
 from certifier.errors import ProofError
 from certifier.model import Array, Geometry, Scene, Volume
 from certifier.proof import limits
-from certifier.verify.kinematics import ExactKinematics, exact
+from certifier.verify.kinematics import ExactKinematics, Numbers, exact
 
 Point = tuple[fmpq, ...]
 
@@ -49,14 +49,9 @@ def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> N
     Raises:
         ProofError: the volume makes no sense, or does not contain a geometry, which the message names.
     """
-    if not _is_known(scene, volume):
-        raise ProofError("proof_volume", "a volume stands for nothing, or for what is no geometry of the scene")
+    check_shape(scene, volume)
     if volume.is_geometry_of(scene):
         return
-    if volume.vertices.ndim != 2 or volume.vertices.shape[1] != 3 or len(volume.vertices) == 0 or not volume.radius >= 0:
-        raise ProofError("proof_malformed", "a volume has no vertices or a negative radius")
-    if volume.body not in scene.bodies:
-        raise ProofError("proof_volume", f"the scene has no body {volume.body!r}")
     corners = [tuple(exact(x) for x in vertex) for vertex in volume.vertices]
     box = _box(volume.vertices)
     for name in volume.geometries:
@@ -69,6 +64,20 @@ def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> N
                 or _near_segment(v, corners, reach - radius)
             ):
                 raise ProofError("proof_volume", f"{name} is not contained in the volume that stands for it")
+
+
+def check_shape(scene: Scene, volume: Volume) -> None:
+    """Checks that the volume has vertices and a radius, a body of the scene, and geometries of it.
+
+    Raises:
+        ProofError: it has not.
+    """
+    if not _is_known(scene, volume):
+        raise ProofError("proof_volume", "a volume stands for nothing, or for what is no geometry of the scene")
+    if volume.vertices.ndim != 2 or volume.vertices.shape[1] != 3 or len(volume.vertices) == 0 or not volume.radius >= 0:
+        raise ProofError("proof_malformed", "a volume has no vertices or a negative radius")
+    if volume.body not in scene.bodies:
+        raise ProofError("proof_volume", f"the scene has no body {volume.body!r}")
 
 
 def _is_known(scene: Scene, volume: Volume) -> bool:
@@ -85,19 +94,24 @@ def _vertices(kinematics: ExactKinematics, body: str, geometry: Geometry) -> lis
     X = kinematics.fixed_pose(body, geometry.body)
     if X is None:
         raise ProofError("proof_volume", f"{geometry.name} is not welded to {body}")
-    return [tuple(sum((X[i][j] * v[j] for j in range(3)), X[i][3]) for i in range(3)) for v in vertices]
+    return [placed(X, v) for v in vertices]
+
+
+def placed(X: Numbers, p: Point) -> Point:
+    """Returns where a rigid transform, (4, 4) with the entry [3][3] = 1, takes a point."""
+    return tuple(sum((X[i][j] * p[j] for j in range(3)), X[i][3]) for i in range(3))
 
 
 def _near_corner(v: Point, corners: Sequence[Point], distance: fmpq) -> bool:
-    return distance >= 0 and any(_dot(offset, offset) <= distance * distance for offset in (_minus(v, corner) for corner in corners))
+    return distance >= 0 and any(dot(offset, offset) <= distance * distance for offset in (minus(v, corner) for corner in corners))
 
 
 def _near_segment(v: Point, corners: Sequence[Point], distance: fmpq) -> bool:
     """Returns whether v is within the distance of a point between two corners, which projection finds."""
     for start, end in itertools.combinations(corners, 2):
-        offset, direction = _minus(v, start), _minus(end, start)
-        length, along = _dot(direction, direction), _dot(offset, direction)
-        if 0 < along < length and distance >= 0 and _dot(offset, offset) - along * along / length <= distance * distance:
+        offset, direction = minus(v, start), minus(end, start)
+        length, along = dot(direction, direction), dot(offset, direction)
+        if 0 < along < length and distance >= 0 and dot(offset, offset) - along * along / length <= distance * distance:
             return True
     return False
 
@@ -115,9 +129,11 @@ def _in_box(v: Point, box: tuple[Point, Point], inset: fmpq) -> bool:
     return all(low + inset <= x <= high - inset for x, low, high in zip(v, *box, strict=True))
 
 
-def _minus(a: Point, b: Point) -> Point:
+def minus(a: Point, b: Point) -> Point:
+    """Returns a - b."""
     return tuple(x - y for x, y in zip(a, b, strict=True))
 
 
-def _dot(a: Point, b: Point) -> fmpq:
+def dot(a: Point, b: Point) -> fmpq:
+    """Returns the scalar product."""
     return sum((x * y for x, y in zip(a, b, strict=True)), fmpq(0))

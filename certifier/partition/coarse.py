@@ -1,0 +1,151 @@
+"""Coarse volumes are made here: balls and capsules that contain geometries whatever the angles of the joints between are.
+
+certifier.verify.coarse says why they do, and checks it exactly. Here everything is computed in doubles, so radii are larger by a margin.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from certifier.kinematics import Kinematics, rigid_inverse
+from certifier.model import WORLD, Array, Geometry, JointKind, Volume
+from certifier.verify.coarse import foot
+
+RELATIVE, ABSOLUTE = 1e-9, 1e-12
+"""A radius is larger by these, the second in metres, than the one that is computed."""
+
+
+@dataclass(frozen=True)
+class _Linkage:
+    """Holds how a geometry hangs on the revolute joints between a body and its own.
+
+    Attributes:
+        first: name of the joint next to the body.
+        axes: m unit vectors, each in its joint's frame, whose origin is on the axis; in path order from the body.
+        poses: m poses, (4, 4): of the first joint's frame in the body's, and of each further joint's in that of the joint before it.
+        vertices: (V, 3) the geometry's, in the last joint's frame, in metres.
+        radius: the geometry's.
+    """
+
+    first: str
+    axes: list[Array]
+    poses: list[Array]
+    vertices: Array
+    radius: float
+
+    @classmethod
+    def between(cls, kinematics: Kinematics, body: str, geometry: Geometry) -> _Linkage | None:
+        """Returns that of a geometry; None if no joint moves it against the body, or others than revolute joints all up or all down."""
+        above, names, axes, poses, fixed = kinematics.scene.joint_above, [], [], [], np.eye(4)
+        directions = set()
+        for here, there in itertools.pairwise(kinematics.bodies_between(body, geometry.body)):
+            upwards = here != WORLD and above[here].parent == there
+            joint = above[here if upwards else there]
+            directions.add(upwards)
+            outer, inner = (joint.X_BM, joint.X_PF) if upwards else (joint.X_PF, joint.X_BM)
+            fixed = fixed @ outer
+            if joint.index is not None:
+                if joint.kind is not JointKind.REVOLUTE:
+                    return None
+                names.append(joint.name)
+                axes.append(joint.axis)
+                poses.append(fixed)
+                fixed = np.eye(4)
+            fixed = fixed @ rigid_inverse(inner)
+        if not names or len(directions) > 1:
+            return None
+        return cls(names[0], axes, poses, _placed(fixed, geometry.vertices), geometry.radius)
+
+    def reach(self) -> tuple[float, Array]:
+        """Returns the way from the geometry's outside over the axes to the last point before the first joint's axis, and this point.
+
+        Where only one joint is between, the way is the radius alone, and the points, (V, 3), are the vertices; else it is one point,
+        (1, 3). They are in the first joint's frame.
+        """
+        reach, points = self.radius, self.vertices
+        for i in reversed(range(1, len(self.axes))):
+            pose = self.poses[i]
+            t = foot((pose[:3, :3] @ self.axes[i]).tolist(), (-pose[:3, 3]).tolist(), self.axes[i - 1].tolist())
+            e = (_along(points, self.axes[i]) if t is None else t) * self.axes[i]
+            reach += _farthest(points, e)
+            points = _placed(pose, e[None])
+        return reach, points
+
+    def on_first_axis(self, points: Array) -> float:
+        """Returns where on the first joint's axis a ball's centre is best, for the points that :meth:`reach` gives."""
+        t = None
+        if len(self.axes) > 1:
+            pose = self.poses[1]
+            t = foot(self.axes[0].tolist(), pose[:3, 3].tolist(), (pose[:3, :3] @ self.axes[1]).tolist())
+        return _along(points, self.axes[0]) if t is None else t
+
+
+def ball(kinematics: Kinematics, geometries: Sequence[Geometry], body: str) -> Volume | None:
+    """Returns a ball fixed to a body that holds geometries at all angles of the joints between.
+
+    Its centre is on the axis of the joint next to the body: where this axis is nearest to the next one, or next to the geometries.
+
+    Returns:
+        None if a geometry is fixed to the body, or not all are behind the same joint of it, or one is behind a joint that slides.
+    """
+    linkages = [_Linkage.between(kinematics, body, geometry) for geometry in geometries]
+    known = [linkage for linkage in linkages if linkage is not None]
+    if len(known) < len(linkages) or len({linkage.first for linkage in known}) != 1:
+        return None
+    reaches = [linkage.reach() for linkage in known]
+    t = np.mean([linkage.on_first_axis(points) for linkage, (_, points) in zip(known, reaches, strict=True)])
+    center = t * known[0].axes[0]
+    radius = max(reach + _farthest(points, center) for reach, points in reaches)
+    names = tuple(geometry.name for geometry in geometries)
+    return Volume(names, body, _placed(known[0].poses[0], center[None]), _enlarged(radius))
+
+
+def capsule(kinematics: Kinematics, geometry: Geometry) -> Volume | None:
+    """Returns a capsule along the axis of the joint that moves the geometry's rigid part, which holds it at all angles of this joint.
+
+    It is fixed to the root of the rigid part before the joint. Among those with the least radius, it is the shortest.
+
+    Returns:
+        None if no joint moves the geometry, or one that slides.
+    """
+    root = kinematics.rigid_root(geometry.body)
+    if root == WORLD:
+        return None
+    body = kinematics.rigid_root(kinematics.scene.joint_above[root].parent)
+    linkage = _Linkage.between(kinematics, body, geometry)
+    if linkage is None:
+        return None
+    axis, vertices = linkage.axes[0], linkage.vertices
+    along = vertices @ axis
+    across = np.linalg.norm(vertices - along[:, None] * axis, axis=1)
+    # A vertex that is nearer to the axis may reach beyond the segment into the cap.
+    cap = np.sqrt(np.maximum(across.max() ** 2 - across**2, 0.0))
+    lower, upper = (along + cap).min(), (along - cap).max()
+    if lower > upper:
+        lower = upper = 0.5 * (lower + upper)
+    distance = float(np.linalg.norm(vertices - np.clip(along, lower, upper)[:, None] * axis, axis=1).max())
+    ends = _placed(linkage.poses[0], np.outer([lower, upper], axis))
+    return Volume((geometry.name,), body, ends, _enlarged(distance + geometry.radius))
+
+
+def _placed(X: Array, points: Array) -> Array:
+    """Returns where a rigid transform takes points, (N, 3)."""
+    placed: Array = points @ X[:3, :3].T + X[:3, 3]
+    return placed
+
+
+def _along(points: Array, axis: Array) -> float:
+    """Returns where on an axis through the origin the points, (N, 3), are in the mean."""
+    return float((points @ axis).mean())
+
+
+def _farthest(points: Array, other: Array) -> float:
+    return float(np.linalg.norm(points - other, axis=1).max())
+
+
+def _enlarged(radius: float) -> float:
+    return radius * (1 + RELATIVE) + ABSOLUTE
