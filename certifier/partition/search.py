@@ -216,7 +216,7 @@ class Search:
             return None
         (a, b), (C, d), reach = self._volumes, self._faces(cell), cell.half.copy()
         for _ in range(STEPS):
-            if nearest.distance <= self.reach:
+            if not nearest.gap > self.reach:
                 return s
             step = 1e-6 * cell.half
             around = np.concatenate([s + np.diag(step), s - np.diag(step)])
@@ -236,7 +236,7 @@ class Search:
             if further[best].distance >= nearest.distance - 1e-4 * self._extent:
                 return None
             s, nearest, reach = tried[best], further[best], reach / 2
-        return s if nearest.distance <= self.reach else None
+        return None if nearest.gap > self.reach else s
 
     def _spread(self, cell: _Cell, support: Array, weights: Array) -> int:
         """Returns the joint in which the points that no plane separates lie farthest apart."""
