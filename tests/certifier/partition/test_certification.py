@@ -144,7 +144,7 @@ def shape(rng, name, body):
         return ball(name, body, 0.1, center)
     if kind == 1:
         return box(name, body, (0.2, 0.1, 0.3), center)
-    return Geometry(name, body, np.array([center, center + [0.3, 0.0, 0.1]]), 0.07, {"kind": "capsule"})
+    return Geometry(name, body, center + np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.1]]), 0.07, {"kind": "capsule"})
 
 
 def test_random_trees_and_shapes_get_no_outcome_that_sampling_contradicts():
