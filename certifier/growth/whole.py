@@ -45,14 +45,23 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         if whole.stage + 1 < len(STAGES):
             return begin_stage(scene, state, start, whole.stage + 1)
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
-    corners = [(joints_between(scene, i), report.weaknesses[i].points) for i in report.failures if i in report.weaknesses]
+    unknown = [i for i in report.failures if i not in report.weaknesses]
+    if unknown:
+        return _end(scene, state, report, unknown[0], "could not be certified, and it is not known where they fail")
+    corners = [(joints_between(scene, i), report.weaknesses[i].points) for i in report.failures]
     smaller = cut(scene, whole.polytope, start.keep, corners, action.iteration)
     if smaller is None:
-        pair = scene.pairs[report.failures[0]]
-        reason = f"{pair.a} and {pair.b} touch, or come too close, at or between configurations that have to stay inside"
-        outcome = Outcome.CERTIFIED if state.best is not None else combine(list(report.outcomes.values()))
-        return Transition(state, Finish(outcome, f"certified; growth ended early: {reason}" if state.best is not None else reason))
+        why = "touch, or come too close, at or between configurations that have to stay inside"
+        return _end(scene, state, report, report.failures[0], why)
     return _next(scene, replace(state, whole=replace(whole, polytope=smaller)))
+
+
+def _end(scene: Scene, state: GrowthState, report: Outcomes, index: int, why: str) -> Transition:
+    """Ends the growth because of a pair that nothing can be done about."""
+    reason = f"{scene.pairs[index].a} and {scene.pairs[index].b} {why}"
+    if state.best is not None:
+        return Transition(state, Finish(Outcome.CERTIFIED, f"certified; growth ended early: {reason}"))
+    return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
 
 
 def _next(scene: Scene, state: GrowthState) -> Transition:

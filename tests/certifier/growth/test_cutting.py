@@ -1,0 +1,133 @@
+"""Faces that cut off what cannot be certified: they do cut it off, keep what has to stay, and lose little."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from certifier.growth.cutting import cut
+from certifier.model import JointKind
+from certifier.polytopes.ellipsoid import inscribed_ellipsoid
+from certifier.polytopes.gibbs import uniform_in_q
+from tests.certifier.scenes import planar_arm
+
+ALL = (0, 1, 2)
+
+
+def polytope_of(scene, rng, faces=6):
+    """A random polytope about 0 within the joint limits."""
+    C = rng.normal(size=(faces, scene.n))
+    return scene.polytope(C / np.linalg.norm(C, axis=1)[:, None], rng.uniform(0.4, 1.0, faces))
+
+
+def corner_of(scene, polytope, rng, joints=ALL, count=12):
+    """Points of the polytope near one far from 0, told apart in these joints."""
+    samples = uniform_in_q(polytope, scene.revolute, 100, 10, int(rng.integers(2**31))).reshape(-1, scene.n)
+    J = list(joints)
+    way = rng.normal(size=len(J))
+    return samples[np.argsort(samples[:, J] @ way)[-count:]]
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(list(JointKind)[:2]))
+def test_what_has_to_go_goes_and_what_has_to_stay_stays(seed, kind):
+    scene, rng = planar_arm(3, kind=kind), np.random.default_rng(seed)
+    polytope = polytope_of(scene, rng)
+    keep = np.concatenate([np.zeros((1, 3)), rng.uniform(-0.1, 0.1, (3, 3))])
+    corners = [(joints, corner_of(scene, polytope, rng, joints, 6)) for joints in ((0, 1), ALL)]
+    smaller = cut(scene, polytope, keep, corners, 0)
+    assert smaller is not None
+    for _, points in corners:
+        assert not smaller.contains(points).any()
+    assert (keep @ smaller.C.T < smaller.d).all()
+    # What was there is there still, the joint limits are last, and the faces between are new.
+    old, limits = len(polytope.d) - 2 * scene.n, 2 * scene.n
+    new = len(smaller.d) - len(polytope.d)
+    assert new >= 1
+    for a, b in ((smaller.C, polytope.C), (smaller.d, polytope.d)):
+        assert (a[:old] == b[:old]).all()
+        assert (a[-limits:] == b[-limits:]).all()
+    assert np.linalg.norm(smaller.C[old:-limits], axis=1) == pytest.approx(1)
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([(0,), (1,), (0, 2)]))
+def test_a_face_lies_in_the_joints_between_the_bodies(seed, joints):
+    scene, rng = planar_arm(3), np.random.default_rng(seed)
+    polytope = polytope_of(scene, rng)
+    smaller = cut(scene, polytope, np.zeros((1, 3)), [(joints, corner_of(scene, polytope, rng, joints, 4))], 0)
+    faces = smaller.C[len(polytope.d) - 2 * scene.n : -2 * scene.n]
+    others = [j for j in range(3) if j not in joints]
+    assert len(faces)
+    assert (faces[:, others] == 0).all()
+
+
+def test_nothing_to_cut_off_changes_nothing():
+    scene = planar_arm(3)
+    polytope = scene.polytope([], [])
+    outside = np.full((2, 3), 100.0)
+    for points in (np.zeros((0, 3)), outside):
+        same = cut(scene, polytope, np.zeros((1, 3)), [(ALL, points)], 0)
+        assert same.C.tolist() == polytope.C.tolist()
+        assert same.d.tolist() == polytope.d.tolist()
+
+
+@pytest.mark.parametrize("place", [0.0, 0.5, 0.99, 1.01])
+def test_a_point_between_those_to_keep_cannot_be_cut_off(place):
+    scene = planar_arm(2)
+    polytope, keep = scene.polytope([], []), np.array([[0.0, 0.0], [0.2, 0.4]])
+    point = keep[0] + place * (keep[1] - keep[0])
+    smaller = cut(scene, polytope, keep, [((0, 1), point[None])], 0)
+    if place < 1:
+        assert smaller is None
+    else:
+        assert not smaller.contains(point)
+        assert smaller.contains(keep).all()
+
+
+def test_a_point_that_differs_from_those_to_keep_in_other_joints_alone_cannot_be_cut_off():
+    scene = planar_arm(2)
+    polytope = scene.polytope([], [])
+    point = np.array([[0.0, 0.5]])
+    assert cut(scene, polytope, np.zeros((1, 2)), [((0,), point)], 0) is None
+    assert cut(scene, polytope, np.zeros((1, 2)), [((1,), point)], 0) is not None
+
+
+def test_scattered_points_get_several_faces():
+    """The four corners of a square, which one face cannot cut off together without the middle."""
+    scene = planar_arm(2)
+    polytope = scene.polytope([], [])
+    points = 0.9 * scene.s_upper * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
+    smaller = cut(scene, polytope, np.zeros((1, 2)), [((0, 1), points)], 0)
+    assert not smaller.contains(points).any()
+    assert len(smaller.d) == len(polytope.d) + 4
+
+
+def tangent(polytope, points):
+    """The face through the point of the inscribed ellipsoid's metric that is nearest to its centre, normal there: what cutting by the
+    ellipsoid alone would take, moved so that all points are beyond it."""
+    ellipsoid = inscribed_ellipsoid(polytope)
+    metric = np.linalg.inv(ellipsoid.shape @ ellipsoid.shape.T)
+    away = points - ellipsoid.center
+    nearest = away[np.argmin(np.einsum("wi,ij,wj->w", away, metric, away))]
+    normal = metric @ nearest
+    return normal, float((points @ normal).min())
+
+
+def test_less_volume_is_lost_than_by_planes_tangent_to_the_inscribed_ellipsoid():
+    """By volume in q over random polytopes and corners: at the mean, and at most of them."""
+    scene, ours, theirs = planar_arm(3, limit=2.5), [], []
+    for seed in range(25):
+        rng = np.random.default_rng(seed)
+        polytope = polytope_of(scene, rng)
+        points = corner_of(scene, polytope, rng, count=8)
+        smaller = cut(scene, polytope, np.zeros((1, 3)), [(ALL, points)], 0)
+        samples = uniform_in_q(polytope, scene.revolute, 200, 20, 10_000 + seed).reshape(-1, 3)
+        normal, offset = tangent(polytope, points)
+        ours.append(1 - smaller.contains(samples).mean())
+        theirs.append((samples @ normal >= offset).mean())
+    ours, theirs = np.array(ours), np.array(theirs)
+    assert ours.mean() < theirs.mean()
+    assert (ours < theirs).mean() > 0.6

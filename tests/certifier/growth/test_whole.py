@@ -1,0 +1,209 @@
+"""Growth that keeps the whole proposal: what it asks for, and the regions that it comes to."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from certifier.errors import CirisError
+from certifier.growth.actions import Certify, Finish, Outcomes, Propose
+from certifier.growth.machine import advance, begin
+from certifier.growth.options import GrowthOptions
+from certifier.growth.state import GrowthState
+from certifier.growth.whole import SLICE, STAGES
+from certifier.jobs.local import grow
+from certifier.model import WORLD, Polytope
+from certifier.outcome import Outcome
+from certifier.pair.collisions import in_collision
+from certifier.pair.result import Weakness
+from certifier.polytopes.gibbs import uniform_in_q
+from certifier.scene import load_scene
+from certifier.seeding.proposal import Proposal
+from certifier.verify.region import verify_region
+from tests.certifier.scenes import box, planar_arm
+from tests.oracles.original import collision
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
+PROPOSAL = Proposal(
+    C=np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 2.0], [0.0, -2.0]]),
+    d=np.array([1.0, 1.0, 2.0, 2.0]),
+    center=np.zeros(2),
+    contain=np.array([[0.2, 0.0]]),
+    info={},
+)
+FAR = np.array([[0.9, 0.9], [0.85, 0.9]])
+
+
+def options(cells=SLICE, **others):
+    return GrowthOptions(seed={}, contraction="whole", cells=cells, **others)
+
+
+def drive(verdict, asked, limit=40):
+    """Runs the machine against an oracle: (pair, Certify) -> (outcome, weakness or None).
+
+    Returns:
+        The certifications asked for, the candidates and the last action.
+    """
+    made, accepted = [], []
+    transition = begin(SCENE, asked)
+    for _ in range(limit):
+        document = transition.state.to_document()
+        state = GrowthState.from_document(json.loads(json.dumps(document)), asked)
+        assert state.to_document() == document, "the state survives JSON"
+        if transition.candidate:
+            accepted.append(transition.candidate)
+        action = transition.action
+        if isinstance(action, Finish):
+            return made, accepted, action
+        report = PROPOSAL
+        if not isinstance(action, Propose):
+            assert isinstance(action, Certify)
+            made.append(action)
+            found = {i: verdict(i, action) for i in action.pairs}
+            known = {i: weakness for i, (_, weakness) in found.items() if weakness is not None}
+            report = Outcomes(action, {i: outcome for i, (outcome, _) in found.items()}, known)
+        transition = advance(SCENE, state, report)
+    raise AssertionError("the machine does not end")
+
+
+def weak(points):
+    return Weakness(np.asarray(points, dtype=float).reshape(-1, 2), np.zeros(2))
+
+
+def test_a_proposal_that_certifies_is_kept_whole_after_a_smaller_copy_of_it():
+    made, accepted, end = drive(lambda i, action: (Outcome.CERTIFIED, None), options())
+    assert [action.polytope.d[:4].tolist() for action in made] == [[stage] * 4 for stage in STAGES]
+    assert [action.label for action in made] == ["cells"] * len(STAGES)
+    assert [(action.box.mid - action.box.half < -stage).all() for action, stage in zip(made, STAGES, strict=True)] == [True, True]
+    assert accepted[-1].polytope.d[:4].tolist() == [1.0] * 4
+    assert accepted[-1].proofs == {0: 1, 1: 1}
+    assert end.outcome is Outcome.CERTIFIED
+
+
+def test_where_bodies_touch_is_cut_off_and_what_holds_is_not_asked_for_again():
+    def verdict(index, action):
+        touching = action.polytope.contains(FAR)
+        if index == 1 and touching.any():
+            return Outcome.REFUTED, weak(FAR[touching])
+        return Outcome.CERTIFIED, None
+
+    made, accepted, end = drive(verdict, options())
+    assert [action.pairs for action in made] == [[0, 1], [0, 1], [1]]
+    last = made[-1]
+    assert last.reuse == {0: 1}
+    assert last.begun == {1: 1}
+    assert last.box.mid.tolist() == made[-2].box.mid.tolist()
+    assert last.box.half.tolist() == made[-2].box.half.tolist()
+    assert not last.polytope.contains(FAR).any()
+    assert last.polytope.contains(np.array([[0.0, 0.0], [0.2, 0.0]])).all()
+    assert (last.polytope.C[:4] == made[-2].polytope.C[:4]).all()
+    assert accepted[-1].proofs == {0: 1, 1: 2}
+    assert end.outcome is Outcome.CERTIFIED
+
+
+@pytest.mark.parametrize("slices", [1, 3])
+def test_what_is_open_when_the_effort_is_spent_is_cut_off_and_not_before(slices):
+    def verdict(index, action):
+        there = action.polytope.contains(FAR)
+        if index == 0 or not there.any():
+            return Outcome.CERTIFIED, None
+        return Outcome.INCONCLUSIVE, weak(FAR[there] if index in action.ending else [])
+
+    made, accepted, _ = drive(verdict, options(cells=slices * SLICE))
+    later = made[1:]
+    assert [action.ending for action in later] == [[]] * slices + [[1]] * (len(later) - slices)
+    assert len(later) == slices + 2
+    assert all(action.cells == SLICE for action in later)
+    assert all(action.polytope.contains(FAR).all() for action in later[: slices + 1])
+    assert not accepted[-1].polytope.contains(FAR).any()
+
+
+def test_a_contact_at_a_configuration_to_keep_ends_without_a_region():
+    made, accepted, end = drive(lambda i, action: (Outcome.REFUTED, weak([[0.1, 0.0]])), options())
+    assert len(made) == 1
+    assert not accepted
+    assert end.outcome is Outcome.REFUTED
+    assert SCENE.pairs[0].a in end.reason
+
+
+def test_a_contact_at_a_configuration_to_keep_leaves_the_smaller_region():
+    def verdict(index, action):
+        return (Outcome.CERTIFIED, None) if action.iteration == 0 else (Outcome.REFUTED, weak([[0.1, 0.0]]))
+
+    _, accepted, end = drive(verdict, options())
+    assert [candidate.iteration for candidate in accepted] == [0]
+    assert end.outcome is Outcome.CERTIFIED
+    assert "ended early" in end.reason
+
+
+@pytest.mark.parametrize("after", [0, 1])
+def test_a_pair_that_fails_nobody_knows_where_ends_the_growth(after):
+    """An error, or a proof that does not hold, would come again and again."""
+
+    def verdict(index, action):
+        return (Outcome.ERROR, None) if index == 1 and action.iteration >= after else (Outcome.CERTIFIED, None)
+
+    made, accepted, end = drive(verdict, options())
+    assert len(made) == after + 1
+    assert len(accepted) == after
+    assert end.outcome is (Outcome.CERTIFIED if after else Outcome.ERROR)
+    assert SCENE.pairs[1].a in end.reason
+
+
+@cache
+def example(name):
+    path = EXAMPLES / name / "scene.yaml"
+    return path, load_scene(path), yaml.safe_load((path.parent / "seed.yaml").read_text())["q"]
+
+
+@pytest.mark.parametrize(("name", "half"), [("planar_2dof", 0.6), ("arm_3dof", 0.5)])
+def test_a_region_of_an_example_is_verified_contains_what_it_has_to_and_is_free(name, half):
+    path, scene, q = example(name)
+    contain = (np.array(q) + 0.02).tolist()
+    seed = {"method": "box", "q": q, "half_width": half, "contain": [contain]}
+    region = grow(scene, GrowthOptions(seed=seed, contraction="whole", cells=2 * SLICE))
+    statement = verify_region(region.proof)
+    assert set(statement.gaps) == set(scene.pairs)
+    assert statement.gap > 0
+    kept, proposal = (
+        Polytope(np.array(part["halfspace_normals"]), np.array(part["halfspace_offsets"]))
+        for part in (region.manifest, region.manifest["provenance"]["proposal"])
+    )
+    assert kept.contains(scene.to_s([q, contain])).all()
+    assert collision(path, scene, kept, 5000) is None
+    # The proposal itself does collide, so that something had to be cut off; and it is the proposal that was cut.
+    assert region.manifest["share"]["collision_free"] < 1
+    assert 0 < region.manifest["share"]["value"] < 1
+    samples = uniform_in_q(kept, scene.revolute, 50, 10, 1).reshape(-1, scene.n)
+    assert proposal.contains(samples, 1e-9).all()
+    assert not in_collision(scene, samples).any()
+
+
+def test_the_same_job_comes_to_the_same_bytes():
+    _, scene, q = example("planar_2dof")
+    asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.5}, contraction="whole", cells=SLICE)
+    first, second = (grow(scene, asked) for _ in range(2))
+    assert first.proof == second.proof
+    assert first.manifest["halfspace_offsets"] == second.manifest["halfspace_offsets"]
+
+
+def test_more_effort_does_not_come_to_less():
+    """Of a proposal of which the first slice leaves cells open."""
+    _, scene, q = example("arm_3dof")
+    shares = []
+    for cells in (2, 10 * SLICE):
+        asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.6}, contraction="whole", cells=cells)
+        shares.append(grow(scene, asked).manifest["share"])
+    assert shares[1]["value"] > shares[0]["value"] + 3 * shares[0]["stderr"]
+
+
+def test_a_seed_in_contact_is_refused():
+    scene = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (1.5, 0.0, 0.0)))
+    with pytest.raises(CirisError):
+        grow(scene, GrowthOptions(seed={"method": "box", "q": [0.0, 0.0], "half_width": 0.2}, contraction="whole", cells=SLICE))
