@@ -88,7 +88,7 @@ class CellCertification:
             search.frame,
             self._area.ground,
             self._area.center,
-            (None, None),
+            search.coarse,
             **root.to_streams(len(search.joints)),
         )
         still_open = root.open_cells(self._area.lower, self._area.upper)
@@ -152,8 +152,8 @@ class CellCertification:
 
     def _nearest(self, search: Search, configurations: Array) -> tuple[Array, float]:
         """Returns the configuration at which the bodies are nearest, and their distance there in metres, padding subtracted."""
-        A, B = search.vertices(configurations)
-        reach = search.reach
+        A, B = search.bodies.vertices(configurations)
+        reach = search.bodies.reach
         distances = [closest(a, b).distance - reach for a, b in zip(A, B, strict=True)]
         place = int(np.argmin(distances))
         return configurations[place], max(distances[place], 0.0)

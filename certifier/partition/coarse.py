@@ -132,6 +132,28 @@ def capsule(kinematics: Kinematics, geometry: Geometry) -> Volume | None:
     return Volume((geometry.name,), body, ends, _enlarged(distance + geometry.radius))
 
 
+FAT = 2.1
+"""A ball for the angles of several joints has at most this many times the radius of the geometry's own one."""
+STOUT = 1.25
+"""A capsule for the angles of one joint has at most this many times that radius."""
+
+
+def coarse_volume(kinematics: Kinematics, volume: Volume, other: Volume) -> Volume | None:
+    """Returns a coarse volume for a single geometry that moves with as few joints against another volume as is worth it, or None."""
+    if len(volume.geometries) != 1:
+        return None
+    geometry = kinematics.scene.geometry(volume.geometries[0])
+    own = _farthest(geometry.vertices, geometry.vertices.mean(axis=0)) + geometry.radius
+    between = kinematics.bodies_between(geometry.body, other.body)[1:]
+    roots = list(dict.fromkeys(kinematics.rigid_root(body) for body in between))
+    for body in reversed(roots):
+        found = ball(kinematics, [geometry], body) if len(kinematics.chain(body, geometry.body)) > 1 else None
+        if found is not None and found.radius <= FAT * own:
+            return found
+    found = capsule(kinematics, geometry)
+    return found if found is not None and found.body in roots and found.radius <= STOUT * own else None
+
+
 def _placed(X: Array, points: Array) -> Array:
     """Returns where a rigid transform takes points, (N, 3)."""
     placed: Array = points @ X[:3, :3].T + X[:3, 3]
