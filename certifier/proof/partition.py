@@ -1,7 +1,7 @@
 """A pair's proof over a partition of the polytope is held here as data, and is written to and read from its portable file.
 
 A binary tree of cuts s_j = v divides the box of the proof's ground into cells. j is one of the *joints in play*, those between the
-frame and either body. Every leaf of the tree has a plane that is affine in s,
+frame and the body of any of its volumes. Every leaf of the tree has a plane that is affine in s,
 
     [a; b](s) = Z [1; s_J],   J the k joints in play, ascending,
 

@@ -11,6 +11,9 @@ with its ball is on its side of the plane, as kappa >= |a| on the cell: kappa is
 at the corners, where what is computed is rounded in the same manner. A leaf without a plane is a cell that misses P: over its box,
 -sum_j lambda_j g_j > 0.
 
+The volumes of a cell are the two of the proof, or coarse ones in their places, which contain the same geometries there at all angles of the
+joints that they leave out (certifier.verify.coarse).
+
 If F(alpha) >= t D(alpha) for all alpha and t >= 0, the same argument gives f >= t on the piece. The volumes are (t_A + t_B)/max |a| apart
 then.
 """
@@ -26,6 +29,7 @@ from certifier.model import Array, Scene, Volume
 from certifier.proof import limits
 from certifier.proof.ground import Ground
 from certifier.proof.partition import PLANE, PartitionProof
+from certifier.verify.coarse import check_coarse
 from certifier.verify.control_points import LEAST, Box, Control, Side, rounding
 from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.streams import Cells, Cuts, Multipliers, Pieces
@@ -42,11 +46,12 @@ class PartitionCheck:
 
     Args:
         contained: volumes that are known to contain their geometries, by id. The checks of one scene may share it.
+        coarse: coarse volumes that are known to contain their geometries, in the same manner.
     """
 
-    def __init__(self, scene: Scene, ground: Ground, contained: dict[int, Volume] | None = None) -> None:
+    def __init__(self, scene: Scene, ground: Ground, contained: dict[int, Volume], coarse: dict[int, Volume]) -> None:
         self._scene, self._ground = scene, ground
-        self._contained: dict[int, Volume] = {} if contained is None else contained
+        self._contained, self._coarse = contained, coarse
         self._lower = np.nextafter(ground.mid - ground.half, np.inf)
         self._upper = np.nextafter(ground.mid + ground.half, -np.inf)
 
@@ -63,10 +68,18 @@ class PartitionCheck:
             raise ProofError("proof_pair", f"{proof.title} are not a pair of the scene")
         if proof.frame not in scene.bodies:
             raise ProofError("proof_frame", f"the scene has no body {proof.frame!r}")
-        for volume in proof.volumes:
+        kinematics = ExactKinematics.at(scene, [])
+        for volume, coarse in zip(proof.volumes, proof.coarse, strict=True):
             if id(volume) not in self._contained:
-                check_volume(scene, ExactKinematics.at(scene, []), volume)
+                check_volume(scene, kinematics, volume)
                 self._contained[id(volume)] = volume
+            if coarse is None:
+                continue
+            if coarse.geometries != volume.geometries:
+                raise ProofError("proof_volume", f"{proof.title}: a coarse volume has other geometries than the one that it stands for")
+            if id(coarse) not in self._coarse:
+                check_coarse(scene, kinematics, coarse)
+                self._coarse[id(coarse)] = coarse
         return CellCheck(scene, self._ground, Box.of(self._lower, self._upper), self._lower, self._upper, proof)
 
 
@@ -79,21 +92,28 @@ class CellCheck:
 
     def __init__(self, scene: Scene, ground: Ground, box: Box, lower: Array, upper: Array, proof: PartitionProof) -> None:
         kinematics = ExactKinematics.by_joint(scene)
-        chains = [[joint.index for joint, _ in kinematics.path(proof.frame, v.body) if joint.index is not None] for v in proof.volumes]
-        self._play = sorted({*chains[0], *chains[1]})
+        chains = [[joint.index for joint, _ in kinematics.path(proof.frame, v.body) if joint.index is not None] for v in proof.all_volumes]
+        self._play = sorted(set().union(*chains))
         if max(map(len, chains)) > limits.CHAIN or len(self._play) > limits.PLAY:
             most = f"{limits.CHAIN} between the frame and a body, {limits.PLAY} in all"
             raise ProofError("proof_too_large", f"{proof.title}: {list(map(len, chains))} joints in play; at most {most} are checked")
         self._proof, self._box, self._lower, self._upper = proof, box, lower, upper
         self._cuts = Cuts(proof, self._play)
-        self._pieces = Pieces(proof, (len(proof.volumes[0].vertices), len(proof.volumes[1].vertices)), len(self._play))
+        self._pieces = Pieces(proof, len(self._play))
         self._multipliers = Multipliers(proof, ground)
-        first, second = (
-            Side(kinematics, proof.frame, volume, _not_less(volume.radius, scene.padding), sign, self._play)
-            for volume, sign in zip(proof.volumes, (1.0, -1.0), strict=True)
+
+        positive, negative = (
+            {
+                id(volume): Side(kinematics, proof.frame, volume, _not_less(volume.radius, scene.padding), sign, self._play)
+                for volume in alternatives
+                if volume is not None
+            }
+            for alternatives, sign in zip(zip(proof.volumes, proof.coarse, strict=True), (1.0, -1.0), strict=True)
         )
-        self._sides = first, second
-        self._rounded = any(volume.radius > 0 for volume in proof.volumes) or scene.padding > 0
+        self._sides = {choice: (positive[id(first)], negative[id(second)]) for choice, (first, second) in proof.chosen.items()}
+        self._rounded = {
+            choice: scene.padding > 0 or first.radius > 0 or second.radius > 0 for choice, (first, second) in proof.chosen.items()
+        }
 
     def cells(self, most: int) -> Iterator[Cells]:
         """Yields all cells, at most ``most`` at a time, which :meth:`gap` checks.
@@ -110,18 +130,15 @@ class CellCheck:
             ProofError: the proof does not hold in one of them.
         """
         self._check_empty(cells)
-        least = np.inf
+        least, with_plane = np.inf, np.flatnonzero(~cells.empty)
+        choices = self._proof.choices[cells.plane[with_plane]]
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
-            for first in range(0, len(cells.number), self._together()):
-                some = np.arange(first, min(first + self._together(), len(cells.number)))
-                some = some[~cells.empty[some]]
-                if some.size:
-                    least = min(least, self._gap(cells, some))
+            for choice, sides in self._sides.items():
+                same = with_plane[choices == choice]
+                together = max(1, TOGETHER // max(*(side.vertices * side.entries for side in sides), 2 ** len(self._play)))
+                for first in range(0, len(same), together):
+                    least = min(least, self._gap(cells, same[first : first + together], choice))
         return least
-
-    def _together(self) -> int:
-        """Returns how many cells are checked at once."""
-        return max(1, TOGETHER // max(*(side.vertices * side.entries for side in self._sides), 2 ** len(self._play)))
 
     def _check_empty(self, cells: Cells) -> None:
         empty = np.flatnonzero(cells.empty)
@@ -135,38 +152,40 @@ class CellCheck:
         for i in np.flatnonzero(~(value > rounding(size, sums.count)) | ~np.isfinite(value)):
             raise self._refused(f"cell {cells.number[empty[i]]}", "the multipliers do not prove that it misses the polytope")
 
-    def _gap(self, cells: Cells, some: np.ndarray) -> float:
-        """Checks some cells with planes and returns their least gap."""
+    def _gap(self, cells: Cells, some: np.ndarray, choice: int) -> float:
+        """Checks some cells with planes, all of this choice, and returns their least gap."""
         lower, upper, number, plane = cells.lower[some], cells.upper[some], cells.number[some], cells.plane[some]
         Z = self._proof.planes[plane]
         norms, room = _norms(Z, lower, upper)
         for cell in np.flatnonzero(~np.isfinite(norms)):
             raise self._refused(f"cell {number[cell]}", "the plane's numbers are too large")
-        if self._rounded:
+        if self._rounded[choice]:
             for cell in np.flatnonzero(~(room >= 0)):
                 raise self._refused(f"cell {number[cell]}", "kappa does not bound the plane's normal")
         margins = np.zeros(len(some))
-        for i, side in enumerate(self._sides):
-            start = self._pieces.start(plane, i)
+        for i, side in enumerate(self._sides[choice]):
+            start = self._pieces.start(plane, choice, i)
+            name = ", ".join(self._proof.volumes[i].geometries)
             step = max(1, TOGETHER // side.entries)
             margin = np.full(len(some), np.inf)
             for first in range(0, side.vertices, step):
                 part = slice(first, first + step)
                 control = side.control(lower, upper, Z, part)
-                margin = np.minimum(margin, self._side_margins(i, control, number, start[:, part], first))
+                margin = np.minimum(margin, self._side_margins(side, name, control, number, start[:, part], first))
             margins += margin
         return float((margins / norms).min() * _DOWN)
 
-    def _side_margins(self, side: int, control: Control, number: np.ndarray, start: np.ndarray, vertex: int) -> Array:
+    def _side_margins(self, side: Side, name: str, control: Control, number: np.ndarray, start: np.ndarray, vertex: int) -> Array:
         """Checks some vertices of a volume in B cells and returns, (B,), t with f >= t, infinite where a cell misses the polytope.
 
         Args:
+            name: what the volume stands for, for errors.
             number: (B,) of the cells.
             start: (B, V) where the vertices' trees begin.
             vertex: number of the first one.
         """
         divided = self._pieces.kind(start) >= 0
-        margins = self._margins(side, control, number, np.where(divided, -1, start), vertex)
+        margins = self._margins(side, name, control, number, np.where(divided, -1, start), vertex)
         for box in np.flatnonzero(divided.any(axis=1)).tolist():
             vertices = np.flatnonzero(divided[box])
             parts: dict[int, int] = {}
@@ -178,7 +197,7 @@ class CellCheck:
                 kind = self._pieces.kind(at)
                 ends = np.flatnonzero(kind < 0)
                 if ends.size:
-                    found = self._margins(side, piece.part(0, ends), number[box : box + 1], at[None, ends], vertex + which[ends])
+                    found = self._margins(side, name, piece.part(0, ends), number[box : box + 1], at[None, ends], vertex + which[ends])
                     margins[box] = min(margins[box], found[0])
                 for axis in np.unique(kind[kind >= 0]).tolist():
                     if depth == limits.PIECE_DEPTH:
@@ -190,16 +209,15 @@ class CellCheck:
                     pending += [(depth + 1, high, upper, which[same]), (depth + 1, low, at[same] + 1, which[same])]
         return margins
 
-    def _margins(self, side: int, control: Control, number: np.ndarray, at: np.ndarray, vertex: int | np.ndarray) -> Array:
+    def _margins(self, side: Side, name: str, control: Control, number: np.ndarray, at: np.ndarray, vertex: int | np.ndarray) -> Array:
         """Checks pieces, (B, V), given by their places in the stream, -1 where there is none; returns the least t of each cell, (B,)."""
         here = at >= 0
         z0 = here & (self._pieces.kind(at) == PLANE)
         sums = self._multipliers.of_pieces(number[:, None], np.where(here, self._pieces.rank(at), -1))
-        F, bound = self._sides[side].values(control, z0.astype(float), sums, self._box)
+        F, bound = side.values(control, z0.astype(float), sums, self._box)
         F -= bound[..., None]
         proved = ~here | ((F > 0).all(axis=-1) & np.isfinite(F).all(axis=-1))
         for box, v in np.argwhere(~proved):
-            name = ", ".join(self._proof.volumes[side].geometries)
             which = vertex[v] if isinstance(vertex, np.ndarray) else vertex + v
             what = "the multipliers do not prove that it is on its side of the plane there, or that the piece misses the polytope"
             raise self._refused(f"cell {number[box]}, vertex {which} of {name}, piece {self._pieces.rank(at[box, v])}", what)

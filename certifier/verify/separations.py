@@ -51,7 +51,7 @@ def statements(scene: Scene, proofs: Sequence[Separation], processes: int = 1, p
     Raises:
         ProofError: one of the proofs does not hold; the first one, in their order.
     """
-    check_contained(scene, {id(volume): volume for proof in proofs for volume in proof.volumes}.values())
+    check_contained(scene, {id(volume): volume for proof in proofs for volume in proof.all_volumes}.values())
     check = _Check(scene, proofs)
     gaps = [np.inf] * len(proofs)
     sizes = [int(np.count_nonzero(proof.nodes < 0)) if isinstance(proof, PartitionProof) else 1 for proof in proofs]
@@ -83,6 +83,7 @@ class _Check:
     def __init__(self, scene: Scene, proofs: Sequence[Separation]) -> None:
         self._scene, self._proofs = scene, proofs
         self._contained: dict[int, Volume] = {}
+        self._coarse: dict[int, Volume] = {}
         self._numerators = NumeratorCache()
         self._pair_checks: dict[int, PairCheck] = {}
         self._latest: tuple[int, CellCheck] | None = None
@@ -128,7 +129,7 @@ class _Check:
 
     def _cell_check(self, number: int, proof: PartitionProof) -> CellCheck:
         if self._latest is None or self._latest[0] != number:
-            self._latest = number, PartitionCheck(self._scene, proof.ground, self._contained).prepared(proof)
+            self._latest = number, PartitionCheck(self._scene, proof.ground, self._contained, self._coarse).prepared(proof)
         return self._latest[1]
 
 

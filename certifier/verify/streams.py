@@ -116,30 +116,39 @@ class Pieces:
     """Holds the trees of pieces of a proof, which are checked to be trees.
 
     Args:
-        vertices: numbers of vertices of the two volumes.
         axes: numbers of axes, all of them in play, of which either volume's pieces may be halved along any.
 
     Raises:
-        ProofError: the streams make no trees, or one that is too large.
+        ProofError: the streams make no trees, or one that is too large, or a leaf has no volumes that it could have.
     """
 
-    def __init__(self, proof: PartitionProof, vertices: tuple[int, int], axes: int) -> None:
-        self._proof, self._vertices = proof, vertices
-        pieces = proof.pieces
+    def __init__(self, proof: PartitionProof, axes: int) -> None:
+        self._vertices = {choice: (len(first.vertices), len(second.vertices)) for choice, (first, second) in proof.chosen.items()}
+        self._proof = proof
+        pieces, choices = proof.pieces, proof.choices
+        if len(choices) != len(proof.planes) or not np.isin(choices, list(self._vertices)).all():
+            raise malformed(proof, f"the {len(choices)} choices are not one of {sorted(self._vertices)} for each of the planes")
         if len(pieces) > limits.PIECES:
             raise ProofError("proof_too_large", f"{proof.title}: {len(pieces)} nodes of pieces; at most {limits.PIECES} are checked")
         if pieces.size and not (pieces.min() >= EMPTY and pieces.max() < axes):
             raise malformed(proof, f"a piece is halved along an axis that is not there, or is of no kind; there are {axes}")
         self._bounds = np.concatenate([np.zeros(1, dtype=np.int64), _ends(pieces)])
-        trees = len(proof.planes) * sum(vertices)
-        if len(self._bounds) != 1 + trees or self._bounds[-1] != len(pieces):
-            raise malformed(proof, f"the pieces are not {trees} trees, one for each vertex of each plane")
+        trees = np.zeros(len(choices), dtype=np.int64)
+        for choice, counts in self._vertices.items():
+            trees[choices == choice] = sum(counts)
+        self._first = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(trees)])
+        if len(self._bounds) != 1 + self._first[-1] or self._bounds[-1] != len(pieces):
+            raise malformed(proof, f"the pieces are not {self._first[-1]} trees, one for each vertex of each plane")
         self._rank = np.cumsum(pieces < 0, dtype=np.int32)
 
-    def start(self, plane: np.ndarray, side: int) -> np.ndarray:
-        """Returns, (B, V), where the trees of a volume's vertices begin in the stream of pieces, for planes of these numbers, (B,)."""
-        first = plane * sum(self._vertices) + (self._vertices[0] if side else 0)
-        return self._bounds[first[:, None] + np.arange(self._vertices[side])]
+    def start(self, plane: np.ndarray, choice: int, side: int) -> np.ndarray:
+        """Returns, (B, V), where the trees of a volume's vertices begin in the stream of pieces, for planes of these numbers, (B,).
+
+        All of the planes have the same choice.
+        """
+        vertices = self._vertices[choice]
+        first = self._first[plane] + (vertices[0] if side else 0)
+        return self._bounds[first[:, None] + np.arange(vertices[side])]
 
     def kind(self, at: np.ndarray) -> np.ndarray:
         """Returns the nodes there: PLANE, EMPTY, or the axis that is halved."""
@@ -151,7 +160,7 @@ class Pieces:
 
     def before(self, plane: np.ndarray) -> np.ndarray:
         """Returns how many pieces come before those of the planes of these numbers."""
-        begin = self._bounds[plane * sum(self._vertices)]
+        begin = self._bounds[self._first[plane]]
         return np.where(begin > 0, self._rank[begin - 1] if self._rank.size else 0, 0)
 
     def upper_parts(self, start: int) -> dict[int, int]:

@@ -40,7 +40,7 @@ def check_contained(scene: Scene, volumes: Iterable[Volume]) -> None:
             geometry = scene.geometry(name)
             cost += (1 + len(geometry.vertices)) * (1 + len(kinematics.path(volume.body, geometry.body))) ** 2
             if cost > limits.CONTAINED:
-                raise ProofError("proof_too_large", "the proof's volumes stand for more vertices, behind more welds, than are checked")
+                raise ProofError("proof_too_large", "the proof's volumes stand for more vertices, behind more joints, than are checked")
 
 
 def check_volume(scene: Scene, kinematics: ExactKinematics, volume: Volume) -> None:

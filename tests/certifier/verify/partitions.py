@@ -28,6 +28,7 @@ class Streams:
     nodes: list[int] = field(default_factory=list)
     cuts: list[float] = field(default_factory=list)
     planes: list[np.ndarray] = field(default_factory=list)
+    choices: list[int] = field(default_factory=list)
     pieces: list[int] = field(default_factory=list)
     multipliers: list[list[tuple[int, float]]] = field(default_factory=list)
 
@@ -35,7 +36,7 @@ class Streams:
         for name in vars(self):
             getattr(self, name).extend(getattr(other, name))
 
-    def proof(self, scene, volumes, frame, ground, interior, play) -> PartitionProof:
+    def proof(self, scene, volumes, frame, ground, interior, coarse, play) -> PartitionProof:
         flat = [entry for entries in self.multipliers for entry in entries]
         return PartitionProof(
             scene,
@@ -43,9 +44,11 @@ class Streams:
             frame,
             ground,
             interior,
+            coarse,
             np.array(self.nodes, dtype=np.int8),
             np.array(self.cuts, dtype=float),
             np.array(self.planes, dtype=float).reshape(-1, 5, 1 + len(play)),
+            np.array(self.choices, dtype=np.int8),
             np.array(self.pieces, dtype=np.int8),
             np.array([len(entries) for entries in self.multipliers], dtype=np.int16),
             np.array([face for face, _ in flat], dtype=np.int16),
@@ -54,9 +57,12 @@ class Streams:
 
 
 class Producer:
-    """Makes the proof of one pair on {C s <= d} within the box mid +- half, whose 2n faces come first among the rows."""
+    """Makes the proof of one pair on {C s <= d} within the box mid +- half, whose 2n faces come first among the rows.
 
-    def __init__(self, scene: Scene, pair: Pair, frame: str, mid, half, C=None, d=None, interior=None) -> None:
+    Every cell takes the first of the choices that has a plane, coarse volumes before others.
+    """
+
+    def __init__(self, scene: Scene, pair: Pair, frame: str, mid, half, C=None, d=None, interior=None, coarse=(None, None)) -> None:
         n = scene.n
         self.scene, self.frame = scene, frame
         self.volumes = tuple(Volume.of(scene.geometry(name)) for name in (pair.a, pair.b))
@@ -69,15 +75,16 @@ class Producer:
         self.lower, self.upper = np.nextafter(mid - half, np.inf), np.nextafter(mid + half, -np.inf)
         self.kinematics = Kinematics.of(scene)
         self.interior = chebyshev_center(Polytope(C, d))[0] if interior is None else interior
-        self.chains = [sorted(self.kinematics.chain(frame, v.body)) for v in self.volumes]
-        self.play = sorted({*self.chains[0], *self.chains[1]})
-        self.radii = [v.radius + scene.padding for v in self.volumes]
+        self.coarse = coarse
+        alternatives = [[a for a in (fine, other) if a is not None] for fine, other in zip(self.volumes, coarse, strict=True)]
+        self.play = sorted({j for v in (*alternatives[0], *alternatives[1]) for j in self.kinematics.chain(frame, v.body)})
+        self.chosen = {i + 2 * j: (a, b) for i, a in enumerate(alternatives[0]) for j, b in enumerate(alternatives[1])}
 
     def proof(self, depth: int = DEPTH, least: int = 0, halvings: int = 0) -> PartitionProof | None:
         """The proof, with cells cut and pieces halved at least so many times; None where ``depth`` cuts are not enough."""
         self._halvings = halvings
         found = self._cell(self.lower, self.upper, depth, least)
-        return found and found.proof(self.scene, self.volumes, self.frame, self.ground, self.interior, self.play)
+        return found and found.proof(self.scene, self.volumes, self.frame, self.ground, self.interior, self.coarse, self.play)
 
     def _cell(self, lower, upper, depth: int, least: int, turn: int = 0) -> Streams | None:
         leaf = self._leaf(lower, upper) if turn >= least else None
@@ -105,13 +112,19 @@ class Producer:
         if not radius > 1e-9:
             return self._missing(lower, upper)
         samples = hit_and_run(Polytope(rows, ends), center, 120, 0)
-        Z = self._plane(samples, lower, upper)
+        found = (self._separated(choice, samples, lower, upper) for choice in sorted(self.chosen, reverse=True))
+        return next((streams for streams in found if streams is not None), None)
+
+    def _separated(self, choice: int, samples, lower, upper) -> Streams | None:
+        volumes = self.chosen[choice]
+        Z = self._plane(volumes, samples, lower, upper)
         if Z is None:
             return None
-        streams = Streams([PLANE], [], [Z])
-        for side, volume in enumerate(self.volumes):
+        kappa = self.kappa(Z, lower, upper)
+        streams = Streams([PLANE], [], [np.vstack([Z, [kappa, *np.zeros(len(self.play))]])], [choice])
+        for side, volume in enumerate(volumes):
             for v in volume.vertices:
-                if not self._pieces(streams, Z, side, v, lower, upper, DEPTH):
+                if not self._pieces(streams, Z, kappa, side, volume, v, lower, upper):
                     return None
         return streams
 
@@ -126,19 +139,19 @@ class Producer:
         found = linprog(cost, limits, np.concatenate([np.zeros(2 * n), [1.0]]), bounds=(0, None))
         return Streams([EMPTY], multipliers=[_entries(found.x[:m])]) if found.fun < -MARGIN else None
 
-    def _plane(self, samples, lower, upper):
+    def _plane(self, volumes, samples, lower, upper):
         """The coefficients of largest margin at the samples, all at most 1 in magnitude in centred coordinates."""
         k, play = len(self.play), self.play
         mid, half = 0.5 * (lower + upper)[play], 0.5 * (upper - lower)[play]
         u = np.column_stack([np.ones(len(samples)), (samples[:, play] - mid) / half])
         corners = np.column_stack([np.ones(2**k), np.array(list(itertools.product((-1.0, 1.0), repeat=k))).reshape(2**k, k)])
         rows = []
-        for side, volume in enumerate(self.volumes):
+        for side, volume in enumerate(volumes):
             p = self.kinematics.points(self.frame, volume.body, volume.vertices, samples)
             h = np.concatenate([p, np.ones((*p.shape[:2], 1))], axis=2)
             f = (1 - 2 * side) * np.einsum("svr,se->svre", h, u).reshape(-1, 4 * (1 + k))
             # margin + r kappa - f <= 0
-            rows.append(np.column_stack([-f, np.full(len(f), self.radii[side]), np.ones(len(f))]))
+            rows.append(np.column_stack([-f, np.full(len(f), volume.radius + self.scene.padding), np.ones(len(f))]))
         signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
         bound = np.einsum("ir,ce->icre", np.column_stack([signs, np.zeros(8)]), corners).reshape(-1, 4 * (1 + k))
         rows.append(np.column_stack([bound, -np.ones(len(bound)), np.zeros(len(bound))]))
@@ -158,14 +171,13 @@ class Producer:
         corners = itertools.product(*zip(lower[self.play], upper[self.play], strict=True))
         return max(float(np.linalg.norm(Z[:3] @ [1.0, *corner])) for corner in corners) * (1 + 1e-9)
 
-    def _pieces(self, streams: Streams, Z, side: int, v, lower, upper, depth: int) -> bool:
+    def _pieces(self, streams: Streams, Z, kappa: float, side: int, volume, v, lower, upper) -> bool:
         """Adds the tree of pieces of one vertex; whether there is one."""
-        own = self.chains[side]
+        own = sorted(self.kinematics.chain(self.frame, volume.body))
         axes = [*own, *(j for j in self.play if j not in own)]
-        kappa = self.kappa(Z, lower, upper)
         ranges = {j: [self._end(j, lower[j]), self._end(j, upper[j])] for j in own}
         outs = {j: (0.5 * (lower[j] + upper[j]), 0.5 * (upper[j] - lower[j])) for j in axes[len(own) :]}
-        return self._piece(streams, (Z, kappa, side, v), axes, dict.fromkeys(own, (0.0, 1.0)), ranges, outs, depth)
+        return self._piece(streams, (Z, kappa, side, volume, v), axes, dict.fromkeys(own, (0.0, 1.0)), ranges, outs, DEPTH)
 
     def _end(self, j: int, s: float):
         return (s, 1 / np.sqrt(1 + s * s)) if self.scene.revolute[j] else (s, 1.0)
@@ -196,7 +208,7 @@ class Producer:
 
     def _multipliers(self, vertex, parts, ranges, outs, z0: int):
         """Multipliers that make all control values positive, by interpolating the polynomials on a grid, or None."""
-        Z, kappa, side, v = vertex
+        Z, kappa, side, volume, v = vertex
         own, C, d = list(parts), self.ground.C, self.ground.d
         m, N = len(d), 4 ** len(own)
         grid = np.array(list(itertools.product(np.linspace(0, 1, 4), repeat=len(own)))).reshape(N, len(own))
@@ -208,7 +220,7 @@ class Producer:
             weight = (1 - t) * w0 + t * w1
             s[:, j] = ((1 - t) * w0 * l + t * w1 * u) / weight
             scale *= weight**3
-        X = self.kinematics.numerators(self.frame, self.volumes[side].body, s)
+        X = self.kinematics.numerators(self.frame, volume.body, s)
         basis, line = np.ones((1, 1)), np.array([[_bernstein(i, x) for i in range(4)] for x in np.linspace(0, 1, 4)])
         for _ in own:
             basis = np.kron(basis, line)
@@ -222,7 +234,7 @@ class Producer:
         sign = 1 - 2 * side
         column = {j: 1 + i for i, j in enumerate(self.play)}
         constant = Z[:, 0] + sum((Z[:, column[j]] * mid for j, (mid, _) in outs.items()), np.zeros(4))
-        f = sign * (p @ constant + sum((p @ Z[:, column[j]]) * s[:, j] for j in own)) - self.radii[side] * kappa * den
+        f = sign * (p @ constant + sum((p @ Z[:, column[j]]) * s[:, j] for j in own)) - (volume.radius + self.scene.padding) * kappa * den
         c0, D = control(f), control(den)
         T = {j: control(den * s[:, j]) for j in own}
         c = {j: control(sign * (p @ Z[:, column[j]]) * half) for j, (_, half) in outs.items()}

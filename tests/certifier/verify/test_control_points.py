@@ -51,12 +51,12 @@ class Setting:
         n, k = self.scene.n, len(self.play)
         ends = np.sort(rng.uniform(-reach, reach, (2, n)), axis=0)
         self.lower, self.upper = ends[0] - 0.01, ends[1] + 0.01
-        self.plane, self.kappa, self.sign = rng.normal(size=(4, 1 + k)), float(rng.uniform(0, 3)), float(rng.choice([-1.0, 1.0]))
+        self.plane, self.sign = rng.normal(size=(5, 1 + k)), float(rng.choice([-1.0, 1.0]))
         self.volume = Volume((), self.body, rng.normal(size=(3, 3)), 0.0)
         self.radius = float(rng.choice([0.0, 0.2]))
         self.side = Side(kinematics, self.frame, self.volume, self.radius, self.sign, self.play)
         cell = self.lower[None, self.play], self.upper[None, self.play]
-        self.cell = self.side.control(*cell, self.plane[None], np.array([self.kappa]), slice(0, 3))
+        self.cell = self.side.control(*cell, self.plane[None], slice(0, 3))
 
     def point(self, control, spans):
         """Random t of the own joints and tau of the others within a piece, and the s that they stand for; den's factor of the weights."""
@@ -85,9 +85,9 @@ class Setting:
         X = exact_pose(self.scene, self.frame, self.body, s)
         p = [sum((x * Fraction(float(y)) for x, y in zip(row, [*self.volume.vertices[v], 1.0], strict=True)), Fraction(0)) for row in X]
         h = [Fraction(1), *(s[j] for j in self.play)]
-        plane = [sum((Fraction(float(z)) * x for z, x in zip(row, h, strict=True)), Fraction(0)) for row in self.plane]
+        *plane, kappa = [sum((Fraction(float(z)) * x for z, x in zip(row, h, strict=True)), Fraction(0)) for row in self.plane]
         signed = sum((x * y for x, y in zip(plane, p, strict=True)), Fraction(0))
-        return Fraction(self.sign) * signed - Fraction(self.radius) * Fraction(self.kappa)
+        return Fraction(self.sign) * signed - Fraction(self.radius) * kappa
 
 
 @settings(max_examples=60, deadline=None)
@@ -152,9 +152,7 @@ def test_denominators_of_wide_ranges_have_negative_control_values_and_are_positi
     i = next(i for i, turns in enumerate(here_turns(here)) if turns)
     joint = here.play[here.side.own[i]]
     here.lower[joint], here.upper[joint] = -reach, reach
-    here.cell = here.side.control(
-        here.lower[None, here.play], here.upper[None, here.play], here.plane[None], np.array([here.kappa]), slice(0, 3)
-    )
+    here.cell = here.side.control(here.lower[None, here.play], here.upper[None, here.play], here.plane[None], slice(0, 3))
     assert here.cell.dt[0, 0].min() < 0
     assert np.isfinite(here.cell.c).all()
     spans = [(Fraction(0), Fraction(1)) for _ in here.side.own]

@@ -207,6 +207,7 @@ def test_a_polytope_that_is_said_to_be_empty_is_not():
             true,
             nodes=np.array([EMPTY], np.int8),
             planes=true.planes[:0],
+            choices=true.choices[:0],
             pieces=true.pieces[:0],
             counts=np.array([2], np.int16),
             faces=np.array([0, 1], np.int16),
@@ -296,13 +297,14 @@ def test_hand_made_planes_hold_only_where_no_sample_contradicts(seed):
     """A plane of the true proof turned and shifted at random, without multipliers, on a random part of the box."""
     rng = np.random.default_rng(seed)
     true = proof("tip")
-    plane = true.planes[:1] + rng.normal(size=(1, 4, 3)) * 10.0 ** rng.uniform(-4, 0)
+    plane = true.planes[:1] + rng.normal(size=(1, 5, 3)) * 10.0 ** rng.uniform(-4, 0)
     trees = sum(len(v.vertices) for v in true.volumes)
     changed = replace(
         true,
         nodes=np.array([PLANE], np.int8),
         cuts=true.cuts[:0],
         planes=plane,
+        choices=true.choices[:1],
         pieces=np.full(trees, PLANE, np.int8),
         counts=np.zeros(trees, np.int16),
         faces=true.faces[:0],
