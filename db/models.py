@@ -99,8 +99,6 @@ class JobRow(Base):
     """What CirisError.to_document() returned, when the job failed."""
     options: Mapped[Document]
     """What certifier.growth.options.GrowthOptions.to_document() returned."""
-    growth: Mapped[Document | None] = mapped_column(deferred=True)
-    """What certifier.growth.state.GrowthState.to_document() returned after the last transition."""
     action: Mapped[Document | None] = mapped_column(deferred=True)
     """The action that the job waits for: its kind, the iteration of a certification, the outcome and reason of an end.
 
@@ -118,6 +116,12 @@ class JobRow(Base):
     retry_of: Mapped[str | None] = mapped_column(ForeignKey("jobs.id"))
     attempt: Mapped[int] = mapped_column(default=1)
     """1, or one more than the attempt of ``retry_of``."""
+    open_pairs: Mapped[int] = mapped_column(default=0)
+    """How many of the job's pairs are open. Whoever moves a pair counts it here, so that nobody has to count the rows."""
+    running_pairs: Mapped[int] = mapped_column(default=0)
+    """How many of the job's pairs are running."""
+    next_pair: Mapped[int] = mapped_column(default=0)
+    """No open pair that has killed no process has a lower id. Claims look from here on."""
     region_id: Mapped[str | None] = mapped_column(String(36))
     """Id of the last region accepted."""
     event_seq: Mapped[int] = mapped_column(default=0)
@@ -134,6 +138,20 @@ class JobRow(Base):
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
     deadline_at: Mapped[datetime | None]
+
+
+class GrowthRow(Base):
+    """This row holds what the growth of a job knows.
+
+    It is as long as the scene has pairs, and SQLite writes the whole of a row anew. So it has a table of its own, because every claim
+    changes the row of its job.
+    """
+
+    __tablename__ = "growths"
+
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
+    document: Mapped[Document]
+    """What certifier.growth.state.GrowthState.to_document() returned after the last transition."""
 
 
 class IterationRow(Base):
@@ -168,8 +186,8 @@ class PairRow(Leased, Base):
     __tablename__ = "pairs"
     __table_args__ = (
         UniqueConstraint("job_id", "iteration", "pair_index"),
-        Index(None, "state", "lease_until"),
-        Index(None, "job_id", "state"),
+        Index(None, "state", "lease_token"),
+        Index(None, "job_id", "state", "deaths", "id"),
     )
     transitions: ClassVar[states.Table] = states.PAIR
 

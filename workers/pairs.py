@@ -74,7 +74,7 @@ def _error(error: CirisError, start: float) -> PairResult:
 
 
 @lru_cache(maxsize=2)
-def _certification(scene_id: str, job_id: str, iteration: int) -> tuple[Certification, list[int]]:
+def _certification(scene_id: str, job_id: str, iteration: int) -> tuple[Certification, frozenset[int]]:
     """Returns what the pairs of an iteration share, and which pairs are hard.
 
     An iteration's polytope never changes, so the process keeps the last two.
@@ -86,7 +86,7 @@ def _certification(scene_id: str, job_id: str, iteration: int) -> tuple[Certific
             return row.arrays, row.hard, GrowthOptions.from_document(jobs.get(session, job_id).options).random_seed
 
     arrays, hard, seed = persistently(read)
-    return Certification(load_scene(scene_id), Polytope(arrays["C"], arrays["d"]), arrays.get("center"), seed), hard
+    return Certification(load_scene(scene_id), Polytope(arrays["C"], arrays["d"]), arrays.get("center"), seed), frozenset(hard)
 
 
 def _save(claim: pairs.Claim, results: dict[int, PairResult]) -> pairs.Saved:

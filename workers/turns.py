@@ -109,7 +109,7 @@ def _begin(job_id: str) -> Turn | None:
             return None
         job.coordinator, job.coordinator_until = leases.this_worker(), now + timedelta(seconds=COORDINATION_SECONDS)
         job.coordinator_attempts += 1
-        return Turn(job_id, job.turn, job.scene_id, job.options, job.deadline_at, job.growth, report)
+        return Turn(job_id, job.turn, job.scene_id, job.options, job.deadline_at, jobs.growth(session, job_id), report)
 
 
 def _report(session: Session, job: JobRow) -> Report | None:
@@ -153,7 +153,7 @@ def _save(turn: Turn, transition: Transition) -> bool:
         if job.state == JobState.QUEUED:
             jobs.start(session, job, work.served_by_now(session))
         _advance(job, transition.action)
-        job.growth = transition.state.to_document()
+        jobs.keep_growth(session, job, transition.state.to_document())
         match transition.action:
             case Propose() as action:
                 _add_step(session, job, StepKind.PROPOSE, {"seed": action.seed}, afterwards)
@@ -232,7 +232,7 @@ def _finish_growth(session: Session, job: JobRow, finish: Finish) -> None:
     if job.action is not None and job.action["kind"] == "finish":
         return
     jobs.start(session, job)
-    pairs.skip(session, job.id)
+    pairs.skip(session, job)
     steps.skip(session, job.id)
     pairs.skip_iterations(session, job.id)
     _advance(job, finish)
