@@ -45,14 +45,24 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         if whole.stage + 1 < len(STAGES):
             return begin_stage(scene, state, start, whole.stage + 1)
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
-    corners = [(joints_between(scene, i), report.weaknesses[i].points) for i in report.failures if i in report.weaknesses]
+    unknown = next((i for i in report.failures if i not in report.weaknesses), None)
+    if unknown is not None:  # Nothing can be cut off for it, so it would fail again and again.
+        pair = scene.pairs[unknown]
+        return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing is known of where they fail")
+    corners = [(joints_between(scene, i), report.weaknesses[i].points) for i in report.failures]
     smaller = cut(scene, whole.polytope, start.keep, corners, action.iteration)
     if smaller is None:
         pair = scene.pairs[report.failures[0]]
         reason = f"{pair.a} and {pair.b} touch, or come too close, at or between configurations that have to stay inside"
-        outcome = Outcome.CERTIFIED if state.best is not None else combine(list(report.outcomes.values()))
-        return Transition(state, Finish(outcome, f"certified; growth ended early: {reason}" if state.best is not None else reason))
+        return _ended(state, report, reason)
     return _next(scene, replace(state, whole=replace(whole, polytope=smaller)))
+
+
+def _ended(state: GrowthState, report: Outcomes, reason: str) -> Transition:
+    """Ends the growth with the best region so far, or without one."""
+    if state.best is not None:
+        return Transition(state, Finish(Outcome.CERTIFIED, f"certified; growth ended early: {reason}"))
+    return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
 
 
 def _next(scene: Scene, state: GrowthState) -> Transition:
