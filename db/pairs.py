@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sqlalchemy import ColumnElement, Select, exists, func, insert, select, tuple_
+from sqlalchemy import ColumnElement, Select, exists, func, insert, select, tuple_, update
 from sqlalchemy.orm import Session, defer
 
+from certifier.outcome import Stage
 from certifier.pair.result import PairResult
-from db import events, jobs, leases, proofs
+from db import events, jobs, leases, partitions, proofs
 from db.models import IterationRow, JobRow, PairRow
 from db.states import PAIR, IterationState, PairState, transition, unfinished
 from db.types import utcnow
@@ -86,8 +87,17 @@ def add_iteration(
     reuse: Mapping[int, int],
     hard: Sequence[int],
     failures: int | None,
+    cells: int = 1,
+    box: tuple[ArrayLike, ArrayLike] | None = None,
+    begun: Mapping[int, int] | None = None,
+    ending: Sequence[int] = (),
 ) -> None:
-    """Adds an iteration and its pairs. An iteration without pairs is certified at once. The caller holds the job's lock."""
+    """Adds an iteration and its pairs. An iteration without pairs is certified at once. The caller holds the job's lock.
+
+    Args:
+        box: the middle and the half widths of the root cell of all partitions, in s.
+    """
+    given = {"C": C, "d": d, "center": center} | ({} if box is None else {"mid": box[0], "half": box[1]})
     certified = {} if pairs else {"state": IterationState.CERTIFIED, "finished_at": utcnow()}
     session.add(
         IterationRow(
@@ -95,10 +105,13 @@ def add_iteration(
             index=index,
             label=label,
             faces=np.size(d),
-            arrays={"C": np.asarray(C), "d": np.asarray(d), **({} if center is None else {"center": np.asarray(center)})},
+            arrays={name: np.asarray(array) for name, array in given.items() if array is not None},
             reuse={str(pair): iteration for pair, iteration in reuse.items()},
             hard=list(hard),
             failures=failures,
+            cells=cells,
+            begun={str(pair): iteration for pair, iteration in (begun or {}).items()},
+            ending=list(ending),
             **certified,
         )
     )
@@ -171,7 +184,7 @@ def release(session: Session, job: JobRow, lost: leases.Lost) -> list[PairRow]:
 
 
 def save(session: Session, claim: Claim, results: Mapping[int, PairResult]) -> Saved:
-    """Saves the results of pairs that are still held, with their proofs, in one transaction.
+    """Saves the results of pairs that are still held, with their proofs and partitions, in one transaction.
 
     When enough pairs have failed, it skips the unfinished pairs after them. A worker that holds one of those is stopped (leases.kept).
 
@@ -188,6 +201,7 @@ def save(session: Session, claim: Claim, results: Mapping[int, PairResult]) -> S
     for index, result in saved.items():
         digest = None if result.proof is None else digests[result.proof]
         transition(session, PairRow, state_of(result), PairRow.id == held[index], lease_until=None, proof_digest=digest, **_columns(result))
+    partitions.keep(session, job.id, claim.iteration, {i: r.partition for i, r in saved.items() if r.stage is Stage.CELLS})
     job.running_pairs -= len(saved)
     job.error = next((result.error for result in saved.values() if result.error is not None), job.error)
     public = [_public(index, result) for index, result in saved.items()]
@@ -244,6 +258,12 @@ def reached(session: Session, iteration: IterationRow) -> Sequence[PairRow]:
     if iteration.failures is not None and len(places) >= iteration.failures:
         rows = rows[: places[iteration.failures - 1]]
     return rows
+
+
+def forget_weaknesses(session: Session, job_id: str, iteration: int) -> None:
+    """Deletes where the pairs of an iteration failed. Nobody asks once the next action is decided, and it is up to 50 kB a pair."""
+    mine = (PairRow.job_id == job_id, PairRow.iteration == iteration, PairRow.weakness.is_not(None))
+    session.execute(update(PairRow).where(*mine).values(weakness=None))
 
 
 def order(session: Session, iteration: IterationRow) -> list[int]:
@@ -314,6 +334,7 @@ def _columns(result: PairResult) -> dict[str, Any]:
         "margin": result.margin,
         "seconds": result.seconds,
         "detail": result.detail,
+        "open_cells": result.open_cells,
         "witness_s": None if result.witness_s is None else result.witness_s.tolist(),
         "weakness": None if result.weakness is None else result.weakness.to_document(),
     }

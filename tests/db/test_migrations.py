@@ -96,6 +96,22 @@ def test_a_job_under_way_goes_on_after_the_counts_were_introduced(empty_database
     database.close()
 
 
+def test_iterations_stored_before_there_were_cells_say_that_they_have_none(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.write() as session:
+        job_id = a_running_job(session).id
+    database.close()
+    migrate.downgrade(empty_database_url, "0008")
+    assert "partitions" not in tables(empty_database_url)
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.read() as session:
+        assert [(row.cells, row.begun, row.ending) for row in pairs.iterations(session, job_id)] == [(1, {}, [])]
+        assert {row.open_cells for row in pairs.of_job(session, job_id)} == {None}
+    database.close()
+
+
 def claimed(database: Database, job_id: str) -> pairs.Claim:
     with database.write() as session:
         claim = work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5)
