@@ -25,6 +25,7 @@ from api.schemas.jobs import GrowthPoint, Iteration, Job, PairCell, PairMatrix
 from api.schemas.scenes import PairInfo
 from certifier.verify.decimals import at_least_mm, at_most_mm
 from db.session import Database
+from db.states import PairState
 
 _ROOT = Path(dashboard.__file__).parent
 _CHART = (600, 150)
@@ -165,6 +166,7 @@ _GLYPHS = {
     "certified": "✓",
     "refuted": "✗",
     "not_certifiable": "⊘",
+    "too_close": "≈",
     "inconclusive": "?",
     "error": "!",
     "running": "◌",
@@ -194,10 +196,17 @@ def _cell(cell: PairCell | None, pair: int, iteration: Iteration) -> Cell:
     if cell.margin is not None:
         parts.append(f"margin at least {at_least_mm(cell.margin)}")
     if cell.witness_q is not None:
-        parts.append("in collision at q = " + ", ".join(f"{value:.4g}" for value in cell.witness_q))
+        what = "in collision" if cell.state is PairState.REFUTED else "nearest"
+        parts.append(f"{what} at q = " + ", ".join(f"{value:.4g}" for value in cell.witness_q))
+    if cell.open_cells:
+        parts.append(_open_cells(cell.open_cells))
     if cell.detail:
         parts.append(cell.detail)
     return Cell(cell.state, _GLYPHS[cell.state], "; ".join(parts))
+
+
+def _open_cells(number: int) -> str:
+    return f"{number} open cell{'' if number == 1 else 's'}"
 
 
 @dataclass(frozen=True)
@@ -207,12 +216,14 @@ class Progress:
     Attributes:
         parts: (state, number of pairs), certified first.
         settled: number of pairs that have their outcome or were reused.
+        open_cells: what the searches over partitions have left open, in words; None where they left nothing.
     """
 
     iteration: Iteration
     parts: list[tuple[str, int]]
     settled: int
     total: int
+    open_cells: str | None
 
 
 def progress(matrix: PairMatrix) -> Progress | None:
@@ -220,12 +231,13 @@ def progress(matrix: PairMatrix) -> Progress | None:
     if not matrix.iterations:
         return None
     last = matrix.iterations[-1]
-    counts = Counter(cell.state.value for cell in matrix.cells if cell.iteration == last.index)
+    cells = [cell for cell in matrix.cells if cell.iteration == last.index]
+    counts, left = Counter(cell.state.value for cell in cells), sum(cell.open_cells or 0 for cell in cells)
     if last.reused:
         counts["reused"] = len(last.reused)
     parts = [(state, counts[state]) for state in _GLYPHS if counts[state]]
     unsettled = counts["open"] + counts["running"] + counts["skipped"]
-    return Progress(last, parts, counts.total() - unsettled, counts.total())
+    return Progress(last, parts, counts.total() - unsettled, counts.total(), _open_cells(left) if left else None)
 
 
 @dataclass(frozen=True)

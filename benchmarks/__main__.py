@@ -8,7 +8,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from typing import Any
 
-from benchmarks import agreement, catalogue, compare, growth, report, scaling, service, survey
+from benchmarks import agreement, catalogue, compare, growth, report, scaling, service, store, survey
 from certifier.errors import CirisError
 from client.output import Screen, print_json
 
@@ -51,6 +51,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "agreement": lambda args, screen: agreement.campaign(agreement.questions(), screen.line),
     "scaling": lambda args, screen: scaling.curves(args.against is not None, screen.line),
     "service": lambda args, screen: service.beside_local(args.example, args.processes, args.turns, screen.line),
+    "store": lambda args, screen: store.store(args.postgresql, store.COUNTS, screen.line),
     "survey": lambda args, screen: survey.survey(args.scenes, args.most, screen.line),
 }
 
@@ -84,6 +85,8 @@ def _parser() -> ArgumentParser:
     served.add_argument("example", nargs="?", default="iiwa_shelf", metavar="EXAMPLE", help="default iiwa_shelf")
     served.add_argument("--processes", type=int, default=1, metavar="N", help="number of the service's solving processes; default 1")
     served.add_argument("--turns", type=int, default=5, metavar="N", help="how often each is run; default 5")
+    stored = kinds.add_parser("store", parents=[json], help="measure what the database takes for a pair in jobs of 1000 and of 100000")
+    stored.add_argument("--postgresql", metavar="URL", help="measure this empty PostgreSQL database too, besides SQLite")
     kinds.add_parser("docs", help="write the tables of docs/benchmarks.md from docs/benchmarks/*.json")
     return parser
 

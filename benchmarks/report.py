@@ -189,6 +189,16 @@ def _percent(share: float) -> str:
     return f"{100 * share:+.1f} %"
 
 
+def _store(document: Document) -> list[str]:
+    header = ["database", "pairs", "settled", "insert all, s", "claim", "save", "claim and save", "look"]
+    rows = []
+    for row in document["rows"]:
+        both = row["claim_ms"] + row["save_ms"]
+        times = [f"{value:.1f}" for value in (row["claim_ms"], row["save_ms"], both, row["look_ms"])]
+        rows.append([row["database"], str(row["pairs"]), str(row["settled"]), seconds(row["insert_seconds"]), *times])
+    return [f"Milliseconds for one pair by the clock, medians of {document['repeat']}.", _table(header, rows)]
+
+
 def _survey(document: Document) -> list[str]:
     rows = [
         [row["scene"], row["region"], _counts(row["outcomes"]), str(row["left_out"]), seconds(row["seconds"])] for row in document["counts"]
@@ -217,5 +227,6 @@ _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "agreement": _agreement,
     "scaling": _scaling,
     "service": _service,
+    "store": _store,
     "survey": _survey,
 }

@@ -181,6 +181,12 @@ def _parser() -> argparse.ArgumentParser:
         required=True,
         help="arrays C (m x n), d (m) and optionally center (n), in s; ciris adds the joint limits",
     )
+    certify.add_argument(
+        "--cells",
+        type=int,
+        metavar="N",
+        help="look at N cells of the polytope for each pair, each with a plane of its own; default: 1, one plane on all of it",
+    )
     certify.add_argument("--watch", action="store_true", help="print a line for every pair as it is settled")
     certify.add_argument("--local", action="store_true", help="certify in this process, without a service")
     certify.add_argument("--backend", choices=["ciris", "drake"], default="ciris", help="drake asks Drake's own program, as a cross-check")
@@ -210,7 +216,7 @@ def _parser() -> argparse.ArgumentParser:
     contains.set_defaults(run="client.commands:contains")
 
     bench = verbs.add_parser("bench", help="measure ciris, and Drake beside it if asked; see ciris bench BENCHMARK --help")
-    kinds = ["pairs", "scene", "growth", "agreement", "scaling", "service", "survey", "docs"]
+    kinds = ["pairs", "scene", "growth", "agreement", "scaling", "service", "store", "survey", "docs"]
     bench.add_argument("benchmark", choices=kinds)
     bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...")
     bench.set_defaults(run="client.bench:bench")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from certifier.errors import CirisError
+from certifier.outcome import Outcome
 from certifier.verify.decimals import at_most_mm, exactly
 from client import output, service
 from client.find import api_key, service_url
@@ -179,21 +180,24 @@ def save_proof(manifest: dict[str, Any], proof: bytes, out: str | None) -> Path:
 def certify(args: Namespace) -> int:
     screen = Screen()
     polytope = polytope_file(args.polytope)
-    drake = _drake(args)
+    drake, cells = _drake(args), 1 if args.cells is None else args.cells
     if args.local:
         from client import local
 
-        document = local.certify(args.scene, polytope, screen, args.watch, drake)
+        document = local.certify(args.scene, polytope, screen, args.watch, drake, cells)
     else:
         with _client(args) as client:
-            document = service.certify(client, service.known_scene(client, args.scene), polytope, screen, args.watch)
+            document = service.certify(client, service.known_scene(client, args.scene), polytope, screen, args.watch, cells)
     if args.json:
         print_json(document)
     else:
         output.print_pairs(document["pairs"])
         for pair in document["pairs"]:
             if pair["witness_q"] is not None:
-                print(f"collision of {pair['a']} and {pair['b']} at q = {', '.join(f'{value:.6g}' for value in pair['witness_q'])}")
+                where = ", ".join(f"{value:.6g}" for value in pair["witness_q"])
+                collides = pair["outcome"] == Outcome.REFUTED
+                how = f"collision of {pair['a']} and {pair['b']}" if collides else f"{pair['a']} and {pair['b']}: {pair['detail']},"
+                print(f"{how} at q = {where}")
         scene = document["scene"]["name"]
         print(f"{scene}: {output.plain(document['outcome'])}, guarantee {document['guarantee']}, {output.seconds(document['seconds'])}")
     return OK if document["outcome"] == "certified" else NO
@@ -205,6 +209,8 @@ def _drake(args: Namespace) -> str | None:
         if args.solver is not None:
             raise CirisError("option", "only Drake takes a solver", field="--solver", hint="add --backend drake")
         return None
+    if args.cells is not None:
+        raise CirisError("option", "Drake's own program knows no cells", field="--cells", hint="leave --cells or --backend drake out")
     if not args.local:
         raise CirisError("option", "the service asks its own certifier only", field="--backend", hint="add --local")
     return args.solver or "clarabel"

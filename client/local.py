@@ -37,18 +37,19 @@ def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], screen: Scre
     return Grown(region.manifest, region.proof, provenance["seconds"], remark=provenance["reason"])
 
 
-def certify(scene: str, given: PolytopeFile, screen: Screen, watch: bool, drake: str | None) -> dict[str, Any]:
+def certify(scene: str, given: PolytopeFile, screen: Screen, watch: bool, drake: str | None, cells: int) -> dict[str, Any]:
     """Certifies a polytope in this process, and returns the document of ``ciris certify --json``.
 
     Args:
         drake: name of the solver with which Drake is asked instead; None asks our certifier.
+        cells: as in :class:`certifier.growth.options.GrowthOptions`, for our certifier.
     """
     loaded = load(scene)
     progress = screen.line if watch else screen.status
     if drake is None:
         from certifier.jobs import local
 
-        verdict = local.certify(loaded, given.polytope, given.center, progress)
+        verdict = local.certify(loaded, given.polytope, given.center, progress, cells)
     else:
         from certifier.jobs import reference
 

@@ -68,7 +68,7 @@ def grow_many(client: Client, requests: Sequence[Document], screen: Screen, watc
     return [_wait(client, job, screen, watch) for job in jobs]
 
 
-def certify(client: Client, scene: Document, given: PolytopeFile, screen: Screen, watch: bool = False) -> Document:
+def certify(client: Client, scene: Document, given: PolytopeFile, screen: Screen, watch: bool = False, cells: int = 1) -> Document:
     """Makes the service certify a polytope, and returns the document of ``ciris certify --json``.
 
     Raises:
@@ -77,7 +77,7 @@ def certify(client: Client, scene: Document, given: PolytopeFile, screen: Screen
     body: dict[str, Any] = {"C": given.polytope.C.tolist(), "d": given.polytope.d.tolist()}
     if given.center is not None:
         body["center"] = given.center.tolist()
-    job, _ = client.create_job({"kind": "certify", "scene": scene["id"], "polytope": body})
+    job, _ = client.create_job({"kind": "certify", "scene": scene["id"], "polytope": body, "cells": cells})
     screen.line(f"job {job['id']}: {client.url}/jobs/{job['id']}")
     job = _wait(client, job["id"], screen, watch)
     if job["outcome"] is None or (job["error"] and job["error"]["code"] not in NEGATIVE):

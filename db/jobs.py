@@ -6,16 +6,16 @@ from datetime import datetime
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import ColumnElement, exists, func, or_, select
+from sqlalchemy import ColumnElement, and_, exists, func, or_, select
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
 from db import events, leases, pages, webhooks
-from db.models import JobRow, PairRow, StepRow
+from db.models import GrowthRow, JobRow, StepRow
 from db.pages import Page
 from db.session import insert_new
 from db.settings import settings
-from db.states import JOB, PAIR, STEP, JobState, StepKind, transition, unfinished
+from db.states import JOB, STEP, JobState, StepKind, transition, unfinished
 from db.types import utcnow
 
 
@@ -173,6 +173,17 @@ def cancel(session: Session, job_id: str) -> JobRow:
     return job
 
 
+def growth(session: Session, job_id: str) -> dict[str, Any] | None:
+    """Returns the state of the job's growth after its last transition; None before the first."""
+    row = session.get(GrowthRow, job_id)
+    return None if row is None else row.document
+
+
+def keep_growth(session: Session, job: JobRow, document: dict[str, Any]) -> None:
+    """Stores the state of the job's growth. The caller holds the job's lock."""
+    session.merge(GrowthRow(job_id=job.id, document=document))
+
+
 def start(session: Session, job: JobRow, served: float = 0.0) -> None:
     """Moves a queued job to running. The caller holds its lock.
 
@@ -212,8 +223,8 @@ def awaiting_coordination(session: Session, now: datetime) -> list[str]:
 
     A coordination is due when the job is being cancelled, when its deadline has passed, or when it waits for no pair and no step.
     """
-    pair = exists().where(PairRow.job_id == JobRow.id, PairRow.state.in_(unfinished(PAIR)))
+    no_pair = and_(JobRow.open_pairs == 0, JobRow.running_pairs == 0)
     step = exists().where(StepRow.job_id == JobRow.id, StepRow.state.in_(unfinished(STEP)), StepRow.kind != StepKind.ACCEPT)
-    due = or_(JobRow.state == JobState.CANCELLING, JobRow.deadline_at <= now, ~pair & ~step)
+    due = or_(JobRow.state == JobState.CANCELLING, JobRow.deadline_at <= now, no_pair & ~step)
     rows = session.scalars(select(JobRow).where(JobRow.state.in_(unfinished(JOB)), due).order_by(JobRow.created_at))
     return [job.id for job in rows if not is_coordinated(job, now)]

@@ -99,8 +99,6 @@ class JobRow(Base):
     """What CirisError.to_document() returned, when the job failed."""
     options: Mapped[Document]
     """What certifier.growth.options.GrowthOptions.to_document() returned."""
-    growth: Mapped[Document | None] = mapped_column(deferred=True)
-    """What certifier.growth.state.GrowthState.to_document() returned after the last transition."""
     action: Mapped[Document | None] = mapped_column(deferred=True)
     """The action that the job waits for: its kind, the iteration of a certification, the outcome and reason of an end.
 
@@ -118,6 +116,12 @@ class JobRow(Base):
     retry_of: Mapped[str | None] = mapped_column(ForeignKey("jobs.id"))
     attempt: Mapped[int] = mapped_column(default=1)
     """1, or one more than the attempt of ``retry_of``."""
+    open_pairs: Mapped[int] = mapped_column(default=0)
+    """How many of the job's pairs are open. Whoever moves a pair counts it here, so that nobody has to count the rows."""
+    running_pairs: Mapped[int] = mapped_column(default=0)
+    """How many of the job's pairs are running."""
+    next_pair: Mapped[int] = mapped_column(default=0)
+    """No open pair that has killed no process has a lower id. Claims look from here on."""
     region_id: Mapped[str | None] = mapped_column(String(36))
     """Id of the last region accepted."""
     event_seq: Mapped[int] = mapped_column(default=0)
@@ -136,6 +140,20 @@ class JobRow(Base):
     deadline_at: Mapped[datetime | None]
 
 
+class GrowthRow(Base):
+    """This row holds what the growth of a job knows.
+
+    It is as long as the scene has pairs, and SQLite writes the whole of a row anew. So it has a table of its own, because every claim
+    changes the row of its job.
+    """
+
+    __tablename__ = "growths"
+
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
+    document: Mapped[Document]
+    """What certifier.growth.state.GrowthState.to_document() returned after the last transition."""
+
+
 class IterationRow(Base):
     """An iteration is a polytope whose pairs are certified together."""
 
@@ -147,7 +165,10 @@ class IterationRow(Base):
     label: Mapped[str]
     """Says to people what this polytope is."""
     arrays: Mapped[Arrays]
-    """C (m, n), d (m,) with the joint limits, and center (n,) where one was given; in s."""
+    """In s: C (m, n), d (m,) with the joint limits; center (n,) where one was given.
+
+    Where the root cell of the pairs' partitions was given, also its mid and half, (n,).
+    """
     faces: Mapped[int]
     """Number of faces, m."""
     state: Mapped[str] = mapped_column(String(16), default=states.IterationState.RUNNING)
@@ -155,6 +176,12 @@ class IterationRow(Base):
     """Indices of the pairs for which nothing less than all faces is tried."""
     failures: Mapped[int | None]
     """How many failures end the iteration; None when none does."""
+    cells: Mapped[int] = mapped_column(default=1)
+    """So many cells of each pair are looked at; 1 for the program (11) on all of the polytope."""
+    begun: Mapped[Document] = mapped_column(default=dict)
+    """Pair index (as a string) -> the earlier iteration that left a partition to go on with."""
+    ending: Mapped[list[int]] = mapped_column(default=list)
+    """Indices of the pairs whose open cells are going to be cut off."""
     reuse: Mapped[Document]
     """Pair index (as a string) -> the iteration whose proof serves here too."""
     ellipsoid_volume: Mapped[float | None]
@@ -168,8 +195,8 @@ class PairRow(Leased, Base):
     __tablename__ = "pairs"
     __table_args__ = (
         UniqueConstraint("job_id", "iteration", "pair_index"),
-        Index(None, "state", "lease_until"),
-        Index(None, "job_id", "state"),
+        Index(None, "state", "lease_token"),
+        Index(None, "job_id", "state", "deaths", "id"),
     )
     transitions: ClassVar[states.Table] = states.PAIR
 
@@ -189,8 +216,26 @@ class PairRow(Leased, Base):
     detail: Mapped[str | None]
     witness_s: Mapped[list[float] | None] = mapped_column(JSON(none_as_null=True))
     weakness: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
-    """What certifier.pair.result.Weakness.to_document() returned."""
+    """What certifier.pair.result.Weakness.to_document() returned, until the job's next action is decided."""
     proof_digest: Mapped[str | None] = mapped_column(ForeignKey("proofs.digest"))
+    open_cells: Mapped[int | None]
+    """How many cells of the partition that the pair's search left are open."""
+
+
+class PartitionRow(Base):
+    """This row holds what a search over partitions has proved already of a pair that it has not certified. It is no proof.
+
+    A job has one for each pair at most, that of the pair's last result, and none after its end.
+    """
+
+    __tablename__ = "partitions"
+
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
+    pair_index: Mapped[int] = mapped_column(primary_key=True)
+    iteration: Mapped[int]
+    """The iteration whose result it is part of."""
+    data: Mapped[bytes]
+    """What certifier.pair.result.PairResult calls ``partition``."""
 
 
 class StepRow(Leased, Base):

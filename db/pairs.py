@@ -2,27 +2,33 @@
 
 Pairs are claimed in the order in which they were added to their iteration. The first failures in this order, not the first in time,
 end the iteration early. So the result of a job depends neither on the number of workers nor on what happens to them.
+
+Claiming and saving read as many rows as they change, however many pairs there are. For this the job's row counts its open and running
+pairs, and says where the open ones begin. A job has one iteration at a time with such pairs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sqlalchemy import ColumnElement, Select, func, insert, select
+from sqlalchemy import ColumnElement, Select, exists, func, insert, select, tuple_, update
 from sqlalchemy.orm import Session, defer
 
+from certifier.outcome import Stage
 from certifier.pair.result import PairResult
-from db import events, jobs, leases, proofs
+from db import events, jobs, leases, partitions, proofs
 from db.models import IterationRow, JobRow, PairRow
 from db.states import PAIR, IterationState, PairState, transition, unfinished
 from db.types import utcnow
 
 UNFINISHED = unfinished(PAIR)
 FAILED = frozenset(PairState) - UNFINISHED - {PairState.CERTIFIED, PairState.SKIPPED}
+MOST_TOGETHER = 100
+"""At most this many pairs are claimed together, however short they are."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +87,17 @@ def add_iteration(
     reuse: Mapping[int, int],
     hard: Sequence[int],
     failures: int | None,
+    cells: int = 1,
+    box: tuple[ArrayLike, ArrayLike] | None = None,
+    begun: Mapping[int, int] | None = None,
+    ending: Sequence[int] = (),
 ) -> None:
-    """Adds an iteration and its pairs. An iteration without pairs is certified at once. The caller holds the job's lock."""
+    """Adds an iteration and its pairs. An iteration without pairs is certified at once. The caller holds the job's lock.
+
+    Args:
+        box: the middle and the half widths of the root cell of all partitions, in s.
+    """
+    given = {"C": C, "d": d, "center": center} | ({} if box is None else {"mid": box[0], "half": box[1]})
     certified = {} if pairs else {"state": IterationState.CERTIFIED, "finished_at": utcnow()}
     session.add(
         IterationRow(
@@ -90,15 +105,18 @@ def add_iteration(
             index=index,
             label=label,
             faces=np.size(d),
-            arrays={"C": np.asarray(C), "d": np.asarray(d), **({} if center is None else {"center": np.asarray(center)})},
+            arrays={name: np.asarray(array) for name, array in given.items() if array is not None},
             reuse={str(pair): iteration for pair, iteration in reuse.items()},
             hard=list(hard),
             failures=failures,
+            cells=cells,
+            begun={str(pair): iteration for pair, iteration in (begun or {}).items()},
+            ending=list(ending),
             **certified,
         )
     )
     if pairs:
-        session.execute(
+        session.connection().execute(  # the session would take twice as long
             insert(PairRow),
             [
                 {
@@ -112,6 +130,7 @@ def add_iteration(
                 for p in pairs
             ],
         )
+        job.open_pairs += len(pairs)
     events.emit(session, job, "iteration", {"index": index, "label": label, "state": "running", "pairs": len(pairs), "reused": len(reuse)})
 
 
@@ -136,22 +155,36 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
 
     It returns None when no pair is open. The caller holds the job's lock.
     """
+    if job.open_pairs == 0:
+        return None
     columns = (PairRow.id, PairRow.iteration, PairRow.pair_index, PairRow.forecast_seconds, PairRow.attempts, PairRow.deaths)
     is_open = (PairRow.job_id == job.id, PairRow.state == PairState.OPEN)
-    rows = session.execute(select(*columns).where(*is_open).order_by(PairRow.id)).all()
-    if not rows:
-        return None
-    fresh = {row.pair_index: row for row in rows if row.deaths == 0}
-    first = batch(((index, row.forecast_seconds) for index, row in fresh.items()), batch_seconds)
-    chosen = [fresh[index] for index in first] or rows[:1]
+    ahead = tuple_(PairRow.deaths, PairRow.id) >= tuple_(0, job.next_pair)
+    first = select(*columns).where(*is_open, ahead).order_by(PairRow.deaths, PairRow.id).limit(MOST_TOGETHER)
+    rows = session.execute(first).all()
+    fresh = [row for row in rows if row.deaths == 0]
+    chosen = fresh[: len(batch(((row.pair_index, row.forecast_seconds) for row in fresh), batch_seconds))] or rows[:1]
     pairs = tuple(Claimed(row.pair_index, row.attempts + 1, row.deaths) for row in chosen)
     jobs.charge(session, job, sum(row.forecast_seconds for row in chosen))
     token = leases.take(session, PairRow, [row.id for row in chosen], seconds=lease_seconds)
+    job.open_pairs -= len(chosen)
+    job.running_pairs += len(chosen)
+    if fresh:
+        job.next_pair = chosen[-1].id + 1
     return Claim(token, job.id, job.scene_id, chosen[0].iteration, pairs)
 
 
+def release(session: Session, job: JobRow, lost: leases.Lost) -> list[PairRow]:
+    """Opens the pairs of a lost lease and returns them. The caller holds the job's lock."""
+    rows = leases.release(session, PairRow, lost)
+    job.open_pairs += len(rows)
+    job.running_pairs -= len(rows)
+    job.next_pair = min([job.next_pair, *(row.id for row in rows if row.deaths == 0)])
+    return rows
+
+
 def save(session: Session, claim: Claim, results: Mapping[int, PairResult]) -> Saved:
-    """Saves the results of pairs that are still held, with their proofs, in one transaction.
+    """Saves the results of pairs that are still held, with their proofs and partitions, in one transaction.
 
     When enough pairs have failed, it skips the unfinished pairs after them. A worker that holds one of those is stopped (leases.kept).
 
@@ -159,10 +192,8 @@ def save(session: Session, claim: Claim, results: Mapping[int, PairResult]) -> S
         results: pair index -> result.
     """
     job = jobs.lock(session, claim.job_id)
-    columns = (PairRow.id, PairRow.pair_index, PairRow.state, PairRow.lease_token)
-    mine = (PairRow.job_id == claim.job_id, PairRow.iteration == claim.iteration)
-    rows = session.execute(select(*columns).where(*mine).order_by(PairRow.id)).all()
-    held = {row.pair_index: row.id for row in rows if row.state == PairState.RUNNING and row.lease_token == claim.token}
+    rows = session.execute(select(PairRow.pair_index, PairRow.id).where(leases.held(PairRow, claim.token)))
+    held = {row.pair_index: row.id for row in rows}
     saved = {index: result for index, result in results.items() if index in held}
     if not saved:
         return Saved(held=False, finished=False)
@@ -170,30 +201,44 @@ def save(session: Session, claim: Claim, results: Mapping[int, PairResult]) -> S
     for index, result in saved.items():
         digest = None if result.proof is None else digests[result.proof]
         transition(session, PairRow, state_of(result), PairRow.id == held[index], lease_until=None, proof_digest=digest, **_columns(result))
+    partitions.keep(session, job.id, claim.iteration, {i: r.partition for i, r in saved.items() if r.stage is Stage.CELLS})
+    job.running_pairs -= len(saved)
     job.error = next((result.error for result in saved.values() if result.error is not None), job.error)
     public = [_public(index, result) for index, result in saved.items()]
     events.emit(session, job, "pairs", {"iteration": claim.iteration, "pairs": public})
-    label, enough = session.execute(select(IterationRow.label, IterationRow.failures).where(*_iteration(job.id, claim.iteration))).one()
-    states = {row.id: row.state for row in rows} | {held[index]: state_of(result).value for index, result in saved.items()}
-    failed = [pair for pair, state in states.items() if state in FAILED]
-    if enough is not None and len(failed) >= enough:
-        late = [pair for pair, state in states.items() if pair > failed[enough - 1] and state in UNFINISHED]
-        skip(session, claim.job_id, PairRow.id.in_(late))
-        states |= dict.fromkeys(late, PairState.SKIPPED.value)
-    finished = not UNFINISHED.intersection(states.values()) and _finish_iteration(session, job, claim.iteration, label, states.values())
-    return Saved(any(states[pair] == PairState.RUNNING for pair in held.values()), finished)
+    rest = [pair for index, pair in held.items() if index not in saved]
+    if FAILED.intersection(map(state_of, saved.values())) and (last := _last_failure(session, job.id, claim.iteration)) is not None:
+        skip(session, job, PairRow.iteration == claim.iteration, PairRow.id > last)
+        rest = [pair for pair in rest if pair <= last]
+    finished = job.open_pairs == job.running_pairs == 0 and _finish_iteration(session, job, claim.iteration)
+    return Saved(bool(rest), finished)
 
 
-def skip(session: Session, job_id: str, *which: ColumnElement[bool]) -> None:
-    """Skips the job's unfinished pairs: all of them, or those that match the conditions."""
-    transition(session, PairRow, PairState.SKIPPED, PairRow.job_id == job_id, PairRow.state.in_(UNFINISHED), *which)
+def skip(session: Session, job: JobRow, *which: ColumnElement[bool]) -> None:
+    """Skips the job's unfinished pairs: all of them, or those that match the conditions. The caller holds the job's lock."""
+    mine = (PairRow.job_id == job.id, *which)
+    job.open_pairs -= transition(session, PairRow, PairState.SKIPPED, *mine, PairRow.state == PairState.OPEN)
+    job.running_pairs -= transition(session, PairRow, PairState.SKIPPED, *mine, PairRow.state == PairState.RUNNING)
 
 
-def _finish_iteration(session: Session, job: JobRow, index: int, label: str, states: Collection[str]) -> bool:
-    """Settles an iteration whose pairs are all in these states. Returns True for the one call that does it."""
-    state = IterationState.CERTIFIED if set(states) <= {PairState.CERTIFIED} else IterationState.FAILED
+def _last_failure(session: Session, job_id: str, iteration: int) -> int | None:
+    """Returns the id of the failed pair that ends the iteration early; None as long as more failures are needed or none ends it."""
+    enough = session.scalar(select(IterationRow.failures).where(*_iteration(job_id, iteration)))
+    if enough is None:
+        return None
+    # One query a state, in the order of the index: so the databases use it even when they know nothing about the table yet.
+    mine = select(PairRow.id).where(PairRow.job_id == job_id, PairRow.iteration == iteration).order_by(PairRow.deaths, PairRow.id)
+    failed = sorted(pair for state in FAILED for pair in session.scalars(mine.where(PairRow.state == state)))
+    return failed[enough - 1] if len(failed) >= enough else None
+
+
+def _finish_iteration(session: Session, job: JobRow, index: int) -> bool:
+    """Settles an iteration that has no unfinished pair. Returns True for the one call that does it."""
+    failed = exists().where(PairRow.job_id == job.id, PairRow.iteration == index, PairRow.state != PairState.CERTIFIED)
+    state = IterationState.FAILED if session.scalar(select(failed)) else IterationState.CERTIFIED
     if not transition(session, IterationRow, state, *_iteration(job.id, index), finished_at=utcnow()):
         return False
+    label = session.scalar(select(IterationRow.label).where(*_iteration(job.id, index)))
     events.emit(session, job, "iteration", {"index": index, "label": label, "state": state})
     return True
 
@@ -213,6 +258,12 @@ def reached(session: Session, iteration: IterationRow) -> Sequence[PairRow]:
     if iteration.failures is not None and len(places) >= iteration.failures:
         rows = rows[: places[iteration.failures - 1]]
     return rows
+
+
+def forget_weaknesses(session: Session, job_id: str, iteration: int) -> None:
+    """Deletes where the pairs of an iteration failed. Nobody asks once the next action is decided, and it is up to 50 kB a pair."""
+    mine = (PairRow.job_id == job_id, PairRow.iteration == iteration, PairRow.weakness.is_not(None))
+    session.execute(update(PairRow).where(*mine).values(weakness=None))
 
 
 def order(session: Session, iteration: IterationRow) -> list[int]:
@@ -283,6 +334,7 @@ def _columns(result: PairResult) -> dict[str, Any]:
         "margin": result.margin,
         "seconds": result.seconds,
         "detail": result.detail,
+        "open_cells": result.open_cells,
         "witness_s": None if result.witness_s is None else result.witness_s.tolist(),
         "weakness": None if result.weakness is None else result.weakness.to_document(),
     }

@@ -128,9 +128,14 @@ def _begin_sqlite(begin: str, connection: Connection) -> None:
 
 
 def _configure_postgresql(connection: Any, record: Any) -> None:
-    """Makes the server end a transaction whose client is gone or hangs, so that its locks do not last."""
+    """Makes the server end a transaction whose client is gone or hangs, so that its locks do not last.
+
+    It also makes the server plan every query for the tables as they are. A plan that it keeps may be from when a table was small, and
+    read all of it.
+    """
     with connection.cursor() as cursor:
         cursor.execute(f"SET idle_in_transaction_session_timeout = '{SILENCE_SECONDS}s'")
+        cursor.execute("SET plan_cache_mode = force_custom_plan")
     connection.commit()
     _note_use(connection, record)
 

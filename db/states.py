@@ -50,6 +50,8 @@ class PairState(StrEnum):
     """A configuration in collision is known (``witness_s``)."""
     NOT_CERTIFIABLE = "not_certifiable"
     """No certificate of this degree exists in this frame."""
+    TOO_CLOSE = "too_close"
+    """The bodies come so close that no plane was found in a narrow cell; ``witness_s`` names a configuration, ``detail`` the distance."""
     INCONCLUSIVE = "inconclusive"
     """The search stopped before an answer; ``detail`` says why."""
     ERROR = "error"
@@ -119,6 +121,7 @@ _SETTLED_PAIR: set[StrEnum] = {
     PairState.CERTIFIED,
     PairState.REFUTED,
     PairState.NOT_CERTIFIABLE,
+    PairState.TOO_CLOSE,
     PairState.INCONCLUSIVE,
     PairState.ERROR,
 }

@@ -17,8 +17,8 @@ from sqlalchemy import ColumnElement, Select, and_, bindparam, exists, func, or_
 from sqlalchemy.orm import Session, aliased
 
 from db import jobs, pairs, steps
-from db.models import JobRow, PairRow, StepRow
-from db.states import JobState, PairState, StepKind, StepState
+from db.models import JobRow, StepRow
+from db.states import JobState, StepKind, StepState
 from db.types import Utc, utcnow
 
 URGENT = (StepKind.PROPOSE, StepKind.STEP)
@@ -73,9 +73,8 @@ def _has_region_now() -> Select[str]:
 
 def _has_work() -> ColumnElement[bool]:
     """Returns the condition that :func:`claim` would find work."""
-    pair = exists().where(PairRow.job_id == JobRow.id, PairRow.state == PairState.OPEN)
     step = exists().where(StepRow.job_id == JobRow.id, steps.is_due(StepRow, _NOW), StepRow.kind.in_(URGENT))
-    return or_(and_(JobRow.state == JobState.RUNNING, or_(pair, step)), _has_region())
+    return or_(and_(JobRow.state == JobState.RUNNING, or_(JobRow.open_pairs > 0, step)), _has_region())
 
 
 def _has_region() -> ColumnElement[bool]:

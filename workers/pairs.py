@@ -9,17 +9,17 @@ from functools import lru_cache, partial
 from structlog.contextvars import bound_contextvars
 
 from certifier.errors import CirisError
+from certifier.growth.actions import Certify
 from certifier.growth.options import GrowthOptions
-from certifier.model import Polytope
+from certifier.jobs.pairs import CertifyPair, pair_certifier
 from certifier.outcome import Outcome
-from certifier.pair.certification import Certification
 from certifier.pair.result import PairResult
-from db import jobs, leases, pairs
+from db import jobs, leases, pairs, partitions
 from db.models import IterationRow, PairRow
 from db.session import database
 from db.settings import settings
 from db.states import JobState
-from db.types import Arrays
+from workers.actions import certify_action
 from workers.scenes import load_scene
 from workers.transaction import persistently
 
@@ -59,8 +59,8 @@ def _certify(claim: pairs.Claim, pair: pairs.Claimed) -> PairResult:
         problem = f"{LOST.format(deaths=pair.deaths, attempts=pair.attempt - 1)} this pair"
         return _error(CirisError("worker_lost", problem), start)
     try:
-        certification, hard = _certification(claim.scene_id, claim.job_id, claim.iteration)
-        return certification.certify(pair.index, every_face=pair.index in hard)
+        action, certify = _certification(claim.scene_id, claim.job_id, claim.iteration)
+        return certify(pair.index, _begun(claim.job_id, action, pair.index))
     except CirisError as error:
         return _error(error, start)
     except Exception as error:
@@ -74,19 +74,31 @@ def _error(error: CirisError, start: float) -> PairResult:
 
 
 @lru_cache(maxsize=2)
-def _certification(scene_id: str, job_id: str, iteration: int) -> tuple[Certification, list[int]]:
-    """Returns what the pairs of an iteration share, and which pairs are hard.
+def _certification(scene_id: str, job_id: str, iteration: int) -> tuple[Certify, CertifyPair]:
+    """Returns the action of an iteration, without its pairs, and the function that certifies a pair of it.
 
     An iteration's polytope never changes, so the process keeps the last two.
     """
 
-    def read() -> tuple[Arrays, list[int], int]:
+    def read() -> tuple[Certify, int]:
         with database().read() as session:
-            row = session.get_one(IterationRow, (job_id, iteration))
-            return row.arrays, row.hard, GrowthOptions.from_document(jobs.get(session, job_id).options).random_seed
+            action = certify_action(session.get_one(IterationRow, (job_id, iteration)), pairs=[])
+            return action, GrowthOptions.from_document(jobs.get(session, job_id).options).random_seed
 
-    arrays, hard, seed = persistently(read)
-    return Certification(load_scene(scene_id), Polytope(arrays["C"], arrays["d"]), arrays.get("center"), seed), hard
+    action, seed = persistently(read)
+    return action, pair_certifier(load_scene(scene_id), action, seed)
+
+
+def _begun(job_id: str, action: Certify, index: int) -> bytes | None:
+    """Returns the partition that an earlier iteration left of a pair to go on with; None where the pair begins anew."""
+    if index not in action.begun:
+        return None
+
+    def read() -> bytes:
+        with database().read() as session:
+            return partitions.left_by(session, job_id, index, action.begun[index])
+
+    return persistently(read)
 
 
 def _save(claim: pairs.Claim, results: dict[int, PairResult]) -> pairs.Saved:

@@ -143,8 +143,9 @@ def _sampled_proposal(scene_id: str, job_id: str) -> SampledProposal | None:
     def read() -> GrowthState:
         with database().read() as session:
             job = jobs.get(session, job_id)
-            assert job.growth is not None, "a job with a certified polytope has begun to grow"
-            return GrowthState.from_document(job.growth, GrowthOptions.from_document(job.options))
+            growth = jobs.growth(session, job_id)
+            assert growth is not None, "a job with a certified polytope has begun to grow"
+            return GrowthState.from_document(growth, GrowthOptions.from_document(job.options))
 
     start = persistently(read).start
     return None if start is None else SampledProposal.of(load_scene(scene_id), start.rows)

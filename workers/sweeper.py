@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime, timedelta
 from typing import Any
 
 from kombu.exceptions import OperationalError
+from sqlalchemy.orm import Session
 
-from db import events, jobs, leases, work
-from db.models import PairRow, StepRow
+from db import events, jobs, leases, pairs, work
+from db.models import JobRow, PairRow, StepRow
 from db.session import database
 from db.settings import settings
 from db.types import utcnow
@@ -69,19 +70,21 @@ def sweep(*, by_time: bool = True) -> None:
 
 def release_lost(*, by_time: bool) -> None:
     """Opens the rows of workers that died or, with ``by_time``, did not renew their leases. The jobs' events say why."""
-    _release_lost(PairRow, by_time)
-    _release_lost(StepRow, by_time)
-
-
-def _release_lost(model: type[leases.Row], by_time: bool) -> None:
     with database().read() as session:
-        lost = leases.lost(session, model, by_time=by_time)
-    for lease in lost:
-        with writing() as (session, afterwards):
-            job = jobs.lock(session, lease.job_id)
-            if rows := leases.release(session, model, lease):
-                events.emit(session, job, "lost", {"worker": lease.worker, "reason": lease.reason, **_what(rows)})
-                afterwards.append(send_work)
+        of_pairs = leases.lost(session, PairRow, by_time=by_time)
+        of_steps = leases.lost(session, StepRow, by_time=by_time)
+    for lease in of_pairs:
+        _release(lease, pairs.release)
+    for lease in of_steps:
+        _release(lease, lambda session, _job, lease: leases.release(session, StepRow, lease))
+
+
+def _release(lease: leases.Lost, release: Callable[[Session, JobRow, leases.Lost], Sequence[PairRow] | Sequence[StepRow]]) -> None:
+    with writing() as (session, afterwards):
+        job = jobs.lock(session, lease.job_id)
+        if rows := release(session, job, lease):
+            events.emit(session, job, "lost", {"worker": lease.worker, "reason": lease.reason, **_what(rows)})
+            afterwards.append(send_work)
 
 
 def _what(rows: Sequence[PairRow] | Sequence[StepRow]) -> dict[str, Any]:

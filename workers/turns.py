@@ -17,17 +17,18 @@ from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
 from certifier.growth.actions import Candidate, Certify, Finish, Outcomes, Propose, Report, Step, Transition
-from certifier.model import Polytope
+from certifier.growth.options import GrowthOptions
 from certifier.outcome import Outcome
 from certifier.pair.forecast import PairCost, forecast
 from certifier.pair.result import Weakness
-from db import jobs, leases, pairs, steps, work
+from db import jobs, leases, pairs, partitions, steps, work
 from db.models import IterationRow, JobRow
 from db.session import database
 from db.settings import settings
 from db.states import JOB, STEP, IterationState, JobState, StepKind, StepState, unfinished
 from db.types import utcnow
 from workers import admission
+from workers.actions import certify_action
 from workers.app import send_work
 from workers.coordinator import ending, next_transition, step_report
 from workers.scenes import load_scene
@@ -77,7 +78,8 @@ def coordinate(job_id: str) -> None:
 def _decide(turn: Turn) -> Transition:
     if turn.growth is None:
         left = None if turn.deadline_at is None else (turn.deadline_at - utcnow()).total_seconds()
-        admission.check(_forecast(turn.scene_id), settings(), left)
+        if not GrowthOptions.from_document(turn.options).by_cells:  # the forecast is about the program (11)
+            admission.check(_forecast(turn.scene_id), settings(), left)
     return next_transition(load_scene(turn.scene_id), turn.options, turn.growth, turn.report)
 
 
@@ -109,7 +111,7 @@ def _begin(job_id: str) -> Turn | None:
             return None
         job.coordinator, job.coordinator_until = leases.this_worker(), now + timedelta(seconds=COORDINATION_SECONDS)
         job.coordinator_attempts += 1
-        return Turn(job_id, job.turn, job.scene_id, job.options, job.deadline_at, job.growth, report)
+        return Turn(job_id, job.turn, job.scene_id, job.options, job.deadline_at, jobs.growth(session, job_id), report)
 
 
 def _report(session: Session, job: JobRow) -> Report | None:
@@ -126,16 +128,7 @@ def _report(session: Session, job: JobRow) -> Report | None:
 
 def _outcomes(session: Session, iteration: IterationRow) -> Outcomes:
     """Returns the report on a certification that has ended, from its rows."""
-    action = Certify(
-        iteration=iteration.index,
-        label=iteration.label,
-        polytope=Polytope(iteration.arrays["C"], iteration.arrays["d"]),
-        center=iteration.arrays.get("center"),
-        pairs=pairs.order(session, iteration),
-        reuse={int(pair): source for pair, source in iteration.reuse.items()},
-        hard=iteration.hard,
-        failures=iteration.failures,
-    )
+    action = certify_action(iteration, pairs.order(session, iteration))
     rows = pairs.reached(session, iteration)
     weaknesses = {row.pair_index: Weakness.from_document(row.weakness) for row in rows if row.weakness is not None}
     return Outcomes(action, {row.pair_index: Outcome(row.state) for row in rows}, weaknesses)
@@ -152,8 +145,10 @@ def _save(turn: Turn, transition: Transition) -> bool:
             return True
         if job.state == JobState.QUEUED:
             jobs.start(session, job, work.served_by_now(session))
+        if isinstance(turn.report, Outcomes):
+            pairs.forget_weaknesses(session, job.id, turn.report.action.iteration)
         _advance(job, transition.action)
-        job.growth = transition.state.to_document()
+        jobs.keep_growth(session, job, transition.state.to_document())
         match transition.action:
             case Propose() as action:
                 _add_step(session, job, StepKind.PROPOSE, {"seed": action.seed}, afterwards)
@@ -211,6 +206,10 @@ def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: A
         reuse=action.reuse,
         hard=action.hard,
         failures=action.failures,
+        cells=action.cells,
+        box=None if action.box is None else (action.box.mid, action.box.half),
+        begun=action.begun,
+        ending=action.ending,
     )
     # Each solver that finds work wakes the next one. Where there is much work, this many solvers begin at once.
     pieces = math.ceil(sum(pair.forecast_seconds for pair in new) / settings().batch_seconds)
@@ -232,7 +231,7 @@ def _finish_growth(session: Session, job: JobRow, finish: Finish) -> None:
     if job.action is not None and job.action["kind"] == "finish":
         return
     jobs.start(session, job)
-    pairs.skip(session, job.id)
+    pairs.skip(session, job)
     steps.skip(session, job.id)
     pairs.skip_iterations(session, job.id)
     _advance(job, finish)
@@ -247,6 +246,7 @@ def _finish(session: Session, job: JobRow, afterwards: Afterwards) -> None:
         return
     refused = next((step.report for step in rows if step.kind == StepKind.ACCEPT and step.state == StepState.FAILED), None)
     failed = next((step.report for step in reversed(rows) if step.state == StepState.FAILED), None)
+    partitions.drop(session, job.id)
     assert job.action is not None, "whoever finishes a job has found its last action"
     finish = Finish(Outcome(job.action["outcome"]), job.action["reason"])
     if job.state == JobState.CANCELLING:

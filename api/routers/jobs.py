@@ -95,7 +95,7 @@ def _options(body: GrowRequest | CertifyRequest, scene: Scene) -> dict[str, Any]
     if isinstance(body, GrowRequest):
         return {"kind": "grow", "seed": checks.seed(scene, body.seed).to_document(), **body.options.model_dump()}
     checks.polytope(scene, body.polytope)
-    return {"kind": "certify", "seed": body.polytope.model_dump(exclude_none=True), "random_seed": body.random_seed}
+    return {"kind": "certify", "seed": body.polytope.model_dump(exclude_none=True), "cells": body.cells, "random_seed": body.random_seed}
 
 
 def _digest(scene_id: str, options: dict[str, Any], body: JobRequest) -> str:
@@ -177,7 +177,7 @@ def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge
 def download_pair_proof(job_id: str, pair: int, iteration: Annotated[int, Query(ge=0, le=MAX_INT)], db: Db) -> Response:
     """Returns the proof of a pair's outcome (certified, refuted or not certifiable), together with the scene.
 
-    `ciris verify` checks the file offline.
+    `ciris verify` checks the file offline. What a search over partitions has not certified has no proof.
     """
     with db.read() as session:
         job = jobs.get(session, job_id)
@@ -212,6 +212,7 @@ def _cell(scene: Scene, row: PairRow) -> PairCell:
         seconds=row.seconds,
         detail=row.detail,
         worker=row.worker,
+        open_cells=row.open_cells,
         witness_q=None if row.witness_s is None else scene.to_q(row.witness_s).tolist(),
         proof=row.proof_digest,
     )

@@ -29,9 +29,16 @@ class GrowOptions(Request):
     """Says how to grow the region: how the first polytope contracts, how far the region is pushed out, and when growing stops."""
 
     contraction: Annotated[
-        Literal["targeted", "uniform"],
-        Field(description="`targeted` adds faces where pairs fail; `uniform` moves every face inwards by the same amount."),
-    ] = "targeted"
+        Literal["whole", "targeted", "uniform"],
+        Field(
+            description="`whole` keeps the first polytope, certifies it cell by cell, and cuts off only what cannot be certified. The "
+            "other two shrink it until every pair has one plane that moves with the joints: `targeted` adds faces where pairs fail; "
+            "`uniform` moves every face inwards by the same amount."
+        ),
+    ] = DEFAULTS.contraction
+    cells: Annotated[
+        int, _whole("cells", "For `whole`: so many cells of each pair are looked at before those that are open still are cut off.")
+    ] = DEFAULTS.cells
     contractions: Annotated[
         int | None,
         _whole(
@@ -155,6 +162,14 @@ class CertifyRequest(JobRequest):
 
     kind: Literal["certify"]
     polytope: PolytopeBody
+    cells: Annotated[
+        int,
+        _whole(
+            "cells",
+            "So many cells of the polytope are looked at for each pair, each with a plane of its own. "
+            "With 1, each pair has one plane on all of the polytope.",
+        ),
+    ] = DEFAULTS.cells
     random_seed: RandomSeed = 0
 
 
@@ -268,8 +283,14 @@ class PairCell(BaseModel):
     seconds: float | None
     detail: str | None
     worker: str | None
-    witness_q: list[float] | None = Field(description="A configuration (joint positions) at which the pair collides; null unless refuted.")
-    proof: str | None = Field(description="SHA-256 of the pair's proof file.")
+    witness_q: list[float] | None = Field(
+        description="A configuration (joint positions) at which the pair collides (refuted), or is nearest (too_close, where `detail` says "
+        "how near); else null."
+    )
+    open_cells: int | None = Field(
+        description="Number of cells of the polytope that the search over partitions left open; null where it left none, and elsewhere."
+    )
+    proof: str | None = Field(description="SHA-256 of the pair's proof file; null where the outcome has none.")
 
 
 class PairMatrix(BaseModel):

@@ -69,6 +69,11 @@ class GrowthOptions:
     backoff: int = 2
     random_seed: int = 0
 
+    @property
+    def by_cells(self) -> bool:
+        """Returns whether pairs are certified cell by cell, and not by the program (11) on all of the polytope."""
+        return self.cells > 1 if self.kind == "certify" else self.contraction == "whole"
+
     def to_document(self) -> dict[str, Any]:
         """Returns the options as JSON-able data."""
         return asdict(self)

@@ -45,20 +45,21 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         if whole.stage + 1 < len(STAGES):
             return begin_stage(scene, state, start, whole.stage + 1)
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
-    unknown = [i for i in report.failures if i not in report.weaknesses]
-    if unknown:
-        return _end(scene, state, report, unknown[0], "could not be certified, and it is not known where they fail")
+    unknown = next((i for i in report.failures if i not in report.weaknesses), None)
+    if unknown is not None:  # Nothing can be cut off for it, so it would fail again and again.
+        pair = scene.pairs[unknown]
+        return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing is known of where they fail")
     corners = [(joints_between(scene, i), report.weaknesses[i].points) for i in report.failures]
     smaller = cut(scene, whole.polytope, start.keep, corners, action.iteration)
     if smaller is None:
-        why = "touch, or come too close, at or between configurations that have to stay inside"
-        return _end(scene, state, report, report.failures[0], why)
+        pair = scene.pairs[report.failures[0]]
+        reason = f"{pair.a} and {pair.b} touch, or come too close, at or between configurations that have to stay inside"
+        return _ended(state, report, reason)
     return _next(scene, replace(state, whole=replace(whole, polytope=smaller)))
 
 
-def _end(scene: Scene, state: GrowthState, report: Outcomes, index: int, why: str) -> Transition:
-    """Ends the growth because of a pair that nothing can be done about."""
-    reason = f"{scene.pairs[index].a} and {scene.pairs[index].b} {why}"
+def _ended(state: GrowthState, report: Outcomes, reason: str) -> Transition:
+    """Ends the growth with the best region so far, or without one."""
     if state.best is not None:
         return Transition(state, Finish(Outcome.CERTIFIED, f"certified; growth ended early: {reason}"))
     return Transition(state, Finish(combine(list(report.outcomes.values())), reason))

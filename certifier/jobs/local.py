@@ -12,14 +12,13 @@ from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcome
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import Start
+from certifier.jobs.pairs import pair_certifier
 from certifier.jobs.region import Region, certified_region, growth_point, versions
 from certifier.jobs.share import SampledProposal
 from certifier.jobs.verdict import Verdict
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee, Outcome
-from certifier.pair.certification import Certification
 from certifier.pair.result import PairResult
-from certifier.partition.certification import CellCertification
 from certifier.seeding.options import SeedOptions
 from certifier.seeding.propose import propose
 from certifier.step.step import step
@@ -55,11 +54,12 @@ class _Run:
         self.candidate = candidate
 
     def certify(self, action: Certify) -> Outcomes:
-        certify = self._by_program(action) if action.cells == 1 else self._by_cells(action)
+        certify = pair_certifier(self.scene, action, self.seed)
         found = self.results.setdefault(action.iteration, {})
         failures = 0
         for index in action.pairs:
-            found[index] = certify(index)
+            begun = self.results[action.begun[index]][index].partition if index in action.begun else None
+            found[index] = certify(index, begun)
             pair = self.scene.pairs[index]
             self.progress(
                 f"{action.label} {action.iteration}: {len(found)}/{len(action.pairs)} {pair.a} - {pair.b}: {found[index].outcome}"
@@ -69,19 +69,6 @@ class _Run:
                 break
         weaknesses = {index: result.weakness for index, result in found.items() if result.weakness is not None}
         return Outcomes(action, {index: result.outcome for index, result in found.items()}, weaknesses)
-
-    def _by_program(self, action: Certify) -> Callable[[int], PairResult]:
-        shared = Certification(self.scene, action.polytope, action.center, self.seed)
-        return lambda index: shared.certify(index, every_face=index in action.hard)
-
-    def _by_cells(self, action: Certify) -> Callable[[int], PairResult]:
-        shared = CellCertification(self.scene, action.polytope, self.seed, action.box)
-
-        def certify(index: int) -> PairResult:
-            begun = self.results[action.begun[index]][index].proof if index in action.begun else None
-            return shared.certify(index, action.cells, begun, index in action.ending)
-
-        return certify
 
     def proofs(self, candidate: Candidate) -> dict[int, bytes]:
         return {index: self.results[iteration][index].proof or b"" for index, iteration in candidate.proofs.items()}
@@ -133,15 +120,18 @@ def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: No
     return certified_region(scene, run.candidate, run.proofs(run.candidate), provenance, run.proposal)
 
 
-def certify(scene: Scene, polytope: Polytope, center: Array | None = None, progress: Progress = lambda _: None) -> Verdict:
+def certify(scene: Scene, polytope: Polytope, center: Array | None = None, progress: Progress = lambda _: None, cells: int = 1) -> Verdict:
     """Certifies every pair on a polytope and the joint limits.
 
+    Args:
+        cells: as in :class:`certifier.growth.options.GrowthOptions`.
+
     Raises:
-        RegionError: the polytope is malformed, empty or unbounded.
+        RegionError: the polytope is malformed, empty or unbounded, or ``cells`` is out of range.
     """
     start = time.perf_counter()
     seed = {"C": polytope.C.tolist(), "d": polytope.d.tolist(), "center": None if center is None else center.tolist()}
-    options = GrowthOptions(kind="certify", seed=seed)
+    options = GrowthOptions.from_document({"kind": "certify", "seed": seed, "cells": cells})
     action = begin(scene, options).action
     assert isinstance(action, Certify)
     run = _Run(scene, options.random_seed, progress)

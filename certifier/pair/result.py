@@ -56,9 +56,13 @@ class PairResult:
         seconds: how long it took.
         margin: certified lower bound in metres of the distance between the padded bodies; None unless certified.
         detail: a sentence for people; empty when the outcome says it all.
-        witness_s: (n,) a configuration in s in contact, when refuted.
-        proof: the verified proof as bytes. It is a :class:`certifier.proof.pair.PairProof` when certified; from
-            :mod:`certifier.proof.negative`, a WitnessProof when refuted and a DualProof when not certifiable.
+        witness_s: (n,) a configuration in s: in contact when refuted, or at which the bodies are too close.
+        proof: the verified proof as bytes. When certified it is a :class:`certifier.proof.pair.PairProof` or a
+            :class:`certifier.proof.partition.PartitionProof`; from :mod:`certifier.proof.negative`, a WitnessProof when refuted by the
+            program's contacts and a DualProof when not certifiable.
+        partition: what a search over partitions has proved already, when it has not certified the pair: the bytes of a PartitionProof with
+            open cells, which is no proof of anything. A later search goes on with it.
+        open_cells: how many cells of that partition are open.
         weakness: where the certification fails, when that is known.
         error: the CirisError document of an ``error``.
     """
@@ -70,5 +74,7 @@ class PairResult:
     detail: str = ""
     witness_s: Array | None = None
     proof: bytes | None = None
+    partition: bytes | None = None
+    open_cells: int | None = None
     weakness: Weakness | None = None
     error: dict[str, Any] | None = None

@@ -64,7 +64,7 @@ class CellCertification:
 
         Args:
             cells: end after so many cells.
-            begun: the ``proof`` of an earlier result of this pair that was not certified, on a polytope of which this one is a part.
+            begun: the ``partition`` of an earlier result of this pair, on a polytope of which this one is a part.
             ending: what is still open will be cut off, so the result names points of all open cells.
         """
         start, pair = time.perf_counter(), self._scene.pairs[index]
@@ -116,15 +116,16 @@ class CellCertification:
             points += self._of_cells(cells)
         points += [point for cell in report.narrow for point in cell]
         weakness = Weakness(np.array(points[:MOST_POINTS]).reshape(-1, self._scene.n), np.zeros(self._scene.n))
+        found = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, partition=begun, open_cells=len(cells), weakness=weakness)
         if report.contacts:
-            return PairResult(Outcome.REFUTED, Stage.CELLS, witness_s=report.contacts[0], proof=begun, weakness=weakness)
+            return replace(found, outcome=Outcome.REFUTED, witness_s=report.contacts[0])
         if report.narrow:
             s, distance = self._nearest(search, np.concatenate(report.narrow))
             detail = f"the padded bodies are {distance:.3g} m apart at the configuration named, too close for a plane"
-            return PairResult(Outcome.TOO_CLOSE, Stage.CELLS, witness_s=s, detail=detail, proof=begun, weakness=weakness)
+            return replace(found, outcome=Outcome.TOO_CLOSE, witness_s=s, detail=detail)
         inside = sum(((self._area.samples >= low) & (self._area.samples <= up)).all(axis=1).mean() for low, up in cells)
         detail = f"{len(cells)} cells, {100 * float(inside):.2g} % of the polytope, are open after {report.cells} cells"
-        return PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, detail=detail, proof=begun, weakness=weakness)
+        return replace(found, detail=detail)
 
     def _contacts(self, search: Search, volumes: Volumes, contacts: list[Array]) -> list[Array]:
         """Returns the contacts with others about them, which show how far a contact reaches."""

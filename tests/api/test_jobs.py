@@ -14,7 +14,9 @@ from certifier.growth.options import GrowthOptions
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair.result import PairResult
+from certifier.partition.certification import CellCertification
 from certifier.seeding.options import SeedOptions
+from certifier.verify.file import verify_file
 from db import jobs, pairs
 from db.session import Database
 from tests.api.conftest import BASE_URL, PROBLEM
@@ -169,6 +171,49 @@ def test_a_witness_is_given_in_joint_positions(client: TestClient, database: Dat
     matrix = client.get(f"/v1/jobs/{job_id}/pairs").json()
     assert matrix["cells"][0]["witness_q"] == scene.to_q([0.25]).tolist()
     assert matrix["iterations"][0]["reused"] == {"1": 0}
+
+
+def test_only_outcomes_that_have_a_proof_offer_one(client: TestClient, database: Database, scene: Scene) -> None:
+    """The first pair's search has left a partition with open cells; the second pair is certified."""
+    job_id = client.post("/v1/jobs", json=CERTIFY | {"cells": 50}).json()["id"]
+    polytope = scene.polytope([[1.0], [-1.0]], [0.9, 0.9])
+    search = CellCertification(scene, polytope)
+    certified = search.certify(1, 50)
+    assert certified.outcome is Outcome.CERTIFIED
+    left = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, detail="2 cells are open", partition=certified.proof, open_cells=2)
+    with database.write() as session:
+        job = jobs.lock(session, job_id)
+        jobs.start(session, job)
+        new = [pairs.NewPair(i, pair.a, pair.b, 1.0) for i, pair in enumerate(scene.pairs)]
+        C, d = polytope.C, polytope.d
+        pairs.add_iteration(
+            session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={}, hard=[], failures=None, cells=50
+        )
+        claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
+        assert claim is not None
+        pairs.save(session, claim, {0: left, 1: certified})
+    cells = client.get(f"/v1/jobs/{job_id}/pairs").json()["cells"]
+    assert [(cell["state"], cell["stage"], cell["open_cells"], cell["proof"] is None) for cell in cells] == [
+        ("inconclusive", "cells", 2, True),
+        ("certified", "cells", None, False),
+    ]
+    answers = [client.get(f"/v1/jobs/{job_id}/pairs/{pair}/proof", params={"iteration": 0}) for pair in (0, 1)]
+    assert [answer.status_code for answer in answers] == [404, 200]
+    assert answers[0].json()["code"] == "proof_not_found"
+    assert verify_file(answers[1].content).kind == "partition"
+    page = client.get(f"/jobs/{job_id}", headers={"Accept": "text/html"}).text
+    assert "inconclusive; by cells; 0 s; 2 open cells; 2 cells are open" in page
+
+
+def test_a_job_that_asks_for_cells_says_so(client: TestClient, scene: Scene) -> None:
+    def options(body: dict[str, Any]) -> GrowthOptions:
+        return GrowthOptions.from_document(client.post("/v1/jobs", json=body).json()["options"])
+
+    assert [options(body).by_cells for body in (CERTIFY, CERTIFY | {"cells": 300})] == [False, True]
+    whole = options(GROW | {"options": {"contraction": "whole", "cells": 900}})
+    assert (whole.by_cells, whole.cells) == (True, 900)
+    refused = client.post("/v1/jobs", json=CERTIFY | {"cells": 0})
+    assert (refused.status_code, refused.json()["field"]) == (422, "cells")
 
 
 def test_a_job_is_accepted_while_redis_is_down(database: Database, scene: Scene, environment: pytest.MonkeyPatch) -> None:

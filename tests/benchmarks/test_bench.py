@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import agreement, catalogue, compare, growth, report, service, survey
+from benchmarks import agreement, catalogue, compare, growth, report, service, store, survey
 from benchmarks.compare import Verdict, verdict
 from certifier.errors import CirisError
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD
 from certifier.outcome import Outcome
 from certifier.pair.closest import closest
+from tests.services import Postgres
 
 
 def bench(*arguments: str) -> dict[str, Any]:
@@ -80,6 +81,15 @@ def test_runs_that_come_to_different_regions_are_no_measurement(monkeypatch: pyt
     monkeypatch.setattr(service, "_grown", lambda *_: {"seconds": 1.0, "ellipsoid": next(volumes)})
     with pytest.raises(CirisError, match="different regions"):
         service.beside_local("planar_2dof", processes=1, turns=1, progress=lambda _: None)
+
+
+def test_the_store_is_measured_on_both_databases(postgres: Postgres) -> None:
+    document = store.store(postgres.new_database(), [80], lambda _: None)
+    rows = [(row["database"], row["pairs"], row["settled"]) for row in document["rows"]]
+    assert rows == [(database, 80, settled) for database in ("SQLite", "PostgreSQL") for settled in (0, 40)]
+    for row in document["rows"]:
+        assert min(row["insert_seconds"], row["claim_ms"], row["look_ms"], row["save_ms"]) > 0
+        assert row["database"] in report.text(document)
 
 
 @pytest.mark.parametrize(

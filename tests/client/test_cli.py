@@ -13,8 +13,12 @@ import httpx2
 import numpy as np
 import pytest
 
+from certifier.jobs import local
 from certifier.jobs.region import Region
+from certifier.jobs.verdict import Verdict
 from certifier.model import Scene
+from certifier.outcome import Guarantee, Outcome, Stage
+from certifier.pair.result import PairResult
 from certifier.verify.region import verify_region
 from client import output
 from client.cli import _joined
@@ -133,6 +137,25 @@ def test_certifying_here_prints_the_stable_document(spawn: Ciris, files: Path) -
 
 
 @pytest.mark.usefixtures("parsed_once")
+def test_a_polytope_is_certified_cell_by_cell(ciris: Ciris, files: Path) -> None:
+    document = ciris("certify", PLANAR, "--polytope", "small.npz", "--local", "--cells", "300", "--json").json
+    assert document["outcome"] == "certified"
+    assert {pair["stage"] for pair in document["pairs"]} == {"cells"}
+
+
+@pytest.mark.usefixtures("parsed_once")
+def test_bodies_that_are_too_close_are_no_collision(ciris: Ciris, files: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    detail = "the padded bodies are 0.0001 m apart at the configuration named, too close for a plane"
+    near = PairResult(Outcome.TOO_CLOSE, Stage.CELLS, witness_s=np.zeros(2), detail=detail)
+    monkeypatch.setattr(local, "certify", lambda *_: Verdict({0: near}, Guarantee.EXACT, 0.1))
+    done = ciris("certify", PLANAR, "--polytope", "small.npz", "--local", "--cells", "300")
+    assert done.status == 1
+    assert f"arm/lower/bar and obstacles/body/block: {detail}, at q = 0, 0\n" in done.stdout
+    assert "collision" not in done.stdout
+    assert done.stdout.splitlines()[-1].startswith("planar-2dof: too close, guarantee none")
+
+
+@pytest.mark.usefixtures("parsed_once")
 def test_drakes_answer_is_numeric_at_most(ciris: Ciris, files: Path) -> None:
     arguments = ("certify", PLANAR, "--local", "--backend", "drake", "--json", "--polytope")
     done = ciris(*arguments, "small.npz")
@@ -150,6 +173,8 @@ def test_drakes_answer_is_numeric_at_most(ciris: Ciris, files: Path) -> None:
         (("--local", "--backend", "drake", "--solver", "best"), "solver: best is unknown (available: clarabel"),
         (("--local", "--solver", "scs"), "add --backend drake"),
         (("--backend", "drake"), "add --local"),
+        (("--local", "--backend", "drake", "--cells", "9"), "knows no cells"),
+        (("--local", "--cells", "0"), "cells must be an integer from 1"),
     ],
 )
 def test_drake_and_its_solvers_are_asked_for_properly(ciris: Ciris, files: Path, arguments: tuple[str, ...], words: str) -> None:

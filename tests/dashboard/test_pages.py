@@ -5,18 +5,23 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from datetime import UTC, datetime
+from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
 
+import dashboard
 from api.pages import growth_chart, matrix_rows, progress
 from api.schemas.jobs import GrowthPoint, Iteration, PairCell, PairMatrix
 from api.schemas.scenes import PairInfo
 from certifier.jobs.region import Region
+from certifier.outcome import Outcome
 from db import regions, scenes
 from db.session import Database
 from db.states import IterationState, PairState
 from tests.scenes import slider
+
+ROOT = Path(dashboard.__file__).parent
 
 
 @pytest.fixture
@@ -104,7 +109,7 @@ def iteration(index: int, reused: dict[int, int]) -> Iteration:
 
 
 def cell(pair: int, index: int, state: PairState, **values: object) -> PairCell:
-    known = dict.fromkeys(("stage", "margin", "seconds", "detail", "worker", "witness_q", "proof")) | values
+    known = dict.fromkeys(("stage", "margin", "seconds", "detail", "worker", "witness_q", "open_cells", "proof")) | values
     return PairCell(iteration=index, pair=pair, state=state, **known)  # type: ignore[arg-type]
 
 
@@ -128,6 +133,31 @@ def test_the_matrix_has_a_cell_for_every_pair_and_iteration(matrix: PairMatrix) 
     assert rows[0].cells[0].title == "certified; by sos; 0.5 s; margin at least 12.3 mm"
     assert rows[0].cells[1].title == "certified by the proof of iteration 0"
     assert rows[1].cells[0].title == "refuted; in collision at q = 0.5, 1"
+
+
+def test_what_a_search_has_left_open_is_said(matrix: PairMatrix) -> None:
+    left = [
+        cell(1, 1, PairState.TOO_CLOSE, witness_q=[0.5, 1.0], open_cells=4, detail="0.001 m apart"),
+        cell(2, 1, PairState.INCONCLUSIVE, open_cells=1),
+    ]
+    later = matrix.model_copy(update={"cells": [*matrix.cells[:2], *left]})
+    rows = matrix_rows(later)
+    assert rows[1].cells[1].title == "too close; nearest at q = 0.5, 1; 4 open cells; 0.001 m apart"
+    assert rows[2].cells[1].title == "inconclusive; 1 open cell"
+    found = progress(later)
+    assert found is not None
+    assert (found.parts, found.open_cells) == ([("too_close", 1), ("inconclusive", 1), ("reused", 1)], "5 open cells")
+    nothing_left = progress(matrix)
+    assert nothing_left is not None
+    assert nothing_left.open_cells is None
+
+
+def test_every_state_of_a_pair_has_a_colour_and_a_key() -> None:
+    css, page = ((ROOT / name).read_text() for name in ("static/ciris.css", "templates/job_live.html"))
+    for outcome in Outcome:
+        for selector in (f".badge.{outcome}", f".cell.{outcome}", f".key.{outcome}", f".bar .{outcome}"):
+            assert re.search(rf"{re.escape(selector)}\b", css), selector
+        assert f'class="key {outcome}"' in page
 
 
 def test_progress_counts_what_is_settled(matrix: PairMatrix) -> None:

@@ -175,7 +175,7 @@ def test_a_lease_that_ran_out_is_released_and_its_result_is_then_refused(db: Dat
         assert leases.lost(session, PairRow, by_time=False) == []
         (lease,) = leases.lost(session, PairRow, by_time=True)
         assert lease == leases.Lost(job_id, first.token, ELSEWHERE, "its lease ran out", alone=False)
-        assert [row.pair_index for row in leases.release(session, PairRow, lease)] == [0]
+        assert [row.pair_index for row in pairs.release(session, jobs.lock(session, job_id), lease)] == [0]
     second = claim(db, job_id)
     assert second is not None
     assert second.pairs == (pairs.Claimed(0, attempt=2, deaths=0),)
@@ -202,7 +202,7 @@ def test_a_lease_of_this_host_ends_with_its_process(db: Database) -> None:
     with db.write() as session:
         (lease,) = leases.lost(session, PairRow, by_time=False)
         assert (lease.reason, lease.alone) == ("its worker ended", False)
-        leases.release(session, PairRow, lease)
+        pairs.release(session, jobs.lock(session, job_id), lease)
         assert session.scalars(select(PairRow)).one().deaths == 0
     assert leases.is_alive(leases.this_worker()) is True
     assert leases.is_alive(ELSEWHERE) is None
@@ -269,7 +269,7 @@ def test_a_holder_whose_work_is_not_wanted_any_more_dies(db: Database, database_
     assert process.exitcode is None
     with db.write() as session:
         if what == "skipped":
-            pairs.skip(session, job_id)
+            pairs.skip(session, jobs.lock(session, job_id))
         else:
             jobs.cancel(session, job_id)
     process.join(30)

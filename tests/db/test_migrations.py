@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from sqlalchemy import inspect
 
-from db import jobs, migrate, pairs, scenes
+from db import jobs, migrate, pairs, scenes, work
 from db.session import Database
-from tests.db.builders import a_running_job
+from db.types import utcnow
+from tests.db.builders import a_running_job, certified
 from tests.scenes import slider
 
 
@@ -54,13 +55,65 @@ def test_jobs_and_their_pairs_survive_the_way_down_and_up(empty_database_url: st
     with database.write() as session:
         job = a_running_job(session, pair_count=3)
         certify = {"kind": "certify", "iteration": 0}
-        job.action, job.growth, job_id = certify, {"next": 1}, job.id
+        job.action, job_id = certify, job.id
+        jobs.keep_growth(session, job, {"next": 1})
     migrate.downgrade(empty_database_url, "0001")
     migrate.upgrade(empty_database_url)
     assert migrate.drift(empty_database_url) == []
     with database.read() as session:
         job = jobs.get(session, job_id)
         assert (job.state, len(pairs.of_job(session, job_id))) == ("running", 3)
-        assert (job.action, job.growth) == (certify, {"next": 1})
+        assert (job.action, jobs.growth(session, job_id)) == (certify, {"next": 1})
         assert [(row.hard, row.failures, row.faces) for row in pairs.iterations(session, job_id)] == [([], 1, 2)]
     database.close()
+
+
+def test_a_job_under_way_goes_on_after_the_counts_were_introduced(empty_database_url: str) -> None:
+    """One pair is settled, one is held, two are open; the holder's lease survives."""
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.write() as session:
+        job_id = a_running_job(session, pair_count=4).id
+    done, held = (claimed(database, job_id) for _ in range(2))
+    with database.write() as session:
+        pairs.save(session, done, certified(done.pairs[0].index))
+    database.close()
+    migrate.downgrade(empty_database_url, "0007")
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.read() as session:
+        job = jobs.get(session, job_id)
+        assert (job.open_pairs, job.running_pairs) == (2, 1)
+        assert jobs.awaiting_coordination(session, utcnow()) == []
+    with database.write() as session:
+        assert pairs.save(session, held, certified(held.pairs[0].index)) == pairs.Saved(held=False, finished=False)
+    finished = []
+    for _ in range(2):
+        claim = claimed(database, job_id)
+        with database.write() as session:
+            finished.append(pairs.save(session, claim, certified(claim.pairs[0].index)).finished)
+    assert finished == [False, True]
+    database.close()
+
+
+def test_iterations_stored_before_there_were_cells_say_that_they_have_none(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.write() as session:
+        job_id = a_running_job(session).id
+    database.close()
+    migrate.downgrade(empty_database_url, "0008")
+    assert "partitions" not in tables(empty_database_url)
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.read() as session:
+        assert [(row.cells, row.begun, row.ending) for row in pairs.iterations(session, job_id)] == [(1, {}, [])]
+        assert {row.open_cells for row in pairs.of_job(session, job_id)} == {None}
+    database.close()
+
+
+def claimed(database: Database, job_id: str) -> pairs.Claim:
+    with database.write() as session:
+        claim = work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5)
+    assert isinstance(claim, pairs.Claim)
+    return claim

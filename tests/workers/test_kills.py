@@ -37,9 +37,11 @@ UNTIL_RESTART = (0.0, 1.0)
 """Seconds."""
 TARGETED = {"pushes": 1, "max_rounds": 1}
 UNIFORM = {"contraction": "uniform", "bisection_steps": 4, "max_rounds": 1}
+WHOLE = {"contraction": "whole", "cells": 600}
 JOBS: dict[str, tuple[str, dict[str, Any]]] = {
     "planar, targeted": ("planar_2dof", TARGETED),
     "planar, uniform": ("planar_2dof", UNIFORM),
+    "planar, whole": ("planar_2dof", WHOLE),
     "arm, targeted": ("arm_3dof", TARGETED),
     "arm, uniform": ("arm_3dof", UNIFORM),
 }

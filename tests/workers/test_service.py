@@ -2,27 +2,35 @@
 
 from __future__ import annotations
 
+import os
+import signal
+from typing import Any
+
 import numpy as np
 import pytest
+from sqlalchemy import select
 
 from certifier.growth.options import GrowthOptions
 from certifier.jobs.local import grow
 from certifier.model import Scene
 from certifier.verify.region import verify_region
 from db import jobs, pairs, proofs, regions
+from db.models import PairRow, PartitionRow
 from db.session import database
 from db.settings import settings
 from tests.workers.options import box_around, grow_box
-from tests.workers.service import ended, events_of, eventually, kill_holder, pairs_of, submit
+from tests.workers.record import check_record
+from tests.workers.service import Service, ended, events_of, eventually, holder, kill_holder, pairs_of, submit
 from workers.app import send_coordinate
 
 pytestmark = pytest.mark.usefixtures("service")
 SEED = [0.0, 0.0]
+SAME = ("halfspace_normals", "halfspace_offsets", "interior_point", "inscribed_ellipsoid", "share", "joint_ranges", "archimedean")
 
 
-@pytest.mark.parametrize("contraction", ["targeted", "uniform"])
+@pytest.mark.parametrize("contraction", ["whole", "targeted", "uniform"])
 def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(planar: Scene, contraction: str) -> None:
-    options = grow_box(SEED, 0.4, contraction=contraction, pushes=1, max_rounds=1)
+    options = grow_box(SEED, 0.4, contraction=contraction, pushes=1, max_rounds=1, cells=600)
     job = ended(submit(planar, options))
     assert (job.state, job.outcome, job.error) == ("succeeded", "certified", None)
     with database().read() as session:
@@ -33,6 +41,7 @@ def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(plana
     alone = grow(planar, GrowthOptions.from_document(options)).manifest
     assert (region.arrays["C"].tolist(), region.arrays["d"].tolist()) == (alone["halfspace_normals"], alone["halfspace_offsets"])
     assert region.manifest["share"] == region.share == alone["share"]
+    assert certified_pairs(region.manifest) == certified_pairs(alone)
     assert region.manifest["joint_ranges"] == alone["joint_ranges"]
     assert region.manifest["provenance"]["proposal"] == alone["provenance"]["proposal"]
     curves = ([(p["iteration"], p["share"]) for p in manifest["provenance"]["growth_curve"]] for manifest in (region.manifest, alone))
@@ -47,6 +56,37 @@ def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(plana
     assert [event.seq for event in events] == list(range(1, len(events) + 1))
     assert (events[0].data["state"], events[-1].data["state"]) == ("queued", "succeeded")
     assert {"iteration", "pairs", "step", "region"} < {event.kind for event in events}
+
+
+def certified_pairs(manifest: dict[str, Any]) -> list[tuple[Any, ...]]:
+    return [tuple(pair[name] for name in ("a", "b", "outcome", "margin", "proof_digest")) for pair in manifest["pairs"]]
+
+
+def test_a_whole_region_is_the_same_when_workers_die_between_its_rounds(planar: Scene, service: Service) -> None:
+    """What a dead process had begun is gone on with from where the round before left it."""
+    options = grow_box(SEED, 0.4, contraction="whole", cells=600)
+    job_id = submit(planar, options)
+
+    def goes_on() -> PairRow | None:
+        with database().read() as session:
+            begun = {(row.index, int(pair)) for row in pairs.iterations(session, job_id) for pair in row.begun}
+        return next((row for row in pairs_of(job_id) if row.state == "running" and (row.iteration, row.pair_index) in begun), None)
+
+    killed = eventually(goes_on, "a pair is gone on with")
+    os.kill(holder(killed), signal.SIGKILL)
+    eventually(lambda: any(row.iteration > killed.iteration for row in pairs_of(job_id)), "the next round begins")
+    service.kill("solve")
+    service.start("solve")
+    job = ended(job_id)
+    check_record(job_id)
+    again = next(row for row in pairs_of(job_id) if (row.iteration, row.pair_index) == (killed.iteration, killed.pair_index))
+    assert again.attempts == 2
+    with database().read() as session:
+        manifest = regions.get(session, job.region_id or "").manifest
+        assert session.scalars(select(PartitionRow.pair_index).where(PartitionRow.job_id == job_id)).all() == []
+    alone = grow(planar, GrowthOptions.from_document(options)).manifest
+    assert {name: manifest[name] for name in SAME} == {name: alone[name] for name in SAME}
+    assert certified_pairs(manifest) == certified_pairs(alone)
 
 
 def test_the_workers_say_that_they_are_alive() -> None:

@@ -9,20 +9,22 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sqlalchemy import update
+from sqlalchemy import select, update
 from sqlalchemy.exc import OperationalError
 
 from certifier.errors import CirisError
+from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.pair.forecast import forecast
 from db import jobs, pairs, regions, steps
-from db.models import JobRow, PairRow, ProofRow, StepRow
+from db.models import IterationRow, JobRow, PairRow, PartitionRow, ProofRow, StepRow
 from db.session import database
 from db.settings import settings
 from db.types import utcnow
 from tests.scenes import slider
 from tests.services import Queue, queue_server
 from tests.workers.options import box_around, grow_box
+from tests.workers.record import check_record
 from tests.workers.service import environment, events_of, job_of, pairs_of, submit
 from workers import admission, sweeper, transaction
 from workers.app import CONTROL, SOLVE, send_coordinate, waiting
@@ -31,6 +33,7 @@ from workers.solver import Piece, work
 from workers.turns import coordinate
 
 ELSEWHERE = "elsewhere:1:1"
+WHOLE = grow_box([0.0], 0.9, contraction="whole", cells=600)
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +109,131 @@ def test_a_deadline_ends_the_job_with_what_it_has(job_id: str) -> None:
     coordinate(job_id)
     job = job_of(job_id)
     assert (job.state, job.outcome, job.reason) == ("succeeded", Outcome.INCONCLUSIVE, "the deadline was reached")
+
+
+def in_the_way() -> Scene:
+    """A slider whose first post stands in its way, 0.4 m from where they touch at s = 0; the other is far off."""
+    free = slider(posts=2)
+    cart, post, other = free.geometries
+    return replace(free, geometries=(cart, replace(post, vertices=np.array([[0.6, 0.0, 0.0]])), other))
+
+
+def left_of(job_id: str) -> dict[int, int]:
+    """Pair index -> the iteration whose partition is kept."""
+    with database().read() as session:
+        rows = session.execute(select(PartitionRow.pair_index, PartitionRow.iteration).where(PartitionRow.job_id == job_id))
+        return {row.pair_index: row.iteration for row in rows}
+
+
+def test_a_whole_job_keeps_what_its_last_round_left_and_nothing_in_the_end() -> None:
+    job_id = submit(in_the_way(), WHOLE)
+    coordinate(job_id)
+    work_all()
+    coordinate(job_id)
+    rounds = 0
+    while any(row.state == "open" for row in pairs_of(job_id)):
+        work_all()
+        last = pairs_of(job_id)[-1].iteration
+        failed = {row.pair_index for row in pairs_of(job_id) if row.iteration == last and row.state != "certified"}
+        assert left_of(job_id) == dict.fromkeys(failed, last)
+        assert {row.pair_index for row in pairs_of(job_id) if row.weakness} == failed
+        rounds += bool(failed)
+        coordinate(job_id)
+        assert not any(row.weakness for row in pairs_of(job_id))
+    assert rounds >= 2
+    rows = pairs_of(job_id)
+    assert {row.state for row in rows} >= {"certified", "refuted"}
+    assert all((row.proof_digest is None) == (row.state != "certified") for row in rows)
+    assert all((row.open_cells is None) == (row.state == "certified") for row in rows)
+    work_all()
+    coordinate(job_id)
+    assert (job_of(job_id).state, left_of(job_id)) == ("succeeded", {})
+    check_record(job_id)
+
+
+def test_a_whole_job_that_is_cancelled_leaves_no_partition() -> None:
+    job_id = begun_whole_job()
+    with database().write() as session:
+        jobs.cancel(session, job_id)
+    coordinate(job_id)
+    assert (job_of(job_id).state, left_of(job_id)) == ("cancelled", {})
+
+
+def test_a_whole_job_ends_at_its_deadline_with_its_best_region() -> None:
+    job_id = submit(in_the_way(), WHOLE)
+    while not any(row.label == "cells" and row.state == "certified" for row in iterations_of(job_id)):
+        coordinate(job_id)
+        work_all()
+    coordinate(job_id)
+    assert job_of(job_id).state == "running"
+    with database().write() as session:
+        jobs.lock(session, job_id).deadline_at = utcnow() - timedelta(seconds=1)
+    coordinate(job_id)
+    work_all()
+    coordinate(job_id)
+    job = job_of(job_id)
+    assert (job.state, job.outcome, job.reason) == ("succeeded", Outcome.CERTIFIED, "the deadline was reached")
+    assert job.region_id is not None
+
+
+def test_a_whole_job_ends_when_nothing_is_known_of_a_failure() -> None:
+    """There is nothing to cut off for a pair that kills its process, so another round would end as this one."""
+    job_id = begun_whole_job()
+    with database().write() as session:
+        session.execute(update(PairRow).where(PairRow.state == "open").values(deaths=3))
+    work_all()
+    coordinate(job_id)
+    job = job_of(job_id)
+    assert (job.state, (job.error or {})["code"]) == ("failed", "worker_lost")
+
+
+def test_pairs_that_are_certified_cell_by_cell_need_not_fit_the_forecast() -> None:
+    with environment(CIRIS_PAIR_MEMORY_BYTES="1000", CIRIS_DATABASE_URL=settings().database, CIRIS_REDIS_URL=settings().redis_url):
+        job_ids = [submit(slider(), options) for options in (box_around([0.0], 0.1), {**box_around([0.0], 0.1), "cells": 20})]
+        for job_id in job_ids:
+            coordinate(job_id)
+        assert [job_of(job_id).state for job_id in job_ids] == ["failed", "running"]
+
+
+@pytest.mark.parametrize(("upper", "outcome"), [(0.3, "certified"), (0.3999, "too_close"), (0.45, "refuted")])
+def test_a_polytope_is_decided_cell_by_cell(upper: float, outcome: str) -> None:
+    """The slider touches the post at s = 0.4."""
+    job_id = submit(in_the_way(), {"kind": "certify", "seed": {"C": [[1.0], [-1.0]], "d": [upper, 0.9]}, "cells": 300})
+    coordinate(job_id)
+    work_all()
+    coordinate(job_id)
+    work_all()
+    coordinate(job_id)
+    first, second = pairs_of(job_id)
+    assert (first.state, first.stage, second.state) == (outcome, "cells", "certified")
+    job = job_of(job_id)
+    assert (job.state, job.outcome, job.region_id is not None) == ("succeeded", outcome, outcome == "certified")
+    assert left_of(job_id) == {}
+    if outcome == "certified":
+        assert first.witness_s is None
+    else:
+        (s,) = first.witness_s or []
+        assert (s >= 0.4 - 1e-6) == (outcome == "refuted")
+        assert s <= upper
+    if outcome == "too_close":
+        assert f"{0.4 - s:.3g} m apart" in (first.detail or "")
+
+
+def begun_whole_job() -> str:
+    """A job whose first round has left a partition; its second round is open."""
+    job_id = submit(in_the_way(), WHOLE)
+    for _ in range(2):
+        coordinate(job_id)
+        work_all()
+    coordinate(job_id)
+    assert left_of(job_id) == {0: 0}
+    assert any(row.state == "open" for row in pairs_of(job_id))
+    return job_id
+
+
+def iterations_of(job_id: str) -> list[IterationRow]:
+    with database().read() as session:
+        return list(pairs.iterations(session, job_id))
 
 
 def test_a_poison_pair_ends_as_an_error_with_its_cause(job_id: str) -> None:

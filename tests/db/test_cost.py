@@ -1,0 +1,69 @@
+"""Claiming and saving a pair costs the same however many pairs the iteration has."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable
+from typing import Any
+
+from sqlalchemy import text
+from sqlalchemy.orm import Session
+
+from db import jobs, leases, pairs, work
+from db.models import PairRow
+from db.session import Database
+from db.states import JobState
+from tests.db.builders import a_running_job, certified
+
+
+def effort(db: Database, call: Callable[[Session], Any]) -> tuple[Any, int]:
+    """What the call returns, and its effort: hundreds of instructions of SQLite's machine, or pairs that PostgreSQL reads."""
+    with db.write() as session:
+        if not db.sqlite:
+            before = _read(session)
+            answer = call(session)
+            session.flush()
+            return answer, _read(session) - before
+        raw = session.connection().connection.driver_connection
+        assert isinstance(raw, sqlite3.Connection)
+        ticks: list[None] = []
+        raw.set_progress_handler(lambda: ticks.append(None), 100)
+        try:
+            answer = call(session)
+            session.flush()
+        finally:
+            raw.set_progress_handler(None, 100)
+        return answer, len(ticks)
+
+
+def _read(session: Session) -> int:
+    """How many rows of pairs PostgreSQL read for this connection; it now and then begins to count anew, but not in a transaction."""
+    query = "SELECT seq_tup_read + idx_tup_fetch FROM pg_stat_xact_user_tables WHERE relname = 'pairs'"
+    return int(session.scalar(text(query)) or 0)
+
+
+def efforts(db: Database, pair_count: int, settled: int) -> dict[str, int]:
+    """The efforts for one pair of a job with so many pairs, so many of them settled already."""
+    with db.write() as session:
+        job_id = a_running_job(session, pair_count).id
+    while settled:
+        with db.write() as session:
+            done = work.claim(session, job_id, lease_seconds=60, batch_seconds=settled)
+            assert isinstance(done, pairs.Claim)
+            pairs.save(session, done, {pair.index: certified(pair.index)[pair.index] for pair in done.pairs})
+        settled -= len(done.pairs)
+    asked = {"job_states": [JobState.RUNNING]}
+    claim, claiming = effort(db, lambda session: work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5))
+    wanted, looking = effort(db, lambda session: session.scalar(leases._wanted(PairRow), {"token": claim.token, **asked}))
+    saved, saving = effort(db, lambda session: pairs.save(session, claim, certified(claim.pairs[0].index)))
+    next_job, finding = effort(db, work.next_job)
+    assert (wanted is not None, saved, next_job) == (True, pairs.Saved(held=False, finished=False), job_id)
+    with db.write() as session:
+        pairs.skip(session, jobs.lock(session, job_id))
+    return {"claim": claiming, "look": looking, "save": saving, "find the next job": finding}
+
+
+def test_the_effort_for_a_pair_does_not_grow_with_the_number_of_pairs(db: Database) -> None:
+    few = efforts(db, pair_count=400, settled=200)
+    many = efforts(db, pair_count=8000, settled=4000)
+    assert {call: many[call] for call in many if many[call] > few[call] + 5} == {}, few

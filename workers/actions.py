@@ -1,0 +1,30 @@
+"""The action that asked for an iteration is made again from the iteration's row."""
+
+from __future__ import annotations
+
+from certifier.growth.actions import Certify
+from certifier.model import Box, Polytope
+from db.models import IterationRow
+
+
+def certify_action(iteration: IterationRow, pairs: list[int]) -> Certify:
+    """Returns the action that asked for an iteration.
+
+    Args:
+        pairs: the pairs to certify, which have rows of their own.
+    """
+    arrays = iteration.arrays
+    return Certify(
+        iteration=iteration.index,
+        label=iteration.label,
+        polytope=Polytope(arrays["C"], arrays["d"]),
+        center=arrays.get("center"),
+        pairs=pairs,
+        reuse={int(pair): source for pair, source in iteration.reuse.items()},
+        hard=iteration.hard,
+        failures=iteration.failures,
+        cells=iteration.cells,
+        box=Box(arrays["mid"], arrays["half"]) if "mid" in arrays else None,
+        begun={int(pair): source for pair, source in iteration.begun.items()},
+        ending=iteration.ending,
+    )
