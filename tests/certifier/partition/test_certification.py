@@ -14,7 +14,7 @@ from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import certify_pair
 from certifier.pair.closest import first_within
 from certifier.partition.certification import CellCertification
-from certifier.partition.tree import Node
+from certifier.partition.tree import OPEN, Node
 from certifier.polytopes.gibbs import uniform_in_q
 from certifier.polytopes.polytope import bounds
 from certifier.proof.partition import EMPTY, PLANE, STREAMS, PartitionProof
@@ -48,6 +48,7 @@ def check_refuted(scene, polytope, index, result):
     assert result.outcome is Outcome.REFUTED, result
     assert polytope.contains(result.witness_s)
     assert distance(scene, index, result.witness_s) <= 1e-6
+    assert result.proof is None
     assert polytope.contains(result.weakness.points).all()
     assert any((point == result.witness_s).all() for point in result.weakness.points)
 
@@ -84,8 +85,13 @@ def test_a_ball_that_comes_near_gets_planes_although_their_normals_have_to_keep_
     check_refuted(thicker, polytope, 0, certify(thicker, polytope))
 
 
+def partition(scene, result):
+    """The proof of what is certified, or what was proved already of what is not."""
+    return PartitionProof.from_bytes(result.proof or result.partition, scene)
+
+
 def nodes(scene, result):
-    return PartitionProof.from_bytes(result.proof, scene).nodes.tolist()
+    return partition(scene, result).nodes.tolist()
 
 
 def obstacle(y, shape="box"):
@@ -180,7 +186,7 @@ def test_a_search_that_runs_out_of_cells_goes_on_from_where_it_was():
     result, before = shared.certify(0, 1), []
     while result.outcome is Outcome.INCONCLUSIVE and len(before) < 50:
         before.append(result)
-        result = shared.certify(0, 1, begun=result.proof)
+        result = shared.certify(0, 1, begun=result.partition)
     check_certified(scene, polytope, 0, result)
     assert len(before) >= 2
     # What was cut stays cut, so the trees only grow.
@@ -194,8 +200,10 @@ def test_what_is_open_is_no_proof():
     scene, polytope = passing(0.6, TIP)
     result = certify(scene, polytope, cells=1)
     assert result.outcome is Outcome.INCONCLUSIVE
+    assert result.proof is None
+    assert result.open_cells == nodes(scene, result).count(OPEN) > 0
     with pytest.raises(ProofError):
-        verify_separation(PartitionProof.from_bytes(result.proof, scene))
+        verify_separation(partition(scene, result))
 
 
 def test_a_search_that_is_ending_names_points_of_every_open_cell():
@@ -204,10 +212,11 @@ def test_a_search_that_is_ending_names_points_of_every_open_cell():
     assert len(shared.certify(0, 1).weakness.points) == 0
     result = shared.certify(0, 1, ending=True)
     assert result.outcome is Outcome.INCONCLUSIVE
-    points, proof = result.weakness.points, PartitionProof.from_bytes(result.proof, scene)
+    points, proof = result.weakness.points, partition(scene, result)
     assert polytope.contains(points).all()
     lower, upper = bounds(polytope)
-    cells = Node.of_streams({name: getattr(proof, name) for name in STREAMS}, 9).open_cells(lower, upper)
+    vertices = {choice: sum(len(volume.vertices) for volume in both) for choice, both in proof.chosen.items()}
+    cells = Node.of_streams({name: getattr(proof, name) for name in STREAMS}, vertices).open_cells(lower, upper)
     assert len(cells) == 2
     for _, low, up in cells:
         assert ((points >= low - 1e-9) & (points <= up + 1e-9)).all(axis=1).any()
@@ -232,11 +241,11 @@ def test_what_was_begun_goes_on_when_a_face_has_cut_the_contact_off():
     c = np.array([0.0, 1.0])
     assert (first.weakness.points @ c > 0.58).all()
     smaller, elsewhere = with_face(scene, polytope, c, 0.58), with_face(scene, polytope, -c, 0.58)
-    result = CellCertification(scene, smaller, box=around).certify(0, CELLS, begun=first.proof)
+    result = CellCertification(scene, smaller, box=around).certify(0, CELLS, begun=first.partition)
     check_certified(scene, smaller, 0, result)
-    before, after = (PartitionProof.from_bytes(r.proof, scene).planes for r in (first, result))
+    before, after = (partition(scene, r).planes for r in (first, result))
     assert all((plane == after).all(axis=(1, 2)).any() for plane in before)
-    again = CellCertification(scene, elsewhere, box=around).certify(0, CELLS, begun=first.proof)
+    again = CellCertification(scene, elsewhere, box=around).certify(0, CELLS, begun=first.partition)
     check_refuted(scene, elsewhere, 0, again)
 
 
@@ -244,10 +253,10 @@ def test_cells_that_a_new_face_leaves_outside_are_shown_to_miss_the_polytope():
     scene, polytope = passing(0.6, TIP)
     around = Box.around(*bounds(polytope))
     first = certify(scene, polytope, cells=1, box=around)
-    proof = PartitionProof.from_bytes(first.proof, scene)
+    proof = partition(scene, first)
     joint, value = proof.nodes[0], proof.cuts[0]
     smaller = with_face(scene, polytope, np.eye(2)[joint], value - 0.05)
-    result = CellCertification(scene, smaller, box=around).certify(0, CELLS, begun=first.proof)
+    result = CellCertification(scene, smaller, box=around).certify(0, CELLS, begun=first.partition)
     check_certified(scene, smaller, 0, result)
     assert nodes(scene, result)[-1] == EMPTY
 
@@ -259,13 +268,13 @@ def test_multipliers_of_the_joint_limits_stay_theirs_when_faces_are_added():
     limits = scene.polytope([], [])
     around = Box(np.zeros(2), np.full(2, 0.7))
     shared = CellCertification(scene, limits, box=around)
-    partial = next(r for r in (shared.certify(0, cells) for cells in range(1, 50)) if len(PartitionProof.from_bytes(r.proof, scene).faces))
+    partial = next(r for r in (shared.certify(0, cells) for cells in range(1, 50)) if len(partition(scene, r).faces))
     assert partial.outcome is Outcome.INCONCLUSIVE
-    proof = PartitionProof.from_bytes(partial.proof, scene)
+    proof = partition(scene, partial)
     smaller = with_face(scene, with_face(scene, limits, [1.0, 1.0], 1.1), [-1.0, -1.0], 1.1)
-    result = CellCertification(scene, smaller, box=around).certify(0, CELLS, begun=partial.proof)
+    result = CellCertification(scene, smaller, box=around).certify(0, CELLS, begun=partial.partition)
     check_certified(scene, smaller, 0, result)
-    kept = PartitionProof.from_bytes(result.proof, scene)
+    kept = partition(scene, result)
     assert {*proof.faces.tolist()} <= {face - 2 for face in kept.faces.tolist()}
 
 

@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 from certifier.partition.tree import OPEN, Node, Streams, joined
 from certifier.proof.partition import EMPTY, PLANE, STREAMS
 
-N, K, VERTICES = 3, 2, 4
+N, K = 3, 2
+VERTICES = {0: 4, 1: 2, 2: 3, 3: 1}
+"""Of both volumes together, for every choice of volumes."""
 
 
 def random_pieces(rng, depth=3):
@@ -39,9 +41,10 @@ def random_tree(rng, lower, upper, depth):
         return Node()
     if kind == EMPTY:
         return Node(EMPTY, streams=random_streams(rng, [], 1))
-    pieces = [code for _ in range(VERTICES) for code in random_pieces(rng)]
+    choice = int(rng.choice(list(VERTICES)))
+    pieces = [code for _ in range(VERTICES[choice]) for code in random_pieces(rng)]
     streams = random_streams(rng, pieces, sum(code < 0 for code in pieces))
-    return Node(PLANE, plane=rng.normal(size=(5, 1 + K)), streams=streams)
+    return Node(PLANE, plane=rng.normal(size=(5, 1 + K)), choice=choice, streams=streams)
 
 
 def content(node):
@@ -50,7 +53,7 @@ def content(node):
         (getattr(node.streams, name).tolist(), getattr(node.streams, name).dtype) for name in Streams.__annotations__
     ]
     plane = None if node.plane is None else node.plane.tolist()
-    return node.kind, node.value, plane, streams, [content(child) for child in node.children]
+    return node.kind, node.value, plane, node.choice, streams, [content(child) for child in node.children]
 
 
 @settings(max_examples=60)
