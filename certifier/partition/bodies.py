@@ -197,7 +197,7 @@ class Bodies:
         bound = np.zeros(plane.shape[1])
         if max(self._radii) > 0:
             J = self._play
-            signs = np.array(list(itertools.product((-1.0, 1.0), repeat=len(self.joints)))).reshape(-1, len(self.joints))
+            signs = np.array(list(itertools.product((-1.0, 1.0), repeat=len(self.joints))))
             corners = np.zeros((len(signs), len(J)))
             corners[:, self._places] = signs
             s = cell.mid[J] + corners * cell.half[J]
