@@ -144,7 +144,9 @@ def coarse_volume(kinematics: Kinematics, volume: Volume, other: Volume) -> Volu
         return None
     geometry = kinematics.scene.geometry(volume.geometries[0])
     own = _farthest(geometry.vertices, geometry.vertices.mean(axis=0)) + geometry.radius
-    between = kinematics.bodies_between(geometry.body, other.body)[1:]
+    # The volume may hang on the bodies on the way up alone, or two that hang on each other's would change places.
+    above = set(kinematics.ancestors(geometry.body))
+    between = [body for body in kinematics.bodies_between(geometry.body, other.body)[1:] if body in above]
     roots = list(dict.fromkeys(kinematics.rigid_root(body) for body in between))
     for body in reversed(roots):
         found = ball(kinematics, [geometry], body) if len(kinematics.chain(body, geometry.body)) > 1 else None

@@ -36,6 +36,8 @@ from certifier.proof.partition import EMPTY, PLANE
 
 NARROW = np.radians(3.0)
 """A cell that turns less than this in every joint is not cut any more."""
+LONG = 5
+"""Coarse volumes are tried where so many joints or more move one body against the other."""
 NARROW_COARSE = np.radians(15.0)
 """A cell that turns less than this in every joint that moves the coarse volumes is not cut for them any more."""
 KEPT = 200
@@ -77,7 +79,9 @@ class Search:
         self.frame, self.joints = frame.body, list(frame.path)
         self.bodies = Bodies(area, self.frame, self.joints, volumes, 0)
         a, b = volumes
-        self.coarse = coarse_volume(area.kinematics, a, b), coarse_volume(area.kinematics, b, a)
+        self.coarse: tuple[Volume | None, Volume | None] = (None, None)
+        if len(self.joints) >= LONG:
+            self.coarse = coarse_volume(area.kinematics, a, b), coarse_volume(area.kinematics, b, a)
         small_a, small_b = self.coarse
         choice = (small_a is not None) + 2 * (small_b is not None)
         self._coarse = Bodies(area, self.frame, self.joints, (small_a or a, small_b or b), choice) if choice else None
