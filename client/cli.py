@@ -164,7 +164,13 @@ def _parser() -> argparse.ArgumentParser:
         "iris_np2 (default up to 8 joints) and iris_zo use Drake's IRIS; limits (default beyond) takes the joint limits; "
         "box takes a box around the seed"
     )
-    grow.add_argument("--method", help=f"how the first polytope is found, which is then cut until it is certified: {methods}")
+    grow.add_argument("--method", help=f"how the first polytope is found, which is then certified, or cut until it is: {methods}")
+    grow.add_argument(
+        "--contraction",
+        choices=["whole", "targeted", "uniform"],
+        help="whole (default) keeps the first polytope and certifies it cell by cell; the others shrink it until every pair has one plane",
+    )
+    grow.add_argument("--cells", type=int, metavar="N", help="for whole: what is open after N cells of a pair is cut off")
     grow.add_argument("--pushes", type=int, help="how often the faces are pushed out again; default: more often for smaller arms")
     grow.add_argument("--rounds", type=int, help="rounds of the polytope step; default: a few for small arms, none for large ones")
     grow.add_argument("--random-seed", type=int, help="seed of every random choice; default 0")

@@ -93,7 +93,13 @@ def grow(args: Namespace) -> int:
     seeds = [{"q": seed_of(args.scene, q), **common} for q in args.q or [None]]
     options = {
         name: value
-        for name, value in (("pushes", args.pushes), ("max_rounds", args.rounds), ("random_seed", args.random_seed))
+        for name, value in (
+            ("contraction", args.contraction),
+            ("cells", args.cells),
+            ("pushes", args.pushes),
+            ("max_rounds", args.rounds),
+            ("random_seed", args.random_seed),
+        )
         if value is not None
     }
     if len(seeds) > 1:

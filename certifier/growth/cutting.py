@@ -34,12 +34,13 @@ def cut(scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[t
         corners: for each pair that failed, the joints between its bodies and the points (w, n) to cut off.
 
     Returns:
-        None where a point cannot be cut off without those to keep.
+        None where nothing can be cut off without a point to keep.
     """
     limits = 2 * scene.n
     samples = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, seed).reshape(-1, scene.n)
     scale = np.where(samples.std(axis=0) > 0, samples.std(axis=0), 1.0)
     C, d = polytope.C, polytope.d
+    blocked = False
     for joints, points in corners:
         J = list(joints)
         for _ in range(MOST_FACES):
@@ -53,12 +54,14 @@ def cut(scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[t
             if found is None and len(near) > 1:
                 found = _face(near[:1, J], keep[:, J], samples[:, J], scale[J])
             if found is None:
-                return None
+                # Others of the pair's points may go all the same; this one is left to the next round.
+                points, blocked = points[(points != left[0]).any(axis=1)], True
+                continue
             row = np.zeros(scene.n)
             row[J], offset = found
             C, d = np.insert(C, len(d) - limits, row, axis=0), np.insert(d, len(d) - limits, offset)
             samples = samples[samples @ row <= offset]
-    return Polytope(C, d)
+    return None if blocked and len(d) == len(polytope.d) else Polytope(C, d)
 
 
 def _face(beyond: Array, keep: Array, samples: Array, scale: Array) -> tuple[Array, float] | None:

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from certifier.errors import ProofError
+from certifier.errors import ProofError, RegionError
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Box, Polytope, Scene, Volume
 from certifier.outcome import Outcome, Stage
@@ -26,6 +26,7 @@ from certifier.pair.result import PairResult, Weakness
 from certifier.partition.area import Area
 from certifier.partition.search import Report, Search
 from certifier.partition.tree import Node
+from certifier.polytopes.polytope import chebyshev_center
 from certifier.proof.partition import STREAMS, PartitionProof
 from certifier.verify.pair import check_ground, check_interior
 from certifier.verify.separations import statements
@@ -148,8 +149,18 @@ class CellCertification:
         for lower, upper in cells:
             inside = self._area.samples[((self._area.samples >= lower) & (self._area.samples <= upper)).all(axis=1)]
             corners = np.where(rng.random((8, len(lower))) < 0.5, lower, upper)
-            found += [*inside[:8], *corners[self._area.polytope.contains(corners)]]
+            some = [*inside[:8], *corners[self._area.polytope.contains(corners)]]
+            found += some or self._middle(lower, upper)
         return found
+
+    def _middle(self, lower: Array, upper: Array) -> list[Array]:
+        """Returns the middle of the polytope in a cell; nothing where it misses the cell."""
+        polytope, eye = self._area.polytope, np.eye(len(lower))
+        part = Polytope(np.concatenate([polytope.C, eye, -eye]), np.concatenate([polytope.d, upper, -lower]))
+        try:
+            return [chebyshev_center(part)[0]]
+        except RegionError:
+            return []
 
     def _nearest(self, search: Search, configurations: Array) -> tuple[Array, float]:
         """Returns the configuration at which the bodies are nearest, and their distance there in metres, padding subtracted."""
