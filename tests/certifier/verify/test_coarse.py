@@ -160,11 +160,11 @@ def test_the_least_radius_is_the_one_by_hand(vertices, body, radius):
     refused(arm(), bar(vertices, body, radius * (1 - 1e-12)), "may leave")
 
 
-@pytest.mark.parametrize(("vertex", "least"), [((3.0, 4.0, 0.0), 5.0), ((1.0, 1.0, 0.0), float(np.sqrt(2)))])
+@pytest.mark.parametrize(("vertex", "least"), [((3, 4, 0), 5.0), ((1, 1, 0), float(np.sqrt(2))), ((1, 2**-45, 0), 1 + 2**-52)])
 @pytest.mark.parametrize("ends", [[[0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
 def test_the_check_is_exact_to_the_last_bit(vertex, least, ends):
-    """5 is the root of 25, and the double nearest to the root of 2 is larger than it."""
-    point = Geometry("arm/link1/point", "arm/link1", np.array([vertex]), 0.0, {})
+    """5 is the root of 25, the double nearest to the root of 2 is larger than it, and the last vertex is 2^-91 m farther away than 1 m."""
+    point = Geometry("arm/link1/point", "arm/link1", np.array([vertex], dtype=float), 0.0, {})
     scene = replace(planar_arm(1), geometries=(point,))
     assert holds(scene, Volume((point.name,), WORLD, np.array(ends), least))
     assert not holds(scene, Volume((point.name,), WORLD, np.array(ends), float(np.nextafter(least, 0.0))))
