@@ -89,7 +89,8 @@ def test_what_is_made_holds_and_not_with_a_smaller_radius(seed):
     for volume in made(scene):
         assert holds(scene, volume)
         assert excess(scene, volume) <= 0
-        assert not holds(scene, replace(volume, radius=volume.radius * (1 - 1e-6)))
+        if volume.radius > 1e-3:  # a point on the only axis is a ball of the margin alone
+            assert not holds(scene, replace(volume, radius=volume.radius * (1 - 1e-6)))
 
 
 @pytest.mark.parametrize("name", sorted(path.parent.name for path in EXAMPLES.glob("*/scene.yaml")))
