@@ -13,27 +13,49 @@ from hypothesis import strategies as st
 
 from certifier.errors import ProofError
 from certifier.jobs.region import certified_region
-from certifier.model import WORLD, JointKind, Pair
+from certifier.kinematics import Kinematics
+from certifier.model import WORLD, JointKind, Pair, Volume
 from certifier.pair.certification import Certification
+from certifier.partition.coarse import ball as ball_about
+from certifier.partition.coarse import capsule
 from certifier.proof import limits
 from certifier.proof.container import pack, unpack, with_scene
+from certifier.proof.pair import PairProof
 from certifier.proof.partition import EMPTY, PLANE, STREAMS, PartitionProof
 from certifier.proof.region import RegionProof
 from certifier.verify.file import answer, verify_file
 from certifier.verify.region import verify_region
-from certifier.verify.separations import verify_separation
+from certifier.verify.separations import statements, verify_separation
 from tests.certifier.scenes import accepted, ball, box, cube, planar_arm, two_arms
 from tests.certifier.truth import distances
 from tests.certifier.verify.partitions import Producer
 
 BAND = {"C": np.array([[1.0, 1.0], [-1.0, -1.0]]), "d": np.array([0.0, 0.15])}
-CAMPAIGN = 600
+CAMPAIGN = 1000
 TOLERANCE = 1e-8
 """The distances of samples are computed in floating point, to about this many metres."""
 
 
-def arm(**changes):
-    return planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (1.5, 1.0, 0.0)), **changes)
+def arm(place=(1.5, 1.0, 0.0), **changes):
+    return planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), place), **changes)
+
+
+def folding():
+    """Three links, of which the last may come near the first."""
+    scene = planar_arm(3)
+    return replace(scene, pairs=(Pair("arm/link1/bar", "arm/link3/bar"),))
+
+
+def coarse_proof(scene, first: str, second: str, frame: str, mid, half, **least) -> PartitionProof | None:
+    """The last pair's, with a ball fixed to a body for either volume, or a capsule where the body is "", where there is such a thing."""
+    pair = scene.pairs[-1]
+    coarse = tuple(coarse_volume(scene, name, body) for name, body in ((pair.a, first), (pair.b, second)))
+    return Producer(scene, pair, frame, mid, half, coarse=coarse).proof(**least)
+
+
+def coarse_volume(scene, name: str, body: str) -> Volume | None:
+    kinematics, geometry = Kinematics.of(scene), scene.geometry(name)
+    return ball_about(kinematics, [geometry], body) if body else capsule(kinematics, geometry)
 
 
 def with_tip():
@@ -44,7 +66,11 @@ def with_tip():
 
 @cache
 def proof(name: str) -> PartitionProof:
-    """A true proof: many cells; balls and padding; cells and pieces that the polytope misses; sliding joints; two arms; wide ranges."""
+    """A true proof: many cells; balls and padding; cells and pieces that the polytope misses; sliding joints; two arms; wide ranges.
+
+    Those named in COARSE have coarse volumes in some cells: a ball; a capsule; for both bodies; for the second; seen from the body itself;
+    with a joint in play that moves none of the volumes that any cell chooses.
+    """
     far = box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (2.5, 1.0, 0.0))
     above = box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.5, 0.2, 0.4))
     slides, arms, wide = planar_arm(2, far, kind=JointKind.PRISMATIC), two_arms(1, apart=2.3), planar_arm(1, above, limit=3.1)
@@ -56,6 +82,12 @@ def proof(name: str) -> PartitionProof:
         "inside": lambda: Producer(arm(), arm().pairs[1], "arm/link2", [-0.2, -0.1], [0.3, 0.35]).proof(),
         "slides": lambda: Producer(slides, slides.pairs[1], WORLD, [-0.1, 0.0], [0.4, 0.3]).proof(least=2),
         "arms": lambda: Producer(arms, arms.pairs[0], WORLD, 0.1, 0.3).proof(),
+        "ball": lambda: coarse_proof(arm(place=(1.7, 0.8, 0.0)), "arm/link1", "world", WORLD, [-0.2, -0.3], [0.25, 0.3], least=2),
+        "capsule": lambda: coarse_proof(arm(place=(1.7, 0.8, 0.0), padding=0.01), "", "world", WORLD, [-0.2, -0.3], [0.25, 0.3], least=2),
+        "both": lambda: coarse_proof(two_arms(2, apart=4.0), "", "right/link1", WORLD, [0.1, 0.3, 0.1, 0.5], 0.15, least=1),
+        "second": lambda: coarse_proof(two_arms(2, apart=4.0), "left/link2", "right/link1", WORLD, [0.1, 0.3, 0.1, 0.5], 0.15, least=1),
+        "below": lambda: coarse_proof(arm(), "", "world", "arm/link2", [-0.4, -0.1], [0.5, 0.35]),
+        "beyond": lambda: coarse_proof(folding(), "world", "arm/link1", "arm/link1", [0.0, 1.0, 0.5], [0.1, 0.2, 0.1], least=1),
         "wide": lambda: Producer(wide, wide.pairs[0], WORLD, 0.0, 11.0).proof(),
     }
     found = made[name]()
@@ -63,7 +95,15 @@ def proof(name: str) -> PartitionProof:
     return found
 
 
-NAMES = ("cells", "tip", "band", "corners", "inside", "slides", "arms", "wide")
+COARSE = ("ball", "capsule", "both", "second", "below", "beyond")
+NAMES = (*COARSE, "cells", "tip", "band", "corners", "inside", "slides", "arms", "wide")
+
+
+def test_the_proofs_choose_every_combination_of_volumes():
+    chosen = {name: set(proof(name).choices.tolist()) for name in NAMES}
+    assert set().union(*chosen.values()) == {0, 1, 2, 3}
+    assert all(chosen[name] == {0} for name in NAMES if name not in COARSE)
+    assert all({len(v.vertices) for v in proof(name).coarse if v} == {n} for name, n in (("ball", 1), ("capsule", 2)))
 
 
 def least_distance(of: PartitionProof) -> float:
@@ -235,6 +275,90 @@ def test_large_and_tiny_multipliers_are_refused_or_true():
         multipliers = np.full(len(true.multipliers), weight, np.float32)
         assert np.isfinite(multipliers).all()
         check(replace(true, multipliers=multipliers), "corners")
+
+
+@pytest.mark.parametrize("name", [name for name in COARSE if name != "beyond"])
+def test_changed_coarse_volumes_are_refused_or_true(name):
+    true, rng = proof(name), np.random.default_rng(3)
+    scene = true.scene
+    for i in [i for i in (0, 1) if true.coarse[i] is not None]:
+
+        def with_coarse(i=i, **changes):
+            coarse = list(true.coarse)
+            coarse[i] = replace(true.coarse[i], **changes)
+            return replace(true, coarse=tuple(coarse))
+
+        volume = true.coarse[i]
+        refused(with_coarse(radius=volume.radius * (1 - 1e-6)), "proof_volume")
+        refused(with_coarse(vertices=volume.vertices + np.array([0.0, 0.1, 0.0])), "proof_volume")
+        refused(with_coarse(geometries=true.volumes[1 - i].geometries), "proof_volume")
+        refused(with_coarse(geometries=(*volume.geometries, *true.volumes[1 - i].geometries)), "proof_volume")
+        refused(with_coarse(vertices=np.repeat(volume.vertices, 3, axis=0)), "proof_volume")
+        for body in set(scene.bodies) - {volume.body}:
+            refused(with_coarse(body=body))
+        refused(with_coarse(body="arm/other"), "proof_volume")
+        for _ in range(20):
+            moved = volume.vertices + rng.normal(size=volume.vertices.shape) * 10.0 ** rng.uniform(-4, 0)
+            check(with_coarse(vertices=moved, radius=volume.radius * rng.uniform(0.9, 1.2)), name)
+        refused(replace(true, coarse=tuple(None if j == i else v for j, v in enumerate(true.coarse))), "proof_malformed")
+        refused(replace(true, coarse=tuple(true.volumes[j] if j == i else v for j, v in enumerate(true.coarse))), "proof_volume")
+    for choice in range(-1, 5):
+        said = replace(true, choices=np.full_like(true.choices, choice))
+        if not np.array_equal(said.choices, true.choices):
+            refused(said, None if choice in true.chosen else "proof_malformed")
+
+
+def test_a_ball_that_is_too_small_proves_nothing():
+    """The bar hits the obstacle. A ball about its joint that does not hold it is kept apart from the obstacle, and one that does is not."""
+    scene = arm()
+    ball = coarse_volume(scene, "arm/link2/bar", "arm/link1")
+    small = replace(ball, radius=0.05)
+
+    def made(coarse):
+        return Producer(scene, scene.pairs[1], WORLD, [0.3, 0.3], [0.1, 0.1], coarse=(coarse, None)).proof(depth=3)
+
+    assert least_distance(replace(made(small), coarse=(ball, None))) < 0
+    assert refused(made(small), "proof_volume").message.endswith("may leave the coarse volume that stands for it")
+    refused(replace(made(small), coarse=(ball, None)), "proof_cell")
+    assert made(ball) is None
+
+
+def test_a_coarse_volume_is_no_volume_of_another_proof():
+    """Not even where it is known to hold its geometries, because a cell chose it."""
+    true = proof("ball")
+    coarse, obstacle = true.coarse[0], true.volumes[1]
+    alone = replace(true, volumes=(coarse, obstacle), coarse=(None, None), choices=np.zeros_like(true.choices))
+    refused(alone, "proof_volume")
+    with pytest.raises(ProofError, match="not welded"):
+        statements(true.scene, [true, alone])
+    polytope = cube(true.scene, [-0.2, -0.3], 0.1)
+    squares = PairProof.from_bytes(Certification(true.scene, polytope, np.array([-0.2, -0.3])).certify(1).proof, true.scene)
+    assert verify_separation(squares).gap > 0
+    with pytest.raises(ProofError, match="not welded"):
+        statements(true.scene, [true, replace(squares, volumes=(coarse, obstacle))])
+
+
+def test_coarse_volumes_count_among_those_that_take_long_to_check(monkeypatch):
+    """The bar has eight vertices, behind one joint."""
+    monkeypatch.setattr(limits, "CONTAINED", 9 * 4)
+    assert verify_separation(proof("ball")).gap > 0
+    assert verify_separation(proof("cells")).gap > 0
+    monkeypatch.setattr(limits, "CONTAINED", 9 * 4 - 1)
+    refused(proof("ball"), "proof_too_large")
+    assert verify_separation(proof("cells")).gap > 0
+
+
+def test_files_name_coarse_volumes_strictly():
+    true = proof("both")
+    header, arrays = unpack(true.to_bytes(), "partition")
+    entry = header["proofs"][0]
+    assert entry["coarse"] == [2, 3]
+    for coarse in ([2], [2, 3, 3], [2, 4], [2, -1], [2, 3.0], [2, "3"], [2, None], [None, None], 2, None, {}):
+        with pytest.raises(ProofError) as refusal:
+            PartitionProof.from_bytes(pack({**header, "proofs": [{**entry, "coarse": coarse}]}, arrays), true.scene)
+        assert refusal.value.code == "proof_malformed"
+    swapped = PartitionProof.from_bytes(pack({**header, "proofs": [{**entry, "coarse": [3, 2]}]}, arrays), true.scene)
+    refused(swapped, "proof_volume")
 
 
 def check(changed: PartitionProof, name: str) -> str:
