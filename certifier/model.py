@@ -181,11 +181,12 @@ class Scene:
 
     @cached_property
     def s_lower(self) -> Array:
-        return self._limits_in_s(self.q_lower)
+        # The difference from q* is rounded before the tangent, which may lead beyond the limit as the verifier believes it.
+        return np.maximum(self._limits_in_s(self.q_lower), self.outer_limits[0])
 
     @cached_property
     def s_upper(self) -> Array:
-        return self._limits_in_s(self.q_upper)
+        return np.minimum(self._limits_in_s(self.q_upper), self.outer_limits[1])
 
     def _limits_in_s(self, limits: Array) -> Array:
         """Returns the tangent-space coordinates of joint limits, (n,), rounded to nearest, the same on every machine.

@@ -78,7 +78,7 @@ def coordinate(job_id: str) -> None:
 def _decide(turn: Turn) -> Transition:
     if turn.growth is None:
         left = None if turn.deadline_at is None else (turn.deadline_at - utcnow()).total_seconds()
-        if not GrowthOptions.from_document(turn.options).by_cells:  # the forecast is about the program (11)
+        if not GrowthOptions.from_document(turn.options).by_cells(load_scene(turn.scene_id).n):  # the forecast is about the program (11)
             admission.check(_forecast(turn.scene_id), settings(), left)
     return next_transition(load_scene(turn.scene_id), turn.options, turn.growth, turn.report)
 

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector
 from api.schemas.scenes import PairInfo
-from certifier.growth.options import LARGEST_TOLERANCE, WHOLE_NUMBERS, GrowthOptions
+from certifier.growth.options import LARGEST_TOLERANCE, MOST_CELLS, WHOLE_NUMBERS, GrowthOptions
 from certifier.outcome import Outcome, Stage
 from certifier.seeding.options import Method
 from db.models import EventRow, JobRow, WebhookRow
@@ -29,15 +29,16 @@ class GrowOptions(Request):
     """Says how to grow the region: how the first polytope contracts, how far the region is pushed out, and when growing stops."""
 
     contraction: Annotated[
-        Literal["whole", "targeted", "uniform"],
+        Literal["whole", "targeted", "uniform"] | None,
         Field(
             description="`whole` keeps the first polytope, certifies it cell by cell, and cuts off only what cannot be certified. The "
             "other two shrink it until every pair has one plane that moves with the joints: `targeted` adds faces where pairs fail; "
-            "`uniform` moves every face inwards by the same amount."
+            "`uniform` moves every face inwards by the same amount. Default: `whole` where IRIS makes the first polytope, else `targeted`."
         ),
     ] = DEFAULTS.contraction
     cells: Annotated[
-        int, _whole("cells", "For `whole`: so many cells of each pair are looked at before those that are open still are cut off.")
+        int | None,
+        _whole("cells", f"For `whole`: so many cells of each pair are looked at, then what is open is cut off. Default: {MOST_CELLS}."),
     ] = DEFAULTS.cells
     contractions: Annotated[
         int | None,
@@ -169,7 +170,7 @@ class CertifyRequest(JobRequest):
             "So many cells of the polytope are looked at for each pair, each with a plane of its own. "
             "With 1, each pair has one plane on all of the polytope.",
         ),
-    ] = DEFAULTS.cells
+    ] = 1
     random_seed: RandomSeed = 0
 
 

@@ -26,7 +26,7 @@ from certifier.model import Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.polytopes.polytope import chebyshev_center
-from certifier.seeding.options import Method
+from certifier.seeding.options import IRIS, Method
 from certifier.seeding.proposal import Proposal
 from certifier.step.stepped import Stepped
 
@@ -45,7 +45,7 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
     given, center = Polytope.given(options.seed["C"], options.seed["d"], scene.n), options.seed.get("center")
     limited = scene.polytope(given.C, given.d)
     center = None if center is None else np.array(center)
-    return certify(scene, state, "given", limited, center, failures=None, cells=options.cells)
+    return certify(scene, state, "given", limited, center, failures=None, cells=options.cells or 1)
 
 
 def advance(scene: Scene, state: GrowthState, report: Report) -> Transition:
@@ -69,10 +69,12 @@ def _proposed(scene: Scene, state: GrowthState, proposal: Proposal) -> Transitio
     limited = scene.polytope(proposal.C, proposal.d)
     norms = np.linalg.norm(limited.C, axis=1)
     rows = Polytope(limited.C / norms[:, None], limited.d / norms)
-    given = proposal.info.get("method") in (Method.BOX, Method.POLYTOPE)
-    if state.options.contraction != "uniform":
+    method = proposal.info.get("method")
+    given = method in (Method.BOX, Method.POLYTOPE)
+    contraction = state.options.contraction or ("whole" if method in IRIS else "targeted")
+    if contraction != "uniform":
         start = Start(rows, proposal.center, np.concatenate([proposal.center[None], proposal.contain]), given)
-        if state.options.contraction == "whole":
+        if contraction == "whole":
             return begin_stage(scene, replace(state, start=start), start)
         transition = next_contraction(scene, replace(state, start=start), start)
         assert transition is not None, "before there is a region every contraction is worth it"

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal
 
 from certifier.errors import RegionError
+from certifier.seeding.options import IRIS, MOST_IRIS_JOINTS
 
 EFFORT = (
     (4, {"contractions": 2, "pushes": 10, "max_rounds": 3}),
@@ -32,6 +33,7 @@ WHOLE_NUMBERS = {
     "random_seed": (0, 2**63 - 1),
 }
 """Maps an option to its least and its greatest value."""
+MOST_CELLS = 2000
 LARGEST_TOLERANCE = 10.0
 """A tolerance lies between 0 and this."""
 
@@ -43,10 +45,11 @@ class GrowthOptions:
     Attributes:
         kind: ``grow`` a region from a seed, or ``certify`` a given polytope as it is.
         seed: the document of :class:`certifier.seeding.propose.SeedOptions`; for ``certify`` its ``C``, ``d`` and optional ``center``.
-        contraction: ``whole`` keeps the proposal and certifies it cell by cell; ``targeted`` and ``uniform`` shrink it until every pair has
-            one plane that moves with the joints (11).
-        cells: so many cells of each pair are looked at. Of ``grow``, what is open then is cut off; of ``certify``, 1 gives the program (11)
-            of the papers.
+        contraction: ``whole`` keeps the proposal and certifies it cell by cell; ``targeted`` and ``uniform`` shrink it until every pair
+            has one plane that moves with the joints (11). None is ``whole`` where IRIS makes the proposal. Where a box, a polytope or the
+            joint limits are the proposal, None is ``targeted``: much may collide in them, or much more be free.
+        cells: so many cells of each pair are looked at. Of ``grow``, what is open then is cut off, and None is MOST_CELLS; of ``certify``,
+            1 and None give the program (11) of the papers.
         contractions: how many targeted contractions of the proposal are tried; each is given up when it is smaller than the best so far.
             None, for this and for ``pushes`` and ``max_rounds``, takes the default that pays: see EFFORT.
         bisection_steps: certifications spent on uniform contraction after the two ends are known.
@@ -59,8 +62,8 @@ class GrowthOptions:
 
     kind: Literal["grow", "certify"] = "grow"
     seed: dict[str, Any] = field(default_factory=dict)
-    contraction: Literal["whole", "targeted", "uniform"] = "targeted"
-    cells: int = 1
+    contraction: Literal["whole", "targeted", "uniform"] | None = None
+    cells: int | None = None
     contractions: int | None = None
     bisection_steps: int = 6
     pushes: int | None = None
@@ -69,10 +72,14 @@ class GrowthOptions:
     backoff: int = 2
     random_seed: int = 0
 
-    @property
-    def by_cells(self) -> bool:
-        """Returns whether pairs are certified cell by cell, and not by the program (11) on all of the polytope."""
-        return self.cells > 1 if self.kind == "certify" else self.contraction == "whole"
+    def by_cells(self, joints: int) -> bool:
+        """Returns whether pairs are certified cell by cell in a scene of so many joints, and not by the program (11) on all of P."""
+        if self.kind == "certify":
+            return (self.cells or 1) > 1
+        if self.contraction is not None:
+            return self.contraction == "whole"
+        method = self.seed.get("method")
+        return method in IRIS or (method is None and joints <= MOST_IRIS_JOINTS)
 
     def to_document(self) -> dict[str, Any]:
         """Returns the options as JSON-able data."""
@@ -94,11 +101,11 @@ class GrowthOptions:
         options = cls(**document)
         if options.kind not in ("grow", "certify"):
             raise RegionError("option_value", "kind is 'grow' or 'certify'", field="options.kind")
-        if options.contraction not in ("whole", "targeted", "uniform"):
+        if options.contraction not in ("whole", "targeted", "uniform", None):
             raise RegionError("option_value", "contraction is 'whole', 'targeted' or 'uniform'", field="options.contraction")
         for name, (least, greatest) in WHOLE_NUMBERS.items():
             value = getattr(options, name)
-            if name in EFFORT[0][1] and value is None:
+            if name in ("cells", *EFFORT[0][1]) and value is None:
                 continue
             if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= greatest:
                 raise RegionError("option_value", f"{name} must be an integer from {least} to {greatest}", field=f"options.{name}")

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
 from certifier.growth.cutting import cut
+from certifier.growth.options import MOST_CELLS
 from certifier.growth.state import GrowthState, Start, Whole
 from certifier.growth.targeted import pushed
 from certifier.growth.trials import by_joints, joints_between
@@ -27,8 +28,10 @@ SLICE = 300
 
 
 def begin_stage(scene: Scene, state: GrowthState, start: Start, stage: int = 0) -> Transition:
-    """Asks to certify the proposal, or a smaller copy of it."""
+    """Asks to certify the proposal, or a smaller copy of it that has all points to keep inside."""
     polytope = pushed(scene, start.rows, start.seed, STAGES[stage], scene.polytope([], []))
+    if stage + 1 < len(STAGES) and not (start.keep @ polytope.C.T < polytope.d).all():
+        return begin_stage(scene, state, start, stage + 1)
     box = Box.around(*bounds(polytope))
     return _next(scene, replace(state, whole=Whole(stage, polytope, box.mid, box.half)))
 
@@ -51,6 +54,9 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing is known of where they fail")
     corners = [(joints_between(scene, i), report.weaknesses[i].points) for i in report.failures]
     smaller = cut(scene, whole.polytope, start.keep, corners, action.iteration)
+    if len(smaller.d if smaller else ()) == len(whole.polytope.d) and set(report.failures) <= set(action.ending):
+        pair = scene.pairs[report.failures[0]]
+        return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing more could be cut off for them")
     if smaller is None:
         pair = scene.pairs[report.failures[0]]
         reason = f"{pair.a} and {pair.b} touch, or come too close, at or between configurations that have to stay inside"
@@ -81,6 +87,6 @@ def _next(scene: Scene, state: GrowthState) -> Transition:
         cells=SLICE,
         box=Box(whole.mid, whole.half),
         begun=dict(whole.begun),
-        ending=[i for i in pairs if whole.spent.get(i, 0) >= state.options.cells],
+        ending=[i for i in pairs if whole.spent.get(i, 0) >= (state.options.cells or MOST_CELLS)],
     )
     return Transition(replace(state, next=state.next + 1), action)

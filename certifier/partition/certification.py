@@ -27,9 +27,11 @@ from certifier.partition.area import Area
 from certifier.partition.search import Report, Search
 from certifier.partition.tree import Node
 from certifier.polytopes.polytope import chebyshev_center
+from certifier.proof.negative import WitnessProof
 from certifier.proof.partition import STREAMS, PartitionProof
 from certifier.verify.pair import check_ground, check_interior
 from certifier.verify.separations import statements
+from certifier.verify.witness import check_witness
 
 GROUP_CELLS = 8
 """Volumes of several geometries are given up after this many cells."""
@@ -119,7 +121,7 @@ class CellCertification:
         weakness = Weakness(np.array(points[:MOST_POINTS]).reshape(-1, self._scene.n), np.zeros(self._scene.n))
         found = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, partition=begun, open_cells=len(cells), weakness=weakness)
         if report.contacts:
-            return replace(found, outcome=Outcome.REFUTED, witness_s=report.contacts[0])
+            return self._refuted(search, volumes, report.contacts[0], found)
         if report.narrow:
             s, distance = self._nearest(search, np.concatenate(report.narrow))
             detail = f"the padded bodies are {distance:.3g} m apart at the configuration named, too close for a plane"
@@ -127,6 +129,24 @@ class CellCertification:
         inside = sum(((self._area.samples >= low) & (self._area.samples <= up)).all(axis=1).mean() for low, up in cells)
         detail = f"{len(cells)} cells, {100 * float(inside):.2g} % of the polytope, are open after {report.cells} cells"
         return replace(found, detail=detail)
+
+    def _refuted(self, search: Search, volumes: Volumes, s: Array, found: PairResult) -> PairResult:
+        """Returns the result of a pair that touches at s, with the proof of that, which the verifier has checked."""
+        names = {name for volume in volumes for name in volume.geometries}
+        pair = next((pair for pair in self._scene.pairs if {pair.a, pair.b} == names), None)
+        if pair is None:  # a contact of boxes about several geometries says nothing about them
+            return found
+        (A,), (B,) = search.bodies.vertices(s[None])
+        weights = closest(A, B).weights
+        if pair.a != volumes[0].geometries[0]:
+            weights = weights[1], weights[0]
+        witness = WitnessProof(self._scene, pair, self._area.ground.C, self._area.ground.d, s, weights)
+        try:
+            check_witness(witness)
+        except ProofError as error:
+            detail = f"the contact found does not hold: {error}"
+            return replace(found, outcome=Outcome.TOO_CLOSE, witness_s=s, detail=detail)
+        return replace(found, outcome=Outcome.REFUTED, witness_s=s, proof=witness.to_bytes())
 
     def _contacts(self, search: Search, volumes: Volumes, contacts: list[Array]) -> list[Array]:
         """Returns the contacts with others about them, which show how far a contact reaches."""

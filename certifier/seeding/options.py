@@ -25,6 +25,7 @@ class Method(StrEnum):
     """The given C and d are the polytope."""
 
 
+IRIS = (Method.IRIS_NP2, Method.IRIS_ZO)
 MOST_IRIS_JOINTS = 8
 """IRIS is the default up to this many joints.
 

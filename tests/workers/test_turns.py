@@ -140,10 +140,10 @@ def test_a_whole_job_keeps_what_its_last_round_left_and_nothing_in_the_end() -> 
         rounds += bool(failed)
         coordinate(job_id)
         assert not any(row.weakness for row in pairs_of(job_id))
-    assert rounds >= 2
+    assert rounds >= 1
     rows = pairs_of(job_id)
     assert {row.state for row in rows} >= {"certified", "refuted"}
-    assert all((row.proof_digest is None) == (row.state != "certified") for row in rows)
+    assert all((row.proof_digest is None) == (row.state not in ("certified", "refuted")) for row in rows)
     assert all((row.open_cells is None) == (row.state == "certified") for row in rows)
     work_all()
     coordinate(job_id)

@@ -142,7 +142,7 @@ def test_a_given_polytope_is_certified_once_with_every_pair():
 def test_the_longer_the_chains_the_less_is_done_unasked(joints, pushes, rounds):
     scene = planar_arm(joints)
     proposal = Proposal(np.eye(joints), np.full(joints, 0.01), np.zeros(joints), np.zeros((0, joints)), {"method": "iris_np2"})
-    transition, said = begin(scene, GrowthOptions(seed={}, tolerance=1e-6)), []
+    transition, said = begin(scene, GrowthOptions(seed={}, contraction="targeted", tolerance=1e-6)), []
     while not isinstance(transition.action, Finish):
         report = proposal
         if isinstance(transition.action, Certify):

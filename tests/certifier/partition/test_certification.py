@@ -17,8 +17,10 @@ from certifier.partition.certification import CellCertification
 from certifier.partition.tree import OPEN, Node
 from certifier.polytopes.gibbs import uniform_in_q
 from certifier.polytopes.polytope import bounds
+from certifier.proof.negative import WitnessProof
 from certifier.proof.partition import EMPTY, PLANE, STREAMS, PartitionProof
 from certifier.verify.separations import verify_separation
+from certifier.verify.witness import check_witness
 from tests.certifier.scenes import ball, box, cube, planar_arm, pose, random_tree, two_arms
 from tests.certifier.truth import distances_at
 
@@ -48,7 +50,7 @@ def check_refuted(scene, polytope, index, result):
     assert result.outcome is Outcome.REFUTED, result
     assert polytope.contains(result.witness_s)
     assert distance(scene, index, result.witness_s) <= 1e-6
-    assert result.proof is None
+    check_witness(WitnessProof.from_bytes(result.proof, scene))
     assert polytope.contains(result.weakness.points).all()
     assert any((point == result.witness_s).all() for point in result.weakness.points)
 
@@ -87,7 +89,7 @@ def test_a_ball_that_comes_near_gets_planes_although_their_normals_have_to_keep_
 
 def partition(scene, result):
     """The proof of what is certified, or what was proved already of what is not."""
-    return PartitionProof.from_bytes(result.proof or result.partition, scene)
+    return PartitionProof.from_bytes(result.partition or result.proof, scene)
 
 
 def nodes(scene, result):
