@@ -97,7 +97,7 @@ def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: No
     """
     start = time.perf_counter()
     run = _Run(scene, options.random_seed, progress)
-    transition = begin(scene, options)
+    transition, late = begin(scene, options), False
     while not isinstance(transition.action, Finish):
         failure: CirisError | None = None
         try:
@@ -115,7 +115,8 @@ def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: No
             outcome = Outcome.INCONCLUSIVE if run.candidate is None else Outcome.CERTIFIED
             transition = Transition(transition.state, Finish(outcome, "the deadline was reached"))
     if run.candidate is None:
-        raise CirisError("not_grown", transition.action.reason, hint="try another seed, or look at the pair named")
+        hint = "allow more time" if late else "try another seed, or look at the pair named"
+        raise CirisError("not_grown", transition.action.reason, hint=hint)
     provenance = {
         "options": options.to_document(),
         "versions": versions(scene),

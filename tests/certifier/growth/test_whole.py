@@ -224,8 +224,9 @@ def test_a_deadline_ends_growth_with_the_best_region_so_far(monkeypatch):
     later = grow(scene, asked, deadline_s=1000.0).manifest
     assert later["provenance"]["reason"] == "certified"
     assert len(later["provenance"]["growth_curve"]) > 1
-    with pytest.raises(CirisError, match="the deadline was reached"):
+    with pytest.raises(CirisError, match="the deadline was reached") as refused:
         grow(scene, asked, deadline_s=0.0)
+    assert (refused.value.code, refused.value.hint) == ("not_grown", "allow more time")
 
 
 def test_a_seed_in_contact_is_refused():
