@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from benchmarks import agreement, catalogue, compare, growth, report, scaling, service, store, survey
@@ -44,10 +46,20 @@ def _scene(args: Namespace, screen: Screen) -> dict[str, Any]:
     return compare.compare("scene", [task], args.against is not None, args.repeat, screen.line)
 
 
+def _growth(args: Namespace, screen: Screen) -> dict[str, Any]:
+    old = None if args.into is None else json.loads(args.into.read_text(encoding="utf-8"))
+    document = growth.growth(args.scenes, args.against is not None, args.limit, screen.line)
+    if old is None:
+        return document
+    document = growth.merged(old, document)
+    args.into.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    return document
+
+
 _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "pairs": _pairs,
     "scene": _scene,
-    "growth": lambda args, screen: growth.growth(args.scenes, args.against is not None, screen.line),
+    "growth": _growth,
     "agreement": lambda args, screen: agreement.campaign(agreement.questions(), screen.line),
     "scaling": lambda args, screen: scaling.curves(args.against is not None, screen.line),
     "service": lambda args, screen: service.beside_local(args.example, args.processes, args.turns, screen.line),
@@ -59,9 +71,9 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
 def _parser() -> ArgumentParser:
     parser = ArgumentParser(prog="ciris bench", description=__doc__)
     kinds = parser.add_subparsers(dest="benchmark", required=True)
-    json = ArgumentParser(add_help=False)
-    json.add_argument("--json", action="store_true", help="print one JSON document")
-    against = ArgumentParser(add_help=False, parents=[json])
+    as_json = ArgumentParser(add_help=False)
+    as_json.add_argument("--json", action="store_true", help="print one JSON document")
+    against = ArgumentParser(add_help=False, parents=[as_json])
     against.add_argument("--against", choices=["drake"], help="measure Drake with Clarabel too, in the same run")
     repeat = ArgumentParser(add_help=False)
     repeat.add_argument("--repeat", type=int, default=1, metavar="N", help="run ciris this often; the fastest run counts")
@@ -75,17 +87,21 @@ def _parser() -> ArgumentParser:
     scene.add_argument("--match", default="", metavar="TEXT", help="measure only pairs with this text in their names")
     scene.add_argument("--pairs", type=int, metavar="N", help="measure only the N cheapest of these pairs")
     grown = kinds.add_parser("growth", parents=[against], help="grow regions in several ways")
-    grown.add_argument("scenes", nargs="*", metavar="EXAMPLE", default=list(growth.EXAMPLES), help=f"default: {', '.join(growth.EXAMPLES)}")
-    kinds.add_parser("agreement", parents=[json], help="compare verdicts on hundreds of pairs with Drake's")
+    grown.add_argument("scenes", nargs="*", metavar="EXAMPLE", default=list(catalogue.EXAMPLES), help="default: all")
+    grown.add_argument(
+        "--limit", type=float, default=growth.LIMIT, metavar="SECONDS", help=f"end each way after this long; default {growth.LIMIT:g}"
+    )
+    grown.add_argument("--into", type=Path, metavar="FILE", help="put the rows into this document, in place of the same examples' rows")
+    kinds.add_parser("agreement", parents=[as_json], help="compare verdicts on hundreds of pairs with Drake's")
     kinds.add_parser("scaling", parents=[against], help="measure how the cost grows with obstacles, joints and faces")
-    surveyed = kinds.add_parser("survey", parents=[json], help="certify every pair of every scene on every region")
+    surveyed = kinds.add_parser("survey", parents=[as_json], help="certify every pair of every scene on every region")
     surveyed.add_argument("scenes", nargs="*", metavar="SCENE", default=list(catalogue.SCENES), help="default: all")
     surveyed.add_argument("--most", type=float, default=5.0, metavar="SECONDS", help="leave pairs with a longer forecast out; default 5")
-    served = kinds.add_parser("service", parents=[json], help="measure the service beside --local")
+    served = kinds.add_parser("service", parents=[as_json], help="measure the service beside --local")
     served.add_argument("example", nargs="?", default="iiwa_shelf", metavar="EXAMPLE", help="default iiwa_shelf")
     served.add_argument("--processes", type=int, default=1, metavar="N", help="number of the service's solving processes; default 1")
     served.add_argument("--turns", type=int, default=5, metavar="N", help="how often each is run; default 5")
-    stored = kinds.add_parser("store", parents=[json], help="measure what the database takes for a pair in jobs of 1000 and of 100000")
+    stored = kinds.add_parser("store", parents=[as_json], help="measure what the database takes for a pair in jobs of 1000 and of 100000")
     stored.add_argument("--postgresql", metavar="URL", help="measure this empty PostgreSQL database too, besides SQLite")
     kinds.add_parser("docs", help="write the tables of docs/benchmarks.md from docs/benchmarks/*.json")
     return parser

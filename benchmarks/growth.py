@@ -1,6 +1,7 @@
 """This module measures how large regions grow and how soon.
 
-It compares our ways to grow a region with each other, and with Drake's alternation from the same start.
+It compares our ways to grow a region with each other, and with Drake's alternation from the same start, and draws how much of the
+proposal they keep.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import Any
 
 from benchmarks import catalogue, measure
 from benchmarks.measure import Progress
+from benchmarks.svg import Panel, draw
 from certifier.errors import CirisError
 from certifier.growth.options import GrowthOptions
 from certifier.jobs.local import grow
@@ -21,15 +23,15 @@ from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.verify.region import verify_region
 
 WAYS: dict[str, dict[str, Any]] = {
+    "whole": {"contraction": "whole", "cells": 2000},
+    "targeted": {"contraction": "targeted"},
     "uniform contraction": {"contraction": "uniform", "pushes": 0, "max_rounds": 0},
-    "targeted contraction": {"contractions": 1, "pushes": 0, "max_rounds": 0},
-    "two of them": {"contractions": 2, "pushes": 0, "max_rounds": 0},
-    "one, then (12)": {"contractions": 1, "pushes": 0, "max_rounds": 3},
-    "one, then pushes": {"contractions": 1, "pushes": 2, "max_rounds": 0},
-    "default": {},
 }
 """Each way to grow has these options of a grow job, with the default seeding."""
-EXAMPLES = ("planar_2dof", "arm_3dof", "ur3e_bin", "iiwa_shelf", "dual_ur3e")
+PICTURED = ("whole", "targeted")
+"""The picture shows these ways."""
+LIMIT = 300.0
+"""Growing ends after so many seconds with the best region so far, unless the user says otherwise."""
 AGAINST = ("planar_2dof", "arm_3dof")
 """On these examples Drake's alternation ends within minutes."""
 HALF_WIDTH, ROUNDS, TOLERANCE = 0.05, 10, 1e-3
@@ -42,21 +44,50 @@ Other programs on the machine then disturb all sides alike.
 """
 
 
-def growth(names: list[str], against: bool, progress: Progress) -> dict[str, Any]:
-    """Grows a region on every example in every way, and returns the document of ``ciris bench growth``."""
-    # This first run loads the compiled kernels and does not count.
-    _grown(names[0], {**_seed(names[0]), "method": "box"}, {"pushes": 0, "max_rounds": 0})
+def growth(names: list[str], against: bool, limit: float, progress: Progress) -> dict[str, Any]:
+    """Grows a region on every example in every way, and returns the document of ``ciris bench growth``.
+
+    Every row names its machine, because a document may be put together from several measurements: see :func:`merged`.
+
+    Args:
+        limit: growing one region of ``ways`` ends after so many seconds with the best so far; Drake and what it is compared with have none.
+    """
+    small = {**_seed(catalogue.EXAMPLES[0]), "method": "box"}
+    for options in WAYS.values():  # These first runs load the compiled kernels and do not count.
+        _grown(catalogue.EXAMPLES[0], small, {**options, "pushes": 0, "max_rounds": 0})
+    here = {"machine": measure.machine()}
     ways = []
     for name in names:
         for way, options in WAYS.items():
-            ways.append({"scene": name, "way": way, **_grown(name, _seed(name), options)})
+            ways.append({"scene": name, "way": way, **_grown(name, _seed(name), options, limit), **here})
             progress(_line(ways[-1]))
-    sides = [row for name in AGAINST if name in names for row in _against(name, progress)] if against else []
-    return {"benchmark": "growth", "machine": measure.machine(), "ways": ways, "against": sides}
+    sides = [row | here for name in AGAINST if name in names for row in _against(name, progress)] if against else []
+    return {"benchmark": "growth", "ways": ways, "against": sides}
+
+
+def merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
+    """Returns the document ``old`` with the rows of ``new`` in place of the same examples' rows, in the order of the catalogue."""
+    rows = {}
+    for part in ("ways", "against"):
+        again = {row["scene"] for row in new[part]}
+        kept = [row for row in old[part] if row["scene"] not in again]
+        rows[part] = sorted(kept + new[part], key=lambda row: catalogue.SCENES.index(row["scene"]))
+    return {**new, **rows}
+
+
+def picture(document: dict[str, Any]) -> str:
+    """Draws how much of the proposal is kept over the seconds since the growth began, one panel for each example, as SVG."""
+    panels: dict[str, dict[str, list[tuple[float, float]]]] = {}
+    for row in document["ways"]:
+        if row["way"] in PICTURED:
+            points = [(point["seconds"], point["share"]) for point in row["curve"]]
+            panels.setdefault(row["scene"], {way: [] for way in PICTURED})[row["way"]] = points
+    shown = [Panel(name, series) for name, series in panels.items() if any(series.values())]
+    return draw(shown, "share of the proposal, over seconds", share=True)
 
 
 def _against(name: str, progress: Progress) -> list[dict[str, Any]]:
-    """Compares four sides: Drake's alternation, our alternation and our pushes from one cube about the seed; our default from the seed.
+    """Compares four sides: Drake's alternation, our alternation and our pushes from one cube about the seed; ``targeted`` from the seed.
 
     ``reached_seconds`` is when our certified region first had at least the volume of Drake's last one; None if never.
     ``time_ratios`` are Drake's seconds divided by that, for every run. ``seconds``, ``reached_seconds`` and ``time_ratio`` are medians.
@@ -65,13 +96,13 @@ def _against(name: str, progress: Progress) -> list[dict[str, Any]]:
     center = scene.to_s(catalogue.seed(name))
     C, d = catalogue.cube(center, HALF_WIDTH)
     cube = {"method": "polytope", "C": C.tolist(), "d": d.tolist(), "center": center.tolist()}
-    alternation = {"pushes": 0, "max_rounds": ROUNDS, "tolerance": TOLERANCE}
-    pushes = {"pushes": PUSHES, "max_rounds": 0}
+    alternation = {"contraction": "targeted", "pushes": 0, "max_rounds": ROUNDS, "tolerance": TOLERANCE}
+    pushes = {"contraction": "targeted", "pushes": PUSHES, "max_rounds": 0}
     sides: dict[str, Callable[[], dict[str, Any]]] = {
         "Drake's alternation": lambda: _drakes(scene, C, d),
         "our alternation": lambda: _grown(name, cube, alternation),
         "our pushes": lambda: _grown(name, cube, pushes),
-        "our default, from the seed": lambda: _grown(name, _seed(name), {}),
+        "targeted, from the seed": lambda: _grown(name, _seed(name), WAYS["targeted"]),
     }
     turns: list[list[dict[str, Any]]] = []
     while not turns or (turns[0][0]["seconds"] < SHORT and len(turns) < RUNS):
@@ -102,19 +133,29 @@ def _seed(name: str) -> dict[str, Any]:
     return {"q": catalogue.seed(name).tolist()}
 
 
-def _grown(name: str, seed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
-    """Grows one region of ours and verifies its proof. If no region could be certified, the row says why."""
-    start = time.perf_counter()
+def _grown(name: str, seed: dict[str, Any], options: dict[str, Any], limit: float | None = None) -> dict[str, Any]:
+    """Grows one region of ours and verifies its proof. If no region could be certified, the row says why.
+
+    ``seconds`` are of the clock and ``processor_seconds`` of this process, with the seeding and the proof's first verification.
+    """
+    start, processor = time.perf_counter(), time.process_time()
+
+    def spent() -> dict[str, float]:
+        return {"seconds": time.perf_counter() - start, "processor_seconds": time.process_time() - processor}
+
     try:
-        region = grow(catalogue.scene(name), GrowthOptions(seed=seed, **options))
+        region = grow(catalogue.scene(name), GrowthOptions(seed=seed, **options), deadline_s=limit)
     except CirisError as error:
-        return {"seconds": time.perf_counter() - start, "ellipsoid": 0.0, "faces": 0, "curve": [], "ended": str(error)}
-    seconds, start, manifest = time.perf_counter() - start, time.perf_counter(), region.manifest
+        return {**spent(), "ellipsoid": 0.0, "faces": 0, "curve": [], "ended": str(error)}
+    took, again, manifest = spent(), time.perf_counter(), region.manifest
     verify_region(region.proof)
     return {
-        "seconds": seconds,
-        "verify_seconds": time.perf_counter() - start,
+        **took,
+        "seeding_seconds": manifest["provenance"]["seeding_seconds"],
+        "verify_seconds": time.perf_counter() - again,
         "proof_bytes": len(region.proof),
+        "share": manifest["share"]["value"],
+        "share_stderr": manifest["share"]["stderr"],
         "ellipsoid": manifest["volume"]["ellipsoid"],
         "faces": len(manifest["halfspace_offsets"]),
         "curve": manifest["provenance"]["growth_curve"],
@@ -135,4 +176,6 @@ def _drakes(scene: Scene, C: Array, d: Array) -> dict[str, Any]:
 
 
 def _line(row: dict[str, Any]) -> str:
-    return f"{row['scene']}, {row['way']}: ellipsoid {row['ellipsoid']:.3g}, {row['seconds']:.1f} s, {row['faces']} faces; {row['ended']}"
+    share = f"share {row['share']:.3g}, " if row.get("share") is not None else ""
+    size = f"{share}ellipsoid {row['ellipsoid']:.3g}, {row['faces']} faces"
+    return f"{row['scene']}, {row['way']}: {size}, {row['seconds']:.1f} s; {row['ended']}"

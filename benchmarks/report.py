@@ -6,9 +6,10 @@ import json
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
-from benchmarks import scaling
+from benchmarks import growth, scaling
 from benchmarks.catalogue import ROOT
 
 PAGE, FIGURES = ROOT / "docs/benchmarks.md", ROOT / "docs/benchmarks"
@@ -18,16 +19,24 @@ LINE = 100
 
 Document = dict[str, Any]
 
+PICTURES: dict[str, tuple[Path, Callable[[Document], str]]] = {
+    "scaling": (FIGURES / "scaling.svg", scaling.picture),
+    "growth": (ROOT / "docs/pictures/growth.svg", growth.picture),
+}
+"""Maps a document to the file of its picture and what draws it."""
+
 
 def text(document: Document) -> str:
-    """Returns a document as text for people: the machine, then the document's tables."""
-    return "\n\n".join([machine(document), *_TABLES[document["benchmark"]](document)])
+    """Returns a document as text for people: the machine, then the document's tables, or before each table the machines of its rows."""
+    parts = _TABLES[document["benchmark"]](document)
+    return "\n\n".join([machine(document), *parts] if "machine" in document else parts)
 
 
 def write() -> None:
-    """Writes the tables of all documents in docs/benchmarks into docs/benchmarks.md, and draws the curves."""
+    """Writes the tables of all documents in docs/benchmarks into docs/benchmarks.md, and draws the pictures."""
     PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
-    (FIGURES / "scaling.svg").write_text(scaling.picture(_document("scaling")), encoding="utf-8")
+    for name, (path, picture) in PICTURES.items():
+        path.write_text(picture(_document(name)), encoding="utf-8")
 
 
 def page(old: str) -> str:
@@ -119,19 +128,39 @@ def _compared(document: Document) -> list[str]:
 
 def _growth(document: Document) -> list[str]:
     def line(row: Document) -> list[str]:
-        return [row["scene"], row["way"], f"{row['ellipsoid']:.3g}", seconds(row["seconds"]), str(row["faces"])]
+        return [f"{row['ellipsoid']:.3g}", seconds(row["seconds"]), str(row["faces"])]
 
-    header = ["example", "way", "ellipsoid", "seconds", "faces"]
-    rows = [[*line(row), str(len(row["curve"])), *_proof(row), row["ended"]] for row in document["ways"]]
-    parts = [_table([*header, "certified regions", "proof MB", "verified in", "ended"], rows)]
+    header = ["example", "way", "share", "stderr", "ellipsoid", "seconds", "faces", "processor", "seeding"]
+    rows = []
+    for row in document["ways"]:
+        cells = [row["scene"], row["way"], *_share(row), *line(row), seconds(row["processor_seconds"])]
+        cells += [seconds(row["seeding_seconds"]) if "seeding_seconds" in row else "", str(len(row["curve"])), *_proof(row), row["ended"]]
+        rows.append(cells)
+    parts = [_machines(document["ways"]), _table([*header, "certified regions", "proof MB", "verified in", "ended"], rows)]
     if document["against"]:
         rows = []
         for row in document["against"]:
             reached = [seconds(row["reached_seconds"]), _ratio(row["time_ratio"])] if row["reached_seconds"] else ["never", ""]
             runs = ", ".join(map(_ratio, row["time_ratios"])) if len(row["time_ratios"]) > 1 else ""
-            rows.append([*line(row), f"{row['volume_ratio']:.3g}", *reached, runs])
-        parts.append(_table([*header, "volume / Drake's", "reached Drake's after", "times as fast", "in each run"], rows))
+            rows.append([row["scene"], row["way"], *line(row), f"{row['volume_ratio']:.3g}", *reached, runs])
+        header = ["example", "way", "ellipsoid", "seconds", "faces"]
+        header += ["volume / Drake's", "reached Drake's after", "times as fast", "in each run"]
+        parts += [_machines(document["against"]), _table(header, rows)]
     return parts
+
+
+def _machines(rows: list[Document]) -> str:
+    """Returns a sentence about each machine that the rows were measured on, with the examples where there are several machines."""
+    examples: dict[str, dict[str, None]] = {}
+    for row in rows:
+        examples.setdefault(machine(row), {})[row["scene"]] = None
+    if len(examples) == 1:
+        return next(iter(examples))
+    return "\n\n".join(f"{', '.join(names)}: {sentence}" for sentence, names in examples.items())
+
+
+def _share(row: Document) -> list[str]:
+    return [f"{row['share']:.3f}", f"{row['share_stderr']:.4f}"] if row.get("share") is not None else ["", ""]
 
 
 def _proof(row: Document) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from certifier.errors import CirisError
-from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Step
+from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Step, Transition
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import Start
@@ -85,15 +85,19 @@ class _Run:
         return step(self.scene, action.polytope, self.proofs(self.candidate), action.contain, self.progress)
 
 
-def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: None) -> Region:
+def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: None, deadline_s: float | None = None) -> Region:
     """Grows a certified region in this process.
+
+    Args:
+        deadline_s: after so many seconds growth ends with the best region so far, as soon as the action under way is carried out; None for
+            no deadline.
 
     Raises:
         CirisError: no region could be certified; the code is ``not_grown`` or that of the seeding's error.
     """
     start = time.perf_counter()
     run = _Run(scene, options.random_seed, progress)
-    transition = begin(scene, options)
+    transition, late = begin(scene, options), False
     while not isinstance(transition.action, Finish):
         failure: CirisError | None = None
         try:
@@ -106,8 +110,13 @@ def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: No
         if transition.candidate:
             assert transition.state.start is not None, "what is grown comes from a proposal"
             run.accept(transition.candidate, transition.state.start, time.perf_counter() - start)
+        late = deadline_s is not None and time.perf_counter() - start >= deadline_s
+        if late and not isinstance(transition.action, Finish):
+            outcome = Outcome.INCONCLUSIVE if run.candidate is None else Outcome.CERTIFIED
+            transition = Transition(transition.state, Finish(outcome, "the deadline was reached"))
     if run.candidate is None:
-        raise CirisError("not_grown", transition.action.reason, hint="try another seed, or look at the pair named")
+        hint = "allow more time" if late else "try another seed, or look at the pair named"
+        raise CirisError("not_grown", transition.action.reason, hint=hint)
     provenance = {
         "options": options.to_document(),
         "versions": versions(scene),

@@ -46,21 +46,54 @@ def test_pairs_are_chosen_by_name_and_cost() -> None:
 
 
 def test_a_way_to_grow_is_a_row_with_its_region(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(growth, "WAYS", {"pushes": {"max_rounds": 0}})
-    document = growth.growth(["planar_2dof"], against=False, progress=lambda _: None)
+    monkeypatch.setattr(growth, "WAYS", {"pushes": {"contraction": "targeted", "max_rounds": 0}})
+    document = growth.growth(["planar_2dof"], against=False, limit=growth.LIMIT, progress=lambda _: None)
     (row,) = document["ways"]
     assert (row["scene"], row["way"]) == ("planar_2dof", "pushes")
     assert row["ellipsoid"] > 0.1
     assert row["curve"][-1]["ellipsoid_volume"] == pytest.approx(row["ellipsoid"])
-    assert "planar_2dof" in report.text(document)
+    assert row["curve"][-1]["share"] == row["share"]
+    assert 0 < row["share_stderr"] < row["share"] < 1
+    assert 0 < row["seeding_seconds"] < row["seconds"]
+    assert row["processor_seconds"] > 0
+    assert f"| {row['share']:.3f} | {row['share_stderr']:.4f} |" in report.text(document)
 
 
 def test_a_region_that_cannot_be_grown_is_a_row_that_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(growth, "WAYS", {"nothing": {}})
     monkeypatch.setattr(catalogue, "seed", lambda _: np.array([9.0, 0.0]))
-    (row,) = growth.growth(["planar_2dof"], against=False, progress=lambda _: None)["ways"]
+    document = growth.growth(["planar_2dof"], against=False, limit=growth.LIMIT, progress=lambda _: None)
+    (row,) = document["ways"]
     assert row["ellipsoid"] == 0
     assert "is at 9," in row["ended"]
+    assert "is at 9," in report.text(document)
+
+
+def test_a_way_that_takes_too_long_is_a_row_that_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growth, "WAYS", {"whole": growth.WAYS["whole"]})
+    (row,) = growth.growth(["planar_2dof"], against=False, limit=1e-9, progress=lambda _: None)["ways"]
+    assert (row["ellipsoid"], row["curve"]) == (0, [])
+    assert "the deadline was reached" in row["ended"]
+
+
+def test_examples_measured_anew_replace_their_own_rows_only() -> None:
+    def rows(*names: tuple[str, str]) -> list[dict[str, Any]]:
+        return [{"scene": scene, "way": way} for scene, way in names]
+
+    old = {"benchmark": "growth", "ways": rows(("planar_2dof", "a"), ("arm_3dof", "a"), ("arm_3dof", "b"), ("sphere_arm", "a"))}
+    new = {"benchmark": "growth", "ways": rows(("iiwa_shelf", "c"), ("arm_3dof", "c"), ("arm_3dof", "d")), "against": []}
+    merged = growth.merged(old | {"against": rows(("arm_3dof", "a"))}, new)
+    assert merged["ways"] == rows(("planar_2dof", "a"), ("arm_3dof", "c"), ("arm_3dof", "d"), ("iiwa_shelf", "c"), ("sphere_arm", "a"))
+    assert merged["against"] == rows(("arm_3dof", "a")), "Drake was not asked again"
+
+
+def test_rows_of_several_machines_say_which_is_whose() -> None:
+    document = json.loads((report.FIGURES / "growth.json").read_text(encoding="utf-8"))
+    document["against"] = []
+    row = document["ways"][-1]
+    assert f"{row['scene']}: Measured on" not in report.text(document)
+    row |= {"scene": "another", "machine": row["machine"] | {"processor": "an abacus"}}
+    assert "another: Measured on: an abacus, " in report.text(document)
 
 
 def test_the_service_is_measured_beside_local() -> None:

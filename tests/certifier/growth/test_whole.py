@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
 from certifier.growth.whole import SLICE, STAGES
+from certifier.jobs import local
 from certifier.jobs.local import grow
 from certifier.model import WORLD, Polytope
 from certifier.outcome import Outcome
@@ -201,6 +203,30 @@ def test_more_effort_does_not_come_to_less():
         asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.6}, contraction="whole", cells=cells)
         shares.append(grow(scene, asked).manifest["share"])
     assert shares[1]["value"] > shares[0]["value"] + 3 * shares[0]["stderr"]
+
+
+def test_a_deadline_ends_growth_with_the_best_region_so_far(monkeypatch):
+    _, scene, q = example("planar_2dof")
+    asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.5}, contraction="whole", cells=SLICE)
+    # The clock stands still until a region is reported, and then the deadline is over.
+    clock = [0.0]
+    monkeypatch.setattr(local, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    accept = local._Run.accept
+
+    def accepted(*arguments):
+        accept(*arguments)
+        clock[0] += 10.0
+
+    monkeypatch.setattr(local._Run, "accept", accepted)
+    manifest = grow(scene, asked, deadline_s=10.0).manifest
+    assert manifest["provenance"]["reason"] == "the deadline was reached"
+    assert len(manifest["provenance"]["growth_curve"]) == 1
+    later = grow(scene, asked, deadline_s=1000.0).manifest
+    assert later["provenance"]["reason"] == "certified"
+    assert len(later["provenance"]["growth_curve"]) > 1
+    with pytest.raises(CirisError, match="the deadline was reached") as refused:
+        grow(scene, asked, deadline_s=0.0)
+    assert (refused.value.code, refused.value.hint) == ("not_grown", "allow more time")
 
 
 def test_a_seed_in_contact_is_refused():
