@@ -196,11 +196,10 @@ def test_a_proof_of_another_scene_is_refused(name):
 @pytest.mark.parametrize("name", ["cells", "corners", "band"])
 def test_streams_have_their_lengths(name, stream):
     array = getattr(proof(name), stream)
-    if not array.size:
-        pytest.skip("nothing to take away")
-    refused(replace(proof(name), **{stream: array[:-1]}))
-    refused(replace(proof(name), **{stream: np.concatenate([array, array[-1:]])}), "proof_malformed")
-    refused(replace(proof(name), **{stream: array[:0]}))
+    # A stream may be empty, of cuts for instance; then there is one thing less to try.
+    for changed, code in ((array[:-1], None), (np.concatenate([array, array[-1:]]), "proof_malformed"), (array[:0], None)):
+        if len(changed) != len(array):
+            refused(replace(proof(name), **{stream: changed}), code)
     refused(replace(proof(name), **{stream: array[..., None]}), "proof_malformed")
     refused(replace(proof(name), **{stream: array.astype(np.int64)}), "proof_malformed")
 
