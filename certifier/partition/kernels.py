@@ -135,6 +135,19 @@ def weigh(G: Array, w: Array, rows: Array, m: int) -> int:
 
 
 @njit(cache=True)
+def _unused(origin: Array, m: int) -> int:
+    """Returns the first slot that is not among the first m of those in use."""
+    for slot in range(m + 1):
+        used = False
+        for i in range(m):
+            if origin[i] == slot:
+                used = True
+        if not used:
+            return slot
+    return m
+
+
+@njit(cache=True)
 def _worst(
     A: Array, B: Array, u: Array, radius_a: float, radius_b: float, rows: Array, z: Array, values: Array
 ) -> tuple[int, int, int, float]:
@@ -237,15 +250,7 @@ def separate(
         for c in range(D):
             t += point[c] * point[c]
         G[m, m] = t
-        free = 0
-        for slot in range(D + 2):
-            used = False
-            for i in range(m):
-                if origin[i] == slot:
-                    used = True
-            if not used:
-                free = slot
-                break
+        free = _unused(origin, m)
         points[free] = point
         origin[m] = free
         keys = np.empty(m + 1, np.int64)
@@ -564,15 +569,7 @@ def prove(
                         t += points[origin[i], j] * row[j]
                     G[i, n] = G[n, i] = t
                 G[n, n] = row @ row
-                free = 0
-                for slot in range(D + 2):
-                    used = False
-                    for i in range(n):
-                        if origin[i] == slot:
-                            used = True
-                    if not used:
-                        free = slot
-                        break
+                free = _unused(origin, n)
                 points[free] = row
                 where[free, : k + o + r] = spot
                 where[free, k + o + r] = 0.0 if negative >= 0 else TT[0, place]
