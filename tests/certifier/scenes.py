@@ -94,3 +94,10 @@ def cube(scene, center, half):
 def accepted(polytope, center):
     """What the growth says of a polytope whose pairs are all certified."""
     return Candidate(0, polytope, np.asarray(center, dtype=float), None, None, {})
+
+
+def obstacle(y, shape="box"):
+    """A box or a ball of about 0.3 m that lies y metres beside the middle of a planar arm's reach."""
+    if shape == "box":
+        return box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, y, 0.0))
+    return ball("world/obstacle", WORLD, 0.15, (0.8, y, 0.0))

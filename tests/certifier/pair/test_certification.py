@@ -12,13 +12,7 @@ from certifier.pair.certification import Certification, certify_pair
 from certifier.pair.closest import closest
 from certifier.proof.pair import PairProof
 from certifier.verify.pair import verify_pair
-from tests.certifier.scenes import ball, box, cube, planar_arm
-
-
-def obstacle(y, shape="box"):
-    if shape == "box":
-        return box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, y, 0.0))
-    return ball("world/obstacle", WORLD, 0.15, (0.8, y, 0.0))
+from tests.certifier.scenes import box, cube, obstacle, planar_arm
 
 
 @pytest.mark.parametrize("shape", ["box", "ball"])

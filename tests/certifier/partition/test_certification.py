@@ -21,7 +21,7 @@ from certifier.proof.negative import WitnessProof
 from certifier.proof.partition import EMPTY, PLANE, STREAMS, PartitionProof
 from certifier.verify.separations import verify_separation
 from certifier.verify.witness import check_witness
-from tests.certifier.scenes import ball, box, cube, planar_arm, pose, random_tree, two_arms
+from tests.certifier.scenes import ball, box, cube, obstacle, planar_arm, pose, random_tree, two_arms
 from tests.certifier.truth import distances_at
 
 CELLS = 300
@@ -94,12 +94,6 @@ def partition(scene, result):
 
 def nodes(scene, result):
     return partition(scene, result).nodes.tolist()
-
-
-def obstacle(y, shape="box"):
-    if shape == "box":
-        return box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, y, 0.0))
-    return ball("world/obstacle", WORLD, 0.15, (0.8, y, 0.0))
 
 
 @pytest.mark.parametrize("shape", ["box", "ball"])
