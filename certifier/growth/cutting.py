@@ -14,24 +14,30 @@ from scipy.optimize import linprog
 from certifier.model import Array, Polytope, Scene
 from certifier.polytopes.gibbs import uniform_in_q
 
-CHAINS, EACH = 100, 8
+CHAINS, EACH = 1000, 16
 """So many chains give so many samples each, for the faces of one round."""
+TAIL, AGAIN, MARGIN = 400, 3, 0.1
+"""A program sees TAIL samples, the farthest ones on the way to a corner, and others that it loses in AGAIN rounds. The hinge loss begins
+MARGIN before the face, relative to the distance from the points to keep."""
 CORNER = 0.6
 """The points of one corner lie within this distance of each other, in standard deviations of the samples."""
 MOST_POINTS = 64
-MOST_FACES = 8
+MOST_FACES = 16
 """A pair gets at most this many faces in one round."""
 CLEAR, CLEARER = 0.005, 0.2
 """A face is moved away from what it cuts off, by CLEAR standard deviations and by CLEARER of the depth of what it cuts off."""
 
 
-def cut(scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[tuple[int, ...], Array]], seed: int) -> Polytope | None:
+def cut(
+    scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[tuple[int, ...], Array, float]], seed: int
+) -> Polytope | None:
     """Returns the polytope with faces that cut off the points given.
 
     Args:
         polytope: its last 2n rows are the joint limits; new faces are added before them, and no face is dropped.
         keep: (k, n) points that stay inside.
-        corners: for each pair that failed, the joints between its bodies and the points (w, n) to cut off.
+        corners: for each pair that failed, the joints between its bodies, the points (w, n) to cut off, and the share of the polytope that
+            one face may lose at most.
 
     Returns:
         None where nothing can be cut off without a point to keep.
@@ -41,7 +47,7 @@ def cut(scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[t
     scale = np.where(samples.std(axis=0) > 0, samples.std(axis=0), 1.0)
     C, d = polytope.C, polytope.d
     blocked = False
-    for joints, points in corners:
+    for joints, points, most in corners:
         J = list(joints)
         for _ in range(MOST_FACES):
             left = points[(points @ C.T < d).all(axis=1)]
@@ -53,6 +59,10 @@ def cut(scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[t
             found = _face(near[:, J], keep[:, J], samples[:, J], scale[J])
             if found is None and len(near) > 1:
                 found = _face(near[:1, J], keep[:, J], samples[:, J], scale[J])
+            loss = 0.0 if found is None else float((samples[:, J] @ found[0] > found[1]).mean())
+            if loss > most:
+                points = points[~(points[:, None] == near).all(axis=2).any(axis=1)]
+                continue
             if found is None:
                 # Others of the pair's points may go all the same; this one is left to the next round.
                 points, blocked = points[(points != left[0]).any(axis=1)], True
@@ -66,9 +76,32 @@ def cut(scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[t
 
 def _face(beyond: Array, keep: Array, samples: Array, scale: Array) -> tuple[Array, float] | None:
     """Returns a face (k,), offset in the pair's joints, |c| = 1; None where no face has both on their sides."""
-    k, h = len(scale), len(samples)
     middle = keep[0]
     far, near, rest = ((points - middle) / scale for points in (beyond, keep, samples))
+    # Only samples on the way to what is cut off can be lost; those that are lost all the same join them.
+    mean = rest.mean(axis=0)
+    way = np.linalg.solve(np.cov(rest.T).reshape(len(scale), -1) + 1e-9 * np.eye(len(scale)), far.mean(axis=0) - mean)
+    chosen = np.argsort(-(rest @ way), kind="stable")[:TAIL]
+    found = _hinge(far, near, rest[chosen])
+    for _ in range(AGAIN):
+        more = np.empty(0) if found is None else np.setdiff1d(np.flatnonzero(rest @ found[0] > found[1]), chosen)[:TAIL]
+        if not len(more):
+            break
+        chosen = np.concatenate([chosen, more])
+        found = _hinge(far, near, rest[chosen])
+    if found is None:
+        return None
+    x, offset = found
+    depth, room = float((far @ x).max()) - offset, offset - float((near @ x).max())
+    offset -= min(CLEAR * float(np.linalg.norm(x)) + CLEARER * depth, 0.5 * room)
+    normal = x / scale
+    length = float(np.linalg.norm(normal))
+    return normal / length, float((offset + normal @ middle) / length)
+
+
+def _hinge(far: Array, near: Array, rest: Array) -> tuple[Array, float] | None:
+    """Returns a face (k,), offset with ``far`` beyond it, ``near`` before it, and few of ``rest`` (h, k) beyond it; None without one."""
+    h, k = rest.shape
     A = np.block(
         [
             [-far, np.ones((len(far), 1)), np.zeros((len(far), h))],
@@ -76,14 +109,7 @@ def _face(beyond: Array, keep: Array, samples: Array, scale: Array) -> tuple[Arr
             [rest, -np.ones((h, 1)), -np.eye(h)],
         ]
     )
-    b = np.concatenate([np.zeros(len(far)), -np.ones(len(near) + h)])
+    b = np.concatenate([np.zeros(len(far)), -np.ones(len(near)), np.full(h, -MARGIN)])
     bounds = [(None, None)] * (k + 1) + [(0, None)] * h
     found = linprog(np.concatenate([np.zeros(k + 1), np.ones(h)]), A_ub=A, b_ub=b, bounds=bounds, method="highs")
-    if found.status != 0:
-        return None
-    normal, offset = found.x[:k] / scale, float(found.x[k])
-    depth = float((far @ found.x[:k]).max()) - offset
-    room = offset - float((near @ found.x[:k]).max())
-    offset -= min(CLEAR * float(np.linalg.norm(found.x[:k])) + CLEARER * depth, 0.5 * room)
-    length = float(np.linalg.norm(normal))
-    return normal / length, float((offset + normal @ middle) / length)
+    return (found.x[:k], float(found.x[k])) if found.status == 0 else None

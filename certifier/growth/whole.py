@@ -25,6 +25,8 @@ STAGES = (0.5, 1.0)
 """The faces of the proposal lie this part of their distance from the seed, in one stage after the other."""
 SLICE = 300
 """So many cells of every open pair are looked at in one round."""
+FIRST_LOSS = 0.001
+"""The first faces that cut off open cells lose this share of the polytope at most; twice as much in every round after it."""
 
 
 def begin_stage(scene: Scene, state: GrowthState, start: Start, stage: int = 0) -> Transition:
@@ -52,9 +54,13 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     if unknown is not None:  # Nothing can be cut off for it, so it would fail again and again.
         pair = scene.pairs[unknown]
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing is known of where they fail")
-    corners = [(joints_between(scene, i), report.weaknesses[i].points) for i in report.failures]
+    most = {i: _most_loss(state, whole, i) for i in report.failures}
+    corners = [(joints_between(scene, i), report.weaknesses[i].points, most[i]) for i in report.failures]
     smaller = cut(scene, whole.polytope, start.keep, corners, action.iteration)
-    if len(smaller.d if smaller else ()) == len(whole.polytope.d) and set(report.failures) <= set(action.ending):
+    if (
+        len(smaller.d if smaller else ()) == len(whole.polytope.d)
+        and min(most[i] if i in action.ending else 0.0 for i in report.failures) >= 1
+    ):
         pair = scene.pairs[report.failures[0]]
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing more could be cut off for them")
     if smaller is None:
@@ -62,6 +68,12 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         reason = f"{pair.a} and {pair.b} touch, or come too close, at or between configurations that have to stay inside"
         return _ended(state, report, reason)
     return _next(scene, replace(state, whole=replace(whole, polytope=smaller)))
+
+
+def _most_loss(state: GrowthState, whole: Whole, pair: int) -> float:
+    """Returns which share of the polytope a face may lose for a pair: any until its effort is spent, then little, and more every round."""
+    late = (whole.spent[pair] - (state.options.cells or MOST_CELLS)) // SLICE - 1
+    return 1.0 if late < 0 else min(FIRST_LOSS * 2.0**late, 1.0)
 
 
 def _ended(state: GrowthState, report: Outcomes, reason: str) -> Transition:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Box, Polytope, Scene
 from certifier.polytopes.gibbs import uniform_in_q
@@ -24,6 +26,8 @@ class Area:
         center: (n,) a point inside.
         samples: (S, n) points of the polytope, uniform in q.
         ground: the polytope as proofs hold it, with the root cell as its box.
+        norms: (m,) the lengths of the faces' normals.
+        unit: the polytope with normals of length 1.
     """
 
     scene: Scene
@@ -34,6 +38,8 @@ class Area:
     center: Array
     samples: Array
     ground: Ground
+    norms: Array
+    unit: Polytope
 
     @classmethod
     def of(cls, scene: Scene, polytope: Polytope, seed: int, box: Box | None = None) -> Area:
@@ -50,4 +56,6 @@ class Area:
         box = Box.around(lower, upper) if box is None else box
         ground = Ground(polytope.C, polytope.d, box.mid, box.half, Y_lower, Y_upper)
         samples = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, seed).reshape(-1, scene.n)
-        return cls(scene, Kinematics.of(scene), polytope, box.lower, box.upper, center, samples, ground)
+        norms = np.linalg.norm(polytope.C, axis=1)
+        unit = Polytope(polytope.C / norms[:, None], polytope.d / norms)
+        return cls(scene, Kinematics.of(scene), polytope, box.lower, box.upper, center, samples, ground, norms, unit)

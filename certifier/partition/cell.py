@@ -41,9 +41,9 @@ class Cell:
         return (self.upper - self.lower) / 2
 
     def faces(self, area: Area) -> tuple[Array, Array]:
-        """Returns the faces of the polytope, then the upper and the lower ones of the cell."""
+        """Returns the faces of the polytope, then the upper and the lower ones of the cell, with normals of length 1."""
         eye = np.eye(len(self.lower))
-        return np.concatenate([area.polytope.C, eye, -eye]), np.concatenate([area.polytope.d, self.upper, -self.lower])
+        return np.concatenate([area.unit.C, eye, -eye]), np.concatenate([area.unit.d, self.upper, -self.lower])
 
     def turn(self, area: Area) -> Array:
         """Returns how far every joint turns in the cell, (n,), in radians or metres."""

@@ -24,6 +24,8 @@ from certifier.pair.closest import closest
 from certifier.pair.collisions import touching
 from certifier.pair.result import PairResult, Weakness
 from certifier.partition.area import Area
+from certifier.partition.chords import chords
+from certifier.partition.hulls import approach, gaps
 from certifier.partition.search import Report, Search
 from certifier.partition.tree import Node
 from certifier.polytopes.polytope import chebyshev_center
@@ -38,7 +40,9 @@ GROUP_CELLS = 8
 NEAR_CONTACTS = 48
 """So many configurations about a contact are looked at, at each of SCALES, to see how far it reaches."""
 SCALES = (0.5, 0.2, 0.07, 0.02)
-MOST_POINTS = 400
+NEAR, POINTS_OF_A_CELL = 0.002, 8
+"""Points of an open cell are named at which the bodies are as near as this, relative to their extent, and one at least."""
+MOST_POINTS = 2000
 """A result names at most this many configurations."""
 
 
@@ -116,7 +120,7 @@ class CellCertification:
     ) -> PairResult:
         points = self._contacts(search, volumes, report.contacts)
         if ending:
-            points += self._of_cells(cells)
+            points += self._of_cells(search, cells)
         points += [point for cell in report.narrow for point in cell]
         weakness = Weakness(np.array(points[:MOST_POINTS]).reshape(-1, self._scene.n), np.zeros(self._scene.n))
         found = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, partition=begun, open_cells=len(cells), weakness=weakness)
@@ -136,7 +140,7 @@ class CellCertification:
         pair = next((pair for pair in self._scene.pairs if {pair.a, pair.b} == names), None)
         if pair is None:  # a contact of boxes about several geometries says nothing about them
             return found
-        (A,), (B,) = search.bodies.vertices(s[None])
+        A, B = (self._area.kinematics.points(search.frame, volume.body, volume.vertices, s[None])[0] for volume in volumes)
         weights = closest(A, B).weights
         if pair.a != volumes[0].geometries[0]:
             weights = weights[1], weights[0]
@@ -162,30 +166,27 @@ class CellCertification:
             found += [contact, *near[touching(self._area.kinematics, volumes, near)]]
         return found
 
-    def _of_cells(self, cells: Iterable[tuple[Array, Array]]) -> list[Array]:
-        """Returns points of the polytope that lie in the cells, the samples that are there or else points near their corners."""
+    def _of_cells(self, search: Search, cells: Iterable[tuple[Array, Array]]) -> list[Array]:
+        """Returns points of the polytope in the cells: of every cell where the bodies are nearest, and where they are near."""
         found: list[Array] = []
-        rng = np.random.default_rng(0)
+        unit, eye = self._area.unit, np.eye(self._scene.n)
         for lower, upper in cells:
-            inside = self._area.samples[((self._area.samples >= lower) & (self._area.samples <= upper)).all(axis=1)]
-            corners = np.where(rng.random((8, len(lower))) < 0.5, lower, upper)
-            some = [*inside[:8], *corners[self._area.polytope.contains(corners)]]
-            found += some or self._middle(lower, upper)
+            C, d = np.concatenate([unit.C, eye, -eye]), np.concatenate([unit.d, upper, -lower])
+            try:
+                middle = chebyshev_center(Polytope(C, d))[0]
+            except RegionError:
+                continue
+            X = np.concatenate([middle[None], chords(C, d, middle, np.zeros((0, len(lower))), POINTS_OF_A_CELL, 0)])
+            nearest = np.argsort(gaps(*search.bodies.hulls, X), kind="stable")
+            s = X[nearest[0]].copy()
+            approach(*search.bodies.hulls, np.array(search.bodies.joints), (upper - lower) / 2, C, d, s, 4, 0.0)
+            X = np.concatenate([s[None], X[nearest]])
+            distances = gaps(*search.bodies.hulls, X)
+            found += [X[0], *X[1:][distances[1:] < NEAR]]
         return found
-
-    def _middle(self, lower: Array, upper: Array) -> list[Array]:
-        """Returns the middle of the polytope in a cell; nothing where it misses the cell."""
-        polytope, eye = self._area.polytope, np.eye(len(lower))
-        part = Polytope(np.concatenate([polytope.C, eye, -eye]), np.concatenate([polytope.d, upper, -lower]))
-        try:
-            return [chebyshev_center(part)[0]]
-        except RegionError:
-            return []
 
     def _nearest(self, search: Search, configurations: Array) -> tuple[Array, float]:
         """Returns the configuration at which the bodies are nearest, and their distance there in metres, padding subtracted."""
-        A, B = search.bodies.vertices(configurations)
-        reach = search.bodies.reach
-        distances = [closest(a, b).distance - reach for a, b in zip(A, B, strict=True)]
-        place = int(np.argmin(distances))
-        return configurations[place], max(distances[place], 0.0)
+        distances = gaps(*search.bodies.hulls, configurations)
+        place = int(distances.argmin())
+        return configurations[place], max(float(distances[place]) * search.bodies.extent, 0.0)

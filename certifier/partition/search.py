@@ -24,13 +24,13 @@ import numpy as np
 from scipy.optimize import linprog
 
 from certifier.model import Array, Volume
-from certifier.pair.closest import closest
 from certifier.pair.frames import choose_frame
-from certifier.partition import kernels
 from certifier.partition.area import Area
 from certifier.partition.bodies import TOUCH, Bodies, Separated, Undecided
 from certifier.partition.cell import Cell
+from certifier.partition.chords import chords
 from certifier.partition.coarse import coarse_volume
+from certifier.partition.hulls import gaps
 from certifier.partition.tree import OPEN, Node, Streams
 from certifier.proof.partition import EMPTY, PLANE
 
@@ -39,12 +39,12 @@ NARROW = np.radians(3.0)
 LONG = 5
 """Coarse volumes are tried where so many joints or more move one body against the other."""
 NARROW_COARSE = np.radians(15.0)
-"""A cell that turns less than this in every joint that moves the coarse volumes is not cut for them any more."""
+"""A cell that turns less than this in every joint that moves the coarse volumes, or has no sample, is not cut for them any more."""
 KEPT = 200
 """A cell inherits at most this many points."""
 FEW = 16
 """So many points of a narrow cell are reported."""
-SCOUTED, SCOUTS = 64, 6
+SCOUTED, SCOUTS = 256, 64
 """Before cells are looked at, contacts are looked for from SCOUTS of about four times SCOUTED points: where bodies are nearest."""
 
 
@@ -129,11 +129,10 @@ class Search:
         C, d = cell.faces(area)
         rng = np.random.default_rng(0)
         targets = np.where(rng.random((SCOUTED, len(area.lower))) < 0.5, area.lower, area.upper)
-        X = np.concatenate([area.samples[:SCOUTED], kernels.chords(C, d, area.center, targets, SCOUTED, 0)])
-        distances = [closest(a, b).distance for a, b in zip(*self.bodies.vertices(X), strict=True)]
-        for place in np.argsort(distances)[:SCOUTS]:
+        X = np.concatenate([area.samples[:SCOUTED], chords(C, d, area.center, targets, SCOUTED, 0)])
+        for place in np.argsort(gaps(*self.bodies.hulls, X), kind="stable")[:SCOUTS]:
             nearest = self.bodies.nearest(cell, X[place][None])
-            if nearest is not None and not nearest[1] > self.bodies.reach:
+            if nearest is not None and nearest[1] <= 0:
                 report.contacts.append(nearest[0])
         return bool(report.contacts)
 
@@ -162,7 +161,8 @@ class Search:
             found = self._try(cell, self._coarse, start, seed)
             if found is None:
                 return None
-            if self._turn(cell)[self._coarse.joints].max(initial=0.0) > NARROW_COARSE:
+            hopeless = not len(cell.samples) and found.joint is None
+            if not hopeless and self._turn(cell)[self._coarse.joints].max(initial=0.0) > NARROW_COARSE:
                 return self._cut(cell, self._coarse, found), found.points
             cell.coarse = False
         found = self._try(cell, self.bodies, start, seed)
@@ -170,10 +170,10 @@ class Search:
             return None
         if found.support is not None and found.joint is None:
             nearest = self.bodies.nearest(cell, found.support)
-            if nearest is not None and not nearest[1] > self.bodies.reach:
+            if nearest is not None and nearest[1] <= 0:
                 report.contacts.append(nearest[0])
                 return None
-            if nearest is not None and nearest[1] < self.bodies.reach + TOUCH * self.bodies.extent:
+            if nearest is not None and nearest[1] < TOUCH * self.bodies.extent:
                 report.narrow.append(nearest[0][None])
                 return None
         return self._cut(cell, self.bodies, found), found.points
@@ -200,13 +200,15 @@ class Search:
     def _inside(self, cell: Cell, C: Array, d: Array) -> Array | None:
         """Returns a point of the polytope in the cell; None, after the node was settled, where there is none."""
         n = len(cell.lower)
-        norms = np.linalg.norm(C, axis=1)
-        found = linprog(np.append(np.zeros(n), -1.0), A_ub=np.column_stack([C, norms]), b_ub=d, bounds=(None, None), method="highs")
+        found = linprog(
+            np.append(np.zeros(n), -1.0), A_ub=np.column_stack([C, np.ones(len(d))]), b_ub=d, bounds=(None, None), method="highs"
+        )
         if found.status != 0:
             raise np.linalg.LinAlgError(f"no point of a cell was found: {found.message}")
         if found.x[-1] > -1e-9:
             return np.asarray(found.x[:-1])
-        y = np.maximum(-found.ineqlin.marginals[: len(d) - 2 * n], 0.0)
+        C, d = self._area.polytope.C, self._area.polytope.d
+        y = np.maximum(-found.ineqlin.marginals[: len(d)], 0.0) / self._area.norms
         faces = np.flatnonzero(y > 1e-9 * y.max())
         values = (y[faces] / y.max()).astype(np.float32)
         slope = values @ C[faces]

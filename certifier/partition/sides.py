@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from certifier.model import Array, Volume
-from certifier.partition import kernels
+from certifier.partition import bernstein
 from certifier.partition.area import Area
 from certifier.partition.tree import Streams, joined
 
-PRECISION = 1e-10
+PRECISION = 1e-7
 """Control values have to be this much larger than 0, relative to what they are made of. The verifier asks for less."""
 ROOM = 4096
 """So many pieces are stored for a vertex at most, and ten times as many multipliers."""
@@ -76,7 +76,7 @@ class Side:
         l, u = lower[own], upper[own]
         w, v = (np.where(self._revolute, 1 / np.sqrt(1 + ends * ends), 1.0) for ends in (l, u))
         ends = np.array([l, u, w, v])
-        c, T = kernels.polynomials(
+        c, T = bernstein.polynomials(
             X,
             self.volume.vertices,
             plane[:, 0] + sum((slopes[j] * mid[j] for j in outside), np.zeros(4)),
@@ -95,15 +95,15 @@ class Side:
         for vertex in np.argsort((c[:, 0] - np.abs(c[:, 1:]).sum(axis=1)).min(axis=1)):
             codes, counts, numbers, values = self._room
             lengths, point, halvings = np.zeros(3, np.int64), np.zeros(len(mid)), np.zeros(len(own) + len(outside), np.int64)
-            status = kernels.prove(c[vertex], T, ends, *g, PRECISION, most, codes, counts, numbers, values, lengths, point, halvings)
-            if status == kernels.REFUTED:
+            status = bernstein.prove(c[vertex], T, ends, *g, PRECISION, most, codes, counts, numbers, values, lengths, point, halvings)
+            if status == bernstein.REFUTED:
                 s = mid.copy()
                 place = len(own) + len(outside)
                 s[own] = point[: len(own)]
                 s[outside] = mid[outside] + half[outside] * point[len(own) : place]
                 s[rest] = mid[rest] + half[rest] * point[place:]
                 return s
-            if status == kernels.UNDECIDED:
+            if status == bernstein.UNDECIDED:
                 return int([*own, *outside][int(halvings.argmax())])
             a, b, e = lengths
             found[int(vertex)] = Streams(codes[:a].copy(), counts[:b].copy(), faces[numbers[:e]].astype(np.int16), values[:e].copy())

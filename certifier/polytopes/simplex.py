@@ -20,6 +20,8 @@ _OPTIMAL = 1e-11
 """An optimal vertex may have a multiplier that is negative by this much, relative to the objective."""
 _LEVEL = 1e-13
 """A step no longer than this counts as none; the unknowns are of order one."""
+_BEYOND = 1e-9
+"""A vertex may be beyond a face by this."""
 _PIVOTS = 50
 """At most this many edges are followed for every row and unknown."""
 
@@ -43,6 +45,25 @@ def maximise(A: Array, b: Array, directions: Array, start: Array) -> tuple[Array
     if not _walk(rows, slack, np.ascontiguousarray(directions, dtype=float), points, multipliers):
         raise np.linalg.LinAlgError("no vertex is the best")
     return start + points, multipliers / norms
+
+
+@njit(cache=True)
+def corner(A: Array, b: Array, start: Array, direction: Array, way: Array) -> bool:
+    """Fills in the way (n,) from a point of {x : A x <= b}, with rows of length 1, to where the direction has its largest value.
+
+    Returns:
+        False where there is none, or rounding stands in the way.
+    """
+    m, n = A.shape
+    slack, basis, multipliers = np.empty(m), np.zeros(n, dtype=np.int64), np.zeros(m)
+    for j in range(m):
+        slack[j] = max(b[j] - _dot(A[j], start), 0.0)
+    if not _vertex(A, slack, direction, basis) or not _along_edges(A, slack, direction, basis, way, multipliers):
+        return False
+    worst = 0.0
+    for j in range(m):
+        worst = max(worst, _dot(A[j], way) - slack[j])
+    return worst <= _BEYOND
 
 
 @njit(cache=True)

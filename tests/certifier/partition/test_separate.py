@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
-from certifier.partition.kernels import separate, weigh
+from certifier.partition.planes import separate
+from certifier.partition.wolfe import weigh
 
 LEAST, ENOUGH = 3e-4, 0.8
 
@@ -56,7 +57,7 @@ def moving_points(seed, k, apart, radius):
 def test_a_plane_is_found_where_there_is_one_and_its_margin_is_nearly_the_widest(seed, k, apart, radius):
     A, B, u, radius_a, radius_b = moving_points(seed, k, apart, radius)
     best = widest(A, B, u, radius_a, radius_b)
-    found, z, places, weights = separate(A, B, u, radius_a, radius_b, np.arange(len(u)), LEAST, ENOUGH)
+    found, z, places, weights = separate(A, B, u, radius_a, radius_b, np.ones(len(u)), np.arange(len(u)), LEAST, ENOUGH)
     assert len(places) == len(weights)
     assert (weights > 0).all()
     assert weights.sum() == pytest.approx(1)
@@ -73,7 +74,7 @@ def test_both_answers_occur_on_the_clouds_of_this_file():
     answers = []
     for seed in range(60):
         A, B, u, radius_a, radius_b = moving_points(seed, 2, [0.0, 1.5][seed % 2], 0.2)
-        answers.append(separate(A, B, u, radius_a, radius_b, np.arange(len(u)), LEAST, ENOUGH)[0])
+        answers.append(separate(A, B, u, radius_a, radius_b, np.ones(len(u)), np.arange(len(u)), LEAST, ENOUGH)[0])
     assert 20 <= sum(answers) <= 40
 
 
@@ -81,8 +82,8 @@ def test_only_the_configurations_asked_for_count():
     """Apart from each other at the first ten configurations and in each other's places at the others."""
     A, B, u, *_ = moving_points(0, 1, 1.5, 0.0)
     A[10:], B[10:, :4] = B[10:, :4], A[10:]
-    assert separate(A, B, u, 0.0, 0.0, np.arange(10), LEAST, ENOUGH)[0]
-    found, _, places, _ = separate(A, B, u, 0.0, 0.0, np.arange(5, 15), LEAST, ENOUGH)
+    assert separate(A, B, u, 0.0, 0.0, np.ones(len(u)), np.arange(10), LEAST, ENOUGH)[0]
+    found, _, places, _ = separate(A, B, u, 0.0, 0.0, np.ones(len(u)), np.arange(5, 15), LEAST, ENOUGH)
     assert not found
     assert set(places.tolist()) <= set(range(5, 15))
 

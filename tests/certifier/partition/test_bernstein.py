@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from certifier.partition import kernels
+from certifier.partition import bernstein as bernstein_form
+from certifier.partition.chords import chords
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -32,7 +33,7 @@ def test_chords_end_close_to_the_boundary_and_inside(seed, n):
     d = rng.uniform(0.2, 1.0, len(C))
     start = np.zeros(n)
     targets = rng.normal(size=(10, n))
-    points = kernels.chords(C, d, start, targets, 15, 3)
+    points = chords(C, d, start, targets, 15, 3)
     assert points.shape == (10 + 2 * 15, n)
     slack = d - points @ C.T
     assert (slack > -1e-12).all()
@@ -40,13 +41,13 @@ def test_chords_end_close_to_the_boundary_and_inside(seed, n):
     assert points[:10][~beyond] == pytest.approx(targets[~beyond], rel=1e-5)
     assert (slack[:10][beyond].min(axis=1) < 1e-4).all()
     assert (slack[10:].min(axis=1) < 1e-4).all()
-    assert (points == kernels.chords(C, d, start, targets, 15, 3)).all()
+    assert (points == chords(C, d, start, targets, 15, 3)).all()
 
 
 def test_the_walk_of_the_chords_gets_about():
     """Its ends are near every face of a square, and in all its quarters."""
     C, d = np.concatenate([np.eye(2), -np.eye(2)]), np.ones(4)
-    points = kernels.chords(C, d, np.full(2, 0.99), np.zeros((0, 2)), 100, 0)
+    points = chords(C, d, np.full(2, 0.99), np.zeros((0, 2)), 100, 0)
     assert all((d - points @ C.T < 1e-4)[:, face].sum() >= 10 for face in range(4))
     assert len({tuple(quarter) for quarter in (points > 0).tolist()}) == 4
 
@@ -57,7 +58,7 @@ def test_elevated_coefficients_are_those_of_the_product(seed, k):
     rng = np.random.default_rng(seed)
     values, first, last, t = rng.normal(size=3**k), rng.normal(size=k), rng.normal(size=k), rng.random(k)
     product = bernstein(values, t, 2) * np.prod((1 - t) * first + t * last)
-    assert bernstein(kernels.elevate(values, first, last), t, 3) == pytest.approx(product, rel=1e-9, abs=1e-12)
+    assert bernstein(bernstein_form.elevate(values, first, last), t, 3) == pytest.approx(product, rel=1e-9, abs=1e-12)
 
 
 @settings(max_examples=50)
@@ -66,7 +67,7 @@ def test_halves_are_the_polynomial_on_half_of_a_coordinate(seed, k, in_place):
     rng = np.random.default_rng(seed)
     A, t, axis = rng.normal(size=(2, 4**k)), rng.random(k), int(rng.integers(k))
     given_, low, high = A.copy(), np.empty_like(A), A if in_place else np.empty_like(A)
-    kernels.halve(A, axis, k, low, high)
+    bernstein_form.halve(A, axis, k, low, high)
     for part, place in ((low, t[axis] / 2), (high, (1 + t[axis]) / 2)):
         where = t.copy()
         where[axis] = place
@@ -83,7 +84,7 @@ def test_a_polynomial_is_evaluated_where_the_weights_put_the_point(seed, k, o):
     l, (w, v) = rng.normal(size=k), rng.uniform(0.2, 2.0, (2, k))
     u = l + rng.uniform(0.1, 2.0, k)
     s = ((1 - t) * w * l + t * v * u) / ((1 - t) * w + t * v)
-    found = kernels.evaluate(c, np.concatenate([s, out]), np.array([l, u, w, v]).reshape(4, k))
+    found = bernstein_form.evaluate(c, np.concatenate([s, out]), np.array([l, u, w, v]).reshape(4, k))
     assert found == pytest.approx(bernstein(c[0] + out @ c[1:], t, 3), rel=1e-9, abs=1e-11)
 
 
@@ -97,7 +98,7 @@ def test_the_least_control_value_is_below_the_function_everywhere(seed, k, o, r,
     T[0] = rng.uniform(0.5, 2.0, N)
     z, constant = rng.random(1 + m), rng.normal(size=m)
     own, outside, rest = (rng.normal(size=(m, size)) for size in (k, o, r))
-    least, place = kernels.lowest(z, c, T, constant, own, outside, rest, np.empty(k + o))
+    least, place = bernstein_form.lowest(z, c, T, constant, own, outside, rest, np.empty(k + o))
     assert 0 <= place < N
     values = []
     signs = list(itertools.product((-1.0, 1.0), repeat=o + r))

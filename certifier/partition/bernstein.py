@@ -1,0 +1,553 @@
+"""Polynomials in Bernstein form are proved positive on a polytope, one box of it after the other.
+
+Everything uses one thread. Nothing here is trusted: the verifier checks what is found.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from certifier.model import Array
+from certifier.partition.wolfe import unused, weigh
+
+PROVED, REFUTED, UNDECIDED = 1, 0, -1
+FACES, MORE, ATTEMPTS = 10, 4, 4
+"""A piece is tried with FACES faces, then with MORE of those that its last answer violated, in so many attempts."""
+LOWEST = 32
+"""So many of the lowest control points say which faces these are."""
+STEPS, ZERO = 40, 1e-10
+"""Multipliers are given up after STEPS control points, or where the square of the distance of their rows' hull from 0 is below ZERO."""
+WHOLE = 0.1
+"""A piece is as precise as this part of the cell, at least."""
+SLIGHT = 1e-6
+"""Halves begin with the multipliers of the whole, unless f has less than this part of the largest one."""
+OUTSIDE = 1e-7
+"""A point of the polytope may be beyond a face by this, relative to the magnitude of the face's values."""
+
+
+@njit(cache=True)
+def elevate(values: Array, first: Array, last: Array) -> Array:
+    """Returns the Bernstein coefficients of a polynomial of degree 2 in each of k coordinates times a linear form in each, (4^k,).
+
+    Args:
+        values: (3^k,) coefficients; the first coordinate is the slowest.
+        first, last: (k,) the linear forms' values at the two ends of each coordinate.
+    """
+    k = len(first)
+    left, right = 1, 3**k
+    for i in range(k):
+        right //= 3
+        out = np.empty(left * 4 * right)
+        for x in range(left):
+            for j in range(4):
+                for y in range(right):
+                    t = 0.0
+                    if j < 3:
+                        t += (3 - j) / 3.0 * first[i] * values[(x * 3 + j) * right + y]
+                    if j > 0:
+                        t += j / 3.0 * last[i] * values[(x * 3 + j - 1) * right + y]
+                    out[(x * 4 + j) * right + y] = t
+        values = out
+        left *= 4
+    return values
+
+
+@njit(cache=True)
+def polynomials(X: Array, vertices: Array, base: Array, own: Array, outside: Array, ends: Array) -> tuple[Array, Array]:
+    """Returns the Bernstein coefficients of f den of all vertices, (V, 1 + o, 4^k), and of den and den s_i, (1 + k, 4^k).
+
+    Args:
+        X: (3^k, 4, 4) control matrices of the pose.
+        vertices: (V, 3) metres.
+        base: (4,) the plane at the middle of the outside coordinates; the radius is subtracted from its offset already.
+        own, outside: (k, 4), (o, 4) what the own coordinates s_i and the outside coordinates, which are in [-1, 1], add to it.
+        ends: (4, k) both ends of the own coordinates and their weights.
+    """
+    N, k, o, V = len(X), len(own), len(outside), len(vertices)
+    first, last = ends[2].copy(), ends[3].copy()
+    den = X[:, 3, 3].copy()
+    T = np.empty((1 + k, 4**k))
+    T[0] = elevate(den, first, last)
+    for i in range(k):
+        first[i] *= ends[0, i]
+        last[i] *= ends[1, i]
+        T[1 + i] = elevate(den, first, last)
+        first[i], last[i] = ends[2, i], ends[3, i]
+    c = np.empty((V, 1 + o, 4**k))
+    p, values = np.empty((N, 4)), np.empty(N)
+    for v in range(V):
+        for a in range(N):
+            for e in range(4):
+                p[a, e] = X[a, e, 0] * vertices[v, 0] + X[a, e, 1] * vertices[v, 1] + X[a, e, 2] * vertices[v, 2] + X[a, e, 3]
+            values[a] = p[a, 0] * base[0] + p[a, 1] * base[1] + p[a, 2] * base[2] + p[a, 3] * base[3]
+        c[v, 0] = elevate(values, first, last)
+        for i in range(k):
+            for a in range(N):
+                values[a] = p[a, 0] * own[i, 0] + p[a, 1] * own[i, 1] + p[a, 2] * own[i, 2] + p[a, 3] * own[i, 3]
+            first[i] *= ends[0, i]
+            last[i] *= ends[1, i]
+            c[v, 0] += elevate(values, first, last)
+            first[i], last[i] = ends[2, i], ends[3, i]
+        for i in range(o):
+            for a in range(N):
+                values[a] = p[a, 0] * outside[i, 0] + p[a, 1] * outside[i, 1] + p[a, 2] * outside[i, 2] + p[a, 3] * outside[i, 3]
+            c[v, 1 + i] = elevate(values, first, last)
+    return c, T
+
+
+@njit(cache=True)
+def halve(A: Array, axis: int, k: int, low: Array, high: Array) -> None:
+    """Writes the Bernstein coefficients of both halves of a coordinate, by de Casteljau's algorithm, for every row of A, (q, 4^k).
+
+    ``low`` or ``high`` may be A itself.
+    """
+    q, N = A.shape
+    stride = 4 ** (k - 1 - axis)
+    for r in range(q):
+        for block in range(0, N, 4 * stride):
+            for b in range(block, block + stride):
+                c0, c1, c2, c3 = A[r, b], A[r, b + stride], A[r, b + 2 * stride], A[r, b + 3 * stride]
+                d0, d1, d2 = 0.5 * (c0 + c1), 0.5 * (c1 + c2), 0.5 * (c2 + c3)
+                e0, e1 = 0.5 * (d0 + d1), 0.5 * (d1 + d2)
+                f0 = 0.5 * (e0 + e1)
+                low[r, b], low[r, b + stride], low[r, b + 2 * stride], low[r, b + 3 * stride] = c0, d0, e0, f0
+                high[r, b], high[r, b + stride], high[r, b + 2 * stride], high[r, b + 3 * stride] = f0, e1, d2, c3
+
+
+@njit(cache=True)
+def lowest(z: Array, c: Array, T: Array, constant: Array, own: Array, outside: Array, rest: Array, slopes: Array) -> tuple[float, int]:
+    """Returns the least control value of z_0 f - sum_j z_j g_j, and the place of it.
+
+    Args:
+        z: (1 + m,).
+        c: (1 + o, N) of f: the constant part, and the slopes in the outside coordinates, which are in [-1, 1].
+        T: (1 + k, N) of the denominator, and of the denominator times each own coordinate.
+        constant, own, outside, rest: (m,), (m, k), (m, o), (m, r) of the faces g_j, in the coordinates of the piece.
+        slopes: (k + o,) is overwritten with those of sum_j z_j g_j.
+    """
+    N, m, k, o = c.shape[1], len(constant), T.shape[0] - 1, c.shape[0] - 1
+    slopes[:] = 0.0
+    base = 0.0
+    for j in range(m):
+        if z[1 + j] != 0.0:
+            base += z[1 + j] * constant[j]
+            for i in range(k):
+                slopes[i] += z[1 + j] * own[j, i]
+            for i in range(o):
+                slopes[k + i] += z[1 + j] * outside[j, i]
+    for i in range(rest.shape[1]):
+        t = 0.0
+        for j in range(m):
+            t += z[1 + j] * rest[j, i]
+        base += abs(t)
+    least, place = np.inf, 0
+    for a in range(N):
+        t = z[0] * c[0, a] - base * T[0, a]
+        for i in range(k):
+            t -= slopes[i] * T[1 + i, a]
+        for i in range(o):
+            t -= abs(z[0] * c[1 + i, a] - slopes[k + i] * T[0, a])
+        if not t >= least:
+            least, place = (t if t < least else -np.inf), a
+    return least, place
+
+
+@njit(cache=True)
+def steepest(c: Array, k: int) -> int:
+    """Returns the coordinate to halve: the one in which f bends and varies most."""
+    N, o = c.shape[1], c.shape[0] - 1
+    most, axis = -1.0, 0
+    for i in range(k):
+        stride = 4 ** (k - 1 - i)
+        t = 0.0
+        for block in range(0, N, 4 * stride):
+            for b in range(block, block + stride):
+                d0, d1, d2 = (
+                    c[0, b + stride] - c[0, b],
+                    c[0, b + 2 * stride] - c[0, b + stride],
+                    c[0, b + 3 * stride] - c[0, b + 2 * stride],
+                )
+                t = max(t, 2 * max(abs(d1 - d0), abs(d2 - d1)) + 0.3 * max(max(abs(d0), abs(d1)), abs(d2)))
+        if t > most:
+            most, axis = t, i
+    for i in range(o):
+        low, high = c[1 + i].min(), c[1 + i].max()
+        t = (high - low) + 0.3 * max(abs(low), abs(high))
+        if t > most:
+            most, axis = t, k + i
+    return axis
+
+
+@njit(cache=True)
+def evaluate(c: Array, spot: Array, ends: Array) -> float:
+    """Returns f times a positive number at a point.
+
+    Args:
+        c: (1 + o, 4^k) of f.
+        spot: the values of the own coordinates, then the outside coordinates in [-1, 1].
+        ends: (4, k) of the own coordinates: both ends and their weights.
+    """
+    k, o = ends.shape[1], c.shape[0] - 1
+    values = c[0].copy()
+    for i in range(o):
+        values += spot[k + i] * c[1 + i]
+    N = len(values)
+    for i in range(k):
+        low, high = ends[2, i] * (spot[i] - ends[0, i]), ends[3, i] * (ends[1, i] - spot[i])
+        t = min(max(low / (low + high), 0.0), 1.0)
+        N //= 4
+        for y in range(N):
+            d0 = (1 - t) * values[y] + t * values[N + y]
+            d1 = (1 - t) * values[N + y] + t * values[2 * N + y]
+            d2 = (1 - t) * values[2 * N + y] + t * values[3 * N + y]
+            values[y] = (1 - t) * ((1 - t) * d0 + t * d1) + t * ((1 - t) * d1 + t * d2)
+    return values[0]
+
+
+@njit(cache=True)
+def choose(c: Array, T: Array, constant: Array, own: Array, outside: Array, rest: Array, scale: Array, z: Array, chosen: Array) -> int:
+    """Fills in the faces that may help most, those with multipliers in z first, and returns how many there are, which is 1 at least.
+
+    A face helps where f is negative, if it is negative there as well.
+
+    Args:
+        c, T, constant, own, outside, rest: as for :func:`lowest`.
+        scale: (1 + m,) the magnitude of f and of each face.
+        chosen: gets their numbers.
+    """
+    N, m, k, o = c.shape[1], len(constant), T.shape[0] - 1, c.shape[0] - 1
+    values = c[0].copy()
+    for i in range(o):
+        values -= np.abs(c[1 + i])
+    bad = np.zeros(LOWEST, np.int64)
+    count, limit = 0, 0.5 * values.min()
+    for a in range(N):
+        if values[a] <= limit and count < LOWEST:
+            bad[count] = a
+            count += 1
+    help, used = np.zeros(m), np.zeros(m, np.bool_)
+    for j in range(m):
+        for i in range(count):
+            t = constant[j]
+            for e in range(o):
+                t += -outside[j, e] if c[1 + e, bad[i]] > 0 else outside[j, e]
+            t *= T[0, bad[i]]
+            for e in range(k):
+                t += own[j, e] * T[1 + e, bad[i]]
+            help[j] -= min(t, 0.0)
+        help[j] /= scale[1 + j]
+    n = 0
+    for j in range(m):
+        if z[1 + j] > 0 and n < FACES:
+            chosen[n] = j
+            used[j] = True
+            n += 1
+    for j in np.argsort(-help):
+        if n < FACES and help[j] > 0 and not used[j]:
+            chosen[n] = j
+            n += 1
+    return max(n, 1)
+
+
+@njit(cache=True)
+def multipliers(
+    c: Array,
+    T: Array,
+    constant: Array,
+    own: Array,
+    outside: Array,
+    rest: Array,
+    scale: Array,
+    needed: Array,
+    z: Array,
+    spot: Array,
+) -> int:
+    """Looks for z >= 0 with z_0 f - sum_j z_j g_j > 0 at all control points, by Wolfe's algorithm over their rows.
+
+    Args:
+        c, T, constant, own, outside, rest: as for :func:`lowest`.
+        scale: (1 + m,) the magnitude of f and of each face.
+        needed: (1 + m,) control values have to be larger than z times this.
+        z: (1 + m,) gets z_0 = 1 and the multipliers, in single precision; or z_0 = 0, where the faces alone do.
+        spot: (k + o + r,) gets the mean of the control points whose rows come to 0, when REFUTED: at it no face is negative, and f is not
+            positive, as far as control points tell. The own coordinates are as they are, the others in [-1, 1].
+
+    Returns:
+        PROVED, REFUTED or UNDECIDED.
+    """
+    m, k, o, r = len(constant), T.shape[0] - 1, c.shape[0] - 1, rest.shape[1]
+    D = 1 + m
+    points, G, w = np.zeros((2 * D + 2, D)), np.zeros((2 * D + 2, 2 * D + 2)), np.zeros(2 * D + 2)
+    where, origin = np.zeros((2 * D + 2, k + o + r + 1)), np.zeros(2 * D + 2, np.int64)
+    slopes, x, trial, row = np.zeros(k + o), np.zeros(D), np.zeros(D), np.zeros(D)
+    z[:] = 0.0
+    z[0] = 1.0
+    n = 0
+    for _ in range(STEPS):
+        place = lowest(z, c, T, constant, own, outside, rest, slopes)[1]
+        den = T[0, place]
+        row[0] = c[0, place]
+        for i in range(k):
+            spot[i] = T[1 + i, place]
+        for i in range(o):
+            spot[k + i] = -1.0 if z[0] * c[1 + i, place] - slopes[k + i] * den > 0 else 1.0
+            row[0] += spot[k + i] * c[1 + i, place]
+        for i in range(r):
+            t = 0.0
+            for j in range(m):
+                t += z[1 + j] * rest[j, i]
+            spot[k + o + i] = 1.0 if t > 0 else -1.0
+        for j in range(m):
+            t = constant[j] * den
+            for i in range(k):
+                t += own[j, i] * T[1 + i, place]
+            for i in range(o):
+                t += spot[k + i] * outside[j, i] * den
+            for i in range(r):
+                t += spot[k + o + i] * rest[j, i] * den
+            row[1 + j] = -t
+        for i in range(o + r):
+            spot[k + i] *= den
+        for j in range(D):
+            row[j] /= scale[j]
+        free = unused(origin, n)
+        points[free] = row
+        where[free, : k + o + r] = spot
+        where[free, k + o + r] = den
+        n = _joined(points, G, w, origin, n, free)
+        # Coordinates that came out negative get rows of their own, until none does.
+        for _ in range(2 * D):
+            x[:] = 0.0
+            for i in range(n):
+                for j in range(D):
+                    x[j] += w[i] * points[origin[i], j]
+            least, negative = -1e-9 * np.abs(x).max(), -1
+            for j in range(D):
+                if x[j] < least:
+                    least, negative = x[j], j
+            if negative < 0 or n > 2 * D:
+                break
+            free = unused(origin, n)
+            points[free] = 0.0
+            points[free, negative] = 1.0
+            where[free] = 0.0
+            n = _joined(points, G, w, origin, n, free)
+        if x @ x < ZERO:
+            total = 0.0
+            spot[:] = 0.0
+            for i in range(n):
+                total += w[i] * where[origin[i], k + o + r]
+                for a in range(k + o + r):
+                    spot[a] += w[i] * where[origin[i], a]
+            if total <= 0:
+                return UNDECIDED
+            spot /= total
+            return REFUTED
+        if n > 2 * D:
+            return UNDECIDED
+        for j in range(D):
+            z[j] = max(x[j], 0.0) / scale[j]
+        largest = z[1:].max()
+        for positive in (True, False):
+            # The multipliers are stored in single precision.
+            unit = z[0] if positive else largest
+            if unit <= 0 or (not positive and z[0] > 1e-6 * largest):
+                continue
+            trial[0] = 1.0 if positive else 0.0
+            for j in range(m):
+                trial[1 + j] = np.float32(z[1 + j] / unit)
+            if lowest(trial, c, T, constant, own, outside, rest, slopes)[0] > (trial * needed).sum():
+                z[:] = trial
+                return PROVED
+        z /= max(z[0], largest)
+    return UNDECIDED
+
+
+@njit(cache=True)
+def _joined(points: Array, G: Array, w: Array, origin: Array, n: int, slot: int) -> int:
+    """Adds the point in a slot to the n points of a hull, moves their weights, and returns how many are left."""
+    D = points.shape[1]
+    for i in range(n):
+        t = 0.0
+        for j in range(D):
+            t += points[origin[i], j] * points[slot, j]
+        G[i, n] = G[n, i] = t
+    G[n, n] = points[slot] @ points[slot]
+    origin[n] = slot
+    w[n] = 1.0 if n == 0 else 0.0
+    return weigh(G, w, origin, n + 1)
+
+
+@njit(cache=True)
+def _violated(values: Array, chosen: Array, n: int) -> int:
+    """Adds the faces that are violated most to the chosen ones, and returns how many these are then."""
+    for j in np.argsort(values)[:MORE]:
+        if values[j] < 0 and n < len(chosen) and not (chosen[:n] == j).any():
+            chosen[n] = j
+            n += 1
+    return n
+
+
+@njit(cache=True)
+def prove(
+    c: Array,
+    T: Array,
+    ends: Array,
+    constant: Array,
+    own: Array,
+    outside: Array,
+    rest: Array,
+    precision: float,
+    most: int,
+    codes: Array,
+    counts: Array,
+    faces: Array,
+    values: Array,
+    lengths: Array,
+    point: Array,
+    halvings: Array,
+) -> int:
+    """Proves that f > 0 wherever all g_j >= 0, on a box that is halved where one set of multipliers is not enough.
+
+    Every piece gets multipliers with z_0 f - sum_j z_j g_j > 0 at its control points, or z_0 = 0 where the piece misses the polytope.
+
+    Args:
+        c, T, constant, own, outside, rest: as for :func:`lowest`.
+        ends: as for :func:`evaluate`.
+        precision: control values must be larger than this multiple of the magnitude of what they are made of.
+        most: give up after this many pieces.
+        codes, counts, faces, values: streams of the proof (certifier.proof.partition), written from ``lengths`` on.
+        lengths: (3,) of codes, counts and faces; they are advanced.
+        point: (k + o + r,) gets a point of the polytope where f < 0, when REFUTED: own coordinates as they are, the others in [-1, 1].
+        halvings: (k + o,) counts how often each coordinate was halved.
+
+    Returns:
+        PROVED, REFUTED or UNDECIDED.
+    """
+    N, m, k, o, r = c.shape[1], len(constant), T.shape[0] - 1, c.shape[0] - 1, rest.shape[1]
+    D, depth = 1 + m, 40
+    stack_c, stack_T, stack_z = np.zeros((depth, 1 + o, N)), np.zeros((depth, 1 + k, N)), np.zeros((depth, D))
+    center, half = np.zeros((depth, o)), np.ones((depth, o))
+    stack_c[0], stack_T[0], stack_z[0, 0] = c, T, 1.0
+    slopes, local, g_out = np.zeros(k + o), np.zeros(m), np.zeros((m, o))
+    scale, whole, least, some, enough, few = np.zeros(D), np.zeros(D), np.zeros(D), np.zeros(D), np.zeros(D), np.zeros(D)
+    values_at, chosen = np.zeros(m), np.zeros(m, np.int64)
+    z, spot = np.zeros(D), np.zeros(k + o + r)
+    top, count = 1, 0
+    while top:
+        n = 0
+        top -= 1
+        count += 1
+        cc, TT = stack_c[top], stack_T[top]
+        size, weight = np.abs(cc[0]).max(), np.abs(TT[0]).max()
+        for j in range(m):
+            local[j] = constant[j]
+            for i in range(o):
+                local[j] += outside[j, i] * center[top, i]
+                g_out[j, i] = outside[j, i] * half[top, i]
+        scale[0] = size
+        for j in range(m):
+            t = abs(local[j])
+            for i in range(k):
+                t += abs(own[j, i]) * np.abs(TT[1 + i]).max() / weight
+            for i in range(o):
+                t += abs(g_out[j, i])
+            for i in range(r):
+                t += abs(rest[j, i])
+            scale[1 + j] = t * weight
+        z[:] = stack_z[top]
+        if count == 1:
+            whole[:] = scale
+        # The verifier's bound of rounding errors is about the whole cell.
+        least[:] = precision * np.maximum(scale, WHOLE * whole)
+        found = lowest(z, cc, TT, local, own, g_out, rest, slopes)[0] > (z * least).sum()
+        if not found and z[1:].any():
+            z[:] = 0.0
+            z[0] = 1.0
+            found = lowest(z, cc, TT, local, own, g_out, rest, slopes)[0] > least[0]
+        if not found and m:
+            n = choose(cc, TT, local, own, g_out, rest, scale, stack_z[top], chosen)
+            for _ in range(ATTEMPTS):
+                some[0], some[1 : 1 + n] = scale[0], scale[1 + chosen[:n]]
+                enough[0], enough[1 : 1 + n] = least[0], least[1 + chosen[:n]]
+                parts = (local[chosen[:n]], own[chosen[:n]], g_out[chosen[:n]], rest[chosen[:n]])
+                kind = multipliers(cc, TT, *parts, some[: 1 + n], enough[: 1 + n], few[: 1 + n], spot)
+                if kind == PROVED:
+                    z[:] = 0.0
+                    z[0] = few[0]
+                    z[1 + chosen[:n]] = few[1 : 1 + n]
+                    found = True
+                if kind != REFUTED:
+                    break
+                # Where a joint turns by more than 180 degrees some weights are negative, so the spot may lie outside of the piece.
+                within = np.abs(spot[k:]).max() <= 1 if o + r else True
+                for i in range(k):
+                    within = within and ends[0, i] <= spot[i] <= ends[1, i]
+                if not within:
+                    break
+                for i in range(o):
+                    spot[k + i] = center[top, i] + half[top, i] * spot[k + i]
+                for j in range(m):
+                    t = constant[j]
+                    for i in range(k):
+                        t += own[j, i] * spot[i]
+                    for i in range(o):
+                        t += outside[j, i] * spot[k + i]
+                    for i in range(r):
+                        t += rest[j, i] * spot[k + o + i]
+                    values_at[j] = min(t * weight / scale[1 + j] + OUTSIDE, 0.0)
+                if values_at.min() >= 0:
+                    if evaluate(c, spot, ends) < 0:
+                        point[:] = spot
+                        return REFUTED
+                    break
+                before = n
+                n = _violated(values_at, chosen, n)
+                if n == before:
+                    break
+        if found:
+            if lengths[0] >= len(codes) or lengths[1] >= len(counts):
+                return UNDECIDED
+            codes[lengths[0]] = -1 if z[0] > 0 else -2
+            lengths[0] += 1
+            used_faces = 0
+            for j in range(m):
+                if z[1 + j] > 0:
+                    if lengths[2] >= len(faces):
+                        return UNDECIDED
+                    faces[lengths[2]], values[lengths[2]] = j, z[1 + j]
+                    lengths[2] += 1
+                    used_faces += 1
+            counts[lengths[1]] = used_faces
+            lengths[1] += 1
+            continue
+        if count >= most or top + 2 > depth or lengths[0] >= len(codes):
+            return UNDECIDED
+        axis = steepest(cc, k)
+        halvings[axis] += 1
+        codes[lengths[0]] = axis
+        lengths[0] += 1
+        stack_z[top, 0] = 1.0
+        if n and few[0] > SLIGHT * few[: 1 + n].max():
+            for j in range(n):
+                stack_z[top, 1 + chosen[j]] = np.float32(few[1 + j] / few[0])
+        stack_z[top + 1] = stack_z[top]
+        center[top + 1], half[top + 1] = center[top], half[top]
+        if axis < k:
+            halve(cc, axis, k, stack_c[top + 1], stack_c[top])
+            halve(TT, axis, k, stack_T[top + 1], stack_T[top])
+        else:
+            i = axis - k
+            stack_T[top + 1], stack_c[top + 1] = TT, cc
+            for a in range(N):
+                t = 0.5 * cc[1 + i, a]
+                stack_c[top + 1, 0, a] = cc[0, a] - t
+                stack_c[top, 0, a] = cc[0, a] + t
+                stack_c[top, 1 + i, a] = stack_c[top + 1, 1 + i, a] = t
+            half[top, i] *= 0.5
+            half[top + 1, i] = half[top, i]
+            center[top + 1, i] = center[top, i] - half[top, i]
+            center[top, i] += half[top, i]
+        top += 2
+    return PROVED

@@ -1,0 +1,53 @@
+"""A plane that is found keeps both bodies on their sides all over the polytope; where bodies touch there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from certifier.kinematics import Kinematics
+from certifier.model import WORLD, Volume
+from certifier.partition.hulls import hull, place
+from certifier.partition.planes import FOUND, NO_PLANE, Chart, length_bound, look
+from tests.certifier.scenes import box, planar_arm
+
+CALM = 0.3
+
+
+def looked(half, radius):
+    """What is found for the tip of an arm of two links and a box, on a cube in s about 0, from its middle alone."""
+    scene = planar_arm(2, box("world/box", WORLD, (0.2, 0.2, 0.2), (1.2, 1.2, 0.0)))
+    tip = Volume(("tip",), "arm/link2", np.array([[1.0, 0.0, 0.0]]), radius)
+    kinematics, other = Kinematics(scene), Volume.of(scene.geometry("world/box"))
+    a, b = (hull(kinematics, WORLD, volume, volume.radius, np.zeros(3), 1.0) for volume in (tip, other))
+    X = np.zeros((200, 2))
+    chart = Chart(np.arange(2), np.zeros(2), np.full(2, CALM / half), CALM)
+    C, d = np.concatenate([np.eye(2), -np.eye(2)]), np.full(4, half)
+    return a, b, X, look(a, b, chart, np.full(2, half), C, d, X, 1, 20, 4, 3e-4, 0.8)
+
+
+@pytest.mark.parametrize("half", [0.05, 0.15, 0.25])
+@pytest.mark.parametrize("radius", [0.02, 0.1])
+def test_a_plane_that_is_found_holds_at_samples_of_all_of_the_polytope(half, radius):
+    a, b, X, (kind, z, _, _, N) = looked(half, radius)
+    assert kind == FOUND
+    assert (np.abs(X[:N]) <= half + 1e-9).all()
+    bound = np.empty(3)
+    length_bound(z, 2, CALM, bound)
+    for s in np.random.default_rng(0).uniform(-half, half, (500, 2)):
+        plane, length = z.reshape(4, 3) @ np.append(1.0, CALM / half * s), bound @ np.append(1.0, CALM / half * s)
+        assert np.linalg.norm(plane[:3]) <= length
+        for body, sign in ((a, 1.0), (b, -1.0)):
+            points = np.empty(body.vertices.shape)
+            place(body, s, np.empty((4, 4)), np.empty((4, 4)), points)
+            assert (sign * (points @ plane[:3] + plane[3]) >= body.radius * length - 1e-9).all()
+
+
+def test_there_is_no_plane_where_the_bodies_touch_somewhere():
+    """From the middle, where they are apart, the tip is moved to where planes fail, until the points that were found show it."""
+    _, _, X, (kind, z, places, weights, N) = looked(0.9, 0.1)
+    assert kind == NO_PLANE
+    assert np.linalg.norm(z) < 3e-4
+    assert weights.sum() == pytest.approx(1)
+    assert set(places.tolist()) <= set(range(N))
+    assert (np.abs(X[:N]) <= 0.9 + 1e-9).all()
