@@ -21,9 +21,10 @@ from certifier.jobs.reference import Reference
 from certifier.model import Array, Scene
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.verify.region import verify_region
+from client.cores import cores
 
 WAYS: dict[str, dict[str, Any]] = {
-    "whole": {"contraction": "whole", "cells": 2000},
+    "whole": {"contraction": "whole"},
     "targeted": {"contraction": "targeted"},
     "uniform contraction": {"contraction": "uniform", "pushes": 0, "max_rounds": 0},
 }
@@ -144,7 +145,7 @@ def _grown(name: str, seed: dict[str, Any], options: dict[str, Any], limit: floa
         return {"seconds": time.perf_counter() - start, "processor_seconds": time.process_time() - processor}
 
     try:
-        region = grow(catalogue.scene(name), GrowthOptions(seed=seed, **options), deadline_s=limit)
+        region = grow(catalogue.scene(name), GrowthOptions(seed=seed, **options), deadline_s=limit, processes=cores())
     except CirisError as error:
         return {**spent(), "ellipsoid": 0.0, "faces": 0, "curve": [], "ended": str(error)}
     took, again, manifest = spent(), time.perf_counter(), region.manifest

@@ -16,6 +16,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,7 @@ def beside_local(name: str, processes: int, turns: int, progress: Progress) -> d
     with tempfile.TemporaryDirectory() as directory, _running(Path(directory), processes) as service:
         for turn in range(turns):
             for way in (SERVICE, LOCAL) if turn % 2 == 0 else (LOCAL, SERVICE):
-                rows.append({"turn": turn, "way": way, **_grown(name, way, service, Path(directory))})
+                rows.append({"turn": turn, "way": way, **_grown(name, way, service, Path(directory), processes)})
                 if rows[-1]["ellipsoid"] != rows[0]["ellipsoid"]:
                     raise CirisError("regions_differ", f"the runs came to different regions of {name}")
                 progress(_line(rows[-1]))
@@ -68,12 +69,15 @@ def _more(rows: list[dict[str, Any]], what: str) -> dict[str, Any]:
     return {"medians": medians, "share": statistics.median(shares), "each": shares}
 
 
-def _grown(name: str, way: str, service: _Service, directory: Path) -> dict[str, Any]:
+def _grown(name: str, way: str, service: _Service, directory: Path, processes: int) -> dict[str, Any]:
     """Runs one command. Returns its seconds, those besides seeding and pairs, and the processor time of the command and the service."""
     command = [*CIRIS, "grow", str(catalogue.ROOT / "examples" / name / "scene.yaml"), "--json", "--out", str(directory / "proof")]
     command += [LOCAL] if way == LOCAL else ["--url", service.url]
     before, start, busy = _stolen(), time.perf_counter(), _processor_seconds(service.pid)
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    # ``--local`` uses all cores it may, so it may use as many as the service.
+    allowed = set(sorted(os.sched_getaffinity(0))[:processes])
+    fewer = partial(os.sched_setaffinity, 0, allowed) if way == LOCAL else None
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=fewer) as process:
         assert process.stdout is not None
         assert process.stderr is not None
         output, said = process.stdout.read(), process.stderr.read()  # what the command says on standard error fits into a pipe

@@ -7,6 +7,7 @@ from typing import Any
 from certifier.errors import SceneError
 from certifier.model import Scene
 from client import verdicts
+from client.cores import cores
 from client.inputs import PolytopeFile, is_scene_file
 from client.output import Screen
 from client.service import Grown
@@ -26,12 +27,13 @@ def load(scene: str) -> Scene:
 
 
 def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], screen: Screen) -> Grown:
-    """Grows a region in this process."""
+    """Grows a region in this process and children of it."""
     loaded = load(scene)
     from certifier.growth.options import GrowthOptions
     from certifier.jobs import local
 
-    region = local.grow(loaded, GrowthOptions.from_document({"kind": "grow", "seed": seed, **options}), screen.status)
+    asked = GrowthOptions.from_document({"kind": "grow", "seed": seed, **options})
+    region = local.grow(loaded, asked, screen.status, processes=cores())
     screen.clear()
     provenance = region.manifest["provenance"]
     return Grown(region.manifest, region.proof, provenance["seconds"], remark=provenance["reason"])
@@ -49,7 +51,7 @@ def certify(scene: str, given: PolytopeFile, screen: Screen, watch: bool, drake:
     if drake is None:
         from certifier.jobs import local
 
-        verdict = local.certify(loaded, given.polytope, given.center, progress, cells)
+        verdict = local.certify(loaded, given.polytope, given.center, progress, cells, cores())
     else:
         from certifier.jobs import reference
 

@@ -5,7 +5,6 @@ Files come from strangers, so a child process checks them, with limits on its ti
 
 from __future__ import annotations
 
-import os
 import stat
 import sys
 import tempfile
@@ -20,6 +19,7 @@ from certifier.errors import CirisError
 from certifier.isolation.child import run_in_child
 from certifier.model import escaped
 from certifier.proof.limits import FILE_BYTES
+from client.cores import cores
 from client.output import Screen, print_json
 
 HOLDS, DOES_NOT = 0, 1
@@ -46,11 +46,6 @@ def verify(args: Namespace) -> int:
     what = "could not be checked" if problem.code.startswith("child_") or problem.code == "proof_too_large" else "does not hold"
     print("error:", escaped(f"{args.proof}: the proof {what}: ") + " ".join(str(problem).split()), file=sys.stderr)
     return DOES_NOT
-
-
-def cores() -> int:
-    """Returns how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager

@@ -6,6 +6,7 @@ the polytope that are uniform in q as few as possible lie beyond. "As few" is re
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,20 +17,23 @@ from certifier.polytopes.gibbs import uniform_in_q
 
 CHAINS, EACH = 1000, 16
 """So many chains give so many samples each, for the faces of one round."""
+ENOUGH = 2000
+"""With fewer samples left, others are drawn."""
+DRAWN = 4
 TAIL, AGAIN, MARGIN = 400, 3, 0.1
 """A program sees TAIL samples, the farthest ones on the way to a corner, and others that it loses in AGAIN rounds. The hinge loss begins
 MARGIN before the face, relative to the distance from the points to keep."""
 CORNER = 0.6
 """The points of one corner lie within this distance of each other, in standard deviations of the samples."""
 MOST_POINTS = 64
-MOST_FACES = 16
+MOST_FACES = 48
 """A pair gets at most this many faces in one round."""
 CLEAR, CLEARER = 0.005, 0.2
 """A face is moved away from what it cuts off, by CLEAR standard deviations and by CLEARER of the depth of what it cuts off."""
 
 
 def cut(
-    scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[tuple[int, ...], Array, float]], seed: int
+    scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[tuple[int, ...], Array, float]], around: Polytope
 ) -> Polytope | None:
     """Returns the polytope with faces that cut off the points given.
 
@@ -38,12 +42,16 @@ def cut(
         keep: (k, n) points that stay inside.
         corners: for each pair that failed, the joints between its bodies, the points (w, n) to cut off, and the share of the polytope that
             one face may lose at most.
+        around: a polytope of which this one is a part, the same one for all rounds; its samples are drawn once.
 
     Returns:
         None where nothing can be cut off without a point to keep.
     """
     limits = 2 * scene.n
-    samples = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, seed).reshape(-1, scene.n)
+    samples = _samples(scene, around)
+    samples = samples[polytope.contains(samples)]
+    if len(samples) < ENOUGH:
+        samples = _samples(scene, polytope)
     scale = np.where(samples.std(axis=0) > 0, samples.std(axis=0), 1.0)
     C, d = polytope.C, polytope.d
     blocked = False
@@ -72,6 +80,20 @@ def cut(
             C, d = np.insert(C, len(d) - limits, row, axis=0), np.insert(d, len(d) - limits, offset)
             samples = samples[samples @ row <= offset]
     return None if blocked and len(d) == len(polytope.d) else Polytope(C, d)
+
+
+_drawn: OrderedDict[tuple[str, bytes, bytes], Array] = OrderedDict()
+"""These samples were drawn last, by scene and polytope; at most DRAWN of them are kept."""
+
+
+def _samples(scene: Scene, polytope: Polytope) -> Array:
+    """Returns samples of a polytope, (S, n), uniform in q; the same ones for the same polytope."""
+    key = scene.hash, polytope.C.tobytes(), polytope.d.tobytes()
+    if key not in _drawn:
+        _drawn[key] = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, 0).reshape(-1, scene.n)
+        if len(_drawn) > DRAWN:
+            _drawn.popitem(last=False)
+    return _drawn[key]
 
 
 def _face(beyond: Array, keep: Array, samples: Array, scale: Array) -> tuple[Array, float] | None:

@@ -17,7 +17,7 @@ from certifier.growth.options import MOST_CELLS
 from certifier.growth.state import GrowthState, Start, Whole
 from certifier.growth.targeted import pushed
 from certifier.growth.trials import by_joints, joints_between
-from certifier.model import Box, Scene
+from certifier.model import Box, Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytopes.polytope import bounds
 
@@ -31,11 +31,16 @@ FIRST_LOSS = 0.001
 
 def begin_stage(scene: Scene, state: GrowthState, start: Start, stage: int = 0) -> Transition:
     """Asks to certify the proposal, or a smaller copy of it that has all points to keep inside."""
-    polytope = pushed(scene, start.rows, start.seed, STAGES[stage], scene.polytope([], []))
+    polytope = _proposal(scene, start, stage)
     if stage + 1 < len(STAGES) and not (start.keep @ polytope.C.T < polytope.d).all():
         return begin_stage(scene, state, start, stage + 1)
     box = Box.around(*bounds(polytope))
     return _next(scene, replace(state, whole=Whole(stage, polytope, box.mid, box.half)))
+
+
+def _proposal(scene: Scene, start: Start, stage: int) -> Polytope:
+    """Returns the copy of the proposal that a stage begins with."""
+    return pushed(scene, start.rows, start.seed, STAGES[stage], scene.polytope([], []))
 
 
 def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes) -> Transition:
@@ -56,7 +61,7 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing is known of where they fail")
     most = {i: _most_loss(state, whole, i) for i in report.failures}
     corners = [(joints_between(scene, i), report.weaknesses[i].points, most[i]) for i in report.failures]
-    smaller = cut(scene, whole.polytope, start.keep, corners, action.iteration)
+    smaller = cut(scene, whole.polytope, start.keep, corners, _proposal(scene, start, whole.stage))
     if (
         len(smaller.d if smaller else ()) == len(whole.polytope.d)
         and min(most[i] if i in action.ending else 0.0 for i in report.failures) >= 1

@@ -13,6 +13,7 @@ from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import Start
 from certifier.jobs.pairs import pair_certifier
+from certifier.jobs.parallel import side_by_side
 from certifier.jobs.region import Region, certified_region, growth_point, versions
 from certifier.jobs.share import SampledProposal
 from certifier.jobs.verdict import Verdict
@@ -41,6 +42,7 @@ class _Run:
     scene: Scene
     seed: int
     progress: Progress
+    processes: int = 1
     results: dict[int, dict[int, PairResult]] = field(default_factory=dict)
     seeding_seconds: float = 0.0
     candidate: Candidate | None = None
@@ -57,9 +59,10 @@ class _Run:
         certify = pair_certifier(self.scene, action, self.seed)
         found = self.results.setdefault(action.iteration, {})
         failures = 0
-        for index in action.pairs:
-            begun = self.results[action.begun[index]][index].partition if index in action.begun else None
-            found[index] = certify(index, begun)
+        asked = [(index, self.results[action.begun[index]][index].partition if index in action.begun else None) for index in action.pairs]
+        # The program (11) of a pair takes milliseconds, so children would not pay.
+        for index, result in zip(action.pairs, side_by_side(certify, asked, 1 if action.cells == 1 else self.processes), strict=False):
+            found[index] = result
             pair = self.scene.pairs[index]
             self.progress(
                 f"{action.label} {action.iteration}: {len(found)}/{len(action.pairs)} {pair.a} - {pair.b}: {found[index].outcome}"
@@ -85,8 +88,10 @@ class _Run:
         return step(self.scene, action.polytope, self.proofs(self.candidate), action.contain, self.progress)
 
 
-def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: None, deadline_s: float | None = None) -> Region:
-    """Grows a certified region in this process.
+def grow(
+    scene: Scene, options: GrowthOptions, progress: Progress = lambda _: None, deadline_s: float | None = None, processes: int = 1
+) -> Region:
+    """Grows a certified region in this process, or with so many children of it; the region is the same.
 
     Args:
         deadline_s: after so many seconds growth ends with the best region so far, as soon as the action under way is carried out; None for
@@ -96,7 +101,7 @@ def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: No
         CirisError: no region could be certified; the code is ``not_grown`` or that of the seeding's error.
     """
     start = time.perf_counter()
-    run = _Run(scene, options.random_seed, progress)
+    run = _Run(scene, options.random_seed, progress, processes)
     transition, late = begin(scene, options), False
     while not isinstance(transition.action, Finish):
         failure: CirisError | None = None
@@ -129,11 +134,19 @@ def grow(scene: Scene, options: GrowthOptions, progress: Progress = lambda _: No
     return certified_region(scene, run.candidate, run.proofs(run.candidate), provenance, run.proposal)
 
 
-def certify(scene: Scene, polytope: Polytope, center: Array | None = None, progress: Progress = lambda _: None, cells: int = 1) -> Verdict:
+def certify(
+    scene: Scene,
+    polytope: Polytope,
+    center: Array | None = None,
+    progress: Progress = lambda _: None,
+    cells: int = 1,
+    processes: int = 1,
+) -> Verdict:
     """Certifies every pair on a polytope and the joint limits.
 
     Args:
         cells: as in :class:`certifier.growth.options.GrowthOptions`.
+        processes: as for :func:`grow`.
 
     Raises:
         RegionError: the polytope is malformed, empty or unbounded, or ``cells`` is out of range.
@@ -143,6 +156,6 @@ def certify(scene: Scene, polytope: Polytope, center: Array | None = None, progr
     options = GrowthOptions.from_document({"kind": "certify", "seed": seed, "cells": cells})
     action = begin(scene, options).action
     assert isinstance(action, Certify)
-    run = _Run(scene, options.random_seed, progress)
+    run = _Run(scene, options.random_seed, progress, processes)
     run.certify(action)
     return Verdict(run.results[action.iteration], Guarantee.EXACT, time.perf_counter() - start)

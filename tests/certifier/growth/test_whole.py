@@ -188,10 +188,11 @@ def test_a_region_of_an_example_is_verified_contains_what_it_has_to_and_is_free(
     assert not in_collision(scene, samples).any()
 
 
-def test_the_same_job_comes_to_the_same_bytes():
+@pytest.mark.parametrize("processes", [1, 2, 3])
+def test_the_same_job_comes_to_the_same_bytes(processes):
     _, scene, q = example("planar_2dof")
     asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.5}, contraction="whole", cells=SLICE)
-    first, second = (grow(scene, asked) for _ in range(2))
+    first, second = grow(scene, asked), grow(scene, asked, processes=processes)
     assert first.proof == second.proof
     assert first.manifest["halfspace_offsets"] == second.manifest["halfspace_offsets"]
 

@@ -1,0 +1,43 @@
+"""Pairs are certified one after the other in this process, or side by side in children of it."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+
+from certifier.jobs.pairs import CertifyPair
+from certifier.pair.result import PairResult
+
+Asked = tuple[int, bytes | None]
+"""A pair's index, and the ``partition`` of its earlier result where there is one."""
+
+
+def side_by_side(certify: CertifyPair, asked: Sequence[Asked], processes: int) -> Iterator[PairResult]:
+    """Yields the results of pairs in their order, which do not depend on the number of processes.
+
+    Args:
+        processes: so many children work; 1 for this process alone.
+    """
+    if processes == 1 or len(asked) == 1:
+        for index, begun in asked:
+            yield certify(index, begun)
+        return
+    # The children are forked, so they have what the pairs share without preparing it.
+    with ProcessPoolExecutor(min(processes, len(asked)), multiprocessing.get_context("fork"), _adopt, (certify,)) as executor:
+        try:
+            yield from executor.map(_run, asked)
+        finally:
+            executor.shutdown(cancel_futures=True)
+
+
+_adopted: list[CertifyPair] = []
+"""This holds the function of the parent of this process, so that it need not travel to it."""
+
+
+def _adopt(certify: CertifyPair) -> None:
+    _adopted.append(certify)
+
+
+def _run(asked: Asked) -> PairResult:
+    return _adopted[0](*asked)
