@@ -26,7 +26,7 @@ MARGIN before the face, relative to the distance from the points to keep."""
 CORNER = 0.6
 """The points of one corner lie within this distance of each other, in standard deviations of the samples."""
 MOST_POINTS = 64
-MOST_FACES = 48
+MOST_FACES = 16
 """A pair gets at most this many faces in one round."""
 CLEAR, CLEARER = 0.005, 0.2
 """A face is moved away from what it cuts off, by CLEAR standard deviations and by CLEARER of the depth of what it cuts off."""
