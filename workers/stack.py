@@ -83,7 +83,9 @@ class Child:
 
     def _prepare(self) -> None:
         """Runs in the child before it becomes its program."""
-        die_with_parent(self.stop_signal)
+        signal.signal(self.stop_signal, signal.SIG_DFL)  # a script's background processes inherit that SIGINT is ignored
+        # Without the supervisor there is no queue that a worker could give its messages back to, and Celery would wait for it.
+        die_with_parent()
         if self.background:
             give_way()
 
