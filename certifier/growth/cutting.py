@@ -1,6 +1,7 @@
 """A face cuts off what cannot be certified and loses as little of the polytope as it can, by q-volume.
 
-A linear program finds it: all points of a corner that has to go lie beyond the face, all points to keep lie before it, and of samples of
+Contacts often lie along a face of the proposal, so faces of the polytope are moved in where that loses least. Elsewhere a linear program
+finds a new face: all points of a corner that has to go lie beyond the face, all points to keep lie before it, and of samples of
 the polytope that are uniform in q as few as possible lie beyond. "As few" is replaced by the hinge loss, as in a support vector machine.
 """
 
@@ -8,6 +9,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linprog
@@ -28,6 +30,10 @@ CORNER = 0.6
 MOST_POINTS = 64
 MOST_FACES = 16
 """A pair gets at most this many faces in one round."""
+TRIED = 8
+"""So many faces of the polytope are tried, whether moving them in loses less than a new face does."""
+BETTER = 2.0
+"""A new face has to be so many times as good as one that is moved in, because every face makes later cells dearer."""
 CLEAR, CLEARER = 0.005, 0.2
 """A face is moved away from what it cuts off, by CLEAR standard deviations and by CLEARER of the depth of what it cuts off."""
 
@@ -37,26 +43,28 @@ def cut(
 ) -> Polytope | None:
     """Returns the polytope with faces that cut off the points given.
 
+    A face of the polytope is moved in, or a new one is added, whichever cuts off more points for what it loses.
+
     Args:
         polytope: its last 2n rows are the joint limits; new faces are added before them, and no face is dropped.
         keep: (k, n) points that stay inside.
         corners: for each pair that failed, the joints between its bodies, the points (w, n) to cut off, and the share of the polytope that
-            one face may lose at most.
+            its faces may lose together.
         around: a polytope of which this one is a part, the same one for all rounds; its samples are drawn once.
 
     Returns:
-        None where nothing can be cut off without a point to keep.
+        The polytope itself where no face loses little enough; None where nothing can be cut off without a point to keep.
     """
     limits = 2 * scene.n
-    samples = _samples(scene, around)
+    samples = samples_of(scene, around)
     samples = samples[polytope.contains(samples)]
     if len(samples) < ENOUGH:
-        samples = _samples(scene, polytope)
+        samples = samples_of(scene, polytope)
     scale = np.where(samples.std(axis=0) > 0, samples.std(axis=0), 1.0)
-    C, d = polytope.C, polytope.d
-    blocked = False
+    C, d = polytope.C, polytope.d.copy()
+    blocked = moved = False
     for joints, points, most in corners:
-        J = list(joints)
+        J, left_to_lose = list(joints), most
         for _ in range(MOST_FACES):
             left = points[(points @ C.T < d).all(axis=1)]
             if not len(left):
@@ -64,29 +72,76 @@ def cut(
             distance = np.linalg.norm((left - left[0])[:, J] / scale[J], axis=1)
             near = left[np.argsort(distance, kind="stable")[:MOST_POINTS]]
             near = near[: max(1, int((np.sort(distance)[:MOST_POINTS] < CORNER).sum()))]
-            found = _face(near[:, J], keep[:, J], samples[:, J], scale[J])
-            if found is None and len(near) > 1:
-                found = _face(near[:1, J], keep[:, J], samples[:, J], scale[J])
-            loss = 0.0 if found is None else float((samples[:, J] @ found[0] > found[1]).mean())
-            if loss > most:
+            faces = [*_moved_in(C, d, near, J, keep, scale), *_new(near, J, keep, samples, scale)]
+            if not faces and len(near) > 1:
+                near = near[:1]
+                faces = [*_moved_in(C, d, near, J, keep, scale), *_new(near, J, keep, samples, scale)]
+            losses = [float((samples @ face.row > face.offset).mean()) for face in faces]
+            cheap = [k for k in range(len(faces)) if losses[k] <= left_to_lose]
+            if not cheap:
+                # Others of the pair's points may go all the same; these are left to the next round.
+                blocked = blocked or not faces
                 points = points[~(points[:, None] == near).all(axis=2).any(axis=1)]
                 continue
-            if found is None:
-                # Others of the pair's points may go all the same; this one is left to the next round.
-                points, blocked = points[(points != left[0]).any(axis=1)], True
-                continue
-            row = np.zeros(scene.n)
-            row[J], offset = found
-            C, d = np.insert(C, len(d) - limits, row, axis=0), np.insert(d, len(d) - limits, offset)
-            samples = samples[samples @ row <= offset]
-    return None if blocked and len(d) == len(polytope.d) else Polytope(C, d)
+            gains = {k: float((left @ faces[k].row >= faces[k].offset).sum()) / (losses[k] + 1 / len(samples)) for k in cheap}
+            best = faces[max(cheap, key=lambda k: gains[k] / (1 if faces[k].place < len(d) - limits else BETTER))]
+            if best.place < len(d) - limits:
+                d[best.place] = best.offset
+            else:
+                C, d = np.insert(C, len(d) - limits, best.row, axis=0), np.insert(d, len(d) - limits, best.offset)
+            moved = True
+            left_to_lose -= losses[faces.index(best)]
+            samples = samples[samples @ best.row <= best.offset]
+    if not moved:
+        return None if blocked else polytope
+    return Polytope(C, d)
+
+
+@dataclass(frozen=True, eq=False)
+class _Face:
+    """A face row @ s <= offset that cuts points off.
+
+    Attributes:
+        place: the number of the polytope's face that it replaces. Joint limits are not replaced, so their numbers stand for a new face.
+    """
+
+    row: Array
+    offset: float
+    place: int
+
+
+def _moved_in(C: Array, d: Array, beyond: Array, joints: list[int], keep: Array, scale: Array) -> list[_Face]:
+    """Returns the faces of the polytope in these joints that cut off the points when they are moved in least, at most TRIED of them.
+
+    A face in other joints would not cut off what it is about: bodies that touch do so whatever the joints are that move neither.
+    """
+    norms = np.linalg.norm(C * scale, axis=1)
+    depths = (d - beyond @ C.T).max(axis=0)
+    usable = np.flatnonzero((np.delete(C, joints, axis=1) == 0).all(axis=1))
+    faces = []
+    for k in usable[np.argsort((depths / norms)[usable], kind="stable")[:TRIED]]:
+        room = d[k] - depths[k] - float((keep @ C[k]).max())
+        if room > 0:
+            clear = min(CLEAR * norms[k] + CLEARER * depths[k], 0.5 * room)
+            faces.append(_Face(C[k], float(d[k] - depths[k] - clear), int(k)))
+    return faces
+
+
+def _new(beyond: Array, joints: list[int], keep: Array, samples: Array, scale: Array) -> list[_Face]:
+    """Returns the new face in these joints that cuts off the points and loses least, if there is one."""
+    found = _face(beyond[:, joints], keep[:, joints], samples[:, joints], scale[joints])
+    if found is None:
+        return []
+    row = np.zeros(len(scale))
+    row[joints] = found[0]
+    return [_Face(row, found[1], np.iinfo(np.int64).max)]
 
 
 _drawn: OrderedDict[tuple[str, bytes, bytes], Array] = OrderedDict()
 """These samples were drawn last, by scene and polytope; at most DRAWN of them are kept."""
 
 
-def _samples(scene: Scene, polytope: Polytope) -> Array:
+def samples_of(scene: Scene, polytope: Polytope) -> Array:
     """Returns samples of a polytope, (S, n), uniform in q; the same ones for the same polytope."""
     key = scene.hash, polytope.C.tobytes(), polytope.d.tobytes()
     if key not in _drawn:

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from certifier.errors import RegionError
-from certifier.growth.actions import Candidate, Failed, Finish, Outcomes, Propose, Report, Transition
+from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Transition
 from certifier.growth.options import GrowthOptions
 from certifier.growth.pushes import further, less, next_push
 from certifier.growth.rounds import after_round, certify_step, next_round
@@ -21,7 +21,7 @@ from certifier.growth.state import Best, Bisection, GrowthState, Start
 from certifier.growth.targeted import contraction_starts, cut, next_contraction
 from certifier.growth.trials import certify
 from certifier.growth.uniform import bisect, shrink
-from certifier.growth.whole import after_cells, begin_stage
+from certifier.growth.whole import after_cells, begin_stage, keeps_more
 from certifier.model import Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
@@ -92,12 +92,20 @@ def _certified(scene: Scene, state: GrowthState, report: Outcomes) -> Transition
     candidate = None
     if report.complete:
         volume = inscribed_ellipsoid(action.polytope).volume
-        if state.best is None or volume > state.best.ellipsoid_volume:
+        if state.best is None or _better(scene, state.start, action, volume, state.best):
             candidate = _candidate(state, report, volume)
             center = chebyshev_center(action.polytope)[0] if action.center is None else action.center
             state = replace(state, best=Best(action.iteration, action.polytope, center, volume))
     assert state.start is not None, "what is certified comes from a proposal"
     return replace(_after(scene, state, state.start, report, candidate is not None), candidate=candidate)
+
+
+def _better(scene: Scene, start: Start | None, action: Certify, volume: float, best: Best) -> bool:
+    """Returns whether a certified polytope is better than the best so far: by its share of the proposal where it is certified by cells,
+    and else by its inscribed ellipsoid, which is what contractions, pushes and rounds make larger."""
+    if action.label == "cells" and start is not None:
+        return keeps_more(scene, start, action.polytope, best.polytope)
+    return volume > best.ellipsoid_volume
 
 
 def _candidate(state: GrowthState, report: Outcomes, volume: float | None) -> Candidate:

@@ -33,7 +33,7 @@ WHOLE_NUMBERS = {
     "random_seed": (0, 2**63 - 1),
 }
 """Maps an option to its least and its greatest value."""
-MOST_CELLS = 600
+MOST_CELLS = 20_000
 LARGEST_TOLERANCE = 10.0
 """A tolerance lies between 0 and this."""
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
-from certifier.growth.cutting import cut
+from certifier.growth.cutting import cut, samples_of
 from certifier.growth.options import MOST_CELLS
 from certifier.growth.state import GrowthState, Start, Whole
 from certifier.growth.targeted import pushed
@@ -21,12 +21,18 @@ from certifier.model import Box, Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytopes.polytope import bounds
 
-STAGES = (0.5, 1.0)
+STAGES = (0.7, 1.0)
 """The faces of the proposal lie this part of their distance from the seed, in one stage after the other."""
 SLICE = 300
 """So many cells of every open pair are looked at in one round."""
-FIRST_LOSS = 0.001
-"""The first faces that cut off open cells lose this share of the polytope at most; twice as much in every round after it."""
+HARD = 2 * SLICE
+"""When so many cells of a pair were looked at, its open cells are cut off too, not only contacts."""
+LOSS, PATIENCE = 0.002, 12 * SLICE
+"""While a hard pair is worked on, its faces lose this share of the polytope in a round at most, and twice as much after PATIENCE cells."""
+FAST_LOSS = 0.05
+"""They lose this share at most before a pair is hard, and when its effort is spent. Then it is twice as much in every round."""
+EARLY_EFFORT = 2 * SLICE
+"""The effort of all stages but the last one, so that the first region comes soon."""
 
 
 def begin_stage(scene: Scene, state: GrowthState, start: Start, stage: int = 0) -> Transition:
@@ -41,6 +47,12 @@ def begin_stage(scene: Scene, state: GrowthState, start: Start, stage: int = 0) 
 def _proposal(scene: Scene, start: Start, stage: int) -> Polytope:
     """Returns the copy of the proposal that a stage begins with."""
     return pushed(scene, start.rows, start.seed, STAGES[stage], scene.polytope([], []))
+
+
+def keeps_more(scene: Scene, start: Start, polytope: Polytope, other: Polytope) -> bool:
+    """Returns whether a region keeps more of the proposal than another one does, by q-volume."""
+    samples = samples_of(scene, _proposal(scene, start, len(STAGES) - 1))
+    return int(polytope.contains(samples).sum()) > int(other.contains(samples).sum())
 
 
 def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes) -> Transition:
@@ -62,10 +74,7 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     most = {i: _most_loss(state, whole, i) for i in report.failures}
     corners = [(joints_between(scene, i), report.weaknesses[i].points, most[i]) for i in report.failures]
     smaller = cut(scene, whole.polytope, start.keep, corners, _proposal(scene, start, whole.stage))
-    if (
-        len(smaller.d if smaller else ()) == len(whole.polytope.d)
-        and min(most[i] if i in action.ending else 0.0 for i in report.failures) >= 1
-    ):
+    if smaller is whole.polytope and min(most[i] if i in action.ending else 0.0 for i in report.failures) >= 1:
         pair = scene.pairs[report.failures[0]]
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing more could be cut off for them")
     if smaller is None:
@@ -76,9 +85,13 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
 
 
 def _most_loss(state: GrowthState, whole: Whole, pair: int) -> float:
-    """Returns which share of the polytope a face may lose for a pair: any until its effort is spent, then little, and more every round."""
-    late = (whole.spent[pair] - (state.options.cells or MOST_CELLS)) // SLICE - 1
-    return 1.0 if late < 0 else min(FIRST_LOSS * 2.0**late, 1.0)
+    """Returns which share of the polytope the faces for a pair may lose in this round."""
+    effort, spent = state.options.cells or MOST_CELLS, whole.spent[pair]
+    if whole.stage + 1 < len(STAGES):
+        effort = min(effort, EARLY_EFFORT)
+    if HARD < spent < effort:
+        return float(LOSS * 2.0 ** ((spent - HARD) // PATIENCE))
+    return float(min(FAST_LOSS * 2.0 ** max((spent - effort) // SLICE, 0), 1.0))
 
 
 def _ended(state: GrowthState, report: Outcomes, reason: str) -> Transition:
@@ -104,6 +117,6 @@ def _next(scene: Scene, state: GrowthState) -> Transition:
         cells=SLICE,
         box=Box(whole.mid, whole.half),
         begun=dict(whole.begun),
-        ending=[i for i in pairs if whole.spent.get(i, 0) >= (state.options.cells or MOST_CELLS)],
+        ending=[i for i in pairs if whole.spent.get(i, 0) >= min(HARD, state.options.cells or MOST_CELLS)],
     )
     return Transition(replace(state, next=state.next + 1), action)

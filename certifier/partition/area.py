@@ -59,3 +59,12 @@ class Area:
         norms = np.linalg.norm(polytope.C, axis=1)
         unit = Polytope(polytope.C / norms[:, None], polytope.d / norms)
         return cls(scene, Kinematics.of(scene), polytope, box.lower, box.upper, center, samples, ground, norms, unit)
+
+    def inside(self, lower: Array, upper: Array) -> tuple[Array, Polytope]:
+        """Returns the numbers of the faces that cut a cell, (f,), and the polytope in the cell, with normals of length 1.
+
+        Its faces are those that cut the cell, then the upper and the lower ones of the cell.
+        """
+        C, d, eye = self.unit.C, self.unit.d, np.eye(len(lower))
+        cutting = np.flatnonzero(d - C @ ((lower + upper) / 2) - np.abs(C) @ ((upper - lower) / 2) < 0)
+        return cutting, Polytope(np.concatenate([C[cutting], eye, -eye]), np.concatenate([d[cutting], upper, -lower]))

@@ -18,6 +18,8 @@ LOWEST = 32
 """So many of the lowest control points say which faces these are."""
 STEPS, ZERO = 40, 1e-10
 """Multipliers are given up after STEPS control points, or where the square of the distance of their rows' hull from 0 is below ZERO."""
+EARLY, HOPELESS = 16, 4.0
+"""A proof is given up when, after EARLY pieces, what they have proved lets one expect HOPELESS times as many pieces as are allowed."""
 WHOLE = 0.1
 """A piece is as precise as this part of the cell, at least."""
 SLIGHT = 1e-6
@@ -226,7 +228,7 @@ def choose(c: Array, T: Array, constant: Array, own: Array, outside: Array, rest
         if values[a] <= limit and count < LOWEST:
             bad[count] = a
             count += 1
-    help, used = np.zeros(m), np.zeros(m, np.bool_)
+    gain, used = np.zeros(m), np.zeros(m, np.bool_)
     for j in range(m):
         for i in range(count):
             t = constant[j]
@@ -235,16 +237,16 @@ def choose(c: Array, T: Array, constant: Array, own: Array, outside: Array, rest
             t *= T[0, bad[i]]
             for e in range(k):
                 t += own[j, e] * T[1 + e, bad[i]]
-            help[j] -= min(t, 0.0)
-        help[j] /= scale[1 + j]
+            gain[j] -= min(t, 0.0)
+        gain[j] /= scale[1 + j]
     n = 0
     for j in range(m):
         if z[1 + j] > 0 and n < FACES:
             chosen[n] = j
             used[j] = True
             n += 1
-    for j in np.argsort(-help):
-        if n < FACES and help[j] > 0 and not used[j]:
+    for j in np.argsort(-gain):
+        if n < FACES and gain[j] > 0 and not used[j]:
             chosen[n] = j
             n += 1
     return max(n, 1)
@@ -432,8 +434,9 @@ def prove(
     stack_c[0], stack_T[0], stack_z[0, 0] = c, T, 1.0
     slopes, local, g_out = np.zeros(k + o), np.zeros(m), np.zeros((m, o))
     scale, whole, least, some, enough, few = np.zeros(D), np.zeros(D), np.zeros(D), np.zeros(D), np.zeros(D), np.zeros(D)
-    values_at, chosen = np.zeros(m), np.zeros(m, np.int64)
+    values_at, chosen, reach = np.zeros(m), np.zeros(m, np.int64), np.zeros(k)
     z, spot = np.zeros(D), np.zeros(k + o + r)
+    level, done = np.zeros(depth, np.int64), 0.0
     top, count = 1, 0
     while top:
         n = 0
@@ -441,6 +444,8 @@ def prove(
         count += 1
         cc, TT = stack_c[top], stack_T[top]
         size, weight = np.abs(cc[0]).max(), np.abs(TT[0]).max()
+        for i in range(k):
+            reach[i] = np.abs(TT[1 + i]).max() / weight
         for j in range(m):
             local[j] = constant[j]
             for i in range(o):
@@ -450,7 +455,7 @@ def prove(
         for j in range(m):
             t = abs(local[j])
             for i in range(k):
-                t += abs(own[j, i]) * np.abs(TT[1 + i]).max() / weight
+                t += abs(own[j, i]) * reach[i]
             for i in range(o):
                 t += abs(g_out[j, i])
             for i in range(r):
@@ -521,7 +526,10 @@ def prove(
                     used_faces += 1
             counts[lengths[1]] = used_faces
             lengths[1] += 1
+            done += 0.5 ** level[top]
             continue
+        if count >= EARLY and count > HOPELESS * done * most:
+            return UNDECIDED
         if count >= most or top + 2 > depth or lengths[0] >= len(codes):
             return UNDECIDED
         axis = steepest(cc, k)
@@ -534,6 +542,8 @@ def prove(
                 stack_z[top, 1 + chosen[j]] = np.float32(few[1 + j] / few[0])
         stack_z[top + 1] = stack_z[top]
         center[top + 1], half[top + 1] = center[top], half[top]
+        level[top] += 1
+        level[top + 1] = level[top]
         if axis < k:
             halve(cc, axis, k, stack_c[top + 1], stack_c[top])
             halve(TT, axis, k, stack_T[top + 1], stack_T[top])

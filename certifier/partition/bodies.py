@@ -12,7 +12,7 @@ from certifier.partition import planes
 from certifier.partition.area import Area
 from certifier.partition.cell import Cell
 from certifier.partition.chords import chords
-from certifier.partition.hulls import INSIDE, approach, gaps, hull
+from certifier.partition.hulls import approach, gaps, hull
 from certifier.partition.sides import Side
 from certifier.partition.tree import Streams, joined
 
@@ -24,6 +24,8 @@ CALM = 0.3
 """So much less weight is on the slopes of a plane than on the rest: it turns less, and its normal's length has a tight affine bound."""
 LEAST, ENOUGH = 3e-4, 0.8
 """A plane's margin is at least LEAST, relative to the bodies' extent, and at least ENOUGH of the widest one."""
+SAFE = 1e-9
+"""The bound of a normal's length is larger than it by this part."""
 LOOKS, ROUNDS = 20, 8
 """So many planes are tried against configurations, and so many of those that hold there are tried to be proved, before a cell is cut."""
 PIECES, MANY_PIECES = 25, 60
@@ -104,7 +106,8 @@ class Bodies:
             start: (n,) a point of the polytope in the cell.
         """
         n = len(start)
-        C, d = cell.faces(self._area)
+        inside = cell.inside[1]
+        C, d = inside.C, inside.d
         rng = np.random.default_rng(seed)
         targets = np.where(rng.random((CORNERS if self._corners is None else len(self._corners), n)) < 0.5, cell.lower, cell.upper)
         if self._corners is not None:
@@ -116,16 +119,16 @@ class Bodies:
         J = np.array(self.joints)
         chart = planes.Chart(J, cell.mid[J], CALM / cell.half[J], CALM)
         for _ in range(ROUNDS):
-            kind, z, places, weights, N = planes.look(*self.hulls, chart, cell.half, C, d, X, N, LOOKS, DESCENT, LEAST, ENOUGH)
+            kind, z, places, weights, N = planes.look(*self.hulls, chart, C, d, X, N, LOOKS, DESCENT, LEAST, ENOUGH)
             if kind != planes.FOUND:
                 break
-            plane = self._bounded(cell, self._in_s(cell, z))
+            plane = self._in_s(cell, z)
             result = self._prove(cell, plane)
             if isinstance(result, Streams):
                 return Separated(plane, result)
             if isinstance(result, int) or len(X) == N:
                 return Undecided(X[:N].copy(), None, weights, result if isinstance(result, int) else None)
-            X[N] = _towards(C, d, start, result)
+            X[N] = chords(C, d, start, result[None], 0, 0)[0]
             N += 1
         return Undecided(X[:N].copy(), X[places], weights)
 
@@ -139,54 +142,37 @@ class Bodies:
         if found[place] > CLOSE:
             return None
         s = configurations[place].copy()
-        gap = approach(*self.hulls, np.array(self.joints), cell.half, *cell.faces(self._area), s, STEPS, 0.0)
+        inside = cell.inside[1]
+        gap = approach(*self.hulls, np.array(self.joints), cell.half, inside.C, inside.d, s, STEPS, 0.0)
         return s, gap * self.extent
 
     def _prove(self, cell: Cell, plane: Array) -> Streams | Array | int:
         """Returns the streams of a proof, or what :meth:`certifier.partition.sides.Side.prove` says."""
-        C, d = self._area.polytope.C, self._area.polytope.d
-        cutting = np.flatnonzero(d - C @ cell.mid - np.abs(C) @ cell.half < 0)
+        cutting = cell.inside[0]
+        C, d = self._area.polytope.C[cutting], self._area.polytope.d[cutting]
         found = []
         for side in self._sides:
-            result = side.prove(plane, cell.lower, cell.upper, C[cutting], d[cutting], cutting, self._pieces)
+            result = side.prove(plane, cell.lower, cell.upper, C, d, cutting, self._pieces)
             if not isinstance(result, Streams):
                 return result
             found.append(result)
         return joined(found)
 
     def _in_s(self, cell: Cell, z: Array) -> Array:
-        """Returns a plane in the frame, metres and s from one in the coordinates of the search, (4, 1 + k), k the joints in play."""
-        plane = z.reshape(4, -1).copy()
-        plane[:3] /= self.extent
+        """Returns a plane as a proof holds it, (5, 1 + k), from one in the coordinates of the search.
+
+        Its last row is a bound of the normal's length on the cell, larger than that by more than rounding errors.
+        """
+        k = len(self.joints)
+        plane = np.zeros((5, 1 + k))
+        plane[:4] = z.reshape(4, 1 + k)
+        if max(self._radii) > 0:
+            planes.length_bound(z, k, CALM, plane[4])
+            plane[4, 0] += SAFE * np.abs(plane[4]).sum()
+        plane[[0, 1, 2, 4]] /= self.extent
         plane[3] -= self._middle @ plane[:3]
         plane[:, 1:] *= CALM / cell.half[self.joints]
         plane[:, 0] -= plane[:, 1:] @ cell.mid[self.joints]
-        spread = np.zeros((4, 1 + len(self._play)))
+        spread = np.zeros((5, 1 + len(self._play)))
         spread[:, [0, *(1 + place for place in self._places)]] = plane / np.abs(plane[:3]).max()
         return spread
-
-    def _bounded(self, cell: Cell, plane: Array) -> Array:
-        """Returns the plane with a bound of its normal's length below, (5, 1 + k), which is affine in s and holds on the cell.
-
-        The length is convex, so a bound of it at the corners is enough. Its slopes are the mean differences between the corners.
-        """
-        bound = np.zeros(plane.shape[1])
-        if max(self._radii) > 0:
-            J = self._play
-            signs = np.array(list(itertools.product((-1.0, 1.0), repeat=len(self.joints))))
-            corners = np.zeros((len(signs), len(J)))
-            corners[:, self._places] = signs
-            s = cell.mid[J] + corners * cell.half[J]
-            lengths = np.linalg.norm(plane[:3, :1] + plane[:3, 1:] @ s.T, axis=0) * (1 + 1e-9)
-            slopes = lengths @ corners / len(corners)
-            bound[1:] = slopes / cell.half[J]
-            bound[0] = (lengths - s @ bound[1:]).max() + 1e-12 * (lengths.max() + np.abs(s @ bound[1:]).max())
-        return np.vstack([plane, bound])
-
-
-def _towards(C: Array, d: Array, start: Array, end: Array) -> Array:
-    """Returns the end, or where the way there leaves the polytope."""
-    rate, slack = C @ (end - start), d - C @ start
-    reach = float((slack[rate > 0] / rate[rate > 0]).min(initial=1.0))
-    point: Array = start + min(reach, INSIDE) * (end - start)
-    return point

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from certifier.model import Array
+from certifier.model import Array, Polytope
 from certifier.partition.area import Area
 from certifier.partition.tree import Node
 
@@ -16,6 +17,7 @@ class Cell:
     """A cell is a box in s with what is known of the polytope in it.
 
     Attributes:
+        area: the polytope and what is known of it.
         node: its node in the tree.
         lower, upper: (n,) its bounds; joints that do not move one body against the other have those of the root cell.
         points: (p, n) points of the polytope in the cell.
@@ -23,6 +25,7 @@ class Cell:
         coarse: coarse volumes are tried first.
     """
 
+    area: Area
     node: Node
     lower: Array
     upper: Array
@@ -40,12 +43,12 @@ class Cell:
         """Returns the half edges, (n,)."""
         return (self.upper - self.lower) / 2
 
-    def faces(self, area: Area) -> tuple[Array, Array]:
-        """Returns the faces of the polytope, then the upper and the lower ones of the cell, with normals of length 1."""
-        eye = np.eye(len(self.lower))
-        return np.concatenate([area.unit.C, eye, -eye]), np.concatenate([area.unit.d, self.upper, -self.lower])
+    @cached_property
+    def inside(self) -> tuple[Array, Polytope]:
+        """Holds the numbers of the polytope's faces that cut the cell, and the polytope in it (Area.inside)."""
+        return self.area.inside(self.lower, self.upper)
 
-    def turn(self, area: Area) -> Array:
+    def turn(self) -> Array:
         """Returns how far every joint turns in the cell, (n,), in radians or metres."""
-        turn: Array = np.where(area.scene.revolute, 2 * (np.arctan(self.upper) - np.arctan(self.lower)), self.upper - self.lower)
+        turn: Array = np.where(self.area.scene.revolute, 2 * (np.arctan(self.upper) - np.arctan(self.lower)), self.upper - self.lower)
         return turn

@@ -15,20 +15,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from certifier.errors import ProofError, RegionError
+from certifier.errors import ProofError
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Box, Polytope, Scene, Volume
 from certifier.outcome import Outcome, Stage
 from certifier.pair.broad_phase import BroadPhase, Volumes
 from certifier.pair.closest import closest
-from certifier.pair.collisions import touching
 from certifier.pair.result import PairResult, Weakness
 from certifier.partition.area import Area
 from certifier.partition.chords import chords
 from certifier.partition.hulls import approach, gaps
 from certifier.partition.search import Report, Search
 from certifier.partition.tree import Node
-from certifier.polytopes.polytope import chebyshev_center
+from certifier.polytopes.simplex import deepest
 from certifier.proof.negative import WitnessProof
 from certifier.proof.partition import STREAMS, PartitionProof
 from certifier.verify.pair import check_ground, check_interior
@@ -118,7 +117,7 @@ class CellCertification:
     def _open(
         self, search: Search, volumes: Volumes, report: Report, cells: list[tuple[Array, Array]], begun: bytes, ending: bool
     ) -> PairResult:
-        points = self._contacts(search, volumes, report.contacts)
+        points = self._contacts(search, report.contacts)
         if ending:
             points += self._of_cells(search, cells)
         points += [point for cell in report.narrow for point in cell]
@@ -152,7 +151,7 @@ class CellCertification:
             return replace(found, outcome=Outcome.TOO_CLOSE, witness_s=s, detail=detail)
         return replace(found, outcome=Outcome.REFUTED, witness_s=s, proof=witness.to_bytes())
 
-    def _contacts(self, search: Search, volumes: Volumes, contacts: list[Array]) -> list[Array]:
+    def _contacts(self, search: Search, contacts: list[Array]) -> list[Array]:
         """Returns the contacts with others about them, which show how far a contact reaches."""
         found: list[Array] = []
         rng = np.random.default_rng(len(contacts))
@@ -163,18 +162,17 @@ class CellCertification:
             scales = np.repeat(SCALES, NEAR_CONTACTS)[:, None]
             near[:, J] += scales * rng.normal(size=(len(near), len(J))) @ root.T / np.sqrt(len(J))
             near = near[polytope.contains(near)]
-            found += [contact, *near[touching(self._area.kinematics, volumes, near)]]
+            found += [contact, *near[gaps(*search.bodies.hulls, near) <= 0]]
         return found
 
     def _of_cells(self, search: Search, cells: Iterable[tuple[Array, Array]]) -> list[Array]:
         """Returns points of the polytope in the cells: of every cell where the bodies are nearest, and where they are near."""
         found: list[Array] = []
-        unit, eye = self._area.unit, np.eye(self._scene.n)
         for lower, upper in cells:
-            C, d = np.concatenate([unit.C, eye, -eye]), np.concatenate([unit.d, upper, -lower])
-            try:
-                middle = chebyshev_center(Polytope(C, d))[0]
-            except RegionError:
+            inside = self._area.inside(lower, upper)[1]
+            C, d = inside.C, inside.d
+            middle, depth, _ = deepest(inside, (lower + upper) / 2)
+            if depth <= 0:
                 continue
             X = np.concatenate([middle[None], chords(C, d, middle, np.zeros((0, len(lower))), POINTS_OF_A_CELL, 0)])
             nearest = np.argsort(gaps(*search.bodies.hulls, X), kind="stable")

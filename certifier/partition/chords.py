@@ -7,6 +7,9 @@ from numba import njit
 
 from certifier.model import Array
 
+INSIDE = 0.999999
+"""A way ends so much before the boundary."""
+
 
 @njit(cache=True)
 def chords(C: Array, d: Array, start: Array, targets: Array, steps: int, seed: int) -> Array:
@@ -26,7 +29,7 @@ def chords(C: Array, d: Array, start: Array, targets: Array, steps: int, seed: i
         for j in range(m):
             if rate[j] > 1e-14:
                 reach = min(reach, slack[j] / rate[j])
-        found[i] = start + 0.999999 * reach * way
+        found[i] = start + INSIDE * reach * way
     widths = np.empty(n)
     for i in range(n):
         low, high = -1e6, 1e6
@@ -48,7 +51,7 @@ def chords(C: Array, d: Array, start: Array, targets: Array, steps: int, seed: i
                 high = min(high, slack[j] / rate[j])
             elif rate[j] < -1e-14:
                 low = max(low, slack[j] / rate[j])
-        low, high = min(0.999999 * low, 0.0), max(0.999999 * high, 0.0)
+        low, high = min(INSIDE * low, 0.0), max(INSIDE * high, 0.0)
         found[count + 2 * r] = x + low * way
         found[count + 2 * r + 1] = x + high * way
         x = x + (low + (high - low) * np.random.random()) * way

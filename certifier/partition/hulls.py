@@ -12,6 +12,7 @@ from numba import njit
 
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Volume
+from certifier.partition.chords import INSIDE
 from certifier.partition.wolfe import unused, weigh
 from certifier.polytopes.simplex import corner
 
@@ -21,10 +22,8 @@ TOUCHING = 1e-10
 """Points nearer than the root of this, relative to the space, are taken to touch."""
 DIFFERENCE = 1e-5
 """Slopes are differences over this part of the cell."""
-SHORTEST = 8
-"""A step goes the whole way, a half of it and so on, as long as that is better, and so many times at most."""
-INSIDE = 0.999999
-"""A step ends a little before the boundary."""
+SHORTEST, SLOWEST = 8, 1e-3
+"""A step goes the whole way, or a half of it, and so on, SHORTEST ways; the last one is better by less than SLOWEST."""
 
 
 class Hull(NamedTuple):
@@ -148,6 +147,26 @@ def gaps(a: Hull, b: Hull, X: Array) -> Array:
 
 
 @njit(cache=True)
+def along(C: Array, d: Array, s: Array, direction: Array, basis: Array) -> Array:
+    """Returns configurations on the way from s to the vertex of {C x <= d} that is farthest in a direction, (SHORTEST, n), farthest first.
+
+    Args:
+        C, d: rows of length 1.
+        basis: see :func:`certifier.polytopes.simplex.corner`.
+
+    Returns:
+        (0, n) where no vertex was found.
+    """
+    way = np.zeros(len(s))
+    found = np.empty((SHORTEST if corner(C, d, s, direction, basis, way) else 0, len(s)))
+    length = INSIDE
+    for i in range(len(found)):
+        found[i] = s + length * way
+        length *= 0.5
+    return found
+
+
+@njit(cache=True)
 def approach(a: Hull, b: Hull, joints: Array, half: Array, C: Array, d: Array, s: Array, steps: int, near: float) -> float:
     """Moves s to where the bodies are nearer on {C s <= d}, until they are as near as ``near``, and returns their gap there.
 
@@ -158,45 +177,29 @@ def approach(a: Hull, b: Hull, joints: Array, half: Array, C: Array, d: Array, s
         half: (n,) a length for every joint, of which a small part serves for differences.
         C, d: rows of length 1.
     """
-    n = len(s)
     A, B, P, Q = np.empty(a.vertices.shape), np.empty(b.vertices.shape), np.empty((4, 4)), np.empty((4, 4))
-    normal, wa, wb = np.empty(3), np.empty(len(A)), np.empty(len(B))
-    other, va, vb = np.empty(3), np.empty(len(A)), np.empty(len(B))
-    falling, way, trial, best = np.zeros(n), np.zeros(n), np.empty(n), np.empty(n)
-    reach = a.radius + b.radius
-    place(a, s, P, Q, A)
-    place(b, s, P, Q, B)
-    now = gap(A, B, normal, wa, wb) - reach
+    normal, wa, wb, falling = np.empty(3), np.empty(len(A)), np.empty(len(B)), np.zeros(len(s))
+    now, basis = np.inf, np.full(len(s), -1)
     for _ in range(steps):
+        place(a, s, P, Q, A)
+        place(b, s, P, Q, B)
+        now = gap(A, B, normal, wa, wb) - a.radius - b.radius
         if now <= near:
             break
-        falling[:] = 0.0
         for j in joints:
             old, step = s[j], DIFFERENCE * half[j]
+            falling[j] = 0.0
             for sign in (1.0, -1.0):
                 s[j] = old + sign * step
                 place(a, s, P, Q, A)
                 place(b, s, P, Q, B)
                 falling[j] -= sign * ((wa @ A - wb @ B) @ normal) / (2 * step)
             s[j] = old
-        if not corner(C, d, s, falling, way):
+        trials = along(C, d, s, falling, basis)
+        found = gaps(a, b, trials)
+        best = found.argmin() if len(found) else 0
+        if not len(found) or found[best] >= now - SLOWEST * abs(now):
             break
-        least, length = now, INSIDE
-        for _ in range(SHORTEST):
-            trial[:] = s + length * way
-            place(a, trial, P, Q, A)
-            place(b, trial, P, Q, B)
-            t = gap(A, B, other, va, vb) - reach
-            if t < least:
-                least = t
-                best[:] = trial
-            elif least < now:
-                break
-            length *= 0.5
-        if not least < now - 1e-3 * abs(now):
-            break
-        s[:] = best
-        place(a, s, P, Q, A)
-        place(b, s, P, Q, B)
-        now = gap(A, B, normal, wa, wb) - reach
+        s[:] = trials[best]
+        now = found[best]
     return now

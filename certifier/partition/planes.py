@@ -12,9 +12,8 @@ import numpy as np
 from numba import njit
 
 from certifier.model import Array
-from certifier.partition.hulls import DIFFERENCE, INSIDE, SHORTEST, Hull, place, pose
+from certifier.partition.hulls import SLOWEST, Hull, along, place
 from certifier.partition.wolfe import unused, weigh
-from certifier.polytopes.simplex import corner
 
 FEW = 24
 """So many configurations are looked at in each step for a plane, as long as one of them is on its wrong side."""
@@ -191,73 +190,107 @@ def length_bound(z: Array, k: int, calm: float, bound: Array) -> None:
 
 
 @njit(cache=True)
-def _value(hull: Hull, vertex: Array, sign: float, z: Array, bound: Array, chart: Chart, s: Array, X: Array, Y: Array) -> float:
-    """Returns how far one vertex is on the right side of a plane at s, its radius times the bound of the normal's length subtracted."""
-    pose(hull, s, X, Y)
+def _images(hull: Hull, s: Array, images: Array) -> None:
+    """Fills in where every factor of the pose moves a vertex to, times the denominator, (F + 1, 4); the last row is the vertex itself."""
+    for f in range(len(hull.joints) - 1, -1, -1):
+        j, terms, p = hull.joints[f], hull.terms[f], images[f + 1]
+        for a in range(4):
+            t = terms[0, a, 0] * p[0] + terms[0, a, 1] * p[1] + terms[0, a, 2] * p[2] + terms[0, a, 3] * p[3]
+            if j >= 0:
+                for b in range(4):
+                    t += s[j] * (terms[1, a, b] + s[j] * terms[2, a, b]) * p[b]
+            images[f, a] = t
+
+
+@njit(cache=True)
+def _plane(z: Array, chart: Chart, s: Array, plane: Array) -> None:
+    """Fills in the plane z at s, (4,)."""
     k = len(chart.joints)
-    kappa, value = bound[0], 0.0
-    for e in range(k):
-        kappa += bound[1 + e] * (s[chart.joints[e]] - chart.shift[e]) * chart.scale[e]
     for c in range(4):
-        a = z[c * (k + 1)]
-        for e in range(k):
-            a += z[c * (k + 1) + 1 + e] * (s[chart.joints[e]] - chart.shift[e]) * chart.scale[e]
-        if c < 3:
-            a *= (X[c, 0] * vertex[0] + X[c, 1] * vertex[1] + X[c, 2] * vertex[2] + X[c, 3]) / X[3, 3]
-        value += a
-    return sign * value - hull.radius * kappa
+        plane[c] = z[c * (k + 1)]
+    for e in range(k):
+        u = (s[chart.joints[e]] - chart.shift[e]) * chart.scale[e]
+        for c in range(4):
+            plane[c] += z[c * (k + 1) + 1 + e] * u
+
+
+@njit(cache=True)
+def _value(hull: Hull, sign: float, z: Array, bound: Array, chart: Chart, s: Array, images: Array, plane: Array) -> float:
+    """Returns how far a vertex is on the right side of a plane at s, its radius times the bound of the normal's length subtracted.
+
+    Args:
+        images: (F + 1, 4) its last row is the vertex; the others are filled in (:func:`_images`).
+        plane: (4,) gets the plane at s.
+    """
+    _images(hull, s, images)
+    _plane(z, chart, s, plane)
+    kappa, p = bound[0], images[0]
+    for e in range(len(chart.joints)):
+        kappa += bound[1 + e] * (s[chart.joints[e]] - chart.shift[e]) * chart.scale[e]
+    return sign * ((plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2]) / p[3] + plane[3]) - hull.radius * kappa
+
+
+@njit(cache=True)
+def _slopes(hull: Hull, sign: float, z: Array, bound: Array, chart: Chart, s: Array, images: Array, plane: Array, slopes: Array) -> None:
+    """Fills in the slopes of the value in s, (n,), from what :func:`_value` has filled in."""
+    k, p, row, next_row = len(chart.joints), images[0], np.empty(4), np.empty(4)
+    slopes[:] = 0.0
+    for e in range(k):
+        t = z[3 * (k + 1) + 1 + e]
+        for c in range(3):
+            t += z[c * (k + 1) + 1 + e] * p[c] / p[3]
+        slopes[chart.joints[e]] = (sign * t - hull.radius * bound[1 + e]) * chart.scale[e]
+    row[:3] = sign * plane[:3] / p[3]
+    row[3] = -sign * (plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2]) / p[3] ** 2
+    for f in range(len(hull.joints)):
+        j, terms = hull.joints[f], hull.terms[f]
+        next_row[:] = 0.0
+        for a in range(4):
+            for b in range(4):
+                t = terms[0, a, b]
+                if j >= 0:
+                    t += s[j] * (terms[1, a, b] + s[j] * terms[2, a, b])
+                    slopes[j] += row[a] * (terms[1, a, b] + 2 * s[j] * terms[2, a, b]) * images[f + 1, b]
+                next_row[b] += row[a] * t
+        row[:] = next_row
 
 
 @njit(cache=True)
 def descend(
-    hull: Hull, vertex: Array, sign: float, z: Array, bound: Array, chart: Chart, half: Array, C: Array, d: Array, s: Array, steps: int
+    hull: Hull, vertex: Array, sign: float, z: Array, bound: Array, chart: Chart, C: Array, d: Array, s: Array, steps: int, basis: Array
 ) -> float:
     """Moves s to where the vertex is farther on the wrong side, by linear programs over {C s <= d}, and returns its value there.
 
     Args:
-        half: (n,) a length for every joint, of which a small part serves for differences.
         C, d: rows of length 1.
+        basis: see :func:`certifier.polytopes.simplex.corner`.
     """
-    n = len(s)
-    X, Y = np.empty((4, 4)), np.empty((4, 4))
-    falling, way, trial, best = np.zeros(n), np.zeros(n), np.empty(n), np.empty(n)
-    now = _value(hull, vertex, sign, z, bound, chart, s, X, Y)
+    images, plane, slopes = np.ones((len(hull.joints) + 1, 4)), np.empty(4), np.empty(len(s))
+    images[-1, :3] = vertex
+    now = _value(hull, sign, z, bound, chart, s, images, plane)
     for _ in range(steps):
-        falling[:] = 0.0
-        for j in chart.joints:
-            old, step = s[j], DIFFERENCE * half[j]
-            s[j] = old + step
-            falling[j] -= _value(hull, vertex, sign, z, bound, chart, s, X, Y) / step
-            s[j] = old - step
-            falling[j] += _value(hull, vertex, sign, z, bound, chart, s, X, Y) / step
-            s[j] = old
-        if not corner(C, d, s, falling, way):
-            break
-        least, length = now, INSIDE
-        for _ in range(SHORTEST):
-            trial[:] = s + length * way
-            t = _value(hull, vertex, sign, z, bound, chart, trial, X, Y)
+        _slopes(hull, sign, z, bound, chart, s, images, plane, slopes)
+        least, best = np.inf, -1
+        trials = along(C, d, s, -slopes, basis)
+        for i in range(len(trials)):
+            t = _value(hull, sign, z, bound, chart, trials[i], images, plane)
             if t < least:
-                least = t
-                best[:] = trial
-            elif least < now:
-                break
-            length *= 0.5
-        if not least < now - 1e-3 * abs(now) + WRONG:
+                least, best = t, i
+        if best < 0 or least >= now - SLOWEST * abs(now) + WRONG:
             break
-        now = least
-        s[:] = best
+        s[:] = trials[best]
+        now = _value(hull, sign, z, bound, chart, s, images, plane)
     return now
 
 
 @njit(cache=True)
 def look(
-    a: Hull, b: Hull, chart: Chart, half: Array, C: Array, d: Array, X: Array, N: int, rounds: int, steps: int, least: float, enough: float
+    a: Hull, b: Hull, chart: Chart, C: Array, d: Array, X: Array, N: int, rounds: int, steps: int, least: float, enough: float
 ) -> tuple[int, Array, Array, Array, int]:
     """Looks for a plane that keeps a on its positive and b on its negative side on {C s <= d}.
 
     Args:
-        half, C, d: as for :func:`descend`.
+        C, d: as for :func:`descend`.
         X: (capacity, n) its first N rows are points of the polytope; those at which planes failed are added.
         rounds: give up after so many planes.
         least, enough: as for :func:`separate`.
@@ -269,7 +302,7 @@ def look(
     V, W = len(a.vertices), len(b.vertices)
     A, B, u, ratio = np.empty((capacity, V, 3)), np.empty((capacity, W, 3)), np.empty((capacity, k)), np.ones(capacity)
     P, Q, s, bound, normal = np.empty((4, 4)), np.empty((4, 4)), np.empty(n), np.zeros(1 + k), np.empty(4)
-    low, where = np.empty(V + W), np.empty(V + W, np.int64)
+    low, where, basis = np.empty(V + W), np.empty(V + W, np.int64), np.full(n, -1)
     for _ in range(rounds):
         for i in range(made, N):
             place(a, X[i], P, Q, A[i])
@@ -305,9 +338,9 @@ def look(
         for v in range(V + W):
             s[:] = X[where[v]]
             if v < V:
-                t = descend(a, a.vertices[v], 1.0, z, bound, chart, half, C, d, s, steps)
+                t = descend(a, a.vertices[v], 1.0, z, bound, chart, C, d, s, steps, basis)
             else:
-                t = descend(b, b.vertices[v - V], -1.0, z, bound, chart, half, C, d, s, steps)
+                t = descend(b, b.vertices[v - V], -1.0, z, bound, chart, C, d, s, steps, basis)
             if t < WRONG and capacity > N:
                 X[N] = s
                 N += 1

@@ -21,17 +21,17 @@ import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import linprog
 
 from certifier.model import Array, Volume
-from certifier.pair.frames import choose_frame
 from certifier.partition.area import Area
 from certifier.partition.bodies import TOUCH, Bodies, Separated, Undecided
 from certifier.partition.cell import Cell
 from certifier.partition.chords import chords
 from certifier.partition.coarse import coarse_volume
+from certifier.partition.frames import choose_frame
 from certifier.partition.hulls import gaps
 from certifier.partition.tree import OPEN, Node, Streams
+from certifier.polytopes.simplex import deepest
 from certifier.proof.partition import EMPTY, PLANE
 
 NARROW = np.radians(3.0)
@@ -42,6 +42,8 @@ NARROW_COARSE = np.radians(15.0)
 """A cell that turns less than this in every joint that moves the coarse volumes, or has no sample, is not cut for them any more."""
 KEPT = 200
 """A cell inherits at most this many points."""
+BEYOND = 1e-9
+"""A point may lie beyond a face by this."""
 FEW = 16
 """So many points of a narrow cell are reported."""
 SCOUTED, SCOUTS = 256, 64
@@ -75,8 +77,7 @@ class Search:
 
     def __init__(self, area: Area, volumes: tuple[Volume, Volume]) -> None:
         self._area = area
-        frame = choose_frame(area.kinematics, volumes)
-        self.frame, self.joints = frame.body, list(frame.path)
+        self.frame, self.joints = choose_frame(area.kinematics, volumes, area.lower, area.upper)
         self.bodies = Bodies(area, self.frame, self.joints, volumes, 0)
         a, b = volumes
         self.coarse: tuple[Volume | None, Volume | None] = (None, None)
@@ -102,7 +103,7 @@ class Search:
             return report
         for node, lower, upper in root.open_cells(area.lower, area.upper):
             inside = area.samples[((area.samples >= lower) & (area.samples <= upper)).all(axis=1)]
-            push(Cell(node, lower, upper, inside[:KEPT], inside, self._coarse is not None))
+            push(Cell(area, node, lower, upper, inside[:KEPT], inside, self._coarse is not None))
         while heap and report.cells < cells:
             cell = heapq.heappop(heap)[2]
             report.cells += 1
@@ -119,17 +120,17 @@ class Search:
                 lower, upper = cell.lower.copy(), cell.upper.copy()
                 (upper if below else lower)[joint] = value
                 of_points, of_samples = ((X[:, joint] <= value) == below for X in (points, cell.samples))
-                push(Cell(child, lower, upper, points[of_points][:KEPT], cell.samples[of_samples], cell.coarse))
+                push(Cell(area, child, lower, upper, points[of_points][:KEPT], cell.samples[of_samples], cell.coarse))
         return report
 
     def _scout(self, root: Node, report: Report) -> bool:
         """Looks for contacts on all of the polytope, before anything is proved, and returns whether there are any."""
         area = self._area
-        cell = Cell(root, area.lower, area.upper, area.samples[:KEPT], area.samples)
-        C, d = cell.faces(area)
+        cell = Cell(area, root, area.lower, area.upper, area.samples[:KEPT], area.samples)
+        inside = cell.inside[1]
         rng = np.random.default_rng(0)
         targets = np.where(rng.random((SCOUTED, len(area.lower))) < 0.5, area.lower, area.upper)
-        X = np.concatenate([area.samples[:SCOUTED], chords(C, d, area.center, targets, SCOUTED, 0)])
+        X = np.concatenate([area.samples[:SCOUTED], chords(inside.C, inside.d, area.center, targets, SCOUTED, 0)])
         for place in np.argsort(gaps(*self.bodies.hulls, X), kind="stable")[:SCOUTS]:
             nearest = self.bodies.nearest(cell, X[place][None])
             if nearest is not None and nearest[1] <= 0:
@@ -146,15 +147,15 @@ class Search:
 
     def _turn(self, cell: Cell) -> Array:
         """Returns how far every joint turns in the cell, (n,); a slide counts relative to the bodies' extent."""
-        turn: Array = np.where(self._area.scene.revolute, 1.0, 1 / self.bodies.extent) * cell.turn(self._area)
+        turn: Array = np.where(self._area.scene.revolute, 1.0, 1 / self.bodies.extent) * cell.turn()
         return turn
 
     def _settle(self, cell: Cell, report: Report, seed: int) -> tuple[int, Array] | None:
         """Settles a cell, or returns the joint to cut it in and its points."""
-        C, d = cell.faces(self._area)
+        inside = cell.inside[1]
         start = cell.points.mean(axis=0) if len(cell.points) > len(cell.lower) else None
-        if start is None or (d - C @ start).min() < 1e-7 * cell.half.min():
-            start = self._inside(cell, C, d)
+        if start is None or (inside.d - inside.C @ start).min() < 1e-7 * cell.half.min():
+            start = self._inside(cell)
             if start is None:
                 return None
         if cell.coarse and self._coarse is not None:
@@ -197,23 +198,19 @@ class Search:
         wide = self._turn(cell) > NARROW / 2
         return max(bodies.joints, key=lambda j: float(spread[j]) if wide[j] else -1.0)
 
-    def _inside(self, cell: Cell, C: Array, d: Array) -> Array | None:
+    def _inside(self, cell: Cell) -> Array | None:
         """Returns a point of the polytope in the cell; None, after the node was settled, where there is none."""
-        n = len(cell.lower)
-        found = linprog(
-            np.append(np.zeros(n), -1.0), A_ub=np.column_stack([C, np.ones(len(d))]), b_ub=d, bounds=(None, None), method="highs"
-        )
-        if found.status != 0:
-            raise np.linalg.LinAlgError(f"no point of a cell was found: {found.message}")
-        if found.x[-1] > -1e-9:
-            return np.asarray(found.x[:-1])
-        C, d = self._area.polytope.C, self._area.polytope.d
-        y = np.maximum(-found.ineqlin.marginals[: len(d)], 0.0) / self._area.norms
-        faces = np.flatnonzero(y > 1e-9 * y.max())
-        values = (y[faces] / y.max()).astype(np.float32)
-        slope = values @ C[faces]
-        if slope @ cell.mid - np.abs(slope) @ cell.half - values @ d[faces] > 1e-9 * (values @ np.abs(d[faces]) + 1):
+        cutting, inside = cell.inside
+        point, depth, multipliers = deepest(inside, cell.mid)
+        if depth >= -BEYOND:
+            return point
+        y = multipliers[: len(cutting)] / self._area.norms[cutting]
+        used = y > 1e-9 * y.max()
+        faces, values = cutting[used], (y[used] / y.max()).astype(np.float32)
+        C, d = self._area.polytope.C[faces], self._area.polytope.d[faces]
+        slope = values @ C
+        if slope @ cell.mid - np.abs(slope) @ cell.half - values @ d > 1e-9 * (values @ np.abs(d) + 1):
             streams = Streams(np.zeros(0, np.int8), np.array([len(faces)], np.int16), faces.astype(np.int16), values)
             cell.node.kind, cell.node.streams = EMPTY, streams
             return None
-        return np.asarray(found.x[:-1])
+        return point

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from certifier.model import Array
+from certifier.model import Array, Polytope
 
 _PARALLEL = 1e-9
 """Below this sine a direction is taken as parallel to a face."""
@@ -47,23 +47,47 @@ def maximise(A: Array, b: Array, directions: Array, start: Array) -> tuple[Array
     return start + points, multipliers / norms
 
 
+def deepest(polytope: Polytope, start: Array) -> tuple[Array, float, Array]:
+    """Returns the point (n,) that lies farthest inside of all faces, how far, and the faces' multipliers (m,).
+
+    Args:
+        polytope: bounded, with normals of length 1; it may be empty.
+        start: (n,) any point.
+
+    Returns:
+        Where the polytope is empty, the distance is negative, and the multipliers' sums prove it: that of C is 0, and that of d is the
+        distance.
+
+    Raises:
+        np.linalg.LinAlgError: rounding stands in the way.
+    """
+    C, d = polytope.C, polytope.d
+    objective = np.append(np.zeros(len(start)), 1.0)[None]
+    points, multipliers = maximise(np.column_stack([C, np.ones(len(d))]), d, objective, np.append(start, (d - C @ start).min()))
+    return points[0, :-1], float(points[0, -1]), multipliers[0]
+
+
 @njit(cache=True)
-def corner(A: Array, b: Array, start: Array, direction: Array, way: Array) -> bool:
+def corner(A: Array, b: Array, start: Array, direction: Array, basis: Array, way: Array) -> bool:
     """Fills in the way (n,) from a point of {x : A x <= b}, with rows of length 1, to where the direction has its largest value.
+
+    Args:
+        basis: (n,) the rows of a vertex to begin at, which this replaces with those of the one found; basis[0] = -1 for none.
 
     Returns:
         False where there is none, or rounding stands in the way.
     """
-    m, n = A.shape
-    slack, basis, multipliers = np.empty(m), np.zeros(n, dtype=np.int64), np.zeros(m)
+    m = len(A)
+    slack, multipliers = np.empty(m), np.zeros(m)
     for j in range(m):
         slack[j] = max(b[j] - _dot(A[j], start), 0.0)
-    if not _vertex(A, slack, direction, basis) or not _along_edges(A, slack, direction, basis, way, multipliers):
-        return False
-    worst = 0.0
+    found = basis[0] >= 0 or _vertex(A, slack, direction, basis)
+    found = found and _along_edges(A, slack, direction, basis, way, multipliers)
     for j in range(m):
-        worst = max(worst, _dot(A[j], way) - slack[j])
-    return worst <= _BEYOND
+        found = found and _dot(A[j], way) - slack[j] <= _BEYOND
+    if not found:
+        basis[0] = -1
+    return found
 
 
 @njit(cache=True)

@@ -42,13 +42,12 @@ def test_what_has_to_go_goes_and_what_has_to_stay_stays(seed, kind):
     for _, points, _ in corners:
         assert not smaller.contains(points).any()
     assert (keep @ smaller.C.T < smaller.d).all()
-    # What was there is there still, the joint limits are last, and the faces between are new.
+    # What was there is there still or has moved in, the joint limits are last as they were, and the faces between are new.
     old, limits = len(polytope.d) - 2 * scene.n, 2 * scene.n
-    new = len(smaller.d) - len(polytope.d)
-    assert new >= 1
-    for a, b in ((smaller.C, polytope.C), (smaller.d, polytope.d)):
-        assert (a[:old] == b[:old]).all()
-        assert (a[-limits:] == b[-limits:]).all()
+    assert (smaller.C[:old] == polytope.C[:old]).all()
+    assert (smaller.d[:old] <= polytope.d[:old]).all()
+    assert (smaller.C[-limits:] == polytope.C[-limits:]).all()
+    assert (smaller.d[-limits:] == polytope.d[-limits:]).all()
     assert np.linalg.norm(smaller.C[old:-limits], axis=1) == pytest.approx(1)
 
 
@@ -58,10 +57,35 @@ def test_a_face_lies_in_the_joints_between_the_bodies(seed, joints):
     scene, rng = planar_arm(3), np.random.default_rng(seed)
     polytope = polytope_of(scene, rng)
     smaller = cut(scene, polytope, np.zeros((1, 3)), [(joints, corner_of(scene, polytope, rng, joints, 4), 1.0)], polytope)
-    faces = smaller.C[len(polytope.d) - 2 * scene.n : -2 * scene.n]
+    old = len(polytope.d) - 2 * scene.n
+    faces = np.concatenate([smaller.C[old : -2 * scene.n], smaller.C[:old][smaller.d[:old] < polytope.d[:old]]])
     others = [j for j in range(3) if j not in joints]
     assert len(faces)
     assert (faces[:, others] == 0).all()
+
+
+def test_contacts_along_a_face_take_no_new_face():
+    scene = planar_arm(3)
+    polytope = scene.polytope(np.array([[1.0, 0.5, -0.3]]) / np.linalg.norm([1.0, 0.5, -0.3]), [0.4])
+    samples = uniform_in_q(polytope, scene.revolute, 1000, 40, 0).reshape(-1, 3)
+    sheet = samples[np.argsort(polytope.d[0] - samples @ polytope.C[0])[:40]]
+    smaller = cut(scene, polytope, np.zeros((1, 3)), [(ALL, sheet, 1.0)], polytope)
+    assert len(smaller.d) == len(polytope.d)
+    assert smaller.d[0] < polytope.d[0]
+    assert not smaller.contains(sheet).any()
+    assert smaller.contains(samples).mean() > 0.95
+
+
+def test_a_joint_limit_gets_a_face_of_its_own_beside_it():
+    """Proofs and users know the limits by their place, so a limit itself never moves."""
+    scene = planar_arm(2)
+    polytope = scene.polytope([], [])
+    upper = polytope.d[polytope.C[:, 0] > 0].max()
+    end = np.column_stack([np.full(9, 0.999 * upper), np.linspace(-0.5, 0.5, 9)])
+    smaller = cut(scene, polytope, np.zeros((1, 2)), [((0,), end, 1.0)], polytope)
+    assert len(smaller.d) == len(polytope.d) + 1
+    assert (smaller.d[-4:] == polytope.d).all()
+    assert not smaller.contains(end).any()
 
 
 def test_nothing_to_cut_off_changes_nothing():

@@ -16,7 +16,7 @@ from certifier.growth.actions import Certify, Finish, Outcomes, Propose
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
-from certifier.growth.whole import SLICE, STAGES
+from certifier.growth.whole import HARD, SLICE, STAGES
 from certifier.jobs import local
 from certifier.jobs.local import grow
 from certifier.model import WORLD, Polytope
@@ -109,8 +109,8 @@ def test_where_bodies_touch_is_cut_off_and_what_holds_is_not_asked_for_again():
     assert end.outcome is Outcome.CERTIFIED
 
 
-@pytest.mark.parametrize("slices", [1, 3])
-def test_what_is_open_when_the_effort_is_spent_is_cut_off_and_not_before(slices):
+@pytest.mark.parametrize(("slices", "hard"), [(1, 1), (5, HARD // SLICE)])
+def test_what_stays_open_is_cut_off_and_a_face_loses_little_until_the_effort_is_spent(slices, hard):
     def verdict(index, action):
         there = action.polytope.contains(FAR)
         if index == 0 or not there.any():
@@ -119,11 +119,11 @@ def test_what_is_open_when_the_effort_is_spent_is_cut_off_and_not_before(slices)
 
     made, accepted, _ = drive(verdict, options(cells=slices * SLICE))
     later = made[1:]
-    assert [action.ending for action in later] == [[]] * slices + [[1]] * (len(later) - slices)
-    # Faces may lose little first, and any share eleven rounds later.
-    assert slices + 2 <= len(later) <= slices + 12
+    assert [action.ending for action in later] == [[]] * hard + [[1]] * (len(later) - hard)
+    # Faces may lose little first, and any share eleven rounds after the effort is spent.
+    assert slices + 1 <= len(later) <= slices + 9
     assert all(action.cells == SLICE for action in later)
-    assert all(action.polytope.contains(FAR).all() for action in later[: slices + 1])
+    assert all(action.polytope.contains(FAR).all() for action in later[: max(slices, hard + 1)])
     assert not accepted[-1].polytope.contains(FAR).any()
 
 
@@ -191,20 +191,19 @@ def test_a_region_of_an_example_is_verified_contains_what_it_has_to_and_is_free(
 @pytest.mark.parametrize("processes", [1, 2, 3])
 def test_the_same_job_comes_to_the_same_bytes(processes):
     _, scene, q = example("planar_2dof")
-    asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.5}, contraction="whole", cells=SLICE)
+    asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.35}, contraction="whole", cells=SLICE)
     first, second = grow(scene, asked), grow(scene, asked, processes=processes)
     assert first.proof == second.proof
     assert first.manifest["halfspace_offsets"] == second.manifest["halfspace_offsets"]
 
 
 def test_more_effort_does_not_come_to_less():
-    """Of a proposal of which the first slice leaves cells open."""
     _, scene, q = example("arm_3dof")
     shares = []
     for cells in (2, 10 * SLICE):
-        asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.6}, contraction="whole", cells=cells)
+        asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.3}, contraction="whole", cells=cells)
         shares.append(grow(scene, asked).manifest["share"])
-    assert shares[1]["value"] > shares[0]["value"]
+    assert 0.9 < shares[0]["value"] <= shares[1]["value"]
 
 
 def test_a_deadline_ends_growth_with_the_best_region_so_far(monkeypatch):

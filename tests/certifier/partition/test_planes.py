@@ -8,7 +8,7 @@ import pytest
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Volume
 from certifier.partition.hulls import hull, place
-from certifier.partition.planes import FOUND, NO_PLANE, Chart, length_bound, look
+from certifier.partition.planes import FOUND, NO_PLANE, Chart, _slopes, _value, length_bound, look
 from tests.certifier.scenes import box, planar_arm
 
 CALM = 0.3
@@ -23,7 +23,7 @@ def looked(half, radius):
     X = np.zeros((200, 2))
     chart = Chart(np.arange(2), np.zeros(2), np.full(2, CALM / half), CALM)
     C, d = np.concatenate([np.eye(2), -np.eye(2)]), np.full(4, half)
-    return a, b, X, look(a, b, chart, np.full(2, half), C, d, X, 1, 20, 4, 3e-4, 0.8)
+    return a, b, X, look(a, b, chart, C, d, X, 1, 20, 4, 3e-4, 0.8)
 
 
 @pytest.mark.parametrize("half", [0.05, 0.15, 0.25])
@@ -51,3 +51,28 @@ def test_there_is_no_plane_where_the_bodies_touch_somewhere():
     assert weights.sum() == pytest.approx(1)
     assert set(places.tolist()) <= set(range(N))
     assert (np.abs(X[:N]) <= 0.9 + 1e-9).all()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_slopes_of_a_vertex_are_those_of_its_value(seed):
+    rng = np.random.default_rng(seed)
+    scene = planar_arm(4, box("world/box", WORLD, (0.2, 0.2, 0.2), (1.2, 1.2, 0.0)))
+    tip = Volume(("tip",), "arm/link4", np.array([[1.0, 0.3, 0.1]]), 0.05)
+    # The joints are some of the arm's, with one that turns the plane and not the vertex.
+    body = hull(Kinematics(scene), "arm/link1", tip, 0.05, rng.normal(size=3), 0.7)
+    chart = Chart(np.array([0, 1, 3]), rng.normal(size=3), rng.uniform(0.5, 2, 3), CALM)
+    z, bound, s = rng.normal(size=16), rng.normal(size=4), rng.normal(size=4)
+    images, plane, slopes = np.ones((len(body.joints) + 1, 4)), np.empty(4), np.empty(4)
+    images[-1, :3] = tip.vertices[0]
+
+    def value(at):
+        return _value(body, -1.0, z, bound, chart, at, images, plane)
+
+    differences = [(value(s + 1e-6 * e) - value(s - 1e-6 * e)) / 2e-6 for e in np.eye(4)]
+    points = np.empty((1, 3))
+    place(body, s, np.empty((4, 4)), np.empty((4, 4)), points)
+    u = np.append(1.0, (s[[0, 1, 3]] - chart.shift) * chart.scale)
+    at_s = z.reshape(4, 4) @ u
+    assert value(s) == pytest.approx(-(points[0] @ at_s[:3] + at_s[3]) - body.radius * (bound @ u))
+    _slopes(body, -1.0, z, bound, chart, s, images, plane, slopes)
+    assert slopes == pytest.approx(differences, abs=1e-6)

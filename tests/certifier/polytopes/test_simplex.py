@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from certifier.polytopes.simplex import maximise
+from certifier.model import Polytope
+from certifier.polytopes.simplex import corner, deepest, maximise
 
 
 @st.composite
@@ -67,3 +68,41 @@ def test_a_corner_where_every_face_meets():
 def test_a_direction_without_a_largest_value_is_refused(A):
     with pytest.raises(np.linalg.LinAlgError):
         maximise(np.array(A), np.ones(len(A)), np.array([[-1.0, -1]]), np.zeros(2))
+
+
+def unit(A, b):
+    lengths = np.linalg.norm(A, axis=1)
+    return Polytope(A / lengths[:, None], b / lengths)
+
+
+@given(programs(), st.floats(0.0, 5.0))
+def test_the_deepest_point_is_that_of_highs_and_the_twin_without_points_is_told_by_multipliers(program, apart):
+    A, b, _, start, size = program
+    kept = np.linalg.norm(A, axis=1) > 0
+    polytope = unit(A[kept], b[kept])
+    m, n = polytope.C.shape
+    # Two opposite faces are moved past each other; at 0 they are where they were.
+    moved = Polytope(polytope.C, polytope.d - np.where(np.arange(m) >= m - 2 * n, apart * size, 0.0))
+    point, depth, y = deepest(moved, start)
+    found = linprog(
+        np.append(np.zeros(n), -1.0), A_ub=np.column_stack([moved.C, np.ones(m)]), b_ub=moved.d, bounds=(None, None), method="highs"
+    )
+    scale = size + np.abs(start).max()
+    assert depth == pytest.approx(-found.fun, abs=1e-6 * scale)
+    assert (moved.d - moved.C @ point).min() == pytest.approx(depth, abs=1e-7 * scale)
+    assert (y >= 0).all()
+    assert np.abs(y @ moved.C).max() <= 1e-7
+    assert y @ moved.d == pytest.approx(depth, abs=1e-7 * scale)
+
+
+@given(programs())
+def test_a_corner_is_the_same_from_every_vertex_that_the_search_begins_at(program):
+    A, b, directions, start, size = program
+    kept = np.linalg.norm(A, axis=1) > 0
+    polytope = unit(A[kept], b[kept])
+    basis, way = np.full(len(start), -1), np.zeros(len(start))
+    for direction in directions:
+        assert corner(polytope.C, polytope.d, start, direction, basis, way)
+        warm = direction @ way
+        assert corner(polytope.C, polytope.d, start, direction, np.full(len(start), -1), way)
+        assert warm == pytest.approx(direction @ way, abs=1e-7 * size * max(np.linalg.norm(direction), 1e-9))
