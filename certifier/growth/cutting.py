@@ -72,25 +72,26 @@ def cut(
             distance = np.linalg.norm((left - left[0])[:, J] / scale[J], axis=1)
             near = left[np.argsort(distance, kind="stable")[:MOST_POINTS]]
             near = near[: max(1, int((np.sort(distance)[:MOST_POINTS] < CORNER).sum()))]
-            faces = [*_moved_in(C, d, near, J, keep, scale), *_new(near, J, keep, samples, scale)]
+            faces = [*_moved_in(C, d, limits, near, J, keep, scale), *_new(near, J, keep, samples, scale)]
             if not faces and len(near) > 1:
                 near = near[:1]
-                faces = [*_moved_in(C, d, near, J, keep, scale), *_new(near, J, keep, samples, scale)]
-            losses = [float((samples @ face.row > face.offset).mean()) for face in faces]
-            cheap = [k for k in range(len(faces)) if losses[k] <= left_to_lose]
+                faces = [*_moved_in(C, d, limits, near, J, keep, scale), *_new(near, J, keep, samples, scale)]
+            rated = [(face, float((samples @ face.row > face.offset).mean())) for face in faces]
+            cheap = [(face, loss) for face, loss in rated if loss <= left_to_lose]
             if not cheap:
                 # Others of the pair's points may go all the same; these are left to the next round.
                 blocked = blocked or not faces
                 points = points[~(points[:, None] == near).all(axis=2).any(axis=1)]
                 continue
-            gains = {k: float((left @ faces[k].row >= faces[k].offset).sum()) / (losses[k] + 1 / len(samples)) for k in cheap}
-            best = faces[max(cheap, key=lambda k: gains[k] / (1 if faces[k].place < len(d) - limits else BETTER))]
-            if best.place < len(d) - limits:
-                d[best.place] = best.offset
-            else:
+            gains = [float((left @ face.row >= face.offset).sum()) / (loss + 1 / len(samples)) for face, loss in cheap]
+            worth = [gain / (BETTER if face.replaces is None else 1.0) for gain, (face, _) in zip(gains, cheap, strict=True)]
+            best, loss = cheap[int(np.argmax(worth))]
+            if best.replaces is None:
                 C, d = np.insert(C, len(d) - limits, best.row, axis=0), np.insert(d, len(d) - limits, best.offset)
+            else:
+                d[best.replaces] = best.offset
             moved = True
-            left_to_lose -= losses[faces.index(best)]
+            left_to_lose -= loss
             samples = samples[samples @ best.row <= best.offset]
     if not moved:
         return None if blocked else polytope
@@ -102,18 +103,19 @@ class _Face:
     """A face row @ s <= offset that cuts points off.
 
     Attributes:
-        place: the number of the polytope's face that it replaces. Joint limits are not replaced, so their numbers stand for a new face.
+        replaces: the number of the polytope's face that it replaces; None for a new face.
     """
 
     row: Array
     offset: float
-    place: int
+    replaces: int | None = None
 
 
-def _moved_in(C: Array, d: Array, beyond: Array, joints: list[int], keep: Array, scale: Array) -> list[_Face]:
+def _moved_in(C: Array, d: Array, limits: int, beyond: Array, joints: list[int], keep: Array, scale: Array) -> list[_Face]:
     """Returns the faces of the polytope in these joints that cut off the points when they are moved in least, at most TRIED of them.
 
-    A face in other joints would not cut off what it is about: bodies that touch do so whatever the joints are that move neither.
+    A face in other joints would not cut off what it is about: bodies that touch do so whatever the joints are that move neither. The
+    joint limits, which are the last rows, stay where they are; a new face is put before one of them.
     """
     norms = np.linalg.norm(C * scale, axis=1)
     depths = (d - beyond @ C.T).max(axis=0)
@@ -123,7 +125,7 @@ def _moved_in(C: Array, d: Array, beyond: Array, joints: list[int], keep: Array,
         room = d[k] - depths[k] - float((keep @ C[k]).max())
         if room > 0:
             clear = min(CLEAR * norms[k] + CLEARER * depths[k], 0.5 * room)
-            faces.append(_Face(C[k], float(d[k] - depths[k] - clear), int(k)))
+            faces.append(_Face(C[k], float(d[k] - depths[k] - clear), int(k) if k < len(d) - limits else None))
     return faces
 
 
@@ -134,7 +136,7 @@ def _new(beyond: Array, joints: list[int], keep: Array, samples: Array, scale: A
         return []
     row = np.zeros(len(scale))
     row[joints] = found[0]
-    return [_Face(row, found[1], np.iinfo(np.int64).max)]
+    return [_Face(row, found[1])]
 
 
 _drawn: OrderedDict[tuple[str, bytes, bytes], Array] = OrderedDict()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,18 @@ from certifier.proof.ground import Ground
 
 CHAINS, EACH = 100, 20
 """So many chains give so many samples each."""
+
+
+class Inside(NamedTuple):
+    """The part {C s <= d} of a polytope in a cell, with rows of length 1: the faces that cut the cell, then its upper and lower ones.
+
+    Attributes:
+        faces: (f,) the numbers of those that cut the cell, in the polytope.
+    """
+
+    faces: Array
+    C: Array
+    d: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +73,8 @@ class Area:
         unit = Polytope(polytope.C / norms[:, None], polytope.d / norms)
         return cls(scene, Kinematics.of(scene), polytope, box.lower, box.upper, center, samples, ground, norms, unit)
 
-    def inside(self, lower: Array, upper: Array) -> tuple[Array, Polytope]:
-        """Returns the numbers of the faces that cut a cell, (f,), and the polytope in the cell, with normals of length 1.
-
-        Its faces are those that cut the cell, then the upper and the lower ones of the cell.
-        """
+    def inside(self, lower: Array, upper: Array) -> Inside:
+        """Returns the part of the polytope in a cell."""
         C, d, eye = self.unit.C, self.unit.d, np.eye(len(lower))
         cutting = np.flatnonzero(d - C @ ((lower + upper) / 2) - np.abs(C) @ ((upper - lower) / 2) < 0)
-        return cutting, Polytope(np.concatenate([C[cutting], eye, -eye]), np.concatenate([d[cutting], upper, -lower]))
+        return Inside(cutting, np.concatenate([C[cutting], eye, -eye]), np.concatenate([d[cutting], upper, -lower]))

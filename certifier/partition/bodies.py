@@ -106,8 +106,7 @@ class Bodies:
             start: (n,) a point of the polytope in the cell.
         """
         n = len(start)
-        inside = cell.inside[1]
-        C, d = inside.C, inside.d
+        C, d = cell.inside.C, cell.inside.d
         rng = np.random.default_rng(seed)
         targets = np.where(rng.random((CORNERS if self._corners is None else len(self._corners), n)) < 0.5, cell.lower, cell.upper)
         if self._corners is not None:
@@ -142,17 +141,16 @@ class Bodies:
         if found[place] > CLOSE:
             return None
         s = configurations[place].copy()
-        inside = cell.inside[1]
-        gap = approach(*self.hulls, np.array(self.joints), cell.half, inside.C, inside.d, s, STEPS, 0.0)
+        gap = approach(*self.hulls, np.array(self.joints), cell.half, cell.inside.C, cell.inside.d, s, STEPS, 0.0)
         return s, gap * self.extent
 
     def _prove(self, cell: Cell, plane: Array) -> Streams | Array | int:
         """Returns the streams of a proof, or what :meth:`certifier.partition.sides.Side.prove` says."""
-        cutting = cell.inside[0]
-        C, d = self._area.polytope.C[cutting], self._area.polytope.d[cutting]
+        faces = cell.inside.faces
+        C, d = self._area.polytope.C[faces], self._area.polytope.d[faces]
         found = []
         for side in self._sides:
-            result = side.prove(plane, cell.lower, cell.upper, C, d, cutting, self._pieces)
+            result = side.prove(plane, cell.lower, cell.upper, C, d, faces, self._pieces)
             if not isinstance(result, Streams):
                 return result
             found.append(result)

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from certifier.model import Array, Polytope
-from certifier.partition.area import Area
+from certifier.model import Array
+from certifier.partition.area import Area, Inside
 from certifier.partition.tree import Node
 
 
@@ -44,8 +44,8 @@ class Cell:
         return (self.upper - self.lower) / 2
 
     @cached_property
-    def inside(self) -> tuple[Array, Polytope]:
-        """Holds the numbers of the polytope's faces that cut the cell, and the polytope in it (Area.inside)."""
+    def inside(self) -> Inside:
+        """Holds the part of the polytope in the cell."""
         return self.area.inside(self.lower, self.upper)
 
     def turn(self) -> Array:

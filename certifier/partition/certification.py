@@ -169,9 +169,8 @@ class CellCertification:
         """Returns points of the polytope in the cells: of every cell where the bodies are nearest, and where they are near."""
         found: list[Array] = []
         for lower, upper in cells:
-            inside = self._area.inside(lower, upper)[1]
-            C, d = inside.C, inside.d
-            middle, depth, _ = deepest(inside, (lower + upper) / 2)
+            _, C, d = self._area.inside(lower, upper)
+            middle, depth, _ = deepest(C, d, (lower + upper) / 2)
             if depth <= 0:
                 continue
             X = np.concatenate([middle[None], chords(C, d, middle, np.zeros((0, len(lower))), POINTS_OF_A_CELL, 0)])

@@ -40,6 +40,33 @@ class Chart(NamedTuple):
 
 
 @njit(cache=True)
+def _coordinates(chart: Chart, s: Array, u: Array) -> None:
+    """Fills in the coordinates u (k,) of a configuration."""
+    for e in range(len(chart.joints)):
+        u[e] = (s[chart.joints[e]] - chart.shift[e]) * chart.scale[e]
+
+
+@njit(cache=True)
+def _plane(z: Array, u: Array, plane: Array) -> None:
+    """Fills in the plane z at u, (4,)."""
+    k = len(u)
+    for c in range(4):
+        t = z[c * (k + 1)]
+        for e in range(k):
+            t += z[c * (k + 1) + 1 + e] * u[e]
+        plane[c] = t
+
+
+@njit(cache=True)
+def _length(bound: Array, u: Array) -> float:
+    """Returns the bound of the normal's length at u."""
+    t = bound[0]
+    for e in range(len(u)):
+        t += bound[1 + e] * u[e]
+    return float(t)
+
+
+@njit(cache=True)
 def _worst(
     A: Array, B: Array, u: Array, radius_a: float, radius_b: float, ratio: Array, rows: Array, z: Array, values: Array
 ) -> tuple[int, int, int, float]:
@@ -48,16 +75,11 @@ def _worst(
     Args:
         values: gets the least value at each of the rows, which is positive on the right side.
     """
-    k = u.shape[1]
     plane = np.zeros(4)
     lowest, row, vertex, side = np.inf, 0, 0, 1
     for i in range(len(rows)):
         r = rows[i]
-        for c in range(4):
-            t = z[c * (k + 1)]
-            for e in range(k):
-                t += z[c * (k + 1) + 1 + e] * u[r, e]
-            plane[c] = t
+        _plane(z, u[r], plane)
         norm = ratio[r] * np.sqrt(plane[0] ** 2 + plane[1] ** 2 + plane[2] ** 2)
         least = np.inf
         for v in range(A.shape[1]):
@@ -203,31 +225,18 @@ def _images(hull: Hull, s: Array, images: Array) -> None:
 
 
 @njit(cache=True)
-def _plane(z: Array, chart: Chart, s: Array, plane: Array) -> None:
-    """Fills in the plane z at s, (4,)."""
-    k = len(chart.joints)
-    for c in range(4):
-        plane[c] = z[c * (k + 1)]
-    for e in range(k):
-        u = (s[chart.joints[e]] - chart.shift[e]) * chart.scale[e]
-        for c in range(4):
-            plane[c] += z[c * (k + 1) + 1 + e] * u
-
-
-@njit(cache=True)
-def _value(hull: Hull, sign: float, z: Array, bound: Array, chart: Chart, s: Array, images: Array, plane: Array) -> float:
+def _value(hull: Hull, sign: float, z: Array, bound: Array, chart: Chart, s: Array, images: Array, u: Array, plane: Array) -> float:
     """Returns how far a vertex is on the right side of a plane at s, its radius times the bound of the normal's length subtracted.
 
     Args:
         images: (F + 1, 4) its last row is the vertex; the others are filled in (:func:`_images`).
-        plane: (4,) gets the plane at s.
+        u, plane: (k,), (4,) get the coordinates of s and the plane there.
     """
     _images(hull, s, images)
-    _plane(z, chart, s, plane)
-    kappa, p = bound[0], images[0]
-    for e in range(len(chart.joints)):
-        kappa += bound[1 + e] * (s[chart.joints[e]] - chart.shift[e]) * chart.scale[e]
-    return sign * ((plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2]) / p[3] + plane[3]) - hull.radius * kappa
+    _coordinates(chart, s, u)
+    _plane(z, u, plane)
+    p = images[0]
+    return sign * ((plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2]) / p[3] + plane[3]) - hull.radius * _length(bound, u)
 
 
 @njit(cache=True)
@@ -265,21 +274,22 @@ def descend(
         C, d: rows of length 1.
         basis: see :func:`certifier.polytopes.simplex.corner`.
     """
-    images, plane, slopes = np.ones((len(hull.joints) + 1, 4)), np.empty(4), np.empty(len(s))
+    images, slopes = np.ones((len(hull.joints) + 1, 4)), np.empty(len(s))
+    u, plane = np.empty(len(chart.joints)), np.empty(4)
     images[-1, :3] = vertex
-    now = _value(hull, sign, z, bound, chart, s, images, plane)
+    now = _value(hull, sign, z, bound, chart, s, images, u, plane)
     for _ in range(steps):
         _slopes(hull, sign, z, bound, chart, s, images, plane, slopes)
         least, best = np.inf, -1
         trials = along(C, d, s, -slopes, basis)
         for i in range(len(trials)):
-            t = _value(hull, sign, z, bound, chart, trials[i], images, plane)
+            t = _value(hull, sign, z, bound, chart, trials[i], images, u, plane)
             if t < least:
                 least, best = t, i
         if best < 0 or least >= now - SLOWEST * abs(now) + WRONG:
             break
         s[:] = trials[best]
-        now = _value(hull, sign, z, bound, chart, s, images, plane)
+        now = _value(hull, sign, z, bound, chart, s, images, u, plane)
     return now
 
 
@@ -301,14 +311,13 @@ def look(
     n, k, capacity, made = X.shape[1], len(chart.joints), len(X), 0
     V, W = len(a.vertices), len(b.vertices)
     A, B, u, ratio = np.empty((capacity, V, 3)), np.empty((capacity, W, 3)), np.empty((capacity, k)), np.ones(capacity)
-    P, Q, s, bound, normal = np.empty((4, 4)), np.empty((4, 4)), np.empty(n), np.zeros(1 + k), np.empty(4)
+    P, Q, s, bound, plane = np.empty((4, 4)), np.empty((4, 4)), np.empty(n), np.zeros(1 + k), np.empty(4)
     low, where, basis = np.empty(V + W), np.empty(V + W, np.int64), np.full(n, -1)
     for _ in range(rounds):
         for i in range(made, N):
             place(a, X[i], P, Q, A[i])
             place(b, X[i], P, Q, B[i])
-            for e in range(k):
-                u[i, e] = (X[i, chart.joints[e]] - chart.shift[e]) * chart.scale[e]
+            _coordinates(chart, X[i], u[i])
         made = N
         found, z, places, weights = separate(A[:N], B[:N], u[:N], a.radius, b.radius, ratio, np.arange(N), least, enough)
         if not found:
@@ -317,20 +326,14 @@ def look(
             length_bound(z, k, chart.calm, bound)
         low[:] = np.inf
         for i in range(N):
-            kappa = bound[0]
-            for e in range(k):
-                kappa += bound[1 + e] * u[i, e]
-            for c in range(4):
-                t = z[c * (k + 1)]
-                for e in range(k):
-                    t += z[c * (k + 1) + 1 + e] * u[i, e]
-                normal[c] = t
+            kappa = _length(bound, u[i])
+            _plane(z, u[i], plane)
             if kappa > 0:
                 # The bodies will have to keep their radius times this bound away from the next plane, if it is like this one.
-                ratio[i] = min(kappa / np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2), STEEPEST)
+                ratio[i] = min(kappa / np.sqrt(plane[0] ** 2 + plane[1] ** 2 + plane[2] ** 2), STEEPEST)
             for v in range(V + W):
                 p = A[i, v] if v < V else B[i, v - V]
-                t = normal[0] * p[0] + normal[1] * p[1] + normal[2] * p[2] + normal[3]
+                t = plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2] + plane[3]
                 t = t - a.radius * kappa if v < V else -t - b.radius * kappa
                 if t < low[v]:
                     low[v], where[v] = t, i

@@ -127,10 +127,9 @@ class Search:
         """Looks for contacts on all of the polytope, before anything is proved, and returns whether there are any."""
         area = self._area
         cell = Cell(area, root, area.lower, area.upper, area.samples[:KEPT], area.samples)
-        inside = cell.inside[1]
         rng = np.random.default_rng(0)
         targets = np.where(rng.random((SCOUTED, len(area.lower))) < 0.5, area.lower, area.upper)
-        X = np.concatenate([area.samples[:SCOUTED], chords(inside.C, inside.d, area.center, targets, SCOUTED, 0)])
+        X = np.concatenate([area.samples[:SCOUTED], chords(cell.inside.C, cell.inside.d, area.center, targets, SCOUTED, 0)])
         for place in np.argsort(gaps(*self.bodies.hulls, X), kind="stable")[:SCOUTS]:
             nearest = self.bodies.nearest(cell, X[place][None])
             if nearest is not None and nearest[1] <= 0:
@@ -152,9 +151,8 @@ class Search:
 
     def _settle(self, cell: Cell, report: Report, seed: int) -> tuple[int, Array] | None:
         """Settles a cell, or returns the joint to cut it in and its points."""
-        inside = cell.inside[1]
         start = cell.points.mean(axis=0) if len(cell.points) > len(cell.lower) else None
-        if start is None or (inside.d - inside.C @ start).min() < 1e-7 * cell.half.min():
+        if start is None or (cell.inside.d - cell.inside.C @ start).min() < 1e-7 * cell.half.min():
             start = self._inside(cell)
             if start is None:
                 return None
@@ -200,8 +198,8 @@ class Search:
 
     def _inside(self, cell: Cell) -> Array | None:
         """Returns a point of the polytope in the cell; None, after the node was settled, where there is none."""
-        cutting, inside = cell.inside
-        point, depth, multipliers = deepest(inside, cell.mid)
+        cutting = cell.inside.faces
+        point, depth, multipliers = deepest(cell.inside.C, cell.inside.d, cell.mid)
         if depth >= -BEYOND:
             return point
         y = multipliers[: len(cutting)] / self._area.norms[cutting]

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from certifier.model import Array, Polytope
+from certifier.model import Array
 
 _PARALLEL = 1e-9
 """Below this sine a direction is taken as parallel to a face."""
@@ -47,11 +47,11 @@ def maximise(A: Array, b: Array, directions: Array, start: Array) -> tuple[Array
     return start + points, multipliers / norms
 
 
-def deepest(polytope: Polytope, start: Array) -> tuple[Array, float, Array]:
-    """Returns the point (n,) that lies farthest inside of all faces, how far, and the faces' multipliers (m,).
+def deepest(C: Array, d: Array, start: Array) -> tuple[Array, float, Array]:
+    """Returns the point (n,) of {x : C x <= d} that lies farthest inside of all faces, how far, and the faces' multipliers (m,).
 
     Args:
-        polytope: bounded, with normals of length 1; it may be empty.
+        C, d: rows of length 1, of a polytope that is bounded; it may be empty.
         start: (n,) any point.
 
     Returns:
@@ -61,7 +61,6 @@ def deepest(polytope: Polytope, start: Array) -> tuple[Array, float, Array]:
     Raises:
         np.linalg.LinAlgError: rounding stands in the way.
     """
-    C, d = polytope.C, polytope.d
     objective = np.append(np.zeros(len(start)), 1.0)[None]
     points, multipliers = maximise(np.column_stack([C, np.ones(len(d))]), d, objective, np.append(start, (d - C @ start).min()))
     return points[0, :-1], float(points[0, -1]), multipliers[0]

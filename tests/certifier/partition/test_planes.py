@@ -66,7 +66,7 @@ def test_the_slopes_of_a_vertex_are_those_of_its_value(seed):
     images[-1, :3] = tip.vertices[0]
 
     def value(at):
-        return _value(body, -1.0, z, bound, chart, at, images, plane)
+        return _value(body, -1.0, z, bound, chart, at, images, np.empty(3), plane)
 
     differences = [(value(s + 1e-6 * e) - value(s - 1e-6 * e)) / 2e-6 for e in np.eye(4)]
     points = np.empty((1, 3))

@@ -83,7 +83,7 @@ def test_the_deepest_point_is_that_of_highs_and_the_twin_without_points_is_told_
     m, n = polytope.C.shape
     # Two opposite faces are moved past each other; at 0 they are where they were.
     moved = Polytope(polytope.C, polytope.d - np.where(np.arange(m) >= m - 2 * n, apart * size, 0.0))
-    point, depth, y = deepest(moved, start)
+    point, depth, y = deepest(moved.C, moved.d, start)
     found = linprog(
         np.append(np.zeros(n), -1.0), A_ub=np.column_stack([moved.C, np.ones(m)]), b_ub=moved.d, bounds=(None, None), method="highs"
     )
