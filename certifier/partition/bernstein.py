@@ -1,5 +1,9 @@
 """Polynomials in Bernstein form are proved positive on a polytope, one box of it after the other.
 
+A control point is a place in [0, 4)^k, of k own coordinates. The denominator is a product of one factor in each own coordinate, so its
+control values are products, and so are those of the denominator times an own coordinate. ``den`` (2, k, 4) holds the factors: those of the
+denominator, and those times the coordinate.
+
 Everything uses one thread. Nothing here is trusted: the verifier checks what is found.
 """
 
@@ -16,14 +20,18 @@ FACES, MORE, ATTEMPTS = 10, 4, 4
 """A piece is tried with FACES faces, then with MORE of those that its last answer violated, in so many attempts."""
 LOWEST = 32
 """So many of the lowest control points say which faces these are."""
+BLOCK = 2
+"""Control values are computed in blocks over so many coordinates, which fill the registers."""
 STEPS, ZERO = 40, 1e-10
 """Multipliers are given up after STEPS control points, or where the square of the distance of their rows' hull from 0 is below ZERO."""
 EARLY, HOPELESS = 16, 4.0
 """A proof is given up when, after EARLY pieces, what they have proved lets one expect HOPELESS times as many pieces as are allowed."""
+DEPTH = 40
+"""At most so many pieces wait while others are tried."""
 WHOLE = 0.1
 """A piece is as precise as this part of the cell, at least."""
 SLIGHT = 1e-6
-"""Halves begin with the multipliers of the whole, unless f has less than this part of the largest one."""
+"""f counts for nothing where it has less than this part of the largest multiplier."""
 OUTSIDE = 1e-7
 """A point of the polytope may be beyond a face by this, relative to the magnitude of the face's values."""
 
@@ -56,8 +64,30 @@ def elevate(values: Array, first: Array, last: Array) -> Array:
 
 
 @njit(cache=True)
-def polynomials(X: Array, vertices: Array, base: Array, own: Array, outside: Array, ends: Array) -> tuple[Array, Array]:
-    """Returns the Bernstein coefficients of f den of all vertices, (V, 1 + o, 4^k), and of den and den s_i, (1 + k, 4^k).
+def factors(X: Array, ends: Array) -> Array:
+    """Returns the factors of the denominator, (2, k, 4).
+
+    Args:
+        X: (k, 3) Bernstein coefficients of the denominator in each own coordinate.
+        ends: (4, k) both ends of the own coordinates and their weights.
+    """
+    k = len(X)
+    den = np.zeros((2, k, 4))
+    for i in range(k):
+        l, u, w, v = ends[:, i]
+        for j in range(4):
+            if j < 3:
+                den[0, i, j] += (3 - j) / 3.0 * w * X[i, j]
+                den[1, i, j] += (3 - j) / 3.0 * w * l * X[i, j]
+            if j > 0:
+                den[0, i, j] += j / 3.0 * v * X[i, j - 1]
+                den[1, i, j] += j / 3.0 * v * u * X[i, j - 1]
+    return den
+
+
+@njit(cache=True)
+def polynomials(X: Array, vertices: Array, base: Array, own: Array, outside: Array, ends: Array) -> Array:
+    """Returns the Bernstein coefficients of f den of all vertices, (V, 1 + o, 4^k).
 
     Args:
         X: (3^k, 4, 4) control matrices of the pose.
@@ -68,14 +98,6 @@ def polynomials(X: Array, vertices: Array, base: Array, own: Array, outside: Arr
     """
     N, k, o, V = len(X), len(own), len(outside), len(vertices)
     first, last = ends[2].copy(), ends[3].copy()
-    den = X[:, 3, 3].copy()
-    T = np.empty((1 + k, 4**k))
-    T[0] = elevate(den, first, last)
-    for i in range(k):
-        first[i] *= ends[0, i]
-        last[i] *= ends[1, i]
-        T[1 + i] = elevate(den, first, last)
-        first[i], last[i] = ends[2, i], ends[3, i]
     c = np.empty((V, 1 + o, 4**k))
     p, values = np.empty((N, 4)), np.empty(N)
     for v in range(V):
@@ -95,7 +117,7 @@ def polynomials(X: Array, vertices: Array, base: Array, own: Array, outside: Arr
             for a in range(N):
                 values[a] = p[a, 0] * outside[i, 0] + p[a, 1] * outside[i, 1] + p[a, 2] * outside[i, 2] + p[a, 3] * outside[i, 3]
             c[v, 1 + i] = elevate(values, first, last)
-    return c, T
+    return c
 
 
 @njit(cache=True)
@@ -118,17 +140,63 @@ def halve(A: Array, axis: int, k: int, low: Array, high: Array) -> None:
 
 
 @njit(cache=True)
-def lowest(z: Array, c: Array, T: Array, constant: Array, own: Array, outside: Array, rest: Array, slopes: Array) -> tuple[float, int]:
+def _at(den: Array, place: int, values: Array) -> None:
+    """Fills in the control values of the denominator, and of the denominator times each own coordinate, at one place, (1 + k,)."""
+    k = den.shape[1]
+    values[:] = 1.0
+    for i in range(k - 1, -1, -1):
+        x = place % 4
+        place //= 4
+        for e in range(1 + k):
+            values[e] *= den[1, i, x] if e == 1 + i else den[0, i, x]
+
+
+@njit(cache=True)
+def _expanded(den: Array, slopes: Array, begin: int, end: int, base: float) -> tuple[Array, Array]:
+    """Returns the control values of prod_i den_i and of (base + sum_i slopes_i s_i) prod_i den_i, over some own coordinates."""
+    product, linear = np.empty(4 ** (end - begin)), np.empty(4 ** (end - begin))
+    product[0], linear[0] = 1.0, base
+    n = 1
+    for i in range(begin, end):
+        for b in range(n - 1, -1, -1):
+            p, q = product[b], linear[b]
+            for x in range(4):
+                product[4 * b + x] = p * den[0, i, x]
+                linear[4 * b + x] = q * den[0, i, x] + p * (slopes[i] * den[1, i, x])
+        n *= 4
+    return product, linear
+
+
+@njit(cache=True, fastmath=True)
+def _block(
+    z0: float, c: Array, begin: int, p: float, q: float, product: Array, linear: Array, slopes: Array, k: int, values: Array
+) -> float:
+    """Fills in the control values of one block, over the last own coordinates, and returns the least of them."""
+    n = len(values)
+    for y in range(n):
+        values[y] = z0 * c[0, begin + y] - (q * product[y] + p * linear[y])
+    for i in range(c.shape[0] - 1):
+        slope = slopes[k + i] * p
+        for y in range(n):
+            values[y] -= abs(z0 * c[1 + i, begin + y] - slope * product[y])
+    least = np.inf
+    for y in range(n):
+        least = min(least, values[y])
+    return float(least)
+
+
+@njit(cache=True)
+def lowest(z: Array, c: Array, den: Array, constant: Array, own: Array, outside: Array, rest: Array, slopes: Array) -> tuple[float, int]:
     """Returns the least control value of z_0 f - sum_j z_j g_j, and the place of it.
 
     Args:
         z: (1 + m,).
         c: (1 + o, N) of f: the constant part, and the slopes in the outside coordinates, which are in [-1, 1].
-        T: (1 + k, N) of the denominator, and of the denominator times each own coordinate.
+        den: (2, k, 4) the factors of the denominator.
         constant, own, outside, rest: (m,), (m, k), (m, o), (m, r) of the faces g_j, in the coordinates of the piece.
         slopes: (k + o,) is overwritten with those of sum_j z_j g_j.
     """
-    N, m, k, o = c.shape[1], len(constant), T.shape[0] - 1, c.shape[0] - 1
+    N, m, k, o = c.shape[1], len(constant), den.shape[1], c.shape[0] - 1
     slopes[:] = 0.0
     base = 0.0
     for j in range(m):
@@ -143,16 +211,20 @@ def lowest(z: Array, c: Array, T: Array, constant: Array, own: Array, outside: A
         for j in range(m):
             t += z[1 + j] * rest[j, i]
         base += abs(t)
-    least, place = np.inf, 0
-    for a in range(N):
-        t = z[0] * c[0, a] - base * T[0, a]
-        for i in range(k):
-            t -= slopes[i] * T[1 + i, a]
-        for i in range(o):
-            t -= abs(z[0] * c[1 + i, a] - slopes[k + i] * T[0, a])
-        if not t >= least:
-            least, place = (t if t < least else -np.inf), a
-    return least, place
+    if not np.isfinite(z[0] + base + np.abs(slopes).sum()):
+        return -np.inf, 0
+    first = max(k - BLOCK, 0)
+    products, linears = _expanded(den, slopes, 0, first, base)
+    product, linear = _expanded(den, slopes, first, k, 0.0)
+    n = len(product)
+    values = np.empty(n)
+    least, block = np.inf, 0
+    for b in range(N // n):
+        t = _block(z[0], c, b * n, products[b], linears[b], product, linear, slopes, k, values)
+        if t < least:
+            least, block = t, b
+    _block(z[0], c, block * n, products[block], linears[block], product, linear, slopes, k, values)
+    return least, block * n + int(values.argmin())
 
 
 @njit(cache=True)
@@ -208,25 +280,26 @@ def evaluate(c: Array, spot: Array, ends: Array) -> float:
 
 
 @njit(cache=True)
-def choose(c: Array, T: Array, constant: Array, own: Array, outside: Array, rest: Array, scale: Array, z: Array, chosen: Array) -> int:
+def choose(c: Array, den: Array, constant: Array, own: Array, outside: Array, rest: Array, scale: Array, z: Array, chosen: Array) -> int:
     """Fills in the faces that may help most, those with multipliers in z first, and returns how many there are, which is 1 at least.
 
     A face helps where f is negative, if it is negative there as well.
 
     Args:
-        c, T, constant, own, outside, rest: as for :func:`lowest`.
+        c, den, constant, own, outside, rest: as for :func:`lowest`.
         scale: (1 + m,) the magnitude of f and of each face.
         chosen: gets their numbers.
     """
-    N, m, k, o = c.shape[1], len(constant), T.shape[0] - 1, c.shape[0] - 1
+    N, m, k, o = c.shape[1], len(constant), den.shape[1], c.shape[0] - 1
     values = c[0].copy()
     for i in range(o):
         values -= np.abs(c[1 + i])
-    bad = np.zeros(LOWEST, np.int64)
+    bad, T = np.zeros(LOWEST, np.int64), np.empty((LOWEST, 1 + k))
     count, limit = 0, 0.5 * values.min()
     for a in range(N):
         if values[a] <= limit and count < LOWEST:
             bad[count] = a
+            _at(den, a, T[count])
             count += 1
     gain, used = np.zeros(m), np.zeros(m, np.bool_)
     for j in range(m):
@@ -234,9 +307,9 @@ def choose(c: Array, T: Array, constant: Array, own: Array, outside: Array, rest
             t = constant[j]
             for e in range(o):
                 t += -outside[j, e] if c[1 + e, bad[i]] > 0 else outside[j, e]
-            t *= T[0, bad[i]]
+            t *= T[i, 0]
             for e in range(k):
-                t += own[j, e] * T[1 + e, bad[i]]
+                t += own[j, e] * T[i, 1 + e]
             gain[j] -= min(t, 0.0)
         gain[j] /= scale[1 + j]
     n = 0
@@ -255,7 +328,7 @@ def choose(c: Array, T: Array, constant: Array, own: Array, outside: Array, rest
 @njit(cache=True)
 def multipliers(
     c: Array,
-    T: Array,
+    den: Array,
     constant: Array,
     own: Array,
     outside: Array,
@@ -268,7 +341,7 @@ def multipliers(
     """Looks for z >= 0 with z_0 f - sum_j z_j g_j > 0 at all control points, by Wolfe's algorithm over their rows.
 
     Args:
-        c, T, constant, own, outside, rest: as for :func:`lowest`.
+        c, den, constant, own, outside, rest: as for :func:`lowest`.
         scale: (1 + m,) the magnitude of f and of each face.
         needed: (1 + m,) control values have to be larger than z times this.
         z: (1 + m,) gets z_0 = 1 and the multipliers, in single precision; or z_0 = 0, where the faces alone do.
@@ -278,22 +351,24 @@ def multipliers(
     Returns:
         PROVED, REFUTED or UNDECIDED.
     """
-    m, k, o, r = len(constant), T.shape[0] - 1, c.shape[0] - 1, rest.shape[1]
-    D = 1 + m
+    m, k, o, r = len(constant), den.shape[1], c.shape[0] - 1, rest.shape[1]
+    D, T = 1 + m, np.empty(1 + k)
     points, G, w = np.zeros((2 * D + 2, D)), np.zeros((2 * D + 2, 2 * D + 2)), np.zeros(2 * D + 2)
     where, origin = np.zeros((2 * D + 2, k + o + r + 1)), np.zeros(2 * D + 2, np.int64)
-    slopes, x, trial, row = np.zeros(k + o), np.zeros(D), np.zeros(D), np.zeros(D)
+    slopes, x, row = np.zeros(k + o), np.zeros(D), np.zeros(D)
     z[:] = 0.0
     z[0] = 1.0
     n = 0
     for _ in range(STEPS):
-        place = lowest(z, c, T, constant, own, outside, rest, slopes)[1]
-        den = T[0, place]
+        least, place = lowest(z, c, den, constant, own, outside, rest, slopes)
+        if least > (z * needed).sum():
+            return PROVED
+        _at(den, place, T)
         row[0] = c[0, place]
         for i in range(k):
-            spot[i] = T[1 + i, place]
+            spot[i] = T[1 + i]
         for i in range(o):
-            spot[k + i] = -1.0 if z[0] * c[1 + i, place] - slopes[k + i] * den > 0 else 1.0
+            spot[k + i] = -1.0 if z[0] * c[1 + i, place] - slopes[k + i] * T[0] > 0 else 1.0
             row[0] += spot[k + i] * c[1 + i, place]
         for i in range(r):
             t = 0.0
@@ -301,22 +376,22 @@ def multipliers(
                 t += z[1 + j] * rest[j, i]
             spot[k + o + i] = 1.0 if t > 0 else -1.0
         for j in range(m):
-            t = constant[j] * den
+            t = constant[j] * T[0]
             for i in range(k):
-                t += own[j, i] * T[1 + i, place]
+                t += own[j, i] * T[1 + i]
             for i in range(o):
-                t += spot[k + i] * outside[j, i] * den
+                t += spot[k + i] * outside[j, i] * T[0]
             for i in range(r):
-                t += spot[k + o + i] * rest[j, i] * den
+                t += spot[k + o + i] * rest[j, i] * T[0]
             row[1 + j] = -t
         for i in range(o + r):
-            spot[k + i] *= den
+            spot[k + i] *= T[0]
         for j in range(D):
             row[j] /= scale[j]
         free = unused(origin, n)
         points[free] = row
         where[free, : k + o + r] = spot
-        where[free, k + o + r] = den
+        where[free, k + o + r] = T[0]
         n = _joined(points, G, w, origin, n, free)
         # Coordinates that came out negative get rows of their own, until none does.
         for _ in range(2 * D):
@@ -324,10 +399,10 @@ def multipliers(
             for i in range(n):
                 for j in range(D):
                     x[j] += w[i] * points[origin[i], j]
-            least, negative = -1e-9 * np.abs(x).max(), -1
+            low, negative = -1e-9 * np.abs(x).max(), -1
             for j in range(D):
-                if x[j] < least:
-                    least, negative = x[j], j
+                if x[j] < low:
+                    low, negative = x[j], j
             if negative < 0 or n > 2 * D:
                 break
             free = unused(origin, n)
@@ -350,19 +425,13 @@ def multipliers(
             return UNDECIDED
         for j in range(D):
             z[j] = max(x[j], 0.0) / scale[j]
+        # The multipliers are stored in single precision.
         largest = z[1:].max()
-        for positive in (True, False):
-            # The multipliers are stored in single precision.
-            unit = z[0] if positive else largest
-            if unit <= 0 or (not positive and z[0] > 1e-6 * largest):
-                continue
-            trial[0] = 1.0 if positive else 0.0
-            for j in range(m):
-                trial[1 + j] = np.float32(z[1 + j] / unit)
-            if lowest(trial, c, T, constant, own, outside, rest, slopes)[0] > (trial * needed).sum():
-                z[:] = trial
-                return PROVED
-        z /= max(z[0], largest)
+        positive = z[0] > SLIGHT * largest
+        unit = z[0] if positive else largest
+        z[0] = 1.0 if positive else 0.0
+        for j in range(m):
+            z[1 + j] = np.float32(z[1 + j] / unit)
     return UNDECIDED
 
 
@@ -394,7 +463,7 @@ def _violated(values: Array, chosen: Array, n: int) -> int:
 @njit(cache=True)
 def prove(
     c: Array,
-    T: Array,
+    den: Array,
     ends: Array,
     constant: Array,
     own: Array,
@@ -409,13 +478,14 @@ def prove(
     lengths: Array,
     point: Array,
     halvings: Array,
+    stack: Array,
 ) -> int:
     """Proves that f > 0 wherever all g_j >= 0, on a box that is halved where one set of multipliers is not enough.
 
     Every piece gets multipliers with z_0 f - sum_j z_j g_j > 0 at its control points, or z_0 = 0 where the piece misses the polytope.
 
     Args:
-        c, T, constant, own, outside, rest: as for :func:`lowest`.
+        c, den, constant, own, outside, rest: as for :func:`lowest`.
         ends: as for :func:`evaluate`.
         precision: control values must be larger than this multiple of the magnitude of what they are made of.
         most: give up after this many pieces.
@@ -423,29 +493,32 @@ def prove(
         lengths: (3,) of codes, counts and faces; they are advanced.
         point: (k + o + r,) gets a point of the polytope where f < 0, when REFUTED: own coordinates as they are, the others in [-1, 1].
         halvings: (k + o,) counts how often each coordinate was halved.
+        stack: (DEPTH, 1 + o, N) is overwritten.
 
     Returns:
         PROVED, REFUTED or UNDECIDED.
     """
-    N, m, k, o, r = c.shape[1], len(constant), T.shape[0] - 1, c.shape[0] - 1, rest.shape[1]
-    D, depth = 1 + m, 40
-    stack_c, stack_T, stack_z = np.zeros((depth, 1 + o, N)), np.zeros((depth, 1 + k, N)), np.zeros((depth, D))
-    center, half = np.zeros((depth, o)), np.ones((depth, o))
-    stack_c[0], stack_T[0], stack_z[0, 0] = c, T, 1.0
+    N, m, k, o, r = c.shape[1], len(constant), den.shape[1], c.shape[0] - 1, rest.shape[1]
+    D = 1 + m
+    stack_den, stack_z = np.empty((DEPTH, 2, k, 4)), np.empty((DEPTH, D))
+    center, half = np.zeros((DEPTH, o)), np.ones((DEPTH, o))
+    stack[0], stack_den[0], stack_z[0, :], stack_z[0, 0] = c, den, 0.0, 1.0
     slopes, local, g_out = np.zeros(k + o), np.zeros(m), np.zeros((m, o))
     scale, whole, least, some, enough, few = np.zeros(D), np.zeros(D), np.zeros(D), np.zeros(D), np.zeros(D), np.zeros(D)
     values_at, chosen, reach = np.zeros(m), np.zeros(m, np.int64), np.zeros(k)
     z, spot = np.zeros(D), np.zeros(k + o + r)
-    level, done = np.zeros(depth, np.int64), 0.0
+    level, done = np.zeros(DEPTH, np.int64), 0.0
     top, count = 1, 0
     while top:
         n = 0
         top -= 1
         count += 1
-        cc, TT = stack_c[top], stack_T[top]
-        size, weight = np.abs(cc[0]).max(), np.abs(TT[0]).max()
+        cc, now = stack[top], stack_den[top]
+        size, weight = max(cc[0].max(), -cc[0].min()), 1.0
         for i in range(k):
-            reach[i] = np.abs(TT[1 + i]).max() / weight
+            largest = np.abs(now[0, i]).max()
+            weight *= largest
+            reach[i] = np.abs(now[1, i]).max() / largest
         for j in range(m):
             local[j] = constant[j]
             for i in range(o):
@@ -466,18 +539,18 @@ def prove(
             whole[:] = scale
         # The verifier's bound of rounding errors is about the whole cell.
         least[:] = precision * np.maximum(scale, WHOLE * whole)
-        found = lowest(z, cc, TT, local, own, g_out, rest, slopes)[0] > (z * least).sum()
+        found = lowest(z, cc, now, local, own, g_out, rest, slopes)[0] > (z * least).sum()
         if not found and z[1:].any():
             z[:] = 0.0
             z[0] = 1.0
-            found = lowest(z, cc, TT, local, own, g_out, rest, slopes)[0] > least[0]
+            found = lowest(z, cc, now, local, own, g_out, rest, slopes)[0] > least[0]
         if not found and m:
-            n = choose(cc, TT, local, own, g_out, rest, scale, stack_z[top], chosen)
+            n = choose(cc, now, local, own, g_out, rest, scale, stack_z[top], chosen)
             for _ in range(ATTEMPTS):
                 some[0], some[1 : 1 + n] = scale[0], scale[1 + chosen[:n]]
                 enough[0], enough[1 : 1 + n] = least[0], least[1 + chosen[:n]]
                 parts = (local[chosen[:n]], own[chosen[:n]], g_out[chosen[:n]], rest[chosen[:n]])
-                kind = multipliers(cc, TT, *parts, some[: 1 + n], enough[: 1 + n], few[: 1 + n], spot)
+                kind = multipliers(cc, now, *parts, some[: 1 + n], enough[: 1 + n], few[: 1 + n], spot)
                 if kind == PROVED:
                     z[:] = 0.0
                     z[0] = few[0]
@@ -530,7 +603,7 @@ def prove(
             continue
         if count >= EARLY and count > HOPELESS * done * most:
             return UNDECIDED
-        if count >= most or top + 2 > depth or lengths[0] >= len(codes):
+        if count >= most or top + 2 > DEPTH or lengths[0] >= len(codes):
             return UNDECIDED
         axis = steepest(cc, k)
         halvings[axis] += 1
@@ -544,17 +617,18 @@ def prove(
         center[top + 1], half[top + 1] = center[top], half[top]
         level[top] += 1
         level[top + 1] = level[top]
+        stack_den[top + 1] = now
         if axis < k:
-            halve(cc, axis, k, stack_c[top + 1], stack_c[top])
-            halve(TT, axis, k, stack_T[top + 1], stack_T[top])
+            halve(cc, axis, k, stack[top + 1], cc)
+            halve(now[:, axis], 0, 1, stack_den[top + 1, :, axis], now[:, axis])
         else:
             i = axis - k
-            stack_T[top + 1], stack_c[top + 1] = TT, cc
+            stack[top + 1] = cc
             for a in range(N):
                 t = 0.5 * cc[1 + i, a]
-                stack_c[top + 1, 0, a] = cc[0, a] - t
-                stack_c[top, 0, a] = cc[0, a] + t
-                stack_c[top, 1 + i, a] = stack_c[top + 1, 1 + i, a] = t
+                stack[top + 1, 0, a] = cc[0, a] - t
+                stack[top, 0, a] = cc[0, a] + t
+                stack[top, 1 + i, a] = stack[top + 1, 1 + i, a] = t
             half[top, i] *= 0.5
             half[top + 1, i] = half[top, i]
             center[top + 1, i] = center[top, i] - half[top, i]

@@ -30,12 +30,16 @@ class Side:
         self._order = [factor.index for factor in self._path if factor.index is not None]
         self.own = sorted(self._order)
         self.outside = [j for j in joints if j not in self.own]
+        self._stack = np.empty((bernstein.DEPTH, 1 + len(self.outside), 4 ** len(self.own)))
         self._room = (np.empty(ROOM, np.int8), np.empty(ROOM, np.int16), np.empty(10 * ROOM, np.int16), np.empty(10 * ROOM, np.float32))
         self._revolute = area.scene.revolute[self.own]
 
-    def control_matrices(self, lower: Array, upper: Array) -> Array:
-        """Returns the control matrices of the volume's pose on a cell, (3^k, 4, 4), the first own joint slowest."""
-        X = np.eye(4)[None]
+    def control_matrices(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Returns the control matrices of the volume's pose on a cell, (3^k, 4, 4), the first own joint slowest.
+
+        The lower right elements of a factor are the denominator in one own joint. They are returned as well, (k, 3).
+        """
+        X, den = np.eye(4)[None], np.ones((len(self.own), 3))
         for factor in self._path:
             T = factor.terms
             if factor.index is None:
@@ -48,11 +52,12 @@ class Side:
                 w * v * (T[0] + (l + u) / 2 * T[1] + l * u * T[2]),
                 v * v * (T[0] + u * (T[1] + u * T[2])),
             ]
+            den[self.own.index(factor.index)] = [end[3, 3] for end in ends]
             X = (X[:, None] @ np.array(ends)).reshape(-1, 4, 4)
         k = len(self.own)
         if self._order != self.own:
             X = X.reshape((3,) * k + (4, 4)).transpose([self._order.index(j) for j in self.own] + [k, k + 1]).reshape(-1, 4, 4)
-        return np.ascontiguousarray(X)
+        return np.ascontiguousarray(X), den
 
     def prove(self, plane: Array, lower: Array, upper: Array, C: Array, d: Array, faces: Array, most: int) -> Streams | Array | int:
         """Proves that the volume is on its side of the plane on the polytope and a cell.
@@ -69,14 +74,14 @@ class Side:
         mid, half = (lower + upper) / 2, (upper - lower) / 2
         own, outside = self.own, self.outside
         rest = [i for i in range(len(mid)) if i not in own and i not in outside]
-        X = self.control_matrices(lower, upper)
+        X, den = self.control_matrices(lower, upper)
         plane, bound = self.sign * plane[:4], plane[4]
         plane[3] -= self.radius * bound
         slopes = {joint: plane[:, 1 + place] for place, joint in enumerate(self._joints)}
         l, u = lower[own], upper[own]
         w, v = (np.where(self._revolute, 1 / np.sqrt(1 + ends * ends), 1.0) for ends in (l, u))
         ends = np.array([l, u, w, v])
-        c, T = bernstein.polynomials(
+        c = bernstein.polynomials(
             X,
             self.volume.vertices,
             plane[:, 0] + sum((slopes[j] * mid[j] for j in outside), np.zeros(4)),
@@ -84,6 +89,7 @@ class Side:
             np.array([slopes[j] * half[j] for j in outside]).reshape(-1, 4),
             ends,
         )
+        factors = bernstein.factors(den, ends)
         offset = d - C[:, outside] @ mid[outside] - C[:, rest] @ mid[rest]
         g = (
             np.ascontiguousarray(offset),
@@ -95,7 +101,8 @@ class Side:
         for vertex in np.argsort((c[:, 0] - np.abs(c[:, 1:]).sum(axis=1)).min(axis=1)):
             codes, counts, numbers, values = self._room
             lengths, point, halvings = np.zeros(3, np.int64), np.zeros(len(mid)), np.zeros(len(own) + len(outside), np.int64)
-            status = bernstein.prove(c[vertex], T, ends, *g, PRECISION, most, codes, counts, numbers, values, lengths, point, halvings)
+            out = (codes, counts, numbers, values, lengths, point, halvings)
+            status = bernstein.prove(c[vertex], factors, ends, *g, PRECISION, most, *out, self._stack)
             if status == bernstein.REFUTED:
                 s = mid.copy()
                 place = len(own) + len(outside)

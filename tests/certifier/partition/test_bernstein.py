@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from functools import reduce
 from math import comb
 
 import numpy as np
@@ -94,12 +95,15 @@ def test_the_least_control_value_is_below_the_function_everywhere(seed, k, o, r,
     """z_0 f - sum_j z_j g_j at random points of the box is a mean of control values, so it is no less than the least one."""
     rng = np.random.default_rng(seed)
     N = 4**k
-    c, T = rng.normal(size=(1 + o, N)), rng.normal(size=(1 + k, N))
-    T[0] = rng.uniform(0.5, 2.0, N)
+    c, den = rng.normal(size=(1 + o, N)), rng.normal(size=(2, k, 4))
+    den[0] = rng.uniform(0.5, 2.0, (k, 4))
+    chosen = [den[0], *(np.concatenate([den[0, :i], den[1, i : i + 1], den[0, i + 1 :]]) for i in range(k))]
+    T = np.array([reduce(np.multiply.outer, factors, np.ones(())).ravel() for factors in chosen])
     z, constant = rng.random(1 + m), rng.normal(size=m)
     own, outside, rest = (rng.normal(size=(m, size)) for size in (k, o, r))
-    least, place = bernstein_form.lowest(z, c, T, constant, own, outside, rest, np.empty(k + o))
+    least, place = bernstein_form.lowest(z, c, den, constant, own, outside, rest, np.empty(k + o))
     assert 0 <= place < N
+    assert bernstein_form.lowest(z * np.nan, c, den, constant, own, outside, rest, np.empty(k + o))[0] == -np.inf
     values = []
     signs = list(itertools.product((-1.0, 1.0), repeat=o + r))
     for ends in signs:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from math import comb
 
 import numpy as np
@@ -34,7 +35,8 @@ def test_control_matrices_are_the_pose_on_the_cell(seed):
     assert side.own == sorted(kinematics.chain(frame, body))
     lower = rng.uniform(-1.0, 0.0, scene.n)
     upper = lower + rng.uniform(0.1, 1.0, scene.n)
-    X, points = side.control_matrices(lower, upper), rng.normal(size=(4, 3))
+    (X, den), points = side.control_matrices(lower, upper), rng.normal(size=(4, 3))
+    assert X[:, 3, 3] == pytest.approx(reduce(np.multiply.outer, den, np.ones(())).ravel() * X[0, 3, 3] / den[:, 0].prod())
     for _ in range(10):
         s, basis = rng.uniform(lower, upper), np.ones(1)
         for j in side.own:
