@@ -119,8 +119,8 @@ def _settle(database: Database, seconds: float) -> _Piece:
     with database.read() as session:
         assert session.scalar(select(PairRow.id).where(leases.held(PairRow, claim.token)).limit(1)) is not None
     looked = time.perf_counter()
-    proofs = {pair.index: pair.index.to_bytes(PROOF_BYTES) for pair in claim.pairs}
-    results = {index: PairResult(Outcome.CERTIFIED, Stage.SOS, seconds=1.0, margin=0.01, proof=proof) for index, proof in proofs.items()}
+    proofs = {(pair.index, pair.part): pair.index.to_bytes(PROOF_BYTES) for pair in claim.pairs}
+    results = {work: PairResult(Outcome.CERTIFIED, Stage.SOS, seconds=1.0, margin=0.01, proof=proof) for work, proof in proofs.items()}
     before = time.perf_counter()
     with database.write() as session:
         pairs.save(session, claim, results)

@@ -22,7 +22,7 @@ class Teller:
     def __init__(self, screen: Screen, pairs: list[str], watch: bool) -> None:
         self._screen, self._pairs, self._watch = screen, pairs, watch
         self._total = self._done = 0
-        self._failure = ""
+        self._failure, self._what = "", "pairs"
 
     def tell(self, event: Document) -> None:
         """Says what the event means. It ignores kinds that it does not know."""
@@ -42,11 +42,12 @@ class Teller:
 
     def _tell_iteration(self, data: dict[str, Any]) -> None:
         if data["state"] != "running":
-            result = f"{plain(data['state'])}, {self._done} of {self._total} pairs settled"
+            result = f"{plain(data['state'])}, {self._done} of {self._total} {self._what} settled"
             self._screen.line(f"iteration {data['index']} ({data['label']}): {result}{self._failure}")
             return
-        self._total, self._done, self._failure = data["pairs"], 0, ""
-        self._screen.status(f"iteration {data['index']} ({data['label']}): {self._total} pairs")
+        self._total, self._done, self._failure = data["parts"], 0, ""
+        self._what = "pairs" if data["parts"] == data["pairs"] else f"parts of {data['pairs']} pairs"
+        self._screen.status(f"iteration {data['index']} ({data['label']}): {self._total} {self._what}")
 
     def _tell_pairs(self, data: dict[str, Any]) -> None:
         for pair in data["pairs"]:
@@ -56,7 +57,7 @@ class Teller:
                 self._failure = f"; {text}"
             if self._watch:
                 self._screen.line(f"  {self._done}/{self._total} {text} ({seconds(pair['seconds'])})")
-            self._screen.status(f"iteration {data['iteration']}: {self._done}/{self._total} pairs, {text}")
+            self._screen.status(f"iteration {data['iteration']}: {self._done}/{self._total} {self._what}, {text}")
 
     def _tell_region(self, data: dict[str, Any]) -> None:
         kept = f", {share(data['share'])} of the proposal" if data["share"] else ""

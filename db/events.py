@@ -17,8 +17,8 @@ def emit(session: Session, job: JobRow, kind: str, data: dict[str, Any]) -> None
     The kinds of event, and what their data holds:
 
     - ``job``: state, outcome, reason;
-    - ``iteration``: index, label, state, pairs;
-    - ``pairs``: iteration, and pairs (each with index, state, stage, margin, seconds);
+    - ``iteration``: index, label, state, pairs, parts;
+    - ``pairs``: iteration, and pairs (each with index, part, state, stage, margin, seconds);
     - ``step``: kind, state, seconds;
     - ``region``: region_id, iteration, guarantee, ellipsoid_volume, share (as in the manifest);
     - ``lost``: worker, reason, and either iteration and pairs or step, which are open again.

@@ -178,8 +178,10 @@ class IterationRow(Base):
     """How many failures end the iteration; None when none does."""
     cells: Mapped[int] = mapped_column(default=1)
     """So many cells of each pair are looked at; 1 for the program (11) on all of the polytope."""
-    begun: Mapped[Document] = mapped_column(default=dict)
-    """Pair index (as a string) -> the earlier iteration that left a partition to go on with."""
+    begun: Mapped[int | None]
+    """The iteration in which the partitions of the pairs were begun; None where they begin in this one."""
+    parts: Mapped[Document] = mapped_column(default=dict)
+    """Pair index (as a string) -> how many parts its open cells are dealt to, where there are several."""
     ending: Mapped[list[int]] = mapped_column(default=list)
     """Indices of the pairs whose open cells are going to be cut off."""
     reuse: Mapped[Document]
@@ -190,11 +192,11 @@ class IterationRow(Base):
 
 
 class PairRow(Leased, Base):
-    """This row holds one pair of geometries on the polytope of one iteration, and its result."""
+    """This row holds one pair of geometries on the polytope of one iteration, or a part of it, and its result."""
 
     __tablename__ = "pairs"
     __table_args__ = (
-        UniqueConstraint("job_id", "iteration", "pair_index"),
+        UniqueConstraint("job_id", "iteration", "pair_index", "part"),
         Index(None, "state", "lease_token"),
         Index(None, "job_id", "state", "deaths", "id"),
     )
@@ -205,6 +207,8 @@ class PairRow(Leased, Base):
     iteration: Mapped[int]
     pair_index: Mapped[int]
     """The pair's position in Scene.pairs."""
+    part: Mapped[int] = mapped_column(default=0)
+    """The number of the part, from 0. A pair has several where its open cells are dealt to several pieces of work."""
     a: Mapped[str]
     b: Mapped[str]
     state: Mapped[str] = mapped_column(String(16), default=states.PairState.OPEN)
@@ -219,23 +223,24 @@ class PairRow(Leased, Base):
     """What certifier.pair.result.Weakness.to_document() returned, until the job's next action is decided."""
     proof_digest: Mapped[str | None] = mapped_column(ForeignKey("proofs.digest"))
     open_cells: Mapped[int | None]
-    """How many cells of the partition that the pair's search left are open."""
+    """How many of the cells that the search was given or made are open."""
 
 
-class PartitionRow(Base):
-    """This row holds what a search over partitions has proved already of a pair that it has not certified. It is no proof.
+class SubtreesRow(Base):
+    """This row holds what a search over partitions has proved already of a part of a pair that is not certified. It is no proof.
 
-    A job has one for each pair at most, that of the pair's last result, and none after its end.
+    A job has those of its open pairs, and none after its end.
     """
 
-    __tablename__ = "partitions"
+    __tablename__ = "subtrees"
 
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
     pair_index: Mapped[int] = mapped_column(primary_key=True)
-    iteration: Mapped[int]
+    iteration: Mapped[int] = mapped_column(primary_key=True)
     """The iteration whose result it is part of."""
+    part: Mapped[int] = mapped_column(primary_key=True)
     data: Mapped[bytes]
-    """What certifier.pair.result.PairResult calls ``partition``."""
+    """What certifier.pair.result.PairResult calls ``subtrees``."""
 
 
 class StepRow(Leased, Base):

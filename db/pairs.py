@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from sqlalchemy import ColumnElement, Select, exists, func, insert, select, tuple_, update
 from sqlalchemy.orm import Session, defer
 
-from certifier.outcome import Stage
+from certifier.outcome import Outcome, combine
 from certifier.pair.result import PairResult
-from db import events, jobs, leases, partitions, proofs
+from db import events, jobs, leases, proofs, subtrees
 from db.models import IterationRow, JobRow, PairRow
 from db.states import PAIR, IterationState, PairState, transition, unfinished
 from db.types import utcnow
@@ -33,19 +33,21 @@ MOST_TOGETHER = 100
 
 @dataclass(frozen=True)
 class NewPair:
-    """Describes a pair to certify: its position in Scene.pairs, the names of its geometries, and the seconds it is expected to take."""
+    """Describes a pair to certify, or a part of it: its position in Scene.pairs, the names of its geometries, and the seconds expected."""
 
     index: int
     a: str
     b: str
     forecast_seconds: float
+    part: int = 0
 
 
 @dataclass(frozen=True)
 class Claimed:
-    """Names a pair to certify now. ``attempt`` counts from 1; ``deaths`` is how often the pair may have killed its process."""
+    """Names a part of a pair to certify now. ``attempt`` counts from 1; ``deaths`` is how often it may have killed its process."""
 
     index: int
+    part: int
     attempt: int
     deaths: int
 
@@ -89,7 +91,8 @@ def add_iteration(
     failures: int | None,
     cells: int = 1,
     box: tuple[ArrayLike, ArrayLike] | None = None,
-    begun: Mapping[int, int] | None = None,
+    begun: int | None = None,
+    parts: Mapping[int, int] | None = None,
     ending: Sequence[int] = (),
 ) -> None:
     """Adds an iteration and its pairs. An iteration without pairs is certified at once. The caller holds the job's lock.
@@ -110,7 +113,8 @@ def add_iteration(
             hard=list(hard),
             failures=failures,
             cells=cells,
-            begun={str(pair): iteration for pair, iteration in (begun or {}).items()},
+            begun=begun,
+            parts={str(pair): count for pair, count in (parts or {}).items()},
             ending=list(ending),
             **certified,
         )
@@ -123,6 +127,7 @@ def add_iteration(
                     "job_id": job.id,
                     "iteration": index,
                     "pair_index": p.index,
+                    "part": p.part,
                     "a": p.a,
                     "b": p.b,
                     "forecast_seconds": p.forecast_seconds,
@@ -131,7 +136,8 @@ def add_iteration(
             ],
         )
         job.open_pairs += len(pairs)
-    events.emit(session, job, "iteration", {"index": index, "label": label, "state": "running", "pairs": len(pairs), "reused": len(reuse)})
+    counts = {"pairs": len({pair.index for pair in pairs}), "parts": len(pairs), "reused": len(reuse)}
+    events.emit(session, job, "iteration", {"index": index, "label": label, "state": "running", **counts})
 
 
 def batch(pairs: Iterable[tuple[int, float]], seconds: float) -> list[int]:
@@ -157,14 +163,15 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
     """
     if job.open_pairs == 0:
         return None
-    columns = (PairRow.id, PairRow.iteration, PairRow.pair_index, PairRow.forecast_seconds, PairRow.attempts, PairRow.deaths)
+    work = (PairRow.id, PairRow.iteration, PairRow.pair_index, PairRow.part)
+    columns = (*work, PairRow.forecast_seconds, PairRow.attempts, PairRow.deaths)
     is_open = (PairRow.job_id == job.id, PairRow.state == PairState.OPEN)
     ahead = tuple_(PairRow.deaths, PairRow.id) >= tuple_(0, job.next_pair)
     first = select(*columns).where(*is_open, ahead).order_by(PairRow.deaths, PairRow.id).limit(MOST_TOGETHER)
     rows = session.execute(first).all()
     fresh = [row for row in rows if row.deaths == 0]
     chosen = fresh[: len(batch(((row.pair_index, row.forecast_seconds) for row in fresh), batch_seconds))] or rows[:1]
-    pairs = tuple(Claimed(row.pair_index, row.attempts + 1, row.deaths) for row in chosen)
+    pairs = tuple(Claimed(row.pair_index, row.part, row.attempts + 1, row.deaths) for row in chosen)
     jobs.charge(session, job, sum(row.forecast_seconds for row in chosen))
     token = leases.take(session, PairRow, [row.id for row in chosen], seconds=lease_seconds)
     job.open_pairs -= len(chosen)
@@ -183,30 +190,30 @@ def release(session: Session, job: JobRow, lost: leases.Lost) -> list[PairRow]:
     return rows
 
 
-def save(session: Session, claim: Claim, results: Mapping[int, PairResult]) -> Saved:
-    """Saves the results of pairs that are still held, with their proofs and partitions, in one transaction.
+def save(session: Session, claim: Claim, results: Mapping[tuple[int, int], PairResult]) -> Saved:
+    """Saves the results of pairs that are still held, with their proofs and subtrees, in one transaction.
 
     When enough pairs have failed, it skips the unfinished pairs after them. A worker that holds one of those is stopped (leases.kept).
 
     Args:
-        results: pair index -> result.
+        results: (pair index, part) -> result.
     """
     job = jobs.lock(session, claim.job_id)
-    rows = session.execute(select(PairRow.pair_index, PairRow.id).where(leases.held(PairRow, claim.token)))
-    held = {row.pair_index: row.id for row in rows}
-    saved = {index: result for index, result in results.items() if index in held}
+    rows = session.execute(select(PairRow.pair_index, PairRow.part, PairRow.id).where(leases.held(PairRow, claim.token)))
+    held = {(row.pair_index, row.part): row.id for row in rows}
+    saved = {work: result for work, result in results.items() if work in held}
     if not saved:
         return Saved(held=False, finished=False)
     digests = proofs.put(session, [result.proof for result in saved.values() if result.proof is not None])
-    for index, result in saved.items():
+    for work, result in saved.items():
         digest = None if result.proof is None else digests[result.proof]
-        transition(session, PairRow, state_of(result), PairRow.id == held[index], lease_until=None, proof_digest=digest, **_columns(result))
-    partitions.keep(session, job.id, claim.iteration, {i: r.partition for i, r in saved.items() if r.stage is Stage.CELLS})
+        transition(session, PairRow, state_of(result), PairRow.id == held[work], lease_until=None, proof_digest=digest, **_columns(result))
+    subtrees.keep(session, job.id, claim.iteration, {work: r.subtrees for work, r in saved.items() if r.subtrees is not None})
     job.running_pairs -= len(saved)
     job.error = next((result.error for result in saved.values() if result.error is not None), job.error)
-    public = [_public(index, result) for index, result in saved.items()]
+    public = [_public(*work, result) for work, result in saved.items()]
     events.emit(session, job, "pairs", {"iteration": claim.iteration, "pairs": public})
-    rest = [pair for index, pair in held.items() if index not in saved]
+    rest = [pair for work, pair in held.items() if work not in saved]
     if FAILED.intersection(map(state_of, saved.values())) and (last := _last_failure(session, job.id, claim.iteration)) is not None:
         skip(session, job, PairRow.iteration == claim.iteration, PairRow.id > last)
         rest = [pair for pair in rest if pair <= last]
@@ -268,18 +275,19 @@ def forget_weaknesses(session: Session, job_id: str, iteration: int) -> None:
 
 def order(session: Session, iteration: IterationRow) -> list[int]:
     """Returns the indices of an iteration's pairs, in the order in which they are claimed."""
-    mine = (PairRow.job_id == iteration.job_id, PairRow.iteration == iteration.index)
+    mine = (PairRow.job_id == iteration.job_id, PairRow.iteration == iteration.index, PairRow.part == 0)
     return list(session.scalars(select(PairRow.pair_index).where(*mine).order_by(PairRow.id)))
 
 
 def of_iteration(session: Session, job_id: str, iteration: int) -> Sequence[PairRow]:
-    """Returns the pairs of one iteration, in the order of the scene's pairs."""
-    return session.scalars(_pairs(job_id, iteration).order_by(PairRow.pair_index)).all()
+    """Returns the pairs of one iteration with their parts, in the order of the scene's pairs."""
+    return session.scalars(_pairs(job_id, iteration).order_by(PairRow.pair_index, PairRow.part)).all()
 
 
 def of_job(session: Session, job_id: str) -> Sequence[PairRow]:
-    """Returns the job's pair matrix: every pair of every iteration, in order."""
-    return session.scalars(select(PairRow).where(PairRow.job_id == job_id).order_by(PairRow.iteration, PairRow.pair_index)).all()
+    """Returns the job's pair matrix: every pair of every iteration with its parts, in order."""
+    order = (PairRow.iteration, PairRow.pair_index, PairRow.part)
+    return session.scalars(select(PairRow).where(PairRow.job_id == job_id).order_by(*order)).all()
 
 
 def iterations(session: Session, job_id: str) -> Sequence[IterationRow]:
@@ -294,22 +302,27 @@ def seconds(session: Session, job_id: str) -> float:
 
 
 def expected_seconds(session: Session, job_id: str, iteration: int) -> dict[int, float]:
-    """Returns pair index -> seconds: what the pair took in that iteration, or its forecast where it was not settled.
+    """Returns pair index -> seconds: what a part of the pair took in that iteration, or its forecast where it was not settled.
 
     The result is empty when there is no such iteration.
     """
-    expected = func.coalesce(PairRow.seconds, PairRow.forecast_seconds).label("expected")
+    expected = func.avg(func.coalesce(PairRow.seconds, PairRow.forecast_seconds)).label("expected")
     mine = (PairRow.job_id == job_id, PairRow.iteration == iteration)
-    return {row.pair_index: row.expected for row in session.execute(select(PairRow.pair_index, expected).where(*mine))}
+    query = select(PairRow.pair_index, expected).where(*mine).group_by(PairRow.pair_index)
+    return {row.pair_index: row.expected for row in session.execute(query)}
 
 
 def proving(session: Session, job_id: str, iteration_of: Mapping[int, int]) -> dict[int, PairRow]:
-    """Returns pair index -> the certified row of the iteration that holds the pair's proof. Missing rows are left out."""
+    """Returns pair index -> the certified row of the iteration that holds the pair's proof. Missing rows are left out.
+
+    The first part of a pair has the proof. The caller knows that the other parts are certified as well.
+    """
     rows = session.scalars(
         select(PairRow).where(
             PairRow.job_id == job_id,
             PairRow.iteration.in_(set(iteration_of.values())),
             PairRow.state == PairState.CERTIFIED,
+            PairRow.part == 0,
         )
     )
     return {row.pair_index: row for row in rows if iteration_of.get(row.pair_index) == row.iteration}
@@ -328,6 +341,17 @@ def state_of(result: PairResult) -> PairState:
     return PairState(result.outcome.value)
 
 
+def state_of_parts(states: Sequence[PairState]) -> PairState:
+    """Returns the state of a pair from those of its parts: unfinished while one of them is, then the worst."""
+    if set(states) == {PairState.OPEN}:
+        return PairState.OPEN
+    if UNFINISHED.intersection(states):
+        return PairState.RUNNING
+    if PairState.SKIPPED in states:
+        return PairState.SKIPPED
+    return PairState(combine([Outcome(state) for state in states]))
+
+
 def _columns(result: PairResult) -> dict[str, Any]:
     return {
         "stage": result.stage,
@@ -340,5 +364,12 @@ def _columns(result: PairResult) -> dict[str, Any]:
     }
 
 
-def _public(index: int, result: PairResult) -> dict[str, Any]:
-    return {"index": index, "state": state_of(result), "stage": result.stage, "margin": result.margin, "seconds": result.seconds}
+def _public(index: int, part: int, result: PairResult) -> dict[str, Any]:
+    return {
+        "index": index,
+        "part": part,
+        "state": state_of(result),
+        "stage": result.stage,
+        "margin": result.margin,
+        "seconds": result.seconds,
+    }

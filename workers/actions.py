@@ -25,6 +25,7 @@ def certify_action(iteration: IterationRow, pairs: list[int]) -> Certify:
         failures=iteration.failures,
         cells=iteration.cells,
         box=Box(arrays["mid"], arrays["half"]) if "mid" in arrays else None,
-        begun={int(pair): source for pair, source in iteration.begun.items()},
+        begun=iteration.begun,
+        parts={int(pair): count for pair, count in iteration.parts.items()},
         ending=iteration.ending,
     )

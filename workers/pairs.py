@@ -11,10 +11,10 @@ from structlog.contextvars import bound_contextvars
 from certifier.errors import CirisError
 from certifier.growth.actions import Certify
 from certifier.growth.options import GrowthOptions
-from certifier.jobs.pairs import CertifyPair, pair_certifier
+from certifier.jobs.pairs import CertifyPart, part_certifier
 from certifier.outcome import Outcome
 from certifier.pair.result import PairResult
-from db import jobs, leases, pairs, partitions
+from db import jobs, leases, pairs, subtrees
 from db.models import IterationRow, PairRow
 from db.session import database
 from db.settings import settings
@@ -39,12 +39,12 @@ def certify_pairs(claim: pairs.Claim) -> bool:
 
 def _certify_and_save(claim: pairs.Claim) -> bool:
     """Certifies the claimed pairs and saves their results now and then. Says whether that finished the iteration."""
-    results: dict[int, PairResult] = {}
+    results: dict[tuple[int, int], PairResult] = {}
     since = time.monotonic()
     for place, pair in enumerate(claim.pairs, start=1):
         with bound_contextvars(pair=pair.index):
-            results[pair.index] = _certify(claim, pair)
-        failed = results[pair.index].outcome is not Outcome.CERTIFIED
+            result = results[pair.index, pair.part] = _certify(claim, pair)
+        failed = result.outcome is not Outcome.CERTIFIED
         if failed or place == len(claim.pairs) or time.monotonic() - since >= SAVE_SECONDS:
             saved = persistently(partial(_save, claim, results))
             if saved.finished or not saved.held:
@@ -59,8 +59,7 @@ def _certify(claim: pairs.Claim, pair: pairs.Claimed) -> PairResult:
         problem = f"{LOST.format(deaths=pair.deaths, attempts=pair.attempt - 1)} this pair"
         return _error(CirisError("worker_lost", problem), start)
     try:
-        action, certify = _certification(claim.scene_id, claim.job_id, claim.iteration)
-        return certify(pair.index, _begun(claim.job_id, action, pair.index))
+        return _certification(claim.scene_id, claim.job_id, claim.iteration)(pair.index, pair.part)
     except CirisError as error:
         return _error(error, start)
     except Exception as error:
@@ -74,8 +73,8 @@ def _error(error: CirisError, start: float) -> PairResult:
 
 
 @lru_cache(maxsize=2)
-def _certification(scene_id: str, job_id: str, iteration: int) -> tuple[Certify, CertifyPair]:
-    """Returns the action of an iteration, without its pairs, and the function that certifies a pair of it.
+def _certification(scene_id: str, job_id: str, iteration: int) -> CertifyPart:
+    """Returns the function that certifies a part of a pair of an iteration.
 
     An iteration's polytope never changes, so the process keeps the last two.
     """
@@ -86,21 +85,19 @@ def _certification(scene_id: str, job_id: str, iteration: int) -> tuple[Certify,
             return action, GrowthOptions.from_document(jobs.get(session, job_id).options).random_seed
 
     action, seed = persistently(read)
-    return action, pair_certifier(load_scene(scene_id), action, seed)
+    return part_certifier(load_scene(scene_id), action, seed, partial(_left, job_id))
 
 
-def _begun(job_id: str, action: Certify, index: int) -> bytes | None:
-    """Returns the partition that an earlier iteration left of a pair to go on with; None where the pair begins anew."""
-    if index not in action.begun:
-        return None
+def _left(job_id: str, iteration: int, index: int) -> list[bytes]:
+    """Returns the subtrees that an iteration has left of a pair, in the order of its parts."""
 
-    def read() -> bytes:
+    def read() -> list[bytes]:
         with database().read() as session:
-            return partitions.left_by(session, job_id, index, action.begun[index])
+            return subtrees.left_of(session, job_id, index, iteration)
 
     return persistently(read)
 
 
-def _save(claim: pairs.Claim, results: dict[int, PairResult]) -> pairs.Saved:
+def _save(claim: pairs.Claim, results: dict[tuple[int, int], PairResult]) -> pairs.Saved:
     with database().write() as session:
         return pairs.save(session, claim, results)

@@ -21,7 +21,7 @@ from certifier.growth.options import GrowthOptions
 from certifier.outcome import Outcome
 from certifier.pair.forecast import PairCost, forecast
 from certifier.pair.result import Weakness
-from db import jobs, leases, pairs, partitions, steps, work
+from db import jobs, leases, pairs, steps, subtrees, work
 from db.models import IterationRow, JobRow
 from db.session import database
 from db.settings import settings
@@ -130,8 +130,9 @@ def _outcomes(session: Session, iteration: IterationRow) -> Outcomes:
     """Returns the report on a certification that has ended, from its rows."""
     action = certify_action(iteration, pairs.order(session, iteration))
     rows = pairs.reached(session, iteration)
-    weaknesses = {row.pair_index: Weakness.from_document(row.weakness) for row in rows if row.weakness is not None}
-    return Outcomes(action, {row.pair_index: Outcome(row.state) for row in rows}, weaknesses)
+    weaknesses = (None if row.weakness is None else Weakness.from_document(row.weakness) for row in rows)
+    reached = ((row.pair_index, Outcome(row.state), weakness, row.open_cells) for row, weakness in zip(rows, weaknesses, strict=True))
+    return Outcomes.of_parts(action, reached)
 
 
 def _save(turn: Turn, transition: Transition) -> bool:
@@ -193,7 +194,7 @@ def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: A
     costs = _forecast(job.scene_id)
     # A pair takes about as long as the last time. The forecast by its size alone may be far from that.
     expected = pairs.expected_seconds(session, job.id, action.iteration - 1)
-    new = [pairs.NewPair(i, costs[i].a, costs[i].b, expected.get(i, costs[i].seconds)) for i in action.pairs]
+    new = [pairs.NewPair(i, costs[i].a, costs[i].b, expected.get(i, costs[i].seconds), part) for i, part in action.work]
     pairs.add_iteration(
         session,
         job,
@@ -209,8 +210,11 @@ def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: A
         cells=action.cells,
         box=None if action.box is None else (action.box.mid, action.box.half),
         begun=action.begun,
+        parts=action.parts,
         ending=action.ending,
     )
+    # A certified pair is not asked for again, and partitions that begin anew have nothing to go on with.
+    subtrees.drop(session, job.id, [] if action.begun is None else action.pairs)
     # Each solver that finds work wakes the next one. Where there is much work, this many solvers begin at once.
     pieces = math.ceil(sum(pair.forecast_seconds for pair in new) / settings().batch_seconds)
     afterwards.append(partial(send_work, min(max(pieces, 1), settings().solve_processes)))
@@ -246,7 +250,7 @@ def _finish(session: Session, job: JobRow, afterwards: Afterwards) -> None:
         return
     refused = next((step.report for step in rows if step.kind == StepKind.ACCEPT and step.state == StepState.FAILED), None)
     failed = next((step.report for step in reversed(rows) if step.state == StepState.FAILED), None)
-    partitions.drop(session, job.id)
+    subtrees.drop(session, job.id)
     assert job.action is not None, "whoever finishes a job has found its last action"
     finish = Finish(Outcome(job.action["outcome"]), job.action["reason"])
     if job.state == JobState.CANCELLING:

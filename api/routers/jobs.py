@@ -7,7 +7,9 @@ waits for a Redis that is down.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
+from collections.abc import Sequence
 from datetime import timedelta
 from typing import Annotated, Any
 
@@ -169,7 +171,7 @@ def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge
     return PairMatrix(
         pairs=[PairInfo(index=index, a=pair.a, b=pair.b) for index, pair in enumerate(scene.pairs)],
         iterations=[_iteration(row) for row in iterations],
-        cells=[_cell(scene, row) for row in rows],
+        cells=[_cell(scene, list(parts)) for _, parts in itertools.groupby(rows, lambda row: (row.iteration, row.pair_index))],
     )
 
 
@@ -181,10 +183,11 @@ def download_pair_proof(job_id: str, pair: int, iteration: Annotated[int, Query(
     """
     with db.read() as session:
         job = jobs.get(session, job_id)
-        row = next((row for row in pairs.of_iteration(session, job_id, iteration) if row.pair_index == pair), None)
-        if row is None or row.proof_digest is None:
+        rows = [row for row in pairs.of_iteration(session, job_id, iteration) if row.pair_index == pair]
+        digest = _cell(scenes.load(db, job.scene_id), rows).proof if rows else None
+        if digest is None:
             raise CirisError("proof_not_found", f"there is no proof of pair {pair} in iteration {iteration}", field="pair")
-        data = proofs.get(session, row.proof_digest)
+        data = proofs.get(session, digest)
     headers = {"Content-Disposition": f'attachment; filename="{job_id}-{iteration}-{pair}.proof"'}
     return Response(with_scene(data, scenes.load(db, job.scene_id)), media_type="application/octet-stream", headers=headers)
 
@@ -202,17 +205,24 @@ def _iteration(row: IterationRow) -> Iteration:
     )
 
 
-def _cell(scene: Scene, row: PairRow) -> PairCell:
+def _cell(scene: Scene, parts: Sequence[PairRow]) -> PairCell:
+    """Describes a pair from its parts in their order: by its state from the first part of this state, and by sums of cells and seconds."""
+    state = pairs.state_of_parts([PairState(row.state) for row in parts])
+    row = next((row for row in parts if row.state == state), parts[0])
+    margins, seconds, cells = (
+        [value for part in parts if (value := getattr(part, name)) is not None] for name in ("margin", "seconds", "open_cells")
+    )
     return PairCell(
         iteration=row.iteration,
         pair=row.pair_index,
-        state=PairState(row.state),
+        state=state,
+        parts=len(parts),
         stage=None if row.stage is None else Stage(row.stage),
-        margin=row.margin,
-        seconds=row.seconds,
+        margin=min(margins) if margins and state is PairState.CERTIFIED else None,
+        seconds=sum(seconds) if seconds else None,
         detail=row.detail,
         worker=row.worker,
-        open_cells=row.open_cells,
+        open_cells=sum(cells) if cells else None,
         witness_q=None if row.witness_s is None else scene.to_q(row.witness_s).tolist(),
         proof=row.proof_digest,
     )

@@ -279,6 +279,9 @@ class PairCell(BaseModel):
     iteration: int
     pair: int
     state: PairState
+    parts: int = Field(
+        description="Number of parts that the pair's open cells, or the cells to verify, were dealt to; 1 for an undivided pair."
+    )
     stage: Stage | None
     margin: float | None = Field(description="Certified lower bound, in metres, of the distance between the padded bodies.")
     seconds: float | None

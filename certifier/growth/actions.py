@@ -6,13 +6,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from certifier.errors import CirisError
 from certifier.growth.state import GrowthState
 from certifier.model import Array, Box, Polytope
-from certifier.outcome import Outcome
+from certifier.outcome import Outcome, combine
 from certifier.pair.result import Weakness
 from certifier.seeding.proposal import Proposal
 from certifier.step.stepped import Stepped
@@ -42,7 +43,8 @@ class Certify:
             certify all pairs.
         cells: so many cells of each pair are looked at; 1 for the program (11) of the papers on all of the polytope.
         box: the root cell of all partitions; None for the polytope's smallest box.
-        begun: pair index -> earlier iteration that left a partition to go on with.
+        begun: the iteration in which the partitions of all pairs were begun; None where they begin in this one.
+        parts: pair index -> how many parts its open cells are dealt to; 1 for a pair that is left out.
         ending: pairs whose open cells are going to be cut off.
     """
 
@@ -57,8 +59,14 @@ class Certify:
     failures: int | None
     cells: int = 1
     box: Box | None = None
-    begun: dict[int, int] = field(default_factory=dict)
+    begun: int | None = None
+    parts: dict[int, int] = field(default_factory=dict)
     ending: list[int] = field(default_factory=list)
+
+    @property
+    def work(self) -> list[tuple[int, int]]:
+        """Returns the pairs with the numbers of their parts, in the order in which they are to be certified."""
+        return [(index, part) for index in self.pairs for part in range(self.parts.get(index, 1))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,11 +107,28 @@ class Outcomes:
 
     Attributes:
         weaknesses: pair index -> where it fails; pairs of which nothing is known are left out.
+        open_cells: pair index -> how many cells of its partition are open, where it has one and is not certified.
     """
 
     action: Certify
     outcomes: dict[int, Outcome]
     weaknesses: dict[int, Weakness] = field(default_factory=dict)
+    open_cells: dict[int, int] = field(default_factory=dict)
+
+    @classmethod
+    def of_parts(cls, action: Certify, reached: Iterable[tuple[int, Outcome, Weakness | None, int | None]]) -> Self:
+        """Returns the report from the results of the parts of pairs, in their order: pair index, outcome, weakness, open cells."""
+        found: dict[int, list[tuple[Outcome, Weakness | None, int | None]]] = {}
+        for index, outcome, weakness, cells in reached:
+            found.setdefault(index, []).append((outcome, weakness, cells))
+        outcomes, weaknesses, open_cells = {}, {}, {}
+        for index, results in found.items():
+            outcomes[index] = combine([outcome for outcome, _, _ in results])
+            if known := [weakness for _, weakness, _ in results if weakness is not None]:
+                weaknesses[index] = Weakness.of_parts(known)
+            if left := [cells for _, _, cells in results if cells is not None]:
+                open_cells[index] = sum(left)
+        return cls(action, outcomes, weaknesses, open_cells)
 
     @property
     def failures(self) -> list[int]:

@@ -109,7 +109,8 @@ class Whole:
         polytope: what is left of it; faces are added before the joint limits, which are its last 2n rows, and none is dropped.
         mid, half: (n,) of the box that is the root cell of all partitions of this stage.
         holds: pair index -> iteration whose proof, on a larger polytope, holds on the present one.
-        begun: pair index -> iteration that left a partition to go on with.
+        begun: the iteration with which this stage began; None before it.
+        open_cells: pair index -> how many cells of its partition are open.
         spent: pair index -> how many cells were looked at.
     """
 
@@ -118,7 +119,8 @@ class Whole:
     mid: Array
     half: Array
     holds: dict[int, int] = field(default_factory=dict)
-    begun: dict[int, int] = field(default_factory=dict)
+    begun: int | None = None
+    open_cells: dict[int, int] = field(default_factory=dict)
     spent: dict[int, int] = field(default_factory=dict)
 
 
@@ -193,7 +195,7 @@ class GrowthState:
 def _whole(document: dict[str, Any] | None) -> Whole | None:
     if document is None:
         return None
-    counts = {name: _by_pair(document[name]) for name in ("holds", "begun", "spent")}
+    counts = {name: _by_pair(document[name]) for name in ("holds", "open_cells", "spent")}
     return replace(_part(Whole, {**document, **dict.fromkeys(counts, None)}), **counts)
 
 

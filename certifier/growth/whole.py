@@ -9,6 +9,8 @@ The first region comes from a smaller copy of the proposal about the seed, so th
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
@@ -17,21 +19,29 @@ from certifier.growth.options import MOST_CELLS
 from certifier.growth.state import GrowthState, Start, Whole
 from certifier.growth.targeted import pushed
 from certifier.growth.trials import by_joints, joints_between
-from certifier.model import Box, Polytope, Scene
+from certifier.model import Array, Box, Polytope, Scene
 from certifier.outcome import Outcome, combine
+from certifier.pair.result import Weakness
 from certifier.polytopes.polytope import bounds
 
 STAGES = (0.7, 1.0)
 """The faces of the proposal lie this part of their distance from the seed, in one stage after the other."""
-SLICE = 300
-"""So many cells of every open pair are looked at in one round."""
-HARD = 2 * SLICE
+SLICE = 100
+"""So many cells of every part of a pair are looked at in one round."""
+PARTS, PIECES = 3, 12
+"""The open cells of a pair are dealt to PARTS parts, or to more, so that a round has PIECES parts for the solvers to share. A round counts
+as so many slices of its effort even where it has fewer parts."""
+VERIFIED = 5 * SLICE
+"""When no cell is open, what so many cells came to is a part to verify."""
+HARD = 6 * SLICE
 """When so many cells of a pair were looked at, its open cells are cut off too, not only contacts."""
-LOSS, PATIENCE = 0.002, 12 * SLICE
+LOSS, PATIENCE = 0.002, 36 * SLICE
 """While a hard pair is worked on, its faces lose this share of the polytope in a round at most, and twice as much after PATIENCE cells."""
 FAST_LOSS = 0.05
 """They lose this share at most before a pair is hard, and when its effort is spent. Then it is twice as much in every round."""
-EARLY_EFFORT = 2 * SLICE
+CONTACT_LOSS = 0.01
+"""For contacts, which have to go sooner or later, they lose this share at least where that is needed."""
+EARLY_EFFORT = 6 * SLICE
 """The effort of all stages but the last one, so that the first region comes soon."""
 
 
@@ -60,9 +70,9 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     whole, action = state.whole, report.action
     assert whole is not None
     holds = whole.holds | {i: action.iteration for i, outcome in report.outcomes.items() if outcome is Outcome.CERTIFIED}
-    begun = dict.fromkeys(report.failures, action.iteration)
-    spent = whole.spent | {i: whole.spent.get(i, 0) + SLICE for i in action.pairs}
-    whole = replace(whole, holds=holds, begun=begun, spent=spent)
+    begun = action.iteration if action.begun is None else action.begun
+    spent = whole.spent | {i: whole.spent.get(i, 0) + SLICE * max(action.parts.get(i, 1), PARTS) for i in action.pairs}
+    whole = replace(whole, holds=holds, begun=begun, open_cells=dict(report.open_cells), spent=spent)
     if report.complete:
         if whole.stage + 1 < len(STAGES):
             return begin_stage(scene, state, start, whole.stage + 1)
@@ -71,27 +81,44 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     if unknown is not None:  # Nothing can be cut off for it, so it would fail again and again.
         pair = scene.pairs[unknown]
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing is known of where they fail")
-    most = {i: _most_loss(state, whole, i) for i in report.failures}
-    corners = [(joints_between(scene, i), report.weaknesses[i].points, most[i]) for i in report.failures]
+    failing = [i for i in report.failures if report.open_cells.get(i) != 0]
+    if not failing:
+        return _next(scene, replace(state, whole=whole))
+    most = {i: _most_loss(state, whole, i) for i in failing}
+    corners = [corner for i in failing for corner in _corners(scene, i, report.weaknesses[i], most[i])]
     smaller = cut(scene, whole.polytope, start.keep, corners, _proposal(scene, start, whole.stage))
-    if smaller is whole.polytope and min(most[i] if i in action.ending else 0.0 for i in report.failures) >= 1:
-        pair = scene.pairs[report.failures[0]]
+    if smaller is whole.polytope and min(most[i] if i in action.ending else 0.0 for i in failing) >= 1:
+        pair = scene.pairs[failing[0]]
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing more could be cut off for them")
     if smaller is None:
-        pair = scene.pairs[report.failures[0]]
+        pair = scene.pairs[failing[0]]
         reason = f"{pair.a} and {pair.b} touch, or come too close, at or between configurations that have to stay inside"
         return _ended(state, report, reason)
     return _next(scene, replace(state, whole=replace(whole, polytope=smaller)))
 
 
+def _corners(scene: Scene, pair: int, weakness: Weakness, most: float) -> list[tuple[tuple[int, ...], Array, float]]:
+    """Returns what is to be cut off for a pair: its contacts, which have to go sooner or later, and other points where it fails."""
+    joints, points, k = joints_between(scene, pair), weakness.points, weakness.contacts
+    return [(joints, points[:k], max(most, CONTACT_LOSS)), (joints, points[k:], most)]
+
+
 def _most_loss(state: GrowthState, whole: Whole, pair: int) -> float:
-    """Returns which share of the polytope the faces for a pair may lose in this round."""
+    """Returns which share of the polytope the faces for a pair may lose in this round, for points that are no contacts."""
     effort, spent = state.options.cells or MOST_CELLS, whole.spent[pair]
     if whole.stage + 1 < len(STAGES):
         effort = min(effort, EARLY_EFFORT)
     if HARD < spent < effort:
         return float(LOSS * 2.0 ** ((spent - HARD) // PATIENCE))
-    return float(min(FAST_LOSS * 2.0 ** max((spent - effort) // SLICE, 0), 1.0))
+    return float(min(FAST_LOSS * 2.0 ** max((spent - effort) // (PARTS * SLICE), 0), 1.0))
+
+
+def _parts(pairs: Sequence[int], whole: Whole) -> dict[int, int]:
+    """Returns how many parts each pair is dealt to, where there are several: its open cells, or those to verify when none is open."""
+    known = [i for i in pairs if i in whole.open_cells]
+    each = max(PARTS, math.ceil(PIECES / max(len(known), 1)))
+    parts = {i: min(each, whole.open_cells[i] or whole.spent[i] // VERIFIED) for i in known}
+    return {i: count for i, count in parts.items() if count > 1}
 
 
 def _ended(state: GrowthState, report: Outcomes, reason: str) -> Transition:
@@ -116,7 +143,8 @@ def _next(scene: Scene, state: GrowthState) -> Transition:
         failures=None,
         cells=SLICE,
         box=Box(whole.mid, whole.half),
-        begun=dict(whole.begun),
+        begun=whole.begun,
+        parts=_parts(pairs, whole),
         ending=[i for i in pairs if whole.spent.get(i, 0) >= min(HARD, state.options.cells or MOST_CELLS)],
     )
     return Transition(replace(state, next=state.next + 1), action)

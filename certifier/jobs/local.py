@@ -12,7 +12,7 @@ from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcome
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import Start
-from certifier.jobs.pairs import pair_certifier
+from certifier.jobs.pairs import part_certifier
 from certifier.jobs.parallel import side_by_side
 from certifier.jobs.region import Region, certified_region, growth_point, versions
 from certifier.jobs.share import SampledProposal
@@ -32,7 +32,7 @@ class _Run:
     """Keeps what a job has come to so far.
 
     Attributes:
-        results: iteration -> pair index -> result.
+        results: iteration -> pair index -> results of its parts.
         seeding_seconds: how long the seeding took.
         candidate: the last accepted candidate; None before there is one.
         proposal: what the region is grown from; None before there is a candidate.
@@ -43,7 +43,7 @@ class _Run:
     seed: int
     progress: Progress
     processes: int = 1
-    results: dict[int, dict[int, PairResult]] = field(default_factory=dict)
+    results: dict[int, dict[int, list[PairResult]]] = field(default_factory=dict)
     seeding_seconds: float = 0.0
     candidate: Candidate | None = None
     proposal: SampledProposal | None = None
@@ -56,25 +56,26 @@ class _Run:
         self.candidate = candidate
 
     def certify(self, action: Certify) -> Outcomes:
-        certify = pair_certifier(self.scene, action, self.seed)
+        certify = part_certifier(self.scene, action, self.seed, self.left)
         found = self.results.setdefault(action.iteration, {})
-        failures = 0
-        asked = [(index, self.results[action.begun[index]][index].partition if index in action.begun else None) for index in action.pairs]
+        failures, work = 0, action.work
         # The program (11) of a pair takes milliseconds, so children would not pay.
-        for index, result in zip(action.pairs, side_by_side(certify, asked, 1 if action.cells == 1 else self.processes), strict=False):
-            found[index] = result
+        results = side_by_side(certify, work, 1 if action.cells == 1 else self.processes)
+        for count, ((index, _), result) in enumerate(zip(work, results, strict=False), start=1):
+            found.setdefault(index, []).append(result)
             pair = self.scene.pairs[index]
-            self.progress(
-                f"{action.label} {action.iteration}: {len(found)}/{len(action.pairs)} {pair.a} - {pair.b}: {found[index].outcome}"
-            )
-            failures += found[index].outcome is not Outcome.CERTIFIED
+            self.progress(f"{action.label} {action.iteration}: {count}/{len(work)} {pair.a} - {pair.b}: {result.outcome}")
+            failures += result.outcome is not Outcome.CERTIFIED
             if failures == action.failures:
                 break
-        weaknesses = {index: result.weakness for index, result in found.items() if result.weakness is not None}
-        return Outcomes(action, {index: result.outcome for index, result in found.items()}, weaknesses)
+        reached = ((index, r.outcome, r.weakness, r.open_cells) for index, parts in found.items() for r in parts)
+        return Outcomes.of_parts(action, reached)
+
+    def left(self, iteration: int, index: int) -> list[bytes]:
+        return [result.subtrees for result in self.results[iteration][index] if result.subtrees is not None]
 
     def proofs(self, candidate: Candidate) -> dict[int, bytes]:
-        return {index: self.results[iteration][index].proof or b"" for index, iteration in candidate.proofs.items()}
+        return {index: self.results[iteration][index][0].proof or b"" for index, iteration in candidate.proofs.items()}
 
     def carry_out(self, action: Propose | Certify | Step) -> Report:
         if isinstance(action, Certify):
@@ -128,10 +129,10 @@ def grow(
         "reason": transition.action.reason,
         "growth_curve": run.curve,
         "seeding_seconds": run.seeding_seconds,
-        "pair_seconds": sum(result.seconds for found in run.results.values() for result in found.values()),
+        "pair_seconds": sum(result.seconds for found in run.results.values() for parts in found.values() for result in parts),
         "seconds": time.perf_counter() - start,
     }
-    return certified_region(scene, run.candidate, run.proofs(run.candidate), provenance, run.proposal)
+    return certified_region(scene, run.candidate, run.proofs(run.candidate), provenance, run.proposal, processes)
 
 
 def certify(
@@ -158,4 +159,6 @@ def certify(
     assert isinstance(action, Certify)
     run = _Run(scene, options.random_seed, progress, processes)
     run.certify(action)
-    return Verdict(run.results[action.iteration], Guarantee.EXACT, time.perf_counter() - start)
+    return Verdict(
+        {index: result for index, (result,) in run.results[action.iteration].items()}, Guarantee.EXACT, time.perf_counter() - start
+    )

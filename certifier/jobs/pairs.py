@@ -12,16 +12,20 @@ from certifier.model import Scene
 from certifier.pair.certification import Certification
 from certifier.pair.result import PairResult
 from certifier.partition.certification import CellCertification
+from certifier.partition.subtrees import open_cells
 
-CertifyPair = Callable[[int, bytes | None], PairResult]
-"""Certifies a pair by its index, and goes on with the ``partition`` of an earlier result of this pair where there is one."""
+CertifyPart = Callable[[int, int], PairResult]
+"""Certifies a pair by its index, or the part of it that has this number."""
+Left = Callable[[int, int], list[bytes]]
+"""Returns the ``subtrees`` that an iteration, by its number, has left of a pair, by its index, in the order of the parts."""
 
 
-def pair_certifier(scene: Scene, action: Certify, seed: int) -> CertifyPair:
-    """Prepares what all pairs of the action share, and returns the function that certifies one of them.
+def part_certifier(scene: Scene, action: Certify, seed: int, left: Left) -> CertifyPart:
+    """Prepares what all pairs of the action share, and returns the function that certifies a part of one of them.
 
     Args:
         seed: seeds the samples.
+        left: reads what the iterations from ``action.begun`` on have left.
 
     Raises:
         RegionError: the polytope is empty or unbounded, or the centre is not inside.
@@ -29,6 +33,15 @@ def pair_certifier(scene: Scene, action: Certify, seed: int) -> CertifyPair:
     hard, ending = frozenset(action.hard), frozenset(action.ending)
     if action.cells == 1:
         program = Certification(scene, action.polytope, action.center, seed)
-        return lambda index, begun: program.certify(index, every_face=index in hard)
-    search = CellCertification(scene, action.polytope, seed, action.box)
-    return lambda index, begun: search.certify(index, action.cells, begun, index in ending)
+        return lambda index, part: program.certify(index, every_face=index in hard)
+    search, begun = CellCertification(scene, action.polytope, seed, action.box), action.begun
+    if begun is None:
+        return lambda index, part: search.certify(index, action.cells, index in ending)
+
+    def go_on(index: int, part: int) -> PairResult:
+        last, parts = left(action.iteration - 1, index), action.parts.get(index, 1)
+        if not open_cells(last):
+            return search.put_together(index, [left(iteration, index) for iteration in range(begun, action.iteration)], part, parts)
+        return search.go_on(index, action.cells, last, part, parts, index in ending)
+
+    return go_on

@@ -6,24 +6,24 @@ import multiprocessing
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 
-from certifier.jobs.pairs import CertifyPair
+from certifier.jobs.pairs import CertifyPart
 from certifier.pair.result import PairResult
 
-Asked = tuple[int, bytes | None]
-"""A pair's index, and the ``partition`` of its earlier result where there is one."""
+Asked = tuple[int, int]
+"""A pair's index, and the number of the part."""
 
 
-def side_by_side(certify: CertifyPair, asked: Sequence[Asked], processes: int) -> Iterator[PairResult]:
-    """Yields the results of pairs in their order, which do not depend on the number of processes.
+def side_by_side(certify: CertifyPart, asked: Sequence[Asked], processes: int) -> Iterator[PairResult]:
+    """Yields the results of parts of pairs in their order, which do not depend on the number of processes.
 
     Args:
         processes: so many children work; 1 for this process alone.
     """
     if processes == 1 or len(asked) == 1:
-        for index, begun in asked:
-            yield certify(index, begun)
+        for index, part in asked:
+            yield certify(index, part)
         return
-    # The children are forked, so they have what the pairs share without preparing it.
+    # The children are forked, so they have what the pairs share, and what earlier rounds left, without preparing it.
     with ProcessPoolExecutor(min(processes, len(asked)), multiprocessing.get_context("fork"), _adopt, (certify,)) as executor:
         try:
             yield from executor.map(_run, asked)
@@ -31,11 +31,11 @@ def side_by_side(certify: CertifyPair, asked: Sequence[Asked], processes: int) -
             executor.shutdown(cancel_futures=True)
 
 
-_adopted: list[CertifyPair] = []
+_adopted: list[CertifyPart] = []
 """This holds the function of the parent of this process, so that it need not travel to it."""
 
 
-def _adopt(certify: CertifyPair) -> None:
+def _adopt(certify: CertifyPart) -> None:
     _adopted.append(certify)
 
 

@@ -36,7 +36,12 @@ class Region:
 
 
 def certified_region(
-    scene: Scene, candidate: Candidate, proofs: dict[int, bytes], provenance: dict[str, Any], proposal: SampledProposal | None = None
+    scene: Scene,
+    candidate: Candidate,
+    proofs: dict[int, bytes],
+    provenance: dict[str, Any],
+    proposal: SampledProposal | None = None,
+    processes: int = 1,
 ) -> Region:
     """Assembles a region from its pairs' proofs, verifies the whole, and describes it.
 
@@ -44,6 +49,7 @@ def certified_region(
         proofs: pair index -> proof file, for every pair of the scene; a proof that covers several pairs stands at each of them.
         provenance: options, versions, growth curve, and the seconds of the whole job, of the seeding and of all pairs.
         proposal: what the region was grown from; None for a given polytope.
+        processes: how many processes verify.
 
     Raises:
         ProofError: the proof does not hold; nothing may be served as certified then.
@@ -56,7 +62,7 @@ def certified_region(
     bound = archimedean(polytope)
     parts = tuple(read_part(data, scene) for data in dict.fromkeys(proofs[index] for index in range(len(scene.pairs))))
     data = RegionProof(scene, C, d, interior, _implied(polytope, parts), bound, parts).to_bytes()
-    statement = verify_region(data)
+    statement = verify_region(data, processes)
     ellipsoid = inscribed_ellipsoid(polytope)
     size, error = volume(polytope, seed=0)
     manifest = {

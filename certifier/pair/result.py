@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,11 +20,13 @@ class Weakness:
         points: (w, n) configurations in s near which no plane of those tried works, or the one that is in contact.
         pull: (n,) how much it would help to shorten each joint's range; only the proportions matter. 0 where the bodies are in contact.
         ranges_alone: only planes at rest were tried; for them nothing of the polytope counts but the joints' ranges.
+        contacts: at so many of the first points the bodies touch, as far as a search over partitions knows.
     """
 
     points: Array
     pull: Array
     ranges_alone: bool = False
+    contacts: int = 0
 
     @classmethod
     def of_contact(cls, s: Array) -> Weakness:
@@ -35,16 +38,24 @@ class Weakness:
         """Returns the weakness of which nothing is known but that the certification fails."""
         return cls(np.zeros((0, n)), np.zeros(n))
 
+    @classmethod
+    def of_parts(cls, parts: Sequence[Weakness]) -> Weakness:
+        """Returns the weakness of a pair from those of its parts."""
+        if len(parts) == 1:
+            return parts[0]
+        points = [part.points[: part.contacts] for part in parts] + [part.points[part.contacts :] for part in parts]
+        return cls(np.concatenate(points), parts[0].pull, parts[0].ranges_alone, sum(part.contacts for part in parts))
+
     def to_document(self) -> dict[str, Any]:
         """Returns the weakness as JSON-able data."""
-        return {"points": self.points.tolist(), "pull": self.pull.tolist(), "ranges_alone": self.ranges_alone}
+        return {"points": self.points.tolist(), "pull": self.pull.tolist(), "ranges_alone": self.ranges_alone, "contacts": self.contacts}
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> Weakness:
         """Does the inverse of :meth:`to_document`."""
         pull = np.array(document["pull"], dtype=float)
         points = np.array(document["points"], dtype=float).reshape(-1, len(pull))
-        return cls(points, pull, bool(document["ranges_alone"]))
+        return cls(points, pull, bool(document["ranges_alone"]), int(document["contacts"]))
 
 
 @dataclass(frozen=True)
@@ -60,9 +71,9 @@ class PairResult:
         proof: the verified proof as bytes. When certified it is a :class:`certifier.proof.pair.PairProof` or a
             :class:`certifier.proof.partition.PartitionProof`; from :mod:`certifier.proof.negative`, a WitnessProof when refuted by the
             program's contacts and a DualProof when not certifiable.
-        partition: what a search over partitions has proved already, when it has not certified the pair: the bytes of a PartitionProof with
-            open cells, which is no proof of anything. A later search goes on with it.
-        open_cells: how many cells of that partition are open.
+        subtrees: what a search over partitions has left of the cells that it was given, when it has not certified the pair
+            (:mod:`certifier.partition.subtrees`). It is no proof of anything. Later searches go on with it.
+        open_cells: how many cells of these are open.
         weakness: where the certification fails, when that is known.
         error: the CirisError document of an ``error``.
     """
@@ -74,7 +85,7 @@ class PairResult:
     detail: str = ""
     witness_s: Array | None = None
     proof: bytes | None = None
-    partition: bytes | None = None
+    subtrees: bytes | None = None
     open_cells: int | None = None
     weakness: Weakness | None = None
     error: dict[str, Any] | None = None

@@ -105,20 +105,10 @@ class Bodies:
         Args:
             start: (n,) a point of the polytope in the cell.
         """
-        n = len(start)
         C, d = cell.inside.C, cell.inside.d
-        rng = np.random.default_rng(seed)
-        targets = np.where(rng.random((CORNERS if self._corners is None else len(self._corners), n)) < 0.5, cell.lower, cell.upper)
-        if self._corners is not None:
-            targets[:, self.joints] = np.where(self._corners, cell.upper[self.joints], cell.lower[self.joints])
-        ends = chords(C, d, start, targets, CHORDS, seed)
-        N = 1 + len(ends) + len(cell.points)
-        X = np.empty((N + MORE, n))
-        X[0], X[1 : 1 + len(ends)], X[1 + len(ends) : N] = start, ends, cell.points
-        J = np.array(self.joints)
-        chart = planes.Chart(J, cell.mid[J], CALM / cell.half[J], CALM)
+        X, N = self._configurations(cell, start, seed)
         for _ in range(ROUNDS):
-            kind, z, places, weights, N = planes.look(*self.hulls, chart, C, d, X, N, LOOKS, DESCENT, LEAST, ENOUGH)
+            kind, z, places, weights, N = self._look(cell, X, N)
             if kind != planes.FOUND:
                 break
             plane = self._in_s(cell, z)
@@ -131,6 +121,39 @@ class Bodies:
             N += 1
         return Undecided(X[:N].copy(), X[places], weights)
 
+    def room(self, cell: Cell, start: Array, seed: int) -> float:
+        """Returns how much room a plane has on a cell: its margin by the square of the cell's turn; 0 where no plane is found.
+
+        Cells with more room are more often proved at once.
+
+        Args:
+            start: (n,) a point of the polytope in the cell.
+        """
+        kind, z, *_ = self._look(cell, *self._configurations(cell, start, seed))
+        turn = cell.turn()[self.joints]
+        return float(np.linalg.norm(z) / (turn @ turn)) if kind == planes.FOUND else 0.0
+
+    def _configurations(self, cell: Cell, start: Array, seed: int) -> tuple[Array, int]:
+        """Returns the configurations of the cell to look at first, and how many these are; there is room for MORE."""
+        n, rng = len(start), np.random.default_rng(seed)
+        targets = np.where(rng.random((CORNERS if self._corners is None else len(self._corners), n)) < 0.5, cell.lower, cell.upper)
+        if self._corners is not None:
+            targets[:, self.joints] = np.where(self._corners, cell.upper[self.joints], cell.lower[self.joints])
+        ends = chords(cell.inside.C, cell.inside.d, start, targets, CHORDS, seed)
+        N = 1 + len(ends) + len(cell.points)
+        X = np.empty((N + MORE, n))
+        X[0], X[1 : 1 + len(ends)], X[1 + len(ends) : N] = start, ends, cell.points
+        return X, N
+
+    def _look(self, cell: Cell, X: Array, N: int) -> tuple[int, Array, Array, Array, int]:
+        """Looks for a plane on the polytope and a cell (:func:`certifier.partition.planes.look`)."""
+        J = np.array(self.joints)
+        chart = planes.Chart(J, cell.mid[J], CALM / cell.half[J], CALM)
+        found: tuple[int, Array, Array, Array, int] = planes.look(
+            *self.hulls, chart, cell.inside.C, cell.inside.d, X, N, LOOKS, DESCENT, LEAST, ENOUGH
+        )
+        return found
+
     def nearest(self, cell: Cell, configurations: Array) -> tuple[Array, float] | None:
         """Returns where the bodies are nearest in the cell, from the one of some configurations (w, n) on, and their gap in metres there.
 
@@ -140,8 +163,12 @@ class Bodies:
         place = int(found.argmin())
         if found[place] > CLOSE:
             return None
-        s = configurations[place].copy()
-        gap = approach(*self.hulls, np.array(self.joints), cell.half, cell.inside.C, cell.inside.d, s, STEPS, 0.0)
+        return self.approached(cell, configurations[place], STEPS)
+
+    def approached(self, cell: Cell, s: Array, steps: int) -> tuple[Array, float]:
+        """Returns where the bodies are nearest in the cell, so many steps from a configuration on, and their gap in metres there."""
+        s = s.copy()
+        gap = approach(*self.hulls, np.array(self.joints), cell.half, cell.inside.C, cell.inside.d, s, steps, 0.0)
         return s, gap * self.extent
 
     def _prove(self, cell: Cell, plane: Array) -> Streams | Array | int:

@@ -22,7 +22,6 @@ class Cell:
         lower, upper: (n,) its bounds; joints that do not move one body against the other have those of the root cell.
         points: (p, n) points of the polytope in the cell.
         samples: (S, n) those of the area's samples that lie in the cell.
-        coarse: coarse volumes are tried first.
     """
 
     area: Area
@@ -31,7 +30,6 @@ class Cell:
     upper: Array
     points: Array
     samples: Array
-    coarse: bool = True
 
     @property
     def mid(self) -> Array:

@@ -1,16 +1,18 @@
-"""Pairs are certified over partitions of a polytope here; what was begun on a larger polytope can be gone on with.
+"""Pairs are certified over partitions of a polytope here; what was begun on a larger polytope can be gone on with, in parts.
 
 What was found                                     -> the outcome and what comes with it
 every cell has a plane, or misses the polytope     -> certified, with the proof, which the verifier has checked
 a configuration in contact                         -> refuted, with the configuration and what is proved already
 a narrow cell in which no plane keeps them apart   -> too_close, with a configuration, their distance there, and what is proved already
 so many cells were looked at                       -> inconclusive, with what is proved already and where open cells are
+
+Of a pair that was begun, a part that leaves no cell open is inconclusive as well, until the subtrees of all parts are put together.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,12 +28,13 @@ from certifier.partition.area import Area
 from certifier.partition.chords import chords
 from certifier.partition.hulls import approach, gaps
 from certifier.partition.search import Report, Search
-from certifier.partition.tree import Node
+from certifier.partition.subtrees import Subtrees, dealt, open_cells, put_together
+from certifier.partition.tree import OPEN, Node, OpenCell, to_streams
 from certifier.polytopes.simplex import deepest
 from certifier.proof.negative import WitnessProof
-from certifier.proof.partition import STREAMS, PartitionProof
+from certifier.proof.partition import PartitionProof, choices_of
 from certifier.verify.pair import check_ground, check_interior
-from certifier.verify.separations import statements
+from certifier.verify.separations import gap_of_share
 from certifier.verify.witness import check_witness
 
 GROUP_CELLS = 8
@@ -65,64 +68,88 @@ class CellCertification:
         self._covariance = np.cov(self._area.samples.T).reshape(scene.n, scene.n)
         self._broad_phase = BroadPhase(Kinematics.of(scene), self._together)
 
-    def certify(self, index: int, cells: int, begun: bytes | None = None, ending: bool = False) -> PairResult:
+    def certify(self, index: int, cells: int, ending: bool = False) -> PairResult:
         """Certifies pair ``scene.pairs[index]``, alone or with others that the same proof covers.
 
         Args:
             cells: end after so many cells.
-            begun: the ``partition`` of an earlier result of this pair, on a polytope of which this one is a part.
             ending: what is still open will be cut off, so the result names points of all open cells.
         """
         start, pair = time.perf_counter(), self._scene.pairs[index]
-        result = None if begun else self._broad_phase.find(pair)
-        if result is None:
-            volumes = (Volume.of(self._scene.geometry(pair.a)), Volume.of(self._scene.geometry(pair.b)))
-            result = self._certify(volumes, cells, begun, ending)
+        result = self._broad_phase.find(pair) or self._begin(self._volumes(index), cells, ending)
         return replace(result, seconds=time.perf_counter() - start)
 
+    def go_on(self, index: int, cells: int, left: Sequence[bytes], part: int = 0, parts: int = 1, ending: bool = False) -> PairResult:
+        """Goes on with the open cells of a pair that are dealt to one part.
+
+        Args:
+            cells, ending: as for :meth:`certify`.
+            left: the ``subtrees`` of the round before, in the order of its parts, on a polytope of which this one is a part.
+            part: the number of this part, from 0.
+            parts: how many parts the round has.
+        """
+        start, volumes = time.perf_counter(), self._volumes(index)
+        search = Search(self._area, volumes)
+        given, contacts = dealt(open_cells(left), part, parts), search.scout(1 + part)
+        report = search.run(given, cells)
+        result = self._left(search, volumes, given, replace(report, contacts=contacts + report.contacts), ending)
+        return replace(result, seconds=time.perf_counter() - start)
+
+    def put_together(self, index: int, rounds: Sequence[Sequence[bytes]], part: int = 0, parts: int = 1) -> PairResult:
+        """Certifies a part of a pair of which no cell is open any more; the pair is certified when all its parts are.
+
+        Args:
+            rounds: the ``subtrees`` of all rounds, in order, each in the order of its parts.
+            part: the number of this part, from 0; the first one returns the proof.
+            parts: the cells to verify are dealt to so many parts.
+        """
+        start, volumes = time.perf_counter(), self._volumes(index)
+        search = Search(self._area, volumes)
+        vertices = {choice: len(a.vertices) + len(b.vertices) for choice, (a, b) in choices_of(volumes, search.coarse).items()}
+        root = put_together(rounds, len(self._area.ground.d), 2 * self._scene.n, vertices)
+        return replace(self._proved(search, volumes, root, part, parts), seconds=time.perf_counter() - start)
+
+    def _volumes(self, index: int) -> Volumes:
+        pair = self._scene.pairs[index]
+        return Volume.of(self._scene.geometry(pair.a)), Volume.of(self._scene.geometry(pair.b))
+
     def _together(self, volumes: Volumes) -> PairResult | None:
-        result = self._certify(volumes, GROUP_CELLS, None, False)
+        result = self._begin(volumes, GROUP_CELLS, False)
         return result if result.outcome is Outcome.CERTIFIED else None
 
-    def _certify(self, volumes: Volumes, cells: int, begun: bytes | None, ending: bool) -> PairResult:
-        search = Search(self._area, volumes)
-        root = Node() if begun is None else self._begun(begun)
-        report = search.run(root, cells)
-        proof = PartitionProof(
-            self._scene,
-            volumes,
-            search.frame,
-            self._area.ground,
-            self._area.center,
-            search.coarse,
-            **root.to_streams(len(search.joints)),
-        )
-        still_open = root.open_cells(self._area.lower, self._area.upper)
-        if not still_open:
-            try:
-                statement = statements(self._scene, [proof])[0]
-            except ProofError as error:
-                return PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, detail=f"the proof found does not hold: {error}")
-            return PairResult(Outcome.CERTIFIED, Stage.CELLS, margin=statement.gap, proof=proof.to_bytes())
-        return self._open(search, volumes, report, [(lower, upper) for _, lower, upper in still_open], proof.to_bytes(), ending)
+    def _begin(self, volumes: Volumes, cells: int, ending: bool) -> PairResult:
+        search, root = Search(self._area, volumes), Node()
+        given = [OpenCell(root, self._area.lower, self._area.upper)]
+        contacts = search.scout(0)
+        report = Report(contacts=contacts) if contacts else search.run(given, cells)
+        if any(node.kind == OPEN for node in root.preorder()):
+            return self._left(search, volumes, given, report, ending)
+        return self._proved(search, volumes, root)
 
-    def _begun(self, data: bytes) -> Node:
-        """Returns the tree that was begun; faces were added since before the joint limits, so the limits have other numbers now."""
-        proof = PartitionProof.from_bytes(data, self._scene)
-        added, limits = len(self._area.ground.d) - len(proof.ground.d), len(proof.ground.d) - 2 * self._scene.n
-        arrays = {name: getattr(proof, name) for name in STREAMS}
-        arrays["faces"] = np.where(proof.faces >= limits, proof.faces + added, proof.faces).astype(np.int16)
-        return Node.of_streams(arrays, {choice: sum(len(volume.vertices) for volume in both) for choice, both in proof.chosen.items()})
+    def _proved(self, search: Search, volumes: Volumes, root: Node, part: int = 0, parts: int = 1) -> PairResult:
+        """Returns the result of a part of a pair that has a tree without open cells."""
+        streams = to_streams([root], len(search.joints))
+        proof = PartitionProof(self._scene, volumes, search.frame, self._area.ground, self._area.center, search.coarse, **streams)
+        try:
+            gap = gap_of_share(self._scene, proof, part, parts)
+        except ProofError as error:
+            return PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, detail=f"the proof found does not hold: {error}")
+        # Cells that miss the polytope say nothing about a distance.
+        margin = gap if np.isfinite(gap) else None
+        return PairResult(Outcome.CERTIFIED, Stage.CELLS, margin=margin, proof=None if part else proof.to_bytes())
 
-    def _open(
-        self, search: Search, volumes: Volumes, report: Report, cells: list[tuple[Array, Array]], begun: bytes, ending: bool
-    ) -> PairResult:
+    def _left(self, search: Search, volumes: Volumes, given: Sequence[OpenCell], report: Report, ending: bool) -> PairResult:
+        """Returns the result of a pair that is not certified yet, with what its search has left."""
+        left = Subtrees.of(given, len(self._area.ground.d))
+        cells = [(lower, upper) for _, lower, upper in left.open_cells]
         points = self._contacts(search, report.contacts)
+        contacts = min(len(points), MOST_POINTS)
         if ending:
             points += self._of_cells(search, cells)
         points += [point for cell in report.narrow for point in cell]
-        weakness = Weakness(np.array(points[:MOST_POINTS]).reshape(-1, self._scene.n), np.zeros(self._scene.n))
-        found = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, partition=begun, open_cells=len(cells), weakness=weakness)
+        weakness = Weakness(np.array(points[:MOST_POINTS]).reshape(-1, self._scene.n), np.zeros(self._scene.n), contacts=contacts)
+        subtrees = left.to_bytes(len(search.joints))
+        found = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, subtrees=subtrees, open_cells=len(cells), weakness=weakness)
         if report.contacts:
             return self._refuted(search, volumes, report.contacts[0], found)
         if report.narrow:

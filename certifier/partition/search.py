@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -30,7 +31,7 @@ from certifier.partition.chords import chords
 from certifier.partition.coarse import coarse_volume
 from certifier.partition.frames import choose_frame
 from certifier.partition.hulls import gaps
-from certifier.partition.tree import OPEN, Node, Streams
+from certifier.partition.tree import Node, OpenCell, Streams
 from certifier.polytopes.simplex import deepest
 from certifier.proof.partition import EMPTY, PLANE
 
@@ -39,15 +40,21 @@ NARROW = np.radians(3.0)
 LONG = 5
 """Coarse volumes are tried where so many joints or more move one body against the other."""
 NARROW_COARSE = np.radians(15.0)
-"""A cell that turns less than this in every joint that moves the coarse volumes, or has no sample, is not cut for them any more."""
+"""A cell that turns less than this in every joint that moves the coarse volumes, or has neither a plane nor a sample, is not cut for
+them any more."""
+FEW_JOINTS, NARROWER = 6, np.radians(30.0)
+"""Where more than FEW_JOINTS move one body against the other, a cell without a sample is cut for them until it turns less than NARROWER."""
+CUTS, LEAST_ROOM, MOST_ROOM = 3, 1e-5, 10.0
+"""For coarse volumes so many joints are compared to cut a cell in; less room for a plane than LEAST_ROOM counts as that, and so on."""
 KEPT = 200
 """A cell inherits at most this many points."""
 BEYOND = 1e-9
 """A point may lie beyond a face by this."""
 FEW = 16
 """So many points of a narrow cell are reported."""
-SCOUTED, SCOUTS = 256, 64
-"""Before cells are looked at, contacts are looked for from SCOUTS of about four times SCOUTED points: where bodies are nearest."""
+SCOUTS, AMONG, SCOUT_STEPS = 64, 16, 12
+"""Before cells are looked at, contacts are looked for from SCOUTS of AMONG times as many points, where bodies are nearest, in so many
+steps. A contact that is not found costs many cells, because those about it cannot be proved."""
 
 
 @dataclass
@@ -87,11 +94,11 @@ class Search:
         choice = (small_a is not None) + 2 * (small_b is not None)
         self._coarse = Bodies(area, self.frame, self.joints, (small_a or a, small_b or b), choice) if choice else None
 
-    def run(self, root: Node, cells: int) -> Report:
-        """Works on the open cells of a tree, which it changes.
+    def run(self, cells: Sequence[OpenCell], most: int) -> Report:
+        """Works on open cells, whose nodes it changes.
 
         Args:
-            cells: end after so many cells.
+            most: end after so many cells.
         """
         area, report, ties = self._area, Report(), itertools.count()
         heap: list[tuple[float, int, Cell]] = []
@@ -99,12 +106,10 @@ class Search:
         def push(cell: Cell) -> None:
             heapq.heappush(heap, (-float(len(cell.samples)), next(ties), cell))
 
-        if root.kind == OPEN and self._scout(root, report):
-            return report
-        for node, lower, upper in root.open_cells(area.lower, area.upper):
+        for node, lower, upper in cells:
             inside = area.samples[((area.samples >= lower) & (area.samples <= upper)).all(axis=1)]
-            push(Cell(area, node, lower, upper, inside[:KEPT], inside, self._coarse is not None))
-        while heap and report.cells < cells:
+            push(Cell(area, node, lower, upper, inside[:KEPT], inside))
+        while heap and report.cells < most:
             cell = heapq.heappop(heap)[2]
             report.cells += 1
             cut = self._settle(cell, report, seed=report.cells)
@@ -115,26 +120,36 @@ class Search:
             if value is None:
                 report.narrow.append(points[:FEW])
                 continue
-            cell.node.kind, cell.node.value, cell.node.children = joint, value, (Node(), Node())
-            for child, below in zip(cell.node.children, (True, False), strict=True):
-                lower, upper = cell.lower.copy(), cell.upper.copy()
-                (upper if below else lower)[joint] = value
-                of_points, of_samples = ((X[:, joint] <= value) == below for X in (points, cell.samples))
-                push(Cell(area, child, lower, upper, points[of_points][:KEPT], cell.samples[of_samples], cell.coarse))
+            halves = self._halves(cell, joint, value, points)
+            cell.node.kind, cell.node.value, cell.node.children = joint, value, tuple(half.node for half in halves)
+            for half in halves:
+                push(half)
         return report
 
-    def _scout(self, root: Node, report: Report) -> bool:
-        """Looks for contacts on all of the polytope, before anything is proved, and returns whether there are any."""
-        area = self._area
-        cell = Cell(area, root, area.lower, area.upper, area.samples[:KEPT], area.samples)
-        rng = np.random.default_rng(0)
-        targets = np.where(rng.random((SCOUTED, len(area.lower))) < 0.5, area.lower, area.upper)
-        X = np.concatenate([area.samples[:SCOUTED], chords(cell.inside.C, cell.inside.d, area.center, targets, SCOUTED, 0)])
+    def _halves(self, cell: Cell, joint: int, value: float, points: Array) -> list[Cell]:
+        """Returns the lower and the upper part of a cell, with nodes of their own."""
+        halves = []
+        for below in (True, False):
+            lower, upper = cell.lower.copy(), cell.upper.copy()
+            (upper if below else lower)[joint] = value
+            of_points, of_samples = ((X[:, joint] <= value) == below for X in (points, cell.samples))
+            node = Node(coarse=cell.node.coarse)
+            halves.append(Cell(self._area, node, lower, upper, points[of_points][:KEPT], cell.samples[of_samples]))
+        return halves
+
+    def scout(self, seed: int) -> list[Array]:
+        """Returns contacts that a look at all of the polytope finds, (n,) each; other seeds look elsewhere."""
+        area, contacts = self._area, []
+        cell = Cell(area, Node(), area.lower, area.upper, area.samples[:KEPT], area.samples)
+        rng, count = np.random.default_rng(seed), SCOUTS * AMONG // 4
+        targets = np.where(rng.random((count, len(area.lower))) < 0.5, area.lower, area.upper)
+        samples = area.samples[rng.permutation(len(area.samples))[:count]]
+        X = np.concatenate([samples, chords(cell.inside.C, cell.inside.d, area.center, targets, count, seed)])
         for place in np.argsort(gaps(*self.bodies.hulls, X), kind="stable")[:SCOUTS]:
-            nearest = self.bodies.nearest(cell, X[place][None])
-            if nearest is not None and nearest[1] <= 0:
-                report.contacts.append(nearest[0])
-        return bool(report.contacts)
+            s, gap = self.bodies.approached(cell, X[place], SCOUT_STEPS)
+            if gap <= 0:
+                contacts.append(s)
+        return contacts
 
     def _middle_of(self, cell: Cell, joint: int) -> float | None:
         """Returns where to cut a cell, in the middle of its angle; None where it is narrow in all joints."""
@@ -151,19 +166,18 @@ class Search:
 
     def _settle(self, cell: Cell, report: Report, seed: int) -> tuple[int, Array] | None:
         """Settles a cell, or returns the joint to cut it in and its points."""
-        start = cell.points.mean(axis=0) if len(cell.points) > len(cell.lower) else None
-        if start is None or (cell.inside.d - cell.inside.C @ start).min() < 1e-7 * cell.half.min():
-            start = self._inside(cell)
-            if start is None:
-                return None
-        if cell.coarse and self._coarse is not None:
+        start = self._start(cell)
+        if start is None:
+            return None
+        if cell.node.coarse and self._coarse is not None:
             found = self._try(cell, self._coarse, start, seed)
             if found is None:
                 return None
-            hopeless = not len(cell.samples) and found.joint is None
-            if not hopeless and self._turn(cell)[self._coarse.joints].max(initial=0.0) > NARROW_COARSE:
-                return self._cut(cell, self._coarse, found), found.points
-            cell.coarse = False
+            turn = self._turn(cell)[self._coarse.joints].max(initial=0.0)
+            hopeless = not len(cell.samples) and found.joint is None and (len(self.bodies.joints) <= FEW_JOINTS or turn < NARROWER)
+            if not hopeless and turn > NARROW_COARSE:
+                return self._cut(cell, self._coarse, found, seed), found.points
+            cell.node.coarse = False
         found = self._try(cell, self.bodies, start, seed)
         if found is None:
             return None
@@ -175,7 +189,14 @@ class Search:
             if nearest is not None and nearest[1] < TOUCH * self.bodies.extent:
                 report.narrow.append(nearest[0][None])
                 return None
-        return self._cut(cell, self.bodies, found), found.points
+        return self._cut(cell, self.bodies, found, seed), found.points
+
+    def _start(self, cell: Cell) -> Array | None:
+        """Returns a point of the polytope in the cell; None, after the node was settled, where there is none."""
+        start = cell.points.mean(axis=0) if len(cell.points) > len(cell.lower) else None
+        if start is None or (cell.inside.d - cell.inside.C @ start).min() < 1e-7 * cell.half.min():
+            return self._inside(cell)
+        return start
 
     def _try(self, cell: Cell, bodies: Bodies, start: Array, seed: int) -> Undecided | None:
         """Settles a cell with these bodies and returns None, or says how far that came."""
@@ -186,15 +207,32 @@ class Search:
             return None
         return found
 
-    def _cut(self, cell: Cell, bodies: Bodies, found: Undecided) -> int:
-        """Returns the joint to cut a cell in: where proofs took most pieces, or where points that no plane separates lie farthest apart."""
+    def _cut(self, cell: Cell, bodies: Bodies, found: Undecided, seed: int) -> int:
+        """Returns the joint to cut a cell in: where proofs took most pieces, or where points that no plane separates lie farthest apart.
+
+        For coarse volumes it is, of the CUTS joints with the farthest points, the one that makes most room for planes in both halves.
+        A bad cut there takes several times as many cells.
+        """
         if found.joint in bodies.joints or found.support is None:
             return int(found.joint or 0)
         q = np.where(self._area.scene.revolute, 2 * np.arctan(found.support), found.support / bodies.extent)
         mean = found.weights @ q / found.weights.sum()
         spread = found.weights @ (q - mean) ** 2
         wide = self._turn(cell) > NARROW / 2
-        return max(bodies.joints, key=lambda j: float(spread[j]) if wide[j] else -1.0)
+        order = sorted(bodies.joints, key=lambda j: -float(spread[j]) if wide[j] else 1.0)
+        if not bodies.choice:
+            return order[0]
+        return max(order[:CUTS], key=lambda j: self._room(cell, bodies, j, found.points, seed))
+
+    def _room(self, cell: Cell, bodies: Bodies, joint: int, points: Array, seed: int) -> float:
+        """Returns how much room for planes a cut makes in both halves of a cell, on a logarithmic scale; at most that of EMPTY halves."""
+        value, room = self._middle_of(cell, joint), 0.0
+        if value is None:
+            return -np.inf
+        for half in self._halves(cell, joint, value, points):
+            start = self._start(half)
+            room += np.log(MOST_ROOM if start is None else min(max(bodies.room(half, start, seed), LEAST_ROOM), MOST_ROOM))
+        return float(room)
 
     def _inside(self, cell: Cell) -> Array | None:
         """Returns a point of the polytope in the cell; None, after the node was settled, where there is none."""

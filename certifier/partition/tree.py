@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,6 +36,7 @@ class Node:
         plane: (5, 1 + k) of a cell with a plane, as a proof holds it.
         choice: which volumes the plane separates, as a proof says it.
         streams: the pieces and multipliers of a cell with a plane, or the multipliers of one that misses the polytope.
+        coarse: coarse volumes are to be tried first in this cell.
     """
 
     kind: int = OPEN
@@ -44,6 +45,7 @@ class Node:
     plane: Array | None = None
     choice: int = 0
     streams: Streams | None = None
+    coarse: bool = True
 
     def preorder(self) -> Iterator[Node]:
         """Gives the nodes, each before its children, the lower part first."""
@@ -53,43 +55,54 @@ class Node:
             yield node
             waiting += reversed(node.children)
 
-    def open_cells(self, lower: Array, upper: Array) -> list[tuple[Node, Array, Array]]:
-        """Returns the open nodes with the bounds of their cells, (n,) each; the node's own cell is [lower, upper]."""
+    def open_cells(self, lower: Array, upper: Array) -> list[OpenCell]:
+        """Returns the cells of the open nodes, in preorder; the node's own cell is [lower, upper]."""
         found, waiting = [], [(self, lower, upper)]
         while waiting:
             node, low, high = waiting.pop()
             if node.kind == OPEN:
-                found.append((node, low, high))
+                found.append(OpenCell(node, low, high))
             elif node.children:
                 middle_up, middle_low = high.copy(), low.copy()
                 middle_up[node.kind] = middle_low[node.kind] = node.value
                 waiting += [(node.children[1], middle_low, high), (node.children[0], low, middle_up)]
         return found
 
-    def to_streams(self, k: int) -> dict[str, Any]:
-        """Returns the tree as the arrays of a proof whose planes move with k joints."""
-        nodes = list(self.preorder())
-        held = [node.streams for node in nodes if node.streams is not None]
-        found = {
-            "nodes": [node.kind for node in nodes],
-            "cuts": [node.value for node in nodes if node.children],
-            "planes": np.array([node.plane for node in nodes if node.plane is not None]).reshape(-1, 5, 1 + k),
-            "choices": [node.choice for node in nodes if node.plane is not None],
-            **{
-                name: np.concatenate([getattr(part, name) for part in held] or [[]])
-                for name in ("pieces", "counts", "faces", "multipliers")
-            },
-        }
-        return {name: np.asarray(found[name], dtype=kind) for name, kind in STREAMS.items()}
 
-    @staticmethod
-    def of_streams(arrays: dict[str, np.ndarray], vertices: Mapping[int, int]) -> Node:
-        """Does the inverse of :meth:`to_streams`; ``vertices`` maps every choice to the number of vertices of both its volumes together."""
-        return _Reader(arrays, vertices).node()
+class OpenCell(NamedTuple):
+    """An open node and the bounds of its cell, (n,) each."""
+
+    node: Node
+    lower: Array
+    upper: Array
+
+
+def to_streams(roots: Sequence[Node], k: int) -> dict[str, Any]:
+    """Returns trees, one after the other, as the arrays of a proof whose planes move with k joints."""
+    nodes = [node for root in roots for node in root.preorder()]
+    held = [node.streams for node in nodes if node.streams is not None]
+    found = {
+        "nodes": [node.kind for node in nodes],
+        "cuts": [node.value for node in nodes if node.children],
+        "planes": np.array([node.plane for node in nodes if node.plane is not None]).reshape(-1, 5, 1 + k),
+        "choices": [node.choice for node in nodes if node.plane is not None],
+        **{name: np.concatenate([getattr(part, name) for part in held] or [[]]) for name in ("pieces", "counts", "faces", "multipliers")},
+    }
+    return {name: np.asarray(found[name], dtype=kind) for name, kind in STREAMS.items()}
+
+
+def of_streams(arrays: Mapping[str, np.ndarray], vertices: Mapping[int, int], count: int) -> list[Node]:
+    """Does the inverse of :func:`to_streams` for so many trees.
+
+    Args:
+        vertices: maps every choice to the number of vertices of both its volumes together.
+    """
+    reader = _Reader(arrays, vertices)
+    return [reader.node() for _ in range(count)]
 
 
 class _Reader:
-    def __init__(self, arrays: dict[str, np.ndarray], vertices: Mapping[int, int]) -> None:
+    def __init__(self, arrays: Mapping[str, np.ndarray], vertices: Mapping[int, int]) -> None:
         self._vertices = vertices
         self._nodes, self._cuts, self._planes = iter(arrays["nodes"].tolist()), iter(arrays["cuts"].tolist()), iter(arrays["planes"])
         self._choices = iter(arrays["choices"].tolist())

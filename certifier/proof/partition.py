@@ -50,6 +50,12 @@ STREAMS = {
 """The arrays of a proof with their types, in the order of its attributes."""
 
 
+def choices_of(volumes: tuple[Volume, Volume], coarse: tuple[Volume | None, Volume | None]) -> dict[int, tuple[Volume, Volume]]:
+    """Maps every choice that a leaf may have to the two volumes that its plane separates; ``coarse`` is as in the proof."""
+    firsts, seconds = zip(volumes, coarse, strict=True)
+    return {i + 2 * j: (a, b) for j, b in enumerate(seconds) for i, a in enumerate(firsts) if a is not None and b is not None}
+
+
 @dataclass(frozen=True)
 class PartitionProof(Separation):
     """Holds planes that separate two volumes on the cells of a partition, with the multipliers that prove it.
@@ -89,13 +95,7 @@ class PartitionProof(Separation):
     @property
     def chosen(self) -> dict[int, tuple[Volume, Volume]]:
         """Maps every choice that a leaf has to the two volumes that its plane separates."""
-        (first, second), (coarse_first, coarse_second) = self.volumes, self.coarse
-        return {
-            i + 2 * j: (a, b)
-            for j, b in enumerate((second, coarse_second))
-            for i, a in enumerate((first, coarse_first))
-            if a is not None and b is not None
-        }
+        return choices_of(self.volumes, self.coarse)
 
     def own(self, number: Callable[[Volume], int]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         coarse = [None if volume is None else number(volume) for volume in self.coarse]

@@ -6,6 +6,7 @@ each checks one part after the other. Only so many parts wait at once that memor
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -63,6 +64,21 @@ def statements(scene: Scene, proofs: Sequence[Separation], processes: int = 1, p
         if progress:
             progress(done, total)
     return [check.statement(proof, gap) for proof, gap in zip(proofs, gaps, strict=True)]
+
+
+def gap_of_share(scene: Scene, proof: PartitionProof, share: int, shares: int) -> float:
+    """Checks a share of the cells of a proof and returns the gap that they prove, in metres. The proof holds when all its shares do.
+
+    Args:
+        scene, proof: as for :func:`statements`.
+        share: its number, from 0.
+
+    Raises:
+        ProofError: the proof makes no sense, or a cell of the share does not hold.
+    """
+    check_contained(scene, proof.all_volumes)
+    check = _Check(scene, [proof])
+    return min((check.gap(part) for part in itertools.islice(check.parts(), share, None, shares)), default=np.inf)
 
 
 def verify_separation(proof: Separation, processes: int = 1, progress: Progress | None = None) -> PairStatement:

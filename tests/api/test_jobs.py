@@ -1,7 +1,7 @@
 """Jobs over HTTP: creation, idempotency, refusals, pages, cancel, retry; the queue is real, the workers are not there."""
 
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -167,7 +167,7 @@ def test_a_witness_is_given_in_joint_positions(client: TestClient, database: Dat
         claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
         assert claim is not None
         refuted = PairResult(Outcome.REFUTED, Stage.SCREEN, seconds=0.1, witness_s=np.array([0.25]))
-        pairs.save(session, claim, {0: refuted})
+        pairs.save(session, claim, {(0, 0): refuted})
     matrix = client.get(f"/v1/jobs/{job_id}/pairs").json()
     assert matrix["cells"][0]["witness_q"] == scene.to_q([0.25]).tolist()
     assert matrix["iterations"][0]["reused"] == {"1": 0}
@@ -180,7 +180,7 @@ def test_only_outcomes_that_have_a_proof_offer_one(client: TestClient, database:
     search = CellCertification(scene, polytope)
     certified = search.certify(1, 50)
     assert certified.outcome is Outcome.CERTIFIED
-    left = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, detail="2 cells are open", partition=certified.proof, open_cells=2)
+    left = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, detail="2 cells are open", subtrees=certified.proof, open_cells=2)
     with database.write() as session:
         job = jobs.lock(session, job_id)
         jobs.start(session, job)
@@ -191,7 +191,7 @@ def test_only_outcomes_that_have_a_proof_offer_one(client: TestClient, database:
         )
         claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
         assert claim is not None
-        pairs.save(session, claim, {0: left, 1: certified})
+        pairs.save(session, claim, {(0, 0): left, (1, 0): certified})
     cells = client.get(f"/v1/jobs/{job_id}/pairs").json()["cells"]
     assert [(cell["state"], cell["stage"], cell["open_cells"], cell["proof"] is None) for cell in cells] == [
         ("inconclusive", "cells", 2, True),
@@ -203,6 +203,41 @@ def test_only_outcomes_that_have_a_proof_offer_one(client: TestClient, database:
     assert verify_file(answers[1].content).kind == "partition"
     page = client.get(f"/jobs/{job_id}", headers={"Accept": "text/html"}).text
     assert "inconclusive; by cells; 0 s; 2 open cells; 2 cells are open" in page
+
+
+def test_the_parts_of_a_pair_are_shown_as_one(client: TestClient, database: Database, scene: Scene) -> None:
+    """It is certified when all its parts are, at the least of their margins, and only then offers the proof of the first one."""
+    job_id = client.post("/v1/jobs", json=CERTIFY | {"cells": 50}).json()["id"]
+    polytope = scene.polytope([[1.0], [-1.0]], [0.9, 0.9])
+    search = CellCertification(scene, polytope)
+    first, second = (replace(search.certify(index, 50), seconds=1.0, margin=margin) for index, margin in ((0, 0.02), (1, 0.01)))
+    other = PairResult(Outcome.CERTIFIED, Stage.CELLS, seconds=2.0, margin=0.01)
+    with database.write() as session:
+        job = jobs.lock(session, job_id)
+        jobs.start(session, job)
+        new = [pairs.NewPair(index, f"a{index}", f"b{index}", 1.0, part) for index, part in ((0, 0), (0, 1), (1, 0))]
+        more = {"cells": 50, "begun": 0, "parts": {0: 2}}
+        C, d = polytope.C, polytope.d
+        pairs.add_iteration(
+            session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={}, hard=[], failures=None, **more
+        )
+        claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
+        assert claim is not None
+        pairs.save(session, claim, {(0, 0): first, (1, 0): second})
+
+    def shown() -> list[tuple[Any, ...]]:
+        cells = client.get(f"/v1/jobs/{job_id}/pairs").json()["cells"]
+        return [(cell["pair"], cell["parts"], cell["state"], cell["margin"], cell["seconds"], cell["proof"] is None) for cell in cells]
+
+    def proof() -> int:
+        return client.get(f"/v1/jobs/{job_id}/pairs/0/proof", params={"iteration": 0}).status_code
+
+    assert shown() == [(0, 2, "running", None, 1.0, True), (1, 1, "certified", 0.01, 1.0, False)]
+    assert proof() == 404
+    with database.write() as session:
+        pairs.save(session, claim, {(0, 1): other})
+    assert shown()[0] == (0, 2, "certified", 0.01, 3.0, False)
+    assert proof() == 200
 
 
 def test_a_job_that_asks_for_cells_says_so(client: TestClient, scene: Scene) -> None:

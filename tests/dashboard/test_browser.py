@@ -72,7 +72,7 @@ def settle(database: Database, job_id: str, index: int) -> None:
         assert claim is not None
         assert [pair.index for pair in claim.pairs] == [index]
         result = PairResult(Outcome.CERTIFIED, Stage.SOS, seconds=0.1, margin=0.01, proof=b"proof")
-        pairs.save(session, claim, {index: result})
+        pairs.save(session, claim, {(index, 0): result})
 
 
 def test_text_takes_room(page: Any) -> None:

@@ -45,5 +45,5 @@ def add_pairs(session: Session, job: JobRow, pair_count: int, *, failures: int |
     )
 
 
-def certified(index: int, proof: bytes = b"proof") -> dict[int, PairResult]:
-    return {index: PairResult(Outcome.CERTIFIED, Stage.SOS, seconds=0.1, margin=0.01, proof=proof)}
+def certified(index: int, proof: bytes = b"proof") -> dict[tuple[int, int], PairResult]:
+    return {(index, 0): PairResult(Outcome.CERTIFIED, Stage.SOS, seconds=0.1, margin=0.01, proof=proof)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 import os
 import signal
@@ -19,7 +20,7 @@ from certifier.pair.result import PairResult, Weakness
 from db import events, jobs, leases, pairs, steps, work
 from db.models import IterationRow, PairRow, ProofRow, StepRow
 from db.session import Database
-from db.states import IterationState, JobState, StepKind, StepState
+from db.states import IterationState, JobState, PairState, StepKind, StepState
 from db.types import utcnow
 from tests.db.builders import a_running_job, certified
 
@@ -34,13 +35,13 @@ def claim(db: Database, job_id: str, batch_seconds: float = 0.5) -> pairs.Claim 
         return held
 
 
-def save(db: Database, held: pairs.Claim, results: dict[int, PairResult]) -> pairs.Saved:
+def save(db: Database, held: pairs.Claim, results: dict[tuple[int, int], PairResult]) -> pairs.Saved:
     with db.write() as session:
         return pairs.save(session, held, results)
 
 
-def refuted(index: int) -> dict[int, PairResult]:
-    return {index: PairResult(Outcome.REFUTED, Stage.SCREEN, seconds=0.1, witness_s=np.array([0.5]))}
+def refuted(index: int) -> dict[tuple[int, int], PairResult]:
+    return {(index, 0): PairResult(Outcome.REFUTED, Stage.SCREEN, seconds=0.1, witness_s=np.array([0.5]))}
 
 
 def claim_and_certify(url: str, job_id: str, out: multiprocessing.Queue) -> None:  # type: ignore[type-arg]
@@ -154,7 +155,7 @@ def test_without_early_end_every_pair_gets_its_verdict(db: Database) -> None:
     held = claim(db, job_id, batch_seconds=3)
     assert held is not None
     failed = PairResult(Outcome.NOT_CERTIFIABLE, Stage.SOS, seconds=0.1, weakness=Weakness(np.array([[0.1]]), np.zeros(1)))
-    assert not save(db, held, {0: failed}).finished
+    assert not save(db, held, {(0, 0): failed}).finished
     assert save(db, held, certified(1)).finished
     with db.read() as session:
         assert [row.state for row in pairs.of_job(session, job_id)] == ["not_certifiable", "certified"]
@@ -178,7 +179,7 @@ def test_a_lease_that_ran_out_is_released_and_its_result_is_then_refused(db: Dat
         assert [row.pair_index for row in pairs.release(session, jobs.lock(session, job_id), lease)] == [0]
     second = claim(db, job_id)
     assert second is not None
-    assert second.pairs == (pairs.Claimed(0, attempt=2, deaths=0),)
+    assert second.pairs == (pairs.Claimed(0, part=0, attempt=2, deaths=0),)
     assert not save(db, first, certified(0)).held
     assert save(db, second, certified(0)).finished
 
@@ -329,3 +330,21 @@ def test_the_latest_region_is_accepted_and_an_earlier_one_only_if_it_is_refused(
     else:
         assert earlier is not None
         assert earlier.input == {"turn": 1}
+
+
+@pytest.mark.parametrize(
+    ("parts", "whole"),
+    [
+        ("certified", "certified"),
+        ("open open", "open"),
+        ("open certified", "running"),
+        ("certified running", "running"),
+        ("certified inconclusive", "inconclusive"),
+        ("inconclusive refuted too_close", "refuted"),
+        ("certified skipped", "skipped"),
+        ("certified error", "error"),
+    ],
+)
+def test_a_pair_is_in_the_worst_state_of_its_parts_once_all_are_settled(parts: str, whole: str) -> None:
+    for states in itertools.permutations(map(PairState, parts.split())):
+        assert pairs.state_of_parts(states) == whole

@@ -50,7 +50,7 @@ def efforts(db: Database, pair_count: int, settled: int) -> dict[str, int]:
         with db.write() as session:
             done = work.claim(session, job_id, lease_seconds=60, batch_seconds=settled)
             assert isinstance(done, pairs.Claim)
-            pairs.save(session, done, {pair.index: certified(pair.index)[pair.index] for pair in done.pairs})
+            pairs.save(session, done, {(pair.index, 0): certified(pair.index)[pair.index, 0] for pair in done.pairs})
         settled -= len(done.pairs)
     asked = {"job_states": [JobState.RUNNING]}
     claim, claiming = effort(db, lambda session: work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5))

@@ -69,11 +69,11 @@ class Log:
     def save(self, claim: pairs.Claim, kinds: list[str]) -> None:
         before = self.rows()
         states = [state for state, _, _ in before]
-        results = {pair.index: RESULTS[kind] for pair, kind in zip(claim.pairs, kinds, strict=False)}
+        results = {(pair.index, pair.part): RESULTS[kind] for pair, kind in zip(claim.pairs, kinds, strict=False)}
         held = [index for index, (state, _, token) in enumerate(before) if state == "running" and token == claim.token]
-        saved = [index for index in results if index in held]
+        saved = [index for index, _ in results if index in held]
         for index in saved:
-            states[index] = results[index].outcome.value
+            states[index] = results[index, 0].outcome.value
         failed = [index for index, state in enumerate(states) if state in FAILED]
         if self.failures is not None and len(failed) >= self.failures:
             last = failed[self.failures - 1]

@@ -103,11 +103,11 @@ def test_iterations_stored_before_there_were_cells_say_that_they_have_none(empty
         job_id = a_running_job(session).id
     database.close()
     migrate.downgrade(empty_database_url, "0008")
-    assert "partitions" not in tables(empty_database_url)
+    assert not {"partitions", "subtrees"}.intersection(tables(empty_database_url))
     migrate.upgrade(empty_database_url)
     database = Database(empty_database_url)
     with database.read() as session:
-        assert [(row.cells, row.begun, row.ending) for row in pairs.iterations(session, job_id)] == [(1, {}, [])]
+        assert [(row.cells, row.begun, row.parts, row.ending) for row in pairs.iterations(session, job_id)] == [(1, None, {}, [])]
         assert {row.open_cells for row in pairs.of_job(session, job_id)} == {None}
     database.close()
 

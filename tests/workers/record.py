@@ -29,16 +29,19 @@ def check_record(job_id: str) -> None:
     assert [event.seq for event in events] == list(range(1, len(events) + 1))
     assert [event.data["state"] for event in events if event.kind == "job"] == ["queued", "running", job.state]
 
-    told = Counter((event.data["iteration"], pair["index"]) for event in events if event.kind == "pairs" for pair in event.data["pairs"])
-    settled = {(row.iteration, row.pair_index) for row in rows if row.state in SETTLED}
-    assert told == Counter(settled)
+    told = Counter(
+        (event.data["iteration"], pair["index"], pair["part"]) for event in events if event.kind == "pairs" for pair in event.data["pairs"]
+    )
+    assert told == Counter({(row.iteration, row.pair_index, row.part) for row in rows if row.state in SETTLED})
     assert {row.state for row in rows} <= SETTLED | {PairState.SKIPPED}
     for iteration in iterations:
-        of_iteration = {row.pair_index: row.state for row in rows if row.iteration == iteration.index}
-        assert set(of_iteration) | {int(index) for index in iteration.reuse} == set(range(scene_pairs))
-        certified = set(of_iteration.values()) <= {PairState.CERTIFIED}
+        mine = [row for row in rows if row.iteration == iteration.index]
+        assert {row.pair_index for row in mine} | {int(index) for index in iteration.reuse} == set(range(scene_pairs))
+        parts = {str(pair): count for pair, count in Counter(row.pair_index for row in mine).items() if count > 1}
+        assert parts == iteration.parts
+        certified = all(row.state == PairState.CERTIFIED for row in mine)
         assert iteration.state == (IterationState.CERTIFIED if certified else IterationState.FAILED)
-    assert all(row.proof_digest for row in rows if row.state == PairState.CERTIFIED)
+    assert all((row.proof_digest is None) == (row.part > 0) for row in rows if row.state == PairState.CERTIFIED)
 
     done = Counter(step.kind for step in did if step.state == StepState.DONE)
     assert Counter(event.data["kind"] for event in events if event.kind == "step" and event.data["state"] == "done") == done

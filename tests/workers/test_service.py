@@ -15,7 +15,7 @@ from certifier.jobs.local import grow
 from certifier.model import Scene
 from certifier.verify.region import verify_region
 from db import jobs, pairs, proofs, regions
-from db.models import PairRow, PartitionRow
+from db.models import PairRow, SubtreesRow
 from db.session import database
 from db.settings import settings
 from tests.workers.options import box_around, grow_box
@@ -69,8 +69,8 @@ def test_a_whole_region_is_the_same_when_workers_die_between_its_rounds(planar: 
 
     def goes_on() -> PairRow | None:
         with database().read() as session:
-            begun = {(row.index, int(pair)) for row in pairs.iterations(session, job_id) for pair in row.begun}
-        return next((row for row in pairs_of(job_id) if row.state == "running" and (row.iteration, row.pair_index) in begun), None)
+            begun = {row.index for row in pairs.iterations(session, job_id) if row.begun is not None}
+        return next((row for row in pairs_of(job_id) if row.state == "running" and row.iteration in begun), None)
 
     killed = eventually(goes_on, "a pair is gone on with")
     os.kill(holder(killed), signal.SIGKILL)
@@ -79,11 +79,11 @@ def test_a_whole_region_is_the_same_when_workers_die_between_its_rounds(planar: 
     service.start("solve")
     job = ended(job_id)
     check_record(job_id)
-    again = next(row for row in pairs_of(job_id) if (row.iteration, row.pair_index) == (killed.iteration, killed.pair_index))
+    again = next(row for row in pairs_of(job_id) if row.id == killed.id)
     assert again.attempts == 2
     with database().read() as session:
         manifest = regions.get(session, job.region_id or "").manifest
-        assert session.scalars(select(PartitionRow.pair_index).where(PartitionRow.job_id == job_id)).all() == []
+        assert session.scalars(select(SubtreesRow.pair_index).where(SubtreesRow.job_id == job_id)).all() == []
     alone = grow(planar, GrowthOptions.from_document(options)).manifest
     assert {name: manifest[name] for name in SAME} == {name: alone[name] for name in SAME}
     assert certified_pairs(manifest) == certified_pairs(alone)

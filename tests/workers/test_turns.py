@@ -17,7 +17,7 @@ from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.pair.forecast import forecast
 from db import jobs, pairs, regions, steps
-from db.models import IterationRow, JobRow, PairRow, PartitionRow, ProofRow, StepRow
+from db.models import IterationRow, JobRow, PairRow, ProofRow, StepRow, SubtreesRow
 from db.session import database
 from db.settings import settings
 from db.types import utcnow
@@ -119,9 +119,10 @@ def in_the_way() -> Scene:
 
 
 def left_of(job_id: str) -> dict[int, int]:
-    """Pair index -> the iteration whose partition is kept."""
+    """Pair index -> the last iteration whose subtrees are kept."""
     with database().read() as session:
-        rows = session.execute(select(PartitionRow.pair_index, PartitionRow.iteration).where(PartitionRow.job_id == job_id))
+        columns = (SubtreesRow.pair_index, SubtreesRow.iteration)
+        rows = session.execute(select(*columns).where(SubtreesRow.job_id == job_id).order_by(SubtreesRow.iteration))
         return {row.pair_index: row.iteration for row in rows}
 
 
@@ -135,15 +136,18 @@ def test_a_whole_job_keeps_what_its_last_round_left_and_nothing_in_the_end() -> 
         work_all()
         last = pairs_of(job_id)[-1].iteration
         failed = {row.pair_index for row in pairs_of(job_id) if row.iteration == last and row.state != "certified"}
-        assert left_of(job_id) == dict.fromkeys(failed, last)
+        assert {pair: iteration for pair, iteration in left_of(job_id).items() if iteration == last} == dict.fromkeys(failed, last)
         assert {row.pair_index for row in pairs_of(job_id) if row.weakness} == failed
         rounds += bool(failed)
         coordinate(job_id)
         assert not any(row.weakness for row in pairs_of(job_id))
+        following = {row.pair_index for row in pairs_of(job_id) if row.state == "open"}
+        assert not following or set(left_of(job_id)) <= following, "what is certified is not gone on with"
     assert rounds >= 1
     rows = pairs_of(job_id)
     assert {row.state for row in rows} >= {"certified", "refuted"}
-    assert all((row.proof_digest is None) == (row.state not in ("certified", "refuted")) for row in rows)
+    proving = [row for row in rows if row.state == "refuted" or (row.state == "certified" and row.part == 0)]
+    assert all((row.proof_digest is not None) == (row in proving) for row in rows)
     assert all((row.open_cells is None) == (row.state == "certified") for row in rows)
     work_all()
     coordinate(job_id)

@@ -16,7 +16,7 @@ from certifier.growth.actions import Certify, Finish, Outcomes, Propose
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
-from certifier.growth.whole import HARD, SLICE, STAGES
+from certifier.growth.whole import HARD, PARTS, PIECES, SLICE, STAGES, VERIFIED
 from certifier.jobs import local
 from certifier.jobs.local import grow
 from certifier.model import WORLD, Polytope
@@ -40,6 +40,8 @@ PROPOSAL = Proposal(
     info={},
 )
 FAR = np.array([[0.9, 0.9], [0.85, 0.9]])
+OPEN = 1
+"""So many cells does the oracle leave open in every part."""
 
 
 def options(cells=SLICE, **others):
@@ -68,8 +70,8 @@ def drive(verdict, asked, limit=40):
             assert isinstance(action, Certify)
             made.append(action)
             found = {i: verdict(i, action) for i in action.pairs}
-            known = {i: weakness for i, (_, weakness) in found.items() if weakness is not None}
-            report = Outcomes(action, {i: outcome for i, (outcome, _) in found.items()}, known)
+            reached = [(i, *found[i], OPEN if found[i][1] is not None else None) for i, _ in action.work]
+            report = Outcomes.of_parts(action, reached)
         transition = advance(SCENE, state, report)
     raise AssertionError("the machine does not end")
 
@@ -99,7 +101,7 @@ def test_where_bodies_touch_is_cut_off_and_what_holds_is_not_asked_for_again():
     assert [action.pairs for action in made] == [[0, 1], [0, 1], [1]]
     last = made[-1]
     assert last.reuse == {0: 1}
-    assert last.begun == {1: 1}
+    assert last.begun == 1
     assert last.box.mid.tolist() == made[-2].box.mid.tolist()
     assert last.box.half.tolist() == made[-2].box.half.tolist()
     assert not last.polytope.contains(FAR).any()
@@ -109,7 +111,7 @@ def test_where_bodies_touch_is_cut_off_and_what_holds_is_not_asked_for_again():
     assert end.outcome is Outcome.CERTIFIED
 
 
-@pytest.mark.parametrize(("slices", "hard"), [(1, 1), (5, HARD // SLICE)])
+@pytest.mark.parametrize(("slices", "hard"), [(1, 1), (9, HARD // SLICE // PARTS)])
 def test_what_stays_open_is_cut_off_and_a_face_loses_little_until_the_effort_is_spent(slices, hard):
     def verdict(index, action):
         there = action.polytope.contains(FAR)
@@ -120,11 +122,42 @@ def test_what_stays_open_is_cut_off_and_a_face_loses_little_until_the_effort_is_
     made, accepted, _ = drive(verdict, options(cells=slices * SLICE))
     later = made[1:]
     assert [action.ending for action in later] == [[]] * hard + [[1]] * (len(later) - hard)
-    # Faces may lose little first, and any share eleven rounds after the effort is spent.
-    assert slices + 1 <= len(later) <= slices + 9
+    # Faces may lose little first, and any share some rounds after the effort is spent.
+    assert slices // PARTS + 1 <= len(later) <= slices // PARTS + 9
     assert all(action.cells == SLICE for action in later)
-    assert all(action.polytope.contains(FAR).all() for action in later[: max(slices, hard + 1)])
+    assert all(action.polytope.contains(FAR).all() for action in later[: max(slices // PARTS, hard + 1)])
     assert not accepted[-1].polytope.contains(FAR).any()
+
+
+def test_open_cells_are_dealt_to_parts_and_a_pair_without_any_is_put_together_in_the_next_round():
+    """Both pairs are left open in the first stage; one has no cell open after the second round, the other after the fourth."""
+    rounds = {0: 2, 1: 4}
+
+    def reached(action, index, part):
+        last = action.begun is not None and action.iteration - action.begun >= rounds[index]
+        if last:
+            return index, Outcome.CERTIFIED, None, None
+        left = 0 if action.begun is not None and action.iteration - action.begun == rounds[index] - 1 else 50
+        return index, Outcome.INCONCLUSIVE, weak([]), left
+
+    made, transition = [], begin(SCENE, options(cells=50 * SLICE))
+    while len(made) < 5:
+        report = PROPOSAL
+        if isinstance(transition.action, Certify):
+            made.append(transition.action)
+            report = Outcomes.of_parts(transition.action, [reached(transition.action, *work) for work in transition.action.work])
+        transition = advance(SCENE, transition.state, report)
+    assert [action.begun for action in made] == [None, 0, 0, 0, 0]
+    shared = PIECES // 2
+    # The first round counts as PARTS slices.
+    together = (PARTS + shared) * SLICE // VERIFIED
+    assert [action.parts.get(0, 1) for action in made] == [1, shared, max(together, 1), 1, 1]
+    assert [action.pairs for action in made] == [[0, 1]] * 3 + [[1]] * 2
+    assert [action.parts.get(1, 1) for action in made] == [1, shared, shared, PIECES, min(PIECES, (PARTS + 24) * SLICE // VERIFIED)]
+    assert made[-1].reuse == {0: 2}
+    assert made[-1].work == [(1, part) for part in range(made[-1].parts[1])]
+    assert isinstance(transition.action, Certify)
+    assert (transition.state.best.iteration, transition.action.begun) == (4, None)
 
 
 def test_a_contact_at_a_configuration_to_keep_ends_without_a_region():

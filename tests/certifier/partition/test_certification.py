@@ -16,11 +16,13 @@ from certifier.pair.closest import first_within
 from certifier.partition import bodies
 from certifier.partition.certification import CellCertification
 from certifier.partition.search import Search
-from certifier.partition.tree import OPEN, Node
+from certifier.partition.subtrees import open_cells
+from certifier.partition.tree import OPEN
 from certifier.polytopes.gibbs import uniform_in_q
 from certifier.polytopes.polytope import bounds
+from certifier.proof.container import pack, unpack
 from certifier.proof.negative import WitnessProof
-from certifier.proof.partition import EMPTY, PLANE, STREAMS, PartitionProof
+from certifier.proof.partition import EMPTY, PLANE, PartitionProof
 from certifier.verify.separations import verify_separation
 from certifier.verify.witness import check_witness
 from tests.certifier.scenes import ball, box, cube, obstacle, planar_arm, pose, random_tree, two_arms
@@ -96,13 +98,11 @@ def test_a_ball_that_comes_near_gets_planes_although_their_normals_have_to_keep_
     check_refuted(thicker, polytope, 0, certify(thicker, polytope))
 
 
-def partition(scene, result):
-    """The proof of what is certified, or what was proved already of what is not."""
-    return PartitionProof.from_bytes(result.partition or result.proof, scene)
-
-
 def nodes(scene, result):
-    return partition(scene, result).nodes.tolist()
+    """The nodes of the proof of what is certified, or of what the search has left of what is not."""
+    if result.subtrees is None:
+        return PartitionProof.from_bytes(result.proof, scene).nodes.tolist()
+    return unpack(result.subtrees, "subtrees")[1]["nodes"].tolist()
 
 
 @pytest.mark.parametrize("shape", ["box", "ball"])
@@ -189,17 +189,43 @@ def test_a_search_that_runs_out_of_cells_goes_on_from_where_it_was():
     shared = CellCertification(scene, polytope, box=box_)
     at_once = shared.certify(0, CELLS)
     check_certified(scene, polytope, 0, at_once)
-    result, before = shared.certify(0, 1), []
-    while result.outcome is Outcome.INCONCLUSIVE and len(before) < 50:
-        before.append(result)
-        result = shared.certify(0, 1, begun=result.partition)
-    check_certified(scene, polytope, 0, result)
-    assert len(before) >= 2
-    # What was cut stays cut, so the trees only grow.
-    sizes = [len(nodes(scene, r)) for r in (*before, result)]
-    assert sizes == sorted(sizes)
-    assert all("are open after 1 cells" in r.detail for r in before)
-    assert all(r.margin is None for r in before)
+    rounds, result = [], shared.certify(0, 1)
+    while result.open_cells and len(rounds) < 50:
+        rounds.append([result.subtrees])
+        result = shared.go_on(0, 1, rounds[-1])
+        assert result.outcome is Outcome.INCONCLUSIVE
+        assert result.margin is None
+    rounds.append([result.subtrees])
+    assert len(rounds) >= 3
+    check_certified(scene, polytope, 0, shared.put_together(0, rounds))
+
+
+@pytest.mark.usefixtures("one_piece")
+@pytest.mark.parametrize("parts", [2, 3])
+def test_parts_of_a_pair_are_searched_and_verified_apart_and_put_together_to_one_proof(parts):
+    scene, polytope = passing(0.6, replace(TIP, radius=0.08))
+    shared = CellCertification(scene, polytope)
+    rounds = [[shared.certify(0, 2).subtrees]]
+    while open_cells(rounds[-1]):
+        results = [shared.go_on(0, 1, rounds[-1], part, parts) for part in range(parts)]
+        assert {result.outcome for result in results} == {Outcome.INCONCLUSIVE}
+        assert sum(result.open_cells for result in results) == len(open_cells([result.subtrees for result in results]))
+        rounds.append([result.subtrees for result in results])
+    whole, shares = shared.put_together(0, rounds), [shared.put_together(0, rounds, part, parts) for part in range(parts)]
+    check_certified(scene, polytope, 0, whole)
+    assert {share.outcome for share in shares} == {Outcome.CERTIFIED}
+    assert [share.proof for share in shares] == [whole.proof] + [None] * (parts - 1)
+    assert min(share.margin for share in shares if share.margin is not None) == whole.margin
+    wrong = [[tampered(data) for data in files] for files in rounds]
+    assert Outcome.INCONCLUSIVE in {shared.put_together(0, wrong, part, parts).outcome for part in range(parts)}
+
+
+def tampered(data):
+    """The subtrees with planes moved."""
+    header, arrays = unpack(data, "subtrees")
+    planes = arrays["planes"].copy()
+    planes[:, 3, 0] += 1.0
+    return pack(header, {**arrays, "planes": planes})
 
 
 @pytest.mark.usefixtures("one_piece")
@@ -209,8 +235,9 @@ def test_what_is_open_is_no_proof():
     assert result.outcome is Outcome.INCONCLUSIVE
     assert result.proof is None
     assert result.open_cells == nodes(scene, result).count(OPEN) > 0
-    with pytest.raises(ProofError):
-        verify_separation(partition(scene, result))
+    together = CellCertification(scene, polytope).put_together(0, [[result.subtrees]])
+    assert together.outcome is Outcome.INCONCLUSIVE
+    assert "does not hold" in together.detail
 
 
 @pytest.mark.usefixtures("one_piece")
@@ -220,11 +247,8 @@ def test_a_search_that_is_ending_names_points_of_every_open_cell():
     assert len(shared.certify(0, 1).weakness.points) == 0
     result = shared.certify(0, 1, ending=True)
     assert result.outcome is Outcome.INCONCLUSIVE
-    points, proof = result.weakness.points, partition(scene, result)
+    points, cells = result.weakness.points, open_cells([result.subtrees])
     assert polytope.contains(points).all()
-    lower, upper = bounds(polytope)
-    vertices = {choice: sum(len(volume.vertices) for volume in both) for choice, both in proof.chosen.items()}
-    cells = Node.of_streams({name: getattr(proof, name) for name in STREAMS}, vertices).open_cells(lower, upper)
     assert len(cells) == 2
     for _, low, up in cells:
         assert ((points >= low - 1e-9) & (points <= up + 1e-9)).all(axis=1).any()
@@ -242,22 +266,32 @@ def test_what_was_begun_goes_on_when_a_face_has_cut_the_contact_off(monkeypatch)
     around = Box.around(*bounds(polytope))
     with monkeypatch.context() as patched:
         # A search that does not look for contacts proves some cells before one is met.
-        patched.setattr(Search, "_scout", lambda *_: False)
+        patched.setattr(Search, "scout", lambda *_: [])
         patched.setattr(bodies, "CLOSE", -1.0)
         blind = certify(scene, polytope, cells=20, box=around)
     assert blind.outcome is Outcome.INCONCLUSIVE
-    first = CellCertification(scene, polytope, box=around).certify(0, CELLS, begun=blind.partition)
+    first = CellCertification(scene, polytope, box=around).go_on(0, CELLS, [blind.subtrees])
     check_refuted(scene, polytope, 0, first)
     assert nodes(scene, first).count(PLANE) > 0
     c = np.array([0.0, 1.0])
     assert (first.weakness.points @ c > 0.58).all()
     smaller, elsewhere = with_face(scene, polytope, c, 0.58), with_face(scene, polytope, -c, 0.58)
-    result = CellCertification(scene, smaller, box=around).certify(0, CELLS, begun=first.partition)
+    shared = CellCertification(scene, smaller, box=around)
+    last = shared.go_on(0, CELLS, [first.subtrees])
+    assert last.open_cells == 0
+    result = shared.put_together(0, [[r.subtrees] for r in (blind, first, last)])
     check_certified(scene, smaller, 0, result)
-    before, after = (partition(scene, r).planes for r in (first, result))
+    before, after = unpack(first.subtrees, "subtrees")[1]["planes"], PartitionProof.from_bytes(result.proof, scene).planes
     assert all((plane == after).all(axis=(1, 2)).any() for plane in before)
-    again = CellCertification(scene, elsewhere, box=around).certify(0, CELLS, begun=first.partition)
+    again = CellCertification(scene, elsewhere, box=around).go_on(0, CELLS, [first.subtrees])
     check_refuted(scene, elsewhere, 0, again)
+
+
+def gone_on_with(shared, first):
+    """The result of a pair that is searched to its end from where the first search left it."""
+    last = shared.go_on(0, CELLS, [first.subtrees])
+    assert last.open_cells == 0
+    return shared.put_together(0, [[first.subtrees], [last.subtrees]])
 
 
 @pytest.mark.usefixtures("one_piece")
@@ -265,10 +299,10 @@ def test_cells_that_a_new_face_leaves_outside_are_shown_to_miss_the_polytope():
     scene, polytope = passing(0.6, CLOSE)
     around = Box.around(*bounds(polytope))
     first = certify(scene, polytope, cells=1, box=around)
-    proof = partition(scene, first)
-    joint, value = proof.nodes[0], proof.cuts[0]
+    arrays = unpack(first.subtrees, "subtrees")[1]
+    joint, value = arrays["nodes"][0], arrays["cuts"][0]
     smaller = with_face(scene, polytope, np.eye(2)[joint], value - 0.05)
-    result = CellCertification(scene, smaller, box=around).certify(0, CELLS, begun=first.partition)
+    result = gone_on_with(CellCertification(scene, smaller, box=around), first)
     check_certified(scene, smaller, 0, result)
     assert nodes(scene, result)[-1] == EMPTY
 
@@ -281,14 +315,18 @@ def test_multipliers_of_the_joint_limits_stay_theirs_when_faces_are_added():
     limits = scene.polytope([], [])
     around = Box(np.zeros(2), np.full(2, 0.7))
     shared = CellCertification(scene, limits, box=around)
-    partial = next(r for r in (shared.certify(0, cells) for cells in range(1, 50)) if len(partition(scene, r).faces))
+    partial = next(r for r in (shared.certify(0, cells) for cells in range(1, 50)) if len(faces(r)))
     assert partial.outcome is Outcome.INCONCLUSIVE
-    proof = partition(scene, partial)
     smaller = with_face(scene, with_face(scene, limits, [1.0, 1.0], 1.1), [-1.0, -1.0], 1.1)
-    result = CellCertification(scene, smaller, box=around).certify(0, CELLS, begun=partial.partition)
+    result = gone_on_with(CellCertification(scene, smaller, box=around), partial)
     check_certified(scene, smaller, 0, result)
-    kept = partition(scene, result)
-    assert {*proof.faces.tolist()} <= {face - 2 for face in kept.faces.tolist()}
+    kept = PartitionProof.from_bytes(result.proof, scene)
+    assert {*faces(partial)} <= {face - 2 for face in kept.faces.tolist()}
+
+
+def faces(result):
+    """The faces of the multipliers that a search has left."""
+    return unpack(result.subtrees, "subtrees")[1]["faces"].tolist()
 
 
 def blocks(y):

@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from certifier.partition.tree import OPEN, Node, Streams, joined
+from certifier.partition.subtrees import Subtrees, dealt, open_cells, put_together
+from certifier.partition.tree import OPEN, Node, OpenCell, Streams, joined, of_streams, to_streams
 from certifier.proof.partition import EMPTY, PLANE, STREAMS
 
 N, K = 3, 2
@@ -59,10 +60,11 @@ def content(node):
 @settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(0, 7))
 def test_a_tree_survives_being_arrays(seed, depth):
-    tree = random_tree(np.random.default_rng(seed), -np.ones(N), np.ones(N), depth)
-    arrays = tree.to_streams(K)
+    rng = np.random.default_rng(seed)
+    trees = [random_tree(rng, -np.ones(N), np.ones(N), depth) for _ in range(seed % 3 + 1)]
+    arrays = to_streams(trees, K)
     assert {name: array.dtype for name, array in arrays.items()} == STREAMS
-    assert content(Node.of_streams(arrays, VERTICES)) == content(tree)
+    assert [content(tree) for tree in of_streams(arrays, VERTICES, len(trees))] == [content(tree) for tree in trees]
 
 
 @settings(max_examples=60)
@@ -90,6 +92,40 @@ def test_the_lower_part_comes_first():
         ([0.0, 0.25], [0.5, 1.0]),
         ([0.5, 0.25], [1.0, 1.0]),
     ]
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 4))
+def test_subtrees_of_rounds_in_parts_are_put_together_to_the_tree_that_was_grown(seed, most_parts):
+    """Every round deals the open cells to parts and grows a random subtree in each; faces are added before the limits between rounds."""
+    rng, faces = np.random.default_rng(seed), 9
+    root = Node()
+    given, rounds = [OpenCell(root, -np.ones(N), np.ones(N))], []
+    parts = 1
+    while given and len(rounds) < 4:
+        files, following = [], []
+        for part in range(parts):
+            mine = dealt(given, part, parts)
+            for node, lower, upper in mine:
+                depth = 0 if len(rounds) == 3 else int(rng.integers(4))
+                vars(node).update(vars(random_tree(rng, lower, upper, depth)))
+                node.coarse = bool(rng.integers(2))
+            left = Subtrees.of(mine, faces)
+            files.append(left.to_bytes(K))
+            following += left.open_cells
+        rounds.append(files)
+        read = open_cells(files)
+        assert [(cell.node.coarse, cell.lower.tolist(), cell.upper.tolist()) for cell in read] == [
+            (cell.node.coarse, cell.lower.tolist(), cell.upper.tolist()) for cell in following
+        ]
+        given, parts = following, int(rng.integers(1, most_parts + 1))
+    together = put_together(rounds, faces, 2, VERTICES)
+    assert content(together) == content(root)
+    # The last two faces are the limits; others that came before them have moved them up.
+    moved = put_together(rounds, faces + 5, 2, VERTICES)
+    for node, other in zip(together.preorder(), moved.preorder(), strict=True):
+        if node.streams is not None:
+            assert other.streams.faces.tolist() == [face + 5 if face >= faces - 2 else face for face in node.streams.faces.tolist()]
 
 
 def test_nothing_joined_is_empty_streams():

@@ -1,0 +1,90 @@
+"""A search leaves subtrees: what has become of the cells that it was given. Later searches go on with their open cells.
+
+The first search of a pair is given one cell, the root. What it leaves open is dealt out to the *parts* of the next round, a cell to each in
+turn, and so on. When no cell is open, the subtrees of all rounds are put together to one tree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from certifier.partition.tree import OPEN, Node, OpenCell, of_streams, to_streams
+from certifier.proof.container import FORMAT, pack, unpack
+from certifier.proof.partition import STREAMS
+
+KIND = "subtrees"
+
+
+@dataclass(frozen=True, eq=False)
+class Subtrees:
+    """Holds what one search has left.
+
+    Attributes:
+        roots: a tree for each cell that the search was given.
+        open_cells: the cells that are open in them, in order.
+        faces: how many faces the polytope had, to which the multipliers belong.
+    """
+
+    roots: Sequence[Node]
+    open_cells: Sequence[OpenCell]
+    faces: int
+
+    @classmethod
+    def of(cls, given: Sequence[OpenCell], faces: int) -> Subtrees:
+        """Returns what a search has left of the cells that it was given."""
+        return cls([node for node, _, _ in given], [cell for node, *bounds in given for cell in node.open_cells(*bounds)], faces)
+
+    def to_bytes(self, k: int) -> bytes:
+        """Returns the subtrees as a file; their planes move with k joints."""
+        arrays = {
+            "lower": np.array([lower for _, lower, _ in self.open_cells]),
+            "upper": np.array([upper for _, _, upper in self.open_cells]),
+            "coarse": np.array([node.coarse for node, _, _ in self.open_cells], dtype=np.int8),
+            **to_streams(self.roots, k),
+        }
+        return pack({"format": FORMAT, "kind": KIND, "roots": len(self.roots), "faces": self.faces}, arrays)
+
+
+def open_cells(files: Sequence[bytes]) -> list[OpenCell]:
+    """Returns the cells that the parts of a round have left open, in order, each with a node of its own."""
+    found = []
+    for data in files:
+        arrays = unpack(data, KIND)[1]
+        nodes = (Node(coarse=bool(coarse)) for coarse in arrays["coarse"])
+        found += [OpenCell(*cell) for cell in zip(nodes, arrays["lower"], arrays["upper"], strict=True)]
+    return found
+
+
+def dealt(cells: Sequence[OpenCell], part: int, parts: int) -> Sequence[OpenCell]:
+    """Returns the cells that this part of a round is given, of so many parts."""
+    return cells[part::parts]
+
+
+def put_together(rounds: Sequence[Sequence[bytes]], faces: int, limits: int, vertices: Mapping[int, int]) -> Node:
+    """Returns the tree of a pair from what the parts of all its rounds have left.
+
+    Args:
+        faces: how many faces the polytope has now; faces were added since before the last ``limits`` ones.
+        vertices: as for :func:`certifier.partition.tree.of_streams`.
+    """
+    root = Node()
+    still_open = [root]
+    for files in rounds:
+        following: list[Node] = []
+        for part, data in enumerate(files):
+            for node, grown in zip(still_open[part :: len(files)], _roots(data, faces, limits, vertices), strict=True):
+                vars(node).update(vars(grown))
+                following += [below for below in node.preorder() if below.kind == OPEN]
+        still_open = following
+    return root
+
+
+def _roots(data: bytes, faces: int, limits: int, vertices: Mapping[int, int]) -> Iterator[Node]:
+    """Gives the trees of a file, with the numbers that the polytope's faces have now."""
+    header, arrays = unpack(data, KIND)
+    added, before = faces - header["faces"], header["faces"] - limits
+    moved = np.where(arrays["faces"] >= before, arrays["faces"] + added, arrays["faces"]).astype(STREAMS["faces"])
+    yield from of_streams({**arrays, "faces": moved}, vertices, header["roots"])
