@@ -484,6 +484,9 @@ def prove(
 
     Every piece gets multipliers with z_0 f - sum_j z_j g_j > 0 at its control points, or z_0 = 0 where the piece misses the polytope.
 
+    Where a joint turns by more than 180 degrees, the denominator has negative control values, and what is proved there with a face need not
+    be when the face is moved in. Such a piece is halved in this joint, unless f alone will do.
+
     Args:
         c, den, constant, own, outside, rest: as for :func:`lowest`.
         ends: as for :func:`evaluate`.
@@ -515,7 +518,10 @@ def prove(
         count += 1
         cc, now = stack[top], stack_den[top]
         size, weight = max(cc[0].max(), -cc[0].min()), 1.0
+        wide = -1
         for i in range(k):
+            if now[0, i].min() < 0:
+                wide = i
             largest = np.abs(now[0, i]).max()
             weight *= largest
             reach[i] = np.abs(now[1, i]).max() / largest
@@ -535,6 +541,8 @@ def prove(
                 t += abs(rest[j, i])
             scale[1 + j] = t * weight
         z[:] = stack_z[top]
+        if wide >= 0:
+            z[1:] = 0.0
         if count == 1:
             whole[:] = scale
         # The verifier's bound of rounding errors is about the whole cell.
@@ -544,7 +552,7 @@ def prove(
             z[:] = 0.0
             z[0] = 1.0
             found = lowest(z, cc, now, local, own, g_out, rest, slopes)[0] > least[0]
-        if not found and m:
+        if not found and m and wide < 0:
             n = choose(cc, now, local, own, g_out, rest, scale, stack_z[top], chosen)
             for _ in range(ATTEMPTS):
                 some[0], some[1 : 1 + n] = scale[0], scale[1 + chosen[:n]]
@@ -558,7 +566,7 @@ def prove(
                     found = True
                 if kind != REFUTED:
                     break
-                # Where a joint turns by more than 180 degrees some weights are negative, so the spot may lie outside of the piece.
+                # The spot is a mean of control points, which may lie outside of the piece.
                 within = np.abs(spot[k:]).max() <= 1 if o + r else True
                 for i in range(k):
                     within = within and ends[0, i] <= spot[i] <= ends[1, i]
@@ -605,7 +613,7 @@ def prove(
             return UNDECIDED
         if count >= most or top + 2 > DEPTH or lengths[0] >= len(codes):
             return UNDECIDED
-        axis = steepest(cc, k)
+        axis = wide if wide >= 0 else steepest(cc, k)
         halvings[axis] += 1
         codes[lengths[0]] = axis
         lengths[0] += 1

@@ -126,17 +126,6 @@ class Search:
                 push(half)
         return report
 
-    def _halves(self, cell: Cell, joint: int, value: float, points: Array) -> list[Cell]:
-        """Returns the lower and the upper part of a cell, with nodes of their own."""
-        halves = []
-        for below in (True, False):
-            lower, upper = cell.lower.copy(), cell.upper.copy()
-            (upper if below else lower)[joint] = value
-            of_points, of_samples = ((X[:, joint] <= value) == below for X in (points, cell.samples))
-            node = Node(coarse=cell.node.coarse)
-            halves.append(Cell(self._area, node, lower, upper, points[of_points][:KEPT], cell.samples[of_samples]))
-        return halves
-
     def scout(self, seed: int) -> list[Array]:
         """Returns contacts that a look at all of the polytope finds, (n,) each; other seeds look elsewhere."""
         area, contacts = self._area, []
@@ -150,6 +139,17 @@ class Search:
             if gap <= 0:
                 contacts.append(s)
         return contacts
+
+    def _halves(self, cell: Cell, joint: int, value: float, points: Array) -> list[Cell]:
+        """Returns the lower and the upper part of a cell, with nodes of their own."""
+        halves = []
+        for below in (True, False):
+            lower, upper = cell.lower.copy(), cell.upper.copy()
+            (upper if below else lower)[joint] = value
+            of_points, of_samples = ((X[:, joint] <= value) == below for X in (points, cell.samples))
+            node = Node(coarse=cell.node.coarse)
+            halves.append(Cell(self._area, node, lower, upper, points[of_points][:KEPT], cell.samples[of_samples]))
+        return halves
 
     def _middle_of(self, cell: Cell, joint: int) -> float | None:
         """Returns where to cut a cell, in the middle of its angle; None where it is narrow in all joints."""

@@ -112,3 +112,24 @@ def test_the_least_control_value_is_below_the_function_everywhere(seed, k, o, r,
         values.append(z[0] * (c[0] + x @ c[1:]) - (z[1:] @ g) * T[0] - z[1:] @ own @ T[1:])
     assert least == pytest.approx(np.min(values), rel=1e-9, abs=1e-12)
     assert least == pytest.approx(np.min(values, axis=0)[place], rel=1e-9, abs=1e-12)
+
+
+def test_faces_help_only_in_pieces_that_turn_less_than_half_a_turn():
+    """Else a proof would not hold any more when a face is moved in: where the denominator has a negative control value, less is more.
+
+    One joint turns 300 degrees. f is two faces and a little more, so it is proved by both on the whole range, though it is negative there.
+    """
+    end = np.tan(np.radians(75))
+    ends = np.array([[-end], [end], [np.cos(np.radians(75))], [np.cos(np.radians(75))]])
+    den = bernstein_form.factors(np.array([[1.0, ends[2, 0] * ends[3, 0] * (1 - end * end), 1.0]]), ends)
+    assert den[0].min() < 0
+    own, rest = np.array([[-1.0], [1.0]]), np.zeros((2, 0))
+    c = (np.ones(2) @ (0.5 * den[0, 0] + own * den[1, 0]) + 0.02)[None]
+    assert c.min() < 0
+    constant, outside = np.full(2, 0.5), np.zeros((2, 0))
+    codes, counts, faces, values = (np.zeros(100, kind) for kind in (np.int8, np.int16, np.int16, np.float32))
+    lengths, point, halvings = np.zeros(3, np.int64), np.zeros(1), np.zeros(1, np.int64)
+    out = (codes, counts, faces, values, lengths, point, halvings, np.empty((bernstein_form.DEPTH, 1, 4)))
+    kind = bernstein_form.prove(c, den, ends, constant, own, outside, rest, 1e-7, 100, *out)
+    assert kind == bernstein_form.PROVED
+    assert codes[0] == 0, "all of the range is not proved at once"
