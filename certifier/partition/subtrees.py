@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from certifier.proof.container import FORMAT, pack, unpack
 from certifier.proof.partition import STREAMS
 
 KIND = "subtrees"
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +60,8 @@ def open_cells(files: Sequence[bytes]) -> list[OpenCell]:
     return found
 
 
-def dealt(cells: Sequence[OpenCell], part: int, parts: int) -> Sequence[OpenCell]:
-    """Returns the cells that this part of a round is given, of so many parts."""
+def dealt(cells: Sequence[T], part: int, parts: int) -> Sequence[T]:
+    """Returns the cells, or their nodes, that this part of a round is given, of so many parts."""
     return cells[part::parts]
 
 
@@ -75,7 +77,7 @@ def put_together(rounds: Sequence[Sequence[bytes]], faces: int, limits: int, ver
     for files in rounds:
         following: list[Node] = []
         for part, data in enumerate(files):
-            for node, grown in zip(still_open[part :: len(files)], _roots(data, faces, limits, vertices), strict=True):
+            for node, grown in zip(dealt(still_open, part, len(files)), _roots(data, faces, limits, vertices), strict=True):
                 vars(node).update(vars(grown))
                 following += [below for below in node.preorder() if below.kind == OPEN]
         still_open = following

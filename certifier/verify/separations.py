@@ -78,7 +78,8 @@ def gap_of_share(scene: Scene, proof: PartitionProof, share: int, shares: int) -
     """
     check_contained(scene, proof.all_volumes)
     check = _Check(scene, [proof])
-    return min((check.gap(part) for part in itertools.islice(check.parts(), share, None, shares)), default=np.inf)
+    gap = min((check.gap(part) for part in itertools.islice(check.parts(), share, None, shares)), default=np.inf)
+    return check.statement(proof, gap).gap if shares == 1 else gap
 
 
 def verify_separation(proof: Separation, processes: int = 1, progress: Progress | None = None) -> PairStatement:
