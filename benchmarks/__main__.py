@@ -48,7 +48,7 @@ def _scene(args: Namespace, screen: Screen) -> dict[str, Any]:
 
 def _growth(args: Namespace, screen: Screen) -> dict[str, Any]:
     old = None if args.into is None else json.loads(args.into.read_text(encoding="utf-8"))
-    document = growth.growth(args.scenes, args.against is not None, args.limit, screen.line)
+    document = growth.growth(args.scenes, args.against is not None, args.limit, screen.line, args.way)
     if old is None:
         return document
     document = growth.merged(old, document)
@@ -91,7 +91,10 @@ def _parser() -> ArgumentParser:
     grown.add_argument(
         "--limit", type=float, default=growth.LIMIT, metavar="SECONDS", help=f"end each way after this long; default {growth.LIMIT:g}"
     )
-    grown.add_argument("--into", type=Path, metavar="FILE", help="put the rows into this document, in place of the same examples' rows")
+    grown.add_argument("--way", action="append", choices=[growth.IRIS, *growth.WAYS], help="measure this way only; may be said again")
+    grown.add_argument(
+        "--into", type=Path, metavar="FILE", help="put the rows into this document, in place of the same examples' rows of the same ways"
+    )
     kinds.add_parser("agreement", parents=[as_json], help="compare verdicts on hundreds of pairs with Drake's")
     kinds.add_parser("scaling", parents=[against], help="measure how the cost grows with obstacles, joints and faces")
     surveyed = kinds.add_parser("survey", parents=[as_json], help="certify every pair of every scene on every region")

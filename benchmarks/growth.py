@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from functools import partial
 from typing import Any
 
 from benchmarks import catalogue, measure
@@ -18,8 +19,13 @@ from certifier.errors import CirisError
 from certifier.growth.options import GrowthOptions
 from certifier.jobs.local import grow
 from certifier.jobs.reference import Reference
+from certifier.jobs.share import SampledProposal
 from certifier.model import Array, Scene
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
+from certifier.proof.partition import PartitionProof
+from certifier.proof.region import RegionProof
+from certifier.seeding.options import SeedOptions
+from certifier.seeding.propose import propose
 from certifier.verify.region import verify_region
 from client.cores import cores
 
@@ -29,6 +35,8 @@ WAYS: dict[str, dict[str, Any]] = {
     "uniform contraction": {"contraction": "uniform", "pushes": 0, "max_rounds": 0},
 }
 """Each way to grow has these options of a grow job, with the default seeding."""
+IRIS = "Drake's IRIS"
+"""This way proposes a region, and proves nothing."""
 PICTURED = ("whole", "targeted")
 """The picture shows these ways."""
 LIMIT = 300.0
@@ -45,13 +53,14 @@ Other programs on the machine then disturb all sides alike.
 """
 
 
-def growth(names: list[str], against: bool, limit: float, progress: Progress) -> dict[str, Any]:
+def growth(names: list[str], against: bool, limit: float, progress: Progress, only: Collection[str] | None = None) -> dict[str, Any]:
     """Grows a region on every example in every way, and returns the document of ``ciris bench growth``.
 
     Every row names its machine, because a document may be put together from several measurements: see :func:`merged`.
 
     Args:
         limit: growing one region of ``ways`` ends after so many seconds with the best so far; Drake and what it is compared with have none.
+        only: the ways to measure; None for all.
     """
     small = {**_seed(catalogue.EXAMPLES[0]), "method": "box"}
     for options in WAYS.values():  # These first runs load the compiled kernels and do not count.
@@ -59,20 +68,25 @@ def growth(names: list[str], against: bool, limit: float, progress: Progress) ->
     here = {"machine": measure.machine()}
     ways = []
     for name in names:
-        for way, options in WAYS.items():
-            ways.append({"scene": name, "way": way, **_grown(name, _seed(name), options, limit), **here})
+        ours = {way: partial(_grown, name, _seed(name), options, limit) for way, options in WAYS.items()}
+        for way, run in {IRIS: partial(_proposed, name), **ours}.items():
+            if only is not None and way not in only:
+                continue
+            ways.append({"scene": name, "way": way, **run(), **here})
             progress(_line(ways[-1]))
     sides = [row | here for name in AGAINST if name in names for row in _against(name, progress)] if against else []
     return {"benchmark": "growth", "ways": ways, "against": sides}
 
 
 def merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
-    """Returns the document ``old`` with the rows of ``new`` in place of the same examples' rows, in the order of the catalogue."""
-    rows = {}
+    """Returns the document ``old`` with the rows of ``new`` in place of the same examples' rows of the same ways, in order."""
+    order, rows = [IRIS, *WAYS], {}
     for part in ("ways", "against"):
-        again = {row["scene"] for row in new[part]}
-        kept = [row for row in old[part] if row["scene"] not in again]
-        rows[part] = sorted(kept + new[part], key=lambda row: catalogue.SCENES.index(row["scene"]))
+        again = {(row["scene"], row["way"]) for row in new[part]}
+        kept = [row for row in old[part] if (row["scene"], row["way"]) not in again]
+        known = [row["way"] for row in kept + new[part]]
+        places = {way: (order.index(way) if way in order else len(order), known.index(way)) for way in known}
+        rows[part] = sorted(kept + new[part], key=lambda row: (catalogue.SCENES.index(row["scene"]), places[row["way"]]))
     return {**new, **rows}
 
 
@@ -155,12 +169,45 @@ def _grown(name: str, seed: dict[str, Any], options: dict[str, Any], limit: floa
         "seeding_seconds": manifest["provenance"]["seeding_seconds"],
         "verify_seconds": time.perf_counter() - again,
         "proof_bytes": len(region.proof),
+        "leaves": _leaves(region.proof),
         "share": manifest["share"]["value"],
         "share_stderr": manifest["share"]["stderr"],
         "ellipsoid": manifest["volume"]["ellipsoid"],
         "faces": len(manifest["halfspace_offsets"]),
         "curve": manifest["provenance"]["growth_curve"],
         "ended": manifest["provenance"]["reason"],
+    }
+
+
+def _leaves(data: bytes) -> int:
+    """Returns how many cells the partitions in a region's proof have."""
+    proofs = RegionProof.from_bytes(data).proofs
+    return sum(int((proof.nodes < 0).sum()) for proof in proofs if isinstance(proof, PartitionProof))
+
+
+def _proposed(name: str) -> dict[str, Any]:
+    """Measures the seeding alone. The proposal is no certified region; ``ended`` says which part of its q-volume is in collision."""
+    scene, start, processor = catalogue.scene(name), time.perf_counter(), time.process_time()
+
+    def spent() -> dict[str, float]:
+        return {"seconds": time.perf_counter() - start, "processor_seconds": time.process_time() - processor}
+
+    try:
+        proposal = propose(scene, SeedOptions.from_document(_seed(name)))
+    except CirisError as error:
+        return {**spent(), "ellipsoid": 0.0, "faces": 0, "curve": [], "ended": str(error)}
+    took = spent()
+    polytope = scene.polytope(proposal.C, proposal.d)
+    found = SampledProposal.of(scene, polytope)
+    return {
+        **took,
+        "seeding_seconds": took["seconds"],
+        "share": 1.0,
+        "share_stderr": 0.0,
+        "ellipsoid": inscribed_ellipsoid(polytope).volume,
+        "faces": len(polytope.d),
+        "curve": [],
+        "ended": f"not certified; of {found.free.size} samples {int((~found.free).sum())} are in collision",
     }
 
 

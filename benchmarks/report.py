@@ -136,7 +136,7 @@ def _growth(document: Document) -> list[str]:
         cells = [row["scene"], row["way"], *_share(row), *line(row), seconds(row["processor_seconds"])]
         cells += [seconds(row["seeding_seconds"]) if "seeding_seconds" in row else "", str(len(row["curve"])), *_proof(row), row["ended"]]
         rows.append(cells)
-    parts = [_machines(document["ways"]), _table([*header, "certified regions", "proof MB", "verified in", "ended"], rows)]
+    parts = [_machines(document["ways"]), _table([*header, "certified regions", "proof MB", "cells in it", "verified in", "ended"], rows)]
     if document["against"]:
         rows = []
         for row in document["against"]:
@@ -164,7 +164,10 @@ def _share(row: Document) -> list[str]:
 
 
 def _proof(row: Document) -> list[str]:
-    return [f"{row['proof_bytes'] / 1e6:.2f}", seconds(row["verify_seconds"])] if "proof_bytes" in row else ["", ""]
+    """Returns the proof's megabytes, its cells, and for how long it was verified."""
+    if "proof_bytes" not in row:
+        return ["", "", ""]
+    return [f"{row['proof_bytes'] / 1e6:.2f}", str(row.get("leaves", "")), seconds(row["verify_seconds"])]
 
 
 def _agreement(document: Document) -> list[str]:

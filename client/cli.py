@@ -160,10 +160,7 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         help="joint positions that the region must contain as well; may be given several times",
     )
-    methods = (
-        "iris_np2 (default up to 8 joints) and iris_zo use Drake's IRIS; limits (default beyond) takes the joint limits; "
-        "box takes a box around the seed"
-    )
+    methods = "iris_np2 (default) and iris_zo use Drake's IRIS; limits takes the joint limits; box takes a box around the seed"
     grow.add_argument("--method", help=f"how the first polytope is found, which is then certified, or cut until it is: {methods}")
     grow.add_argument(
         "--contraction",

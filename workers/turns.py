@@ -78,7 +78,7 @@ def coordinate(job_id: str) -> None:
 def _decide(turn: Turn) -> Transition:
     if turn.growth is None:
         left = None if turn.deadline_at is None else (turn.deadline_at - utcnow()).total_seconds()
-        if not GrowthOptions.from_document(turn.options).by_cells(load_scene(turn.scene_id).n):  # the forecast is about the program (11)
+        if not GrowthOptions.from_document(turn.options).by_cells:  # the forecast is about the program (11)
             admission.check(_forecast(turn.scene_id), settings(), left)
     return next_transition(load_scene(turn.scene_id), turn.options, turn.growth, turn.report)
 
@@ -119,20 +119,21 @@ def _report(session: Session, job: JobRow) -> Report | None:
     action = job.action or {}
     if action["kind"] == Certify.kind:
         iteration = session.get_one(IterationRow, (job.id, action["iteration"]))
-        return None if iteration.state == IterationState.RUNNING else _outcomes(session, iteration)
+        return None if iteration.state == IterationState.RUNNING else _outcomes(session, job, iteration)
     step = steps.of_turn(session, job, StepKind(action["kind"]))
     if step is None or step.state in unfinished(STEP):
         return None
     return step_report(StepKind(step.kind), StepState(step.state), step.report or {})
 
 
-def _outcomes(session: Session, iteration: IterationRow) -> Outcomes:
+def _outcomes(session: Session, job: JobRow, iteration: IterationRow) -> Outcomes:
     """Returns the report on a certification that has ended, from its rows."""
     action = certify_action(iteration, pairs.order(session, iteration))
     rows = pairs.reached(session, iteration)
     weaknesses = (None if row.weakness is None else Weakness.from_document(row.weakness) for row in rows)
     reached = ((row.pair_index, Outcome(row.state), weakness, row.open_cells) for row, weakness in zip(rows, weaknesses, strict=True))
-    return Outcomes.of_parts(action, reached)
+    passed = 0.0 if job.deadline_at is None else (utcnow() - job.created_at) / (job.deadline_at - job.created_at)
+    return Outcomes.of_parts(action, reached, passed)
 
 
 def _save(turn: Turn, transition: Transition) -> bool:

@@ -74,7 +74,7 @@ class GrowOptions(Request):
 class Seed(Request):
     """Says where growing begins and how the first polytope is found. An option that is left out has the certifier's default."""
 
-    method: Method | None = Field(None, description="How the first polytope is found. Default: `iris_np2` up to 8 joints, `limits` beyond.")
+    method: Method | None = Field(None, description="How the first polytope is found. Default: `iris_np2`.")
     q: Vector | None = Field(
         None, description="The seed: joint positions in radians or metres, in position order. Every method but `polytope` needs it."
     )

@@ -38,14 +38,15 @@ class Certify:
         center: (n,) interior point; None for the Chebyshev centre.
         pairs: indices into ``scene.pairs`` to certify, those most likely to fail first.
         reuse: pair index -> earlier iteration whose proof, on a superset, serves here too.
-        hard: pairs that failed on a larger polytope; nothing less than all faces is tried for them.
+        hard: pairs that failed on a larger polytope: nothing less than all faces is tried for them. Cell by cell: pairs whose open cells
+            are going to be cut off where the bodies are near.
         failures: end after this many failures, in the order of ``pairs`` (B.3); pairs not reached are left out of the report. None to
             certify all pairs.
         cells: so many cells of each pair are looked at; 1 for the program (11) of the papers on all of the polytope.
         box: the root cell of all partitions; None for the polytope's smallest box.
         begun: the iteration in which the partitions of all pairs were begun; None where they begin in this one.
         parts: pair index -> how many parts its open cells are dealt to; 1 for a pair that is left out.
-        ending: pairs whose open cells are going to be cut off.
+        ending: pairs whose open cells are all going to be cut off.
     """
 
     kind: ClassVar[str] = "certify"
@@ -108,15 +109,17 @@ class Outcomes:
     Attributes:
         weaknesses: pair index -> where it fails; pairs of which nothing is known are left out.
         open_cells: pair index -> how many cells of its partition are open, where it has one and is not certified.
+        passed: the share of the time from the job's start to its deadline that has passed; 0 without a deadline.
     """
 
     action: Certify
     outcomes: dict[int, Outcome]
     weaknesses: dict[int, Weakness] = field(default_factory=dict)
     open_cells: dict[int, int] = field(default_factory=dict)
+    passed: float = 0.0
 
     @classmethod
-    def of_parts(cls, action: Certify, reached: Iterable[tuple[int, Outcome, Weakness | None, int | None]]) -> Self:
+    def of_parts(cls, action: Certify, reached: Iterable[tuple[int, Outcome, Weakness | None, int | None]], passed: float = 0.0) -> Self:
         """Returns the report from the results of the parts of pairs, in their order: pair index, outcome, weakness, open cells."""
         found: dict[int, list[tuple[Outcome, Weakness | None, int | None]]] = {}
         for index, outcome, weakness, cells in reached:
@@ -128,7 +131,7 @@ class Outcomes:
                 weaknesses[index] = Weakness.of_parts(known)
             if left := [cells for _, _, cells in results if cells is not None]:
                 open_cells[index] = sum(left)
-        return cls(action, outcomes, weaknesses, open_cells)
+        return cls(action, outcomes, weaknesses, open_cells, passed)
 
     @property
     def failures(self) -> list[int]:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal
 
 from certifier.errors import RegionError
-from certifier.seeding.options import IRIS, MOST_IRIS_JOINTS
+from certifier.seeding.options import IRIS
 
 EFFORT = (
     (4, {"contractions": 2, "pushes": 10, "max_rounds": 3}),
@@ -72,14 +72,14 @@ class GrowthOptions:
     backoff: int = 2
     random_seed: int = 0
 
-    def by_cells(self, joints: int) -> bool:
-        """Returns whether pairs are certified cell by cell in a scene of so many joints, and not by the program (11) on all of P."""
+    @property
+    def by_cells(self) -> bool:
+        """Returns whether pairs are certified cell by cell, and not by the program (11) on all of P."""
         if self.kind == "certify":
             return (self.cells or 1) > 1
         if self.contraction is not None:
             return self.contraction == "whole"
-        method = self.seed.get("method")
-        return method in IRIS or (method is None and joints <= MOST_IRIS_JOINTS)
+        return self.seed.get("method") in (None, *IRIS)
 
     def to_document(self) -> dict[str, Any]:
         """Returns the options as JSON-able data."""

@@ -112,6 +112,7 @@ class Whole:
         begun: the iteration with which this stage began; None before it.
         open_cells: pair index -> how many cells of its partition are open.
         spent: pair index -> how many cells were looked at.
+        late: pair index -> how many these were when the deadline came near; empty before.
     """
 
     stage: int
@@ -122,6 +123,7 @@ class Whole:
     begun: int | None = None
     open_cells: dict[int, int] = field(default_factory=dict)
     spent: dict[int, int] = field(default_factory=dict)
+    late: dict[int, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +197,7 @@ class GrowthState:
 def _whole(document: dict[str, Any] | None) -> Whole | None:
     if document is None:
         return None
-    counts = {name: _by_pair(document[name]) for name in ("holds", "open_cells", "spent")}
+    counts = {name: _by_pair(document[name]) for name in ("holds", "open_cells", "spent", "late")}
     return replace(_part(Whole, {**document, **dict.fromkeys(counts, None)}), **counts)
 
 

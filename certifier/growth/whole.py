@@ -34,14 +34,18 @@ as so many slices of its effort even where it has fewer parts."""
 VERIFIED = 5 * SLICE
 """When no cell is open, what so many cells came to is a part to verify."""
 HARD = 6 * SLICE
-"""When so many cells of a pair were looked at, its open cells are cut off too, not only contacts."""
+"""When so many cells of a pair were looked at, its open cells are cut off where the bodies are near, not only contacts."""
 LOSS, PATIENCE = 0.002, 36 * SLICE
 """While a hard pair is worked on, its faces lose this share of the polytope in a round at most, and twice as much after PATIENCE cells."""
 FAST_LOSS = 0.05
 """They lose this share at most before a pair is hard, and when its effort is spent. Then it is twice as much in every round."""
 CONTACT_LOSS = 0.01
 """For contacts, which have to go sooner or later, they lose this share at least where that is needed."""
-EARLY_EFFORT = 6 * SLICE
+LATE = 0.6
+"""When this share of the time until the deadline has passed, the effort counts as spent, so that a region comes of what was done."""
+LATE_LOSS = 0.01
+"""From then on faces for a pair lose this share at most in a round, and twice as much after PIECES slices more."""
+EARLY_EFFORT = 24 * SLICE
 """The effort of all stages but the last one, so that the first region comes soon."""
 
 
@@ -72,7 +76,8 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     holds = whole.holds | {i: action.iteration for i, outcome in report.outcomes.items() if outcome is Outcome.CERTIFIED}
     begun = action.iteration if action.begun is None else action.begun
     spent = whole.spent | {i: whole.spent.get(i, 0) + SLICE * max(action.parts.get(i, 1), PARTS) for i in action.pairs}
-    whole = replace(whole, holds=holds, begun=begun, open_cells=dict(report.open_cells), spent=spent)
+    late = whole.late or (spent if report.passed >= LATE else {})
+    whole = replace(whole, holds=holds, begun=begun, open_cells=dict(report.open_cells), spent=spent, late=late)
     if report.complete:
         if whole.stage + 1 < len(STAGES):
             return begin_stage(scene, state, start, whole.stage + 1)
@@ -105,12 +110,18 @@ def _corners(scene: Scene, pair: int, weakness: Weakness, most: float) -> list[t
 
 def _most_loss(state: GrowthState, whole: Whole, pair: int) -> float:
     """Returns which share of the polytope the faces for a pair may lose in this round, for points that are no contacts."""
-    effort, spent = state.options.cells or MOST_CELLS, whole.spent[pair]
-    if whole.stage + 1 < len(STAGES):
-        effort = min(effort, EARLY_EFFORT)
-    if HARD < spent < effort:
+    effort, spent = _effort(state, whole, pair), whole.spent[pair]
+    if whole.stage + 1 == len(STAGES) and HARD < spent < effort:
         return float(LOSS * 2.0 ** ((spent - HARD) // PATIENCE))
-    return float(min(FAST_LOSS * 2.0 ** max((spent - effort) // (PARTS * SLICE), 0), 1.0))
+    loss, more = (LATE_LOSS, PIECES * SLICE) if pair in whole.late else (FAST_LOSS, PARTS * SLICE)
+    return float(min(loss * 2.0 ** max((spent - effort) // more, 0), 1.0))
+
+
+def _effort(state: GrowthState, whole: Whole, pair: int) -> int:
+    """Returns how many cells of a pair are looked at before its open cells are cut off."""
+    effort = state.options.cells or MOST_CELLS
+    early = EARLY_EFFORT if whole.stage + 1 < len(STAGES) else effort
+    return min(effort, early, whole.late.get(pair, effort))
 
 
 def _parts(pairs: Sequence[int], whole: Whole) -> dict[int, int]:
@@ -139,12 +150,12 @@ def _next(scene: Scene, state: GrowthState) -> Transition:
         None,
         pairs,
         reuse=dict(whole.holds),
-        hard=[],
+        hard=[i for i in pairs if HARD <= whole.spent.get(i, 0) < _effort(state, whole, i)],
         failures=None,
         cells=SLICE,
         box=Box(whole.mid, whole.half),
         begun=whole.begun,
         parts=_parts(pairs, whole),
-        ending=[i for i in pairs if whole.spent.get(i, 0) >= min(HARD, state.options.cells or MOST_CELLS)],
+        ending=[i for i in pairs if whole.spent.get(i, 0) >= _effort(state, whole, i)],
     )
     return Transition(replace(state, next=state.next + 1), action)

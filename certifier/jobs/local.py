@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -37,22 +38,37 @@ class _Run:
         candidate: the last accepted candidate; None before there is one.
         proposal: what the region is grown from; None before there is a candidate.
         curve: the growth curve of the manifest.
+        start: when the job began.
     """
 
     scene: Scene
     seed: int
     progress: Progress
     processes: int = 1
+    deadline_s: float | None = None
+    start: float = field(default_factory=lambda: time.perf_counter())
     results: dict[int, dict[int, list[PairResult]]] = field(default_factory=dict)
     seeding_seconds: float = 0.0
     candidate: Candidate | None = None
     proposal: SampledProposal | None = None
     curve: list[dict[str, Any]] = field(default_factory=list)
 
-    def accept(self, candidate: Candidate, start: Start, seconds: float) -> None:
+    @property
+    def seconds(self) -> float:
+        """Returns for how long the job has run."""
+        return time.perf_counter() - self.start
+
+    @property
+    def passed(self) -> float:
+        """Returns the share of the time until the deadline that has passed; 0 without one."""
+        if self.deadline_s is None:
+            return 0.0
+        return self.seconds / self.deadline_s if self.deadline_s > 0 else math.inf
+
+    def accept(self, candidate: Candidate, start: Start) -> None:
         self.proposal = self.proposal or SampledProposal.of(self.scene, start.rows)
         share = self.proposal.share(candidate.polytope)["value"]
-        self.curve.append(growth_point(candidate.iteration, seconds, candidate.ellipsoid_volume, share))
+        self.curve.append(growth_point(candidate.iteration, self.seconds, candidate.ellipsoid_volume, share))
         self.candidate = candidate
 
     def certify(self, action: Certify) -> Outcomes:
@@ -69,7 +85,7 @@ class _Run:
             if failures == action.failures:
                 break
         reached = ((index, r.outcome, r.weakness, r.open_cells) for index, parts in found.items() for r in parts)
-        return Outcomes.of_parts(action, reached)
+        return Outcomes.of_parts(action, reached, self.passed)
 
     def left(self, iteration: int, index: int) -> list[bytes]:
         return [result.subtrees for result in self.results[iteration][index] if result.subtrees is not None]
@@ -101,8 +117,7 @@ def grow(
     Raises:
         CirisError: no region could be certified; the code is ``not_grown`` or that of the seeding's error.
     """
-    start = time.perf_counter()
-    run = _Run(scene, options.random_seed, progress, processes)
+    run = _Run(scene, options.random_seed, progress, processes, deadline_s)
     transition, late = begin(scene, options), False
     while not isinstance(transition.action, Finish):
         failure: CirisError | None = None
@@ -115,8 +130,8 @@ def grow(
             raise failure
         if transition.candidate:
             assert transition.state.start is not None, "what is grown comes from a proposal"
-            run.accept(transition.candidate, transition.state.start, time.perf_counter() - start)
-        late = deadline_s is not None and time.perf_counter() - start >= deadline_s
+            run.accept(transition.candidate, transition.state.start)
+        late = run.passed >= 1
         if late and not isinstance(transition.action, Finish):
             outcome = Outcome.INCONCLUSIVE if run.candidate is None else Outcome.CERTIFIED
             transition = Transition(transition.state, Finish(outcome, "the deadline was reached"))
@@ -130,7 +145,7 @@ def grow(
         "growth_curve": run.curve,
         "seeding_seconds": run.seeding_seconds,
         "pair_seconds": sum(result.seconds for found in run.results.values() for parts in found.values() for result in parts),
-        "seconds": time.perf_counter() - start,
+        "seconds": run.seconds,
     }
     return certified_region(scene, run.candidate, run.proofs(run.candidate), provenance, run.proposal, processes)
 

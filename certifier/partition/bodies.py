@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,10 +44,15 @@ TOUCH = 3e-4
 
 @dataclass(frozen=True, eq=False)
 class Separated:
-    """A plane separates the bodies on the polytope and the cell: (5, 1 + k), as a proof holds it, with its pieces and multipliers."""
+    """A plane separates the bodies on the polytope and the cell.
+
+    Attributes:
+        plane: (5, 1 + k), as a proof holds it, with the k joints that are in play for the bodies.
+        streams: the pieces and multipliers of either side.
+    """
 
     plane: Array
-    streams: Streams
+    streams: tuple[Streams, Streams]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,25 +74,21 @@ class Undecided:
 class Bodies:
     """Two volumes, in the frame of the plane.
 
-    Args:
-        play: position indices of the joints that the plane may move with, ascending.
-        choice: which of the volumes are coarse ones, as a proof holds it.
-
     Attributes:
-        joints: those that move one volume against the other, ascending.
+        joints: position indices of those that move one volume against the other, ascending.
         hulls: the bodies, in the space of the search.
         extent: half the size of the space that their vertices are seen in, in metres.
     """
 
-    def __init__(self, area: Area, frame: str, play: list[int], volumes: tuple[Volume, Volume], choice: int) -> None:
-        self._area, self._play, self.choice = area, play, choice
+    def __init__(self, area: Area, frame: str, volumes: tuple[Volume, Volume]) -> None:
+        self._area = area
         self._radii = [volume.radius + area.scene.padding for volume in volumes]
-        self._sides = [
-            Side(area, frame, volume, play, sign, radius) for volume, sign, radius in zip(volumes, (1.0, -1.0), self._radii, strict=True)
-        ]
         # A joint between the frame and both bodies moves neither against the other, but stays in the plane's frame.
-        self.joints = sorted({*self._sides[0].own, *self._sides[1].own})
-        self._places = [play.index(joint) for joint in self.joints]
+        self.joints = sorted({joint for volume in volumes for joint in area.kinematics.chain(frame, volume.body)})
+        self._sides = [
+            Side(area, frame, volume, self.joints, sign, radius)
+            for volume, sign, radius in zip(volumes, (1.0, -1.0), self._radii, strict=True)
+        ]
         seen = [area.kinematics.points(frame, volume.body, volume.vertices, area.samples[:64]).reshape(-1, 3) for volume in volumes]
         points = np.concatenate(seen)
         self._middle = (points.min(axis=0) + points.max(axis=0)) / 2
@@ -99,21 +101,21 @@ class Bodies:
         signs = np.array(list(itertools.product((False, True), repeat=min(len(self.joints), 12))))
         self._corners = signs if len(signs) <= CORNERS else None
 
-    def separate(self, cell: Cell, start: Array, seed: int) -> Separated | Undecided:
+    def separate(self, cell: Cell, start: Array) -> Separated | Undecided:
         """Looks for a plane on the polytope and a cell, and proves it.
 
         Args:
             start: (n,) a point of the polytope in the cell.
         """
         C, d = cell.inside.C, cell.inside.d
-        X, N = self._configurations(cell, start, seed)
+        X, N = self._configurations(cell, start)
         for _ in range(ROUNDS):
             kind, z, places, weights, N = self._look(cell, X, N)
             if kind != planes.FOUND:
                 break
             plane = self._in_s(cell, z)
             result = self._prove(cell, plane)
-            if isinstance(result, Streams):
+            if isinstance(result, tuple):
                 return Separated(plane, result)
             if isinstance(result, int) or len(X) == N:
                 return Undecided(X[:N].copy(), None, weights, result if isinstance(result, int) else None)
@@ -121,7 +123,7 @@ class Bodies:
             N += 1
         return Undecided(X[:N].copy(), X[places], weights)
 
-    def room(self, cell: Cell, start: Array, seed: int) -> float:
+    def room(self, cell: Cell, start: Array) -> float:
         """Returns how much room a plane has on a cell: its margin by the square of the cell's turn; 0 where no plane is found.
 
         Cells with more room are more often proved at once.
@@ -129,13 +131,14 @@ class Bodies:
         Args:
             start: (n,) a point of the polytope in the cell.
         """
-        kind, z, *_ = self._look(cell, *self._configurations(cell, start, seed))
+        kind, z, *_ = self._look(cell, *self._configurations(cell, start))
         turn = cell.turn()[self.joints]
         return float(np.linalg.norm(z) / (turn @ turn)) if kind == planes.FOUND else 0.0
 
-    def _configurations(self, cell: Cell, start: Array, seed: int) -> tuple[Array, int]:
+    def _configurations(self, cell: Cell, start: Array) -> tuple[Array, int]:
         """Returns the configurations of the cell to look at first, and how many these are; there is room for MORE."""
-        n, rng = len(start), np.random.default_rng(seed)
+        n, seed = len(start), cell.seed
+        rng = np.random.default_rng(seed)
         targets = np.where(rng.random((CORNERS if self._corners is None else len(self._corners), n)) < 0.5, cell.lower, cell.upper)
         if self._corners is not None:
             targets[:, self.joints] = np.where(self._corners, cell.upper[self.joints], cell.lower[self.joints])
@@ -171,8 +174,14 @@ class Bodies:
         gap = approach(*self.hulls, np.array(self.joints), cell.half, cell.inside.C, cell.inside.d, s, steps, 0.0)
         return s, gap * self.extent
 
-    def _prove(self, cell: Cell, plane: Array) -> Streams | Array | int:
-        """Returns the streams of a proof, or what :meth:`certifier.partition.sides.Side.prove` says."""
+    def in_proof(self, found: Separated, play: Sequence[int]) -> tuple[Array, Streams]:
+        """Returns a plane and its streams as a proof holds them that has more joints in play, which are ascending."""
+        plane = np.zeros((5, 1 + len(play)))
+        plane[:, [0, *(1 + play.index(joint) for joint in self.joints)]] = found.plane
+        return plane, joined([side.renumbered(streams, play) for side, streams in zip(self._sides, found.streams, strict=True)])
+
+    def _prove(self, cell: Cell, plane: Array) -> tuple[Streams, Streams] | Array | int:
+        """Returns the streams of both sides, or what :meth:`certifier.partition.sides.Side.prove` says."""
         faces = cell.inside.faces
         C, d = self._area.polytope.C[faces], self._area.polytope.d[faces]
         found = []
@@ -181,7 +190,8 @@ class Bodies:
             if not isinstance(result, Streams):
                 return result
             found.append(result)
-        return joined(found)
+        first, second = found
+        return first, second
 
     def _in_s(self, cell: Cell, z: Array) -> Array:
         """Returns a plane as a proof holds it, (5, 1 + k), from one in the coordinates of the search.
@@ -198,6 +208,5 @@ class Bodies:
         plane[3] -= self._middle @ plane[:3]
         plane[:, 1:] *= CALM / cell.half[self.joints]
         plane[:, 0] -= plane[:, 1:] @ cell.mid[self.joints]
-        spread = np.zeros((5, 1 + len(self._play)))
-        spread[:, [0, *(1 + place for place in self._places)]] = plane / np.abs(plane[:3]).max()
-        return spread
+        normed: Array = plane / np.abs(plane[:3]).max()
+        return normed

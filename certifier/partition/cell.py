@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -45,6 +46,11 @@ class Cell:
     def inside(self) -> Inside:
         """Holds the part of the polytope in the cell."""
         return self.area.inside(self.lower, self.upper)
+
+    @property
+    def seed(self) -> int:
+        """Returns a number for random choices in this cell, the same for every pair."""
+        return zlib.crc32(self.lower.tobytes() + self.upper.tobytes())
 
     def turn(self) -> Array:
         """Returns how far every joint turns in the cell, (n,), in radians or metres."""

@@ -28,11 +28,12 @@ from certifier.partition.area import Area
 from certifier.partition.chords import chords
 from certifier.partition.hulls import approach, gaps
 from certifier.partition.search import Report, Search
+from certifier.partition.shared import Shared
 from certifier.partition.subtrees import Subtrees, dealt, open_cells, put_together
 from certifier.partition.tree import OPEN, Node, OpenCell, to_streams
 from certifier.polytopes.simplex import deepest
 from certifier.proof.negative import WitnessProof
-from certifier.proof.partition import PartitionProof, choices_of
+from certifier.proof.partition import STREAMS, Coarse, PartitionProof, choices_of
 from certifier.verify.pair import check_ground, check_interior
 from certifier.verify.separations import gap_of_share
 from certifier.verify.witness import check_witness
@@ -66,33 +67,35 @@ class CellCertification:
         check_ground(scene, self._area.ground)
         check_interior(scene, self._area.ground, self._area.center)
         self._covariance = np.cov(self._area.samples.T).reshape(scene.n, scene.n)
+        self._shared = Shared(self._area)
         self._broad_phase = BroadPhase(Kinematics.of(scene), self._together)
 
-    def certify(self, index: int, cells: int, ending: bool = False) -> PairResult:
+    def certify(self, index: int, cells: int, within: float = 0.0) -> PairResult:
         """Certifies pair ``scene.pairs[index]``, alone or with others that the same proof covers.
 
         Args:
             cells: end after so many cells.
-            ending: what is still open will be cut off, so the result names points of all open cells.
+            within: what is open and cannot be certified soon will be cut off. So the result names points of open cells where the bodies are
+                nearer than this, relative to their extent.
         """
         start, pair = time.perf_counter(), self._scene.pairs[index]
-        result = self._broad_phase.find(pair) or self._begin(self._volumes(index), cells, ending)
+        result = self._broad_phase.find(pair) or self._begin(self._volumes(index), cells, within)
         return replace(result, seconds=time.perf_counter() - start)
 
-    def go_on(self, index: int, cells: int, left: Sequence[bytes], part: int = 0, parts: int = 1, ending: bool = False) -> PairResult:
+    def go_on(self, index: int, cells: int, left: Sequence[bytes], part: int = 0, parts: int = 1, within: float = 0.0) -> PairResult:
         """Goes on with the open cells of a pair that are dealt to one part.
 
         Args:
-            cells, ending: as for :meth:`certify`.
+            cells, within: as for :meth:`certify`.
             left: the ``subtrees`` of the round before, in the order of its parts, on a polytope of which this one is a part.
             part: the number of this part, from 0.
             parts: how many parts the round has.
         """
         start, volumes = time.perf_counter(), self._volumes(index)
-        search = Search(self._area, volumes)
+        search = Search(self._area, self._shared, volumes)
         given, contacts = dealt(open_cells(left), part, parts), search.scout(1 + part)
         report = search.run(given, cells)
-        result = self._left(search, volumes, given, replace(report, contacts=contacts + report.contacts), ending)
+        result = self._left(search, volumes, given, replace(report, contacts=contacts + report.contacts), within)
         return replace(result, seconds=time.perf_counter() - start)
 
     def put_together(self, index: int, rounds: Sequence[Sequence[bytes]], part: int = 0, parts: int = 1) -> PairResult:
@@ -104,8 +107,8 @@ class CellCertification:
             parts: the cells to verify are dealt to so many parts.
         """
         start, volumes = time.perf_counter(), self._volumes(index)
-        search = Search(self._area, volumes)
-        vertices = {choice: len(a.vertices) + len(b.vertices) for choice, (a, b) in choices_of(volumes, search.coarse).items()}
+        search = Search(self._area, self._shared, volumes)
+        vertices = [len(a.vertices) + len(b.vertices) for a, b in choices_of(volumes, search.coarse)]
         root = put_together(rounds, len(self._area.ground.d), 2 * self._scene.n, vertices)
         return replace(self._proved(search, volumes, root, part, parts), seconds=time.perf_counter() - start)
 
@@ -114,22 +117,23 @@ class CellCertification:
         return Volume.of(self._scene.geometry(pair.a)), Volume.of(self._scene.geometry(pair.b))
 
     def _together(self, volumes: Volumes) -> PairResult | None:
-        result = self._begin(volumes, GROUP_CELLS, False)
+        result = self._begin(volumes, GROUP_CELLS, 0.0)
         return result if result.outcome is Outcome.CERTIFIED else None
 
-    def _begin(self, volumes: Volumes, cells: int, ending: bool) -> PairResult:
-        search, root = Search(self._area, volumes), Node()
+    def _begin(self, volumes: Volumes, cells: int, within: float) -> PairResult:
+        search, root = Search(self._area, self._shared, volumes), Node()
         given = [OpenCell(root, self._area.lower, self._area.upper)]
         contacts = search.scout(0)
         report = Report(contacts=contacts) if contacts else search.run(given, cells)
         if any(node.kind == OPEN for node in root.preorder()):
-            return self._left(search, volumes, given, report, ending)
+            return self._left(search, volumes, given, report, within)
         return self._proved(search, volumes, root)
 
     def _proved(self, search: Search, volumes: Volumes, root: Node, part: int = 0, parts: int = 1) -> PairResult:
         """Returns the result of a part of a pair that has a tree without open cells."""
         streams = to_streams([root], len(search.joints))
-        proof = PartitionProof(self._scene, volumes, search.frame, self._area.ground, self._area.center, search.coarse, **streams)
+        coarse, streams["choices"] = _chosen(search.coarse, streams["choices"])
+        proof = PartitionProof(self._scene, volumes, search.frame, self._area.ground, self._area.center, coarse, **streams)
         try:
             gap = gap_of_share(self._scene, proof, part, parts)
         except ProofError as error:
@@ -138,14 +142,14 @@ class CellCertification:
         margin = gap if np.isfinite(gap) else None
         return PairResult(Outcome.CERTIFIED, Stage.CELLS, margin=margin, proof=None if part else proof.to_bytes())
 
-    def _left(self, search: Search, volumes: Volumes, given: Sequence[OpenCell], report: Report, ending: bool) -> PairResult:
+    def _left(self, search: Search, volumes: Volumes, given: Sequence[OpenCell], report: Report, within: float) -> PairResult:
         """Returns the result of a pair that is not certified yet, with what its search has left."""
         left = Subtrees.of(given, len(self._area.ground.d))
         cells = [(lower, upper) for _, lower, upper in left.open_cells]
         points = self._contacts(search, report.contacts)
         contacts = min(len(points), MOST_POINTS)
-        if ending:
-            points += self._of_cells(search, cells)
+        if within > 0:
+            points += self._of_cells(search, cells, within)
         points += [point for cell in report.narrow for point in cell]
         weakness = Weakness(np.array(points[:MOST_POINTS]).reshape(-1, self._scene.n), np.zeros(self._scene.n), contacts=contacts)
         subtrees = left.to_bytes(len(search.joints))
@@ -192,8 +196,8 @@ class CellCertification:
             found += [contact, *near[gaps(*search.bodies.hulls, near) <= 0]]
         return found
 
-    def _of_cells(self, search: Search, cells: Iterable[tuple[Array, Array]]) -> list[Array]:
-        """Returns points of the polytope in the cells: of every cell where the bodies are nearest, and where they are near."""
+    def _of_cells(self, search: Search, cells: Iterable[tuple[Array, Array]], within: float) -> list[Array]:
+        """Returns points of the polytope in the cells where the bodies are as near as that: the nearest one, and those that are NEAR."""
         found: list[Array] = []
         for lower, upper in cells:
             _, C, d = self._area.inside(lower, upper)
@@ -206,7 +210,8 @@ class CellCertification:
             approach(*search.bodies.hulls, np.array(search.bodies.joints), (upper - lower) / 2, C, d, s, 4, 0.0)
             X = np.concatenate([s[None], X[nearest]])
             distances = gaps(*search.bodies.hulls, X)
-            found += [X[0], *X[1:][distances[1:] < NEAR]]
+            if distances[0] < within:
+                found += [X[0], *X[1:][distances[1:] < NEAR]]
         return found
 
     def _nearest(self, search: Search, configurations: Array) -> tuple[Array, float]:
@@ -214,3 +219,12 @@ class CellCertification:
         distances = gaps(*search.bodies.hulls, configurations)
         place = int(distances.argmin())
         return configurations[place], max(float(distances[place]) * search.bodies.extent, 0.0)
+
+
+def _chosen(coarse: Coarse, choices: np.ndarray) -> tuple[Coarse, np.ndarray]:
+    """Returns the coarse volumes that leaves choose, and their choices among these."""
+    j, i = np.divmod(choices, 1 + len(coarse[0]))
+    used = [np.unique([0, *numbers]) for numbers in (i, j)]
+    first, second = (tuple(volumes[number - 1] for number in kept[1:]) for volumes, kept in zip(coarse, used, strict=True))
+    among = np.searchsorted(used[0], i) + len(used[0]) * np.searchsorted(used[1], j)
+    return (first, second), among.astype(STREAMS["choices"])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -133,27 +133,50 @@ def capsule(kinematics: Kinematics, geometry: Geometry) -> Volume | None:
 
 
 FAT = 2.1
-"""A ball for the angles of several joints has at most this many times the radius of the geometry's own one."""
+"""A slim ball for the angles of several joints has at most this many times the radius of the geometry's own one."""
 STOUT = 1.25
-"""A capsule for the angles of one joint has at most this many times that radius."""
+"""A slim capsule for the angles of one joint has at most this many times that radius."""
 
 
-def coarse_volume(kinematics: Kinematics, volume: Volume, other: Volume) -> Volume | None:
+def slim_volume(kinematics: Kinematics, volume: Volume, other: Volume) -> Volume | None:
     """Returns a coarse volume for a single geometry that moves with as few joints against another volume as is worth it, or None."""
     if len(volume.geometries) != 1:
         return None
     geometry = kinematics.scene.geometry(volume.geometries[0])
     own = _farthest(geometry.vertices, geometry.vertices.mean(axis=0)) + geometry.radius
-    # The volume may hang on the bodies on the way up alone, or two that hang on each other's would change places.
-    above = set(kinematics.ancestors(geometry.body))
-    between = [body for body in kinematics.bodies_between(geometry.body, other.body)[1:] if body in above]
-    roots = list(dict.fromkeys(kinematics.rigid_root(body) for body in between))
+    roots = _roots(kinematics, volume, other)
     for body in reversed(roots):
         found = ball(kinematics, [geometry], body) if len(kinematics.chain(body, geometry.body)) > 1 else None
         if found is not None and found.radius <= FAT * own:
             return found
     found = capsule(kinematics, geometry)
     return found if found is not None and found.body in roots and found.radius <= STOUT * own else None
+
+
+def common_balls(kinematics: Kinematics, volume: Volume, other: Volume) -> list[Volume]:
+    """Returns, for every body on the way to another volume, the ball about all that the same joint of it moves; the nearest body first.
+
+    Other geometries there have the same balls.
+    """
+    found = []
+    for body in _roots(kinematics, volume, other):
+        way = kinematics.bodies_between(body, volume.body)[1:]
+        moved = next((there for there in way if kinematics.scene.joint_above[there].index is not None), None)
+        together = [g for g in kinematics.scene.geometries if moved in {g.body, *kinematics.ancestors(g.body)}]
+        fat = ball(kinematics, together, body)
+        if fat is not None:
+            found.append(replace(fat, geometries=volume.geometries))
+    return found
+
+
+def _roots(kinematics: Kinematics, volume: Volume, other: Volume) -> list[str]:
+    """Returns the bodies that a coarse volume may be fixed to, the one next to the volume first.
+
+    They are above the volume, or the coarse volumes of two that hang on each other's bodies would change places.
+    """
+    above = set(kinematics.ancestors(volume.body))
+    between = [body for body in kinematics.bodies_between(volume.body, other.body)[1:] if body in above]
+    return list(dict.fromkeys(kinematics.rigid_root(body) for body in between))
 
 
 def _placed(X: Array, points: Array) -> Array:

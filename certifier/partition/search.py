@@ -28,12 +28,13 @@ from certifier.partition.area import Area
 from certifier.partition.bodies import TOUCH, Bodies, Separated, Undecided
 from certifier.partition.cell import Cell
 from certifier.partition.chords import chords
-from certifier.partition.coarse import coarse_volume
 from certifier.partition.frames import choose_frame
 from certifier.partition.hulls import gaps
+from certifier.partition.levels import Level, levels_of
+from certifier.partition.shared import Shared
 from certifier.partition.tree import Node, OpenCell, Streams
 from certifier.polytopes.simplex import deepest
-from certifier.proof.partition import EMPTY, PLANE
+from certifier.proof.partition import EMPTY, PLANE, Coarse, choices_of
 
 NARROW = np.radians(3.0)
 """A cell that turns less than this in every joint is not cut any more."""
@@ -78,21 +79,21 @@ class Search:
     Attributes:
         frame: body in whose frame the planes are.
         joints: position indices of the joints in play, ascending.
-        coarse: a coarse volume for either volume, or None.
+        coarse: the coarse volumes that a leaf may choose, as in a proof.
         bodies: the volumes themselves.
     """
 
-    def __init__(self, area: Area, volumes: tuple[Volume, Volume]) -> None:
-        self._area = area
+    def __init__(self, area: Area, shared: Shared, volumes: tuple[Volume, Volume]) -> None:
+        self._area, self._shared = area, shared
         self.frame, self.joints = choose_frame(area.kinematics, volumes, area.lower, area.upper)
-        self.bodies = Bodies(area, self.frame, self.joints, volumes, 0)
-        a, b = volumes
-        self.coarse: tuple[Volume | None, Volume | None] = (None, None)
+        self.coarse: Coarse = ((), ())
+        levels: list[Level] = [(0, 0)]
         if len(self.joints) >= LONG:
-            self.coarse = coarse_volume(area.kinematics, a, b), coarse_volume(area.kinematics, b, a)
-        small_a, small_b = self.coarse
-        choice = (small_a is not None) + 2 * (small_b is not None)
-        self._coarse = Bodies(area, self.frame, self.joints, (small_a or a, small_b or b), choice) if choice else None
+            self.coarse, levels = levels_of(area, self.frame, volumes)
+        chosen = choices_of(volumes, self.coarse)
+        self._choices = [i + (1 + len(self.coarse[0])) * j for i, j in levels]
+        self.bodies = Bodies(area, self.frame, volumes)
+        self._levels = [self.bodies, *(shared.bodies(self.frame, chosen[choice]) for choice in self._choices[1:])]
 
     def run(self, cells: Sequence[OpenCell], most: int) -> Report:
         """Works on open cells, whose nodes it changes.
@@ -112,11 +113,12 @@ class Search:
         while heap and report.cells < most:
             cell = heapq.heappop(heap)[2]
             report.cells += 1
-            cut = self._settle(cell, report, seed=report.cells)
+            cut = self._settle(cell, report)
             if cut is None:
                 continue
             joint, points = cut
-            value = self._middle_of(cell, joint)
+            narrow = self._turn(cell, self.bodies)[self.joints].max() < NARROW
+            value = None if narrow else self._middle_of(cell, joint)
             if value is None:
                 report.narrow.append(points[:FEW])
                 continue
@@ -147,39 +149,40 @@ class Search:
             lower, upper = cell.lower.copy(), cell.upper.copy()
             (upper if below else lower)[joint] = value
             of_points, of_samples = ((X[:, joint] <= value) == below for X in (points, cell.samples))
-            node = Node(coarse=cell.node.coarse)
+            node = Node(level=cell.node.level)
             halves.append(Cell(self._area, node, lower, upper, points[of_points][:KEPT], cell.samples[of_samples]))
         return halves
 
     def _middle_of(self, cell: Cell, joint: int) -> float | None:
-        """Returns where to cut a cell, in the middle of its angle; None where it is narrow in all joints."""
-        if self._turn(cell)[self.joints].max() < NARROW:
-            return None
+        """Returns where to cut a cell, in the middle of its angle; None where doubles do not allow it."""
         l, u = cell.lower[joint], cell.upper[joint]
         value = float(np.tan((np.arctan(l) + np.arctan(u)) / 2)) if self._area.scene.revolute[joint] else float((l + u) / 2)
         return value if l < value < u else None
 
-    def _turn(self, cell: Cell) -> Array:
+    def _turn(self, cell: Cell, bodies: Bodies) -> Array:
         """Returns how far every joint turns in the cell, (n,); a slide counts relative to the bodies' extent."""
-        turn: Array = np.where(self._area.scene.revolute, 1.0, 1 / self.bodies.extent) * cell.turn()
+        turn: Array = np.where(self._area.scene.revolute, 1.0, 1 / bodies.extent) * cell.turn()
         return turn
 
-    def _settle(self, cell: Cell, report: Report, seed: int) -> tuple[int, Array] | None:
+    def _settle(self, cell: Cell, report: Report) -> tuple[int, Array] | None:
         """Settles a cell, or returns the joint to cut it in and its points."""
         start = self._start(cell)
         if start is None:
             return None
-        if cell.node.coarse and self._coarse is not None:
-            found = self._try(cell, self._coarse, start, seed)
-            if found is None:
+        for level in range(min(cell.node.level, len(self._levels)) - 1, 0, -1):
+            bodies = self._levels[level]
+            tried = self._shared.tried(bodies, cell, start)
+            if isinstance(tried.found, Separated):
+                self._separated(cell, level, tried.found)
                 return None
-            turn = self._turn(cell)[self._coarse.joints].max(initial=0.0)
-            hopeless = not len(cell.samples) and found.joint is None and (len(self.bodies.joints) <= FEW_JOINTS or turn < NARROWER)
-            if not hopeless and turn > NARROW_COARSE:
-                return self._cut(cell, self._coarse, found, seed), found.points
-            cell.node.coarse = False
-        found = self._try(cell, self.bodies, start, seed)
-        if found is None:
+            if self._worth_a_cut(cell, bodies, tried.found):
+                if tried.joint is None:
+                    tried.joint = self._cut(cell, bodies, tried.found)
+                return tried.joint, tried.found.points
+            cell.node.level = level
+        found = self.bodies.separate(cell, start)
+        if isinstance(found, Separated):
+            self._separated(cell, 0, found)
             return None
         if found.support is not None and found.joint is None:
             nearest = self.bodies.nearest(cell, found.support)
@@ -189,7 +192,13 @@ class Search:
             if nearest is not None and nearest[1] < TOUCH * self.bodies.extent:
                 report.narrow.append(nearest[0][None])
                 return None
-        return self._cut(cell, self.bodies, found, seed), found.points
+        return self._cut(cell, self.bodies, found), found.points
+
+    def _worth_a_cut(self, cell: Cell, bodies: Bodies, found: Undecided) -> bool:
+        """Returns whether a cell is cut for coarse volumes, or goes on to the next level."""
+        turn = self._turn(cell, bodies)[bodies.joints].max(initial=0.0)
+        hopeless = not len(cell.samples) and found.joint is None and (len(self.bodies.joints) <= FEW_JOINTS or turn < NARROWER)
+        return not hopeless and turn > NARROW_COARSE
 
     def _start(self, cell: Cell) -> Array | None:
         """Returns a point of the polytope in the cell; None, after the node was settled, where there is none."""
@@ -198,16 +207,13 @@ class Search:
             return self._inside(cell)
         return start
 
-    def _try(self, cell: Cell, bodies: Bodies, start: Array, seed: int) -> Undecided | None:
-        """Settles a cell with these bodies and returns None, or says how far that came."""
-        found = bodies.separate(cell, start, seed)
-        if isinstance(found, Separated):
-            node = cell.node
-            node.kind, node.plane, node.streams, node.choice = PLANE, found.plane, found.streams, bodies.choice
-            return None
-        return found
+    def _separated(self, cell: Cell, level: int, found: Separated) -> None:
+        """Settles a cell with a plane for the bodies of this level."""
+        node = cell.node
+        node.kind, node.choice = PLANE, self._choices[level]
+        node.plane, node.streams = self._levels[level].in_proof(found, self.joints)
 
-    def _cut(self, cell: Cell, bodies: Bodies, found: Undecided, seed: int) -> int:
+    def _cut(self, cell: Cell, bodies: Bodies, found: Undecided) -> int:
         """Returns the joint to cut a cell in: where proofs took most pieces, or where points that no plane separates lie farthest apart.
 
         For coarse volumes it is, of the CUTS joints with the farthest points, the one that makes most room for planes in both halves.
@@ -218,20 +224,20 @@ class Search:
         q = np.where(self._area.scene.revolute, 2 * np.arctan(found.support), found.support / bodies.extent)
         mean = found.weights @ q / found.weights.sum()
         spread = found.weights @ (q - mean) ** 2
-        wide = self._turn(cell) > NARROW / 2
+        wide = self._turn(cell, bodies) > NARROW / 2
         order = sorted(bodies.joints, key=lambda j: -float(spread[j]) if wide[j] else 1.0)
-        if not bodies.choice:
+        if bodies is self.bodies:
             return order[0]
-        return max(order[:CUTS], key=lambda j: self._room(cell, bodies, j, found.points, seed))
+        return max(order[:CUTS], key=lambda j: self._room(cell, bodies, j, found.points))
 
-    def _room(self, cell: Cell, bodies: Bodies, joint: int, points: Array, seed: int) -> float:
+    def _room(self, cell: Cell, bodies: Bodies, joint: int, points: Array) -> float:
         """Returns how much room for planes a cut makes in both halves of a cell, on a logarithmic scale; at most that of EMPTY halves."""
         value, room = self._middle_of(cell, joint), 0.0
         if value is None:
             return -np.inf
         for half in self._halves(cell, joint, value, points):
             start = self._start(half)
-            room += np.log(MOST_ROOM if start is None else min(max(bodies.room(half, start, seed), LEAST_ROOM), MOST_ROOM))
+            room += np.log(MOST_ROOM if start is None else min(max(bodies.room(half, start), LEAST_ROOM), MOST_ROOM))
         return float(room)
 
     def _inside(self, cell: Cell) -> Array | None:

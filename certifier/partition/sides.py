@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from certifier.model import Array, Volume
@@ -58,6 +61,15 @@ class Side:
         if self._order != self.own:
             X = X.reshape((3,) * k + (4, 4)).transpose([self._order.index(j) for j in self.own] + [k, k + 1]).reshape(-1, 4, 4)
         return np.ascontiguousarray(X), den
+
+    def renumbered(self, streams: Streams, play: Sequence[int]) -> Streams:
+        """Returns streams with the numbers that the axes have where more joints are in play."""
+        outside = [joint for joint in play if joint not in self.own]
+        numbers = np.array([*range(len(self.own)), *(len(self.own) + outside.index(joint) for joint in self.outside)], np.int8)
+        halved = streams.pieces >= 0
+        pieces = streams.pieces.copy()
+        pieces[halved] = numbers[pieces[halved]]
+        return replace(streams, pieces=pieces)
 
     def prove(self, plane: Array, lower: Array, upper: Array, C: Array, d: Array, faces: Array, most: int) -> Streams | Array | int:
         """Proves that the volume is on its side of the plane on the polytope and a cell.

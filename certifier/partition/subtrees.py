@@ -6,7 +6,7 @@ turn, and so on. When no cell is open, the subtrees of all rounds are put togeth
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -44,7 +44,7 @@ class Subtrees:
         arrays = {
             "lower": np.array([lower for _, lower, _ in self.open_cells]),
             "upper": np.array([upper for _, _, upper in self.open_cells]),
-            "coarse": np.array([node.coarse for node, _, _ in self.open_cells], dtype=np.int8),
+            "levels": np.array([node.level for node, _, _ in self.open_cells], dtype=np.int8),
             **to_streams(self.roots, k),
         }
         return pack({"format": FORMAT, "kind": KIND, "roots": len(self.roots), "faces": self.faces}, arrays)
@@ -55,7 +55,7 @@ def open_cells(files: Sequence[bytes]) -> list[OpenCell]:
     found = []
     for data in files:
         arrays = unpack(data, KIND)[1]
-        nodes = (Node(coarse=bool(coarse)) for coarse in arrays["coarse"])
+        nodes = (Node(level=level) for level in arrays["levels"].tolist())
         found += [OpenCell(*cell) for cell in zip(nodes, arrays["lower"], arrays["upper"], strict=True)]
     return found
 
@@ -65,7 +65,7 @@ def dealt(cells: Sequence[T], part: int, parts: int) -> Sequence[T]:
     return cells[part::parts]
 
 
-def put_together(rounds: Sequence[Sequence[bytes]], faces: int, limits: int, vertices: Mapping[int, int]) -> Node:
+def put_together(rounds: Sequence[Sequence[bytes]], faces: int, limits: int, vertices: Sequence[int]) -> Node:
     """Returns the tree of a pair from what the parts of all its rounds have left.
 
     Args:
@@ -84,7 +84,7 @@ def put_together(rounds: Sequence[Sequence[bytes]], faces: int, limits: int, ver
     return root
 
 
-def _roots(data: bytes, faces: int, limits: int, vertices: Mapping[int, int]) -> Iterator[Node]:
+def _roots(data: bytes, faces: int, limits: int, vertices: Sequence[int]) -> Iterator[Node]:
     """Gives the trees of a file, with the numbers that the polytope's faces have now."""
     header, arrays = unpack(data, KIND)
     added, before = faces - header["faces"], header["faces"] - limits

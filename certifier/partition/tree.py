@@ -11,6 +11,8 @@ import numpy as np
 from certifier.model import Array
 from certifier.proof.partition import EMPTY, PLANE, STREAMS
 
+ALL = 127
+"""So many levels are more than there are."""
 OPEN = -3
 """The cell of this node is open: nothing is proved about it. The verifier accepts no such tree."""
 
@@ -36,7 +38,7 @@ class Node:
         plane: (5, 1 + k) of a cell with a plane, as a proof holds it.
         choice: which volumes the plane separates, as a proof says it.
         streams: the pieces and multipliers of a cell with a plane, or the multipliers of one that misses the polytope.
-        coarse: coarse volumes are to be tried first in this cell.
+        level: so many levels of volumes, the finest ones, are to be tried in this cell.
     """
 
     kind: int = OPEN
@@ -45,7 +47,7 @@ class Node:
     plane: Array | None = None
     choice: int = 0
     streams: Streams | None = None
-    coarse: bool = True
+    level: int = ALL
 
     def preorder(self) -> Iterator[Node]:
         """Gives the nodes, each before its children, the lower part first."""
@@ -91,18 +93,18 @@ def to_streams(roots: Sequence[Node], k: int) -> dict[str, Any]:
     return {name: np.asarray(found[name], dtype=kind) for name, kind in STREAMS.items()}
 
 
-def of_streams(arrays: Mapping[str, np.ndarray], vertices: Mapping[int, int], count: int) -> list[Node]:
+def of_streams(arrays: Mapping[str, np.ndarray], vertices: Sequence[int], count: int) -> list[Node]:
     """Does the inverse of :func:`to_streams` for so many trees.
 
     Args:
-        vertices: maps every choice to the number of vertices of both its volumes together.
+        vertices: the number of vertices of both volumes together, by choice.
     """
     reader = _Reader(arrays, vertices)
     return [reader.node() for _ in range(count)]
 
 
 class _Reader:
-    def __init__(self, arrays: Mapping[str, np.ndarray], vertices: Mapping[int, int]) -> None:
+    def __init__(self, arrays: Mapping[str, np.ndarray], vertices: Sequence[int]) -> None:
         self._vertices = vertices
         self._nodes, self._cuts, self._planes = iter(arrays["nodes"].tolist()), iter(arrays["cuts"].tolist()), iter(arrays["planes"])
         self._choices = iter(arrays["choices"].tolist())

@@ -41,6 +41,8 @@ CHAIN = 7
 """At most this many joints are between the frame of a proof over a partition and a body: each makes four control values of one."""
 PLAY = 14
 """A plane of such a proof moves with at most this many joints; its normal is bounded at 2^PLAY corners."""
+COARSE = 10
+"""Either volume of such a proof has at most this many coarse volumes, so that a byte names any two."""
 NODES = 1 << 22
 """The tree of cuts of a proof over a partition has at most this many nodes."""
 PIECES = 1 << 24

@@ -14,7 +14,7 @@ visible (certifier.verify.partition says how). Trees are streams in preorder, th
 
 A leaf may choose a *coarse volume* in the place of either volume. This is a ball or a capsule, fixed to another body, that contains the
 volume's geometries whatever the angles of the joints between this body and theirs are (certifier.verify.coarse). These joints do not move
-it, so few cells are enough where the bodies are not close.
+it, so few cells are enough where the bodies are not close. A volume may have several, from slim to fat.
 
 Nothing here decides whether a proof holds: certifier.verify does. docs/proofs.md describes the file.
 """
@@ -29,6 +29,7 @@ import numpy as np
 
 from certifier.document import Node
 from certifier.model import Array, Volume
+from certifier.proof import limits
 from certifier.proof.container import Arrays
 from certifier.proof.separation import Common, Separation, item
 
@@ -50,10 +51,14 @@ STREAMS = {
 """The arrays of a proof with their types, in the order of its attributes."""
 
 
-def choices_of(volumes: tuple[Volume, Volume], coarse: tuple[Volume | None, Volume | None]) -> dict[int, tuple[Volume, Volume]]:
-    """Maps every choice that a leaf may have to the two volumes that its plane separates; ``coarse`` is as in the proof."""
-    firsts, seconds = zip(volumes, coarse, strict=True)
-    return {i + 2 * j: (a, b) for j, b in enumerate(seconds) for i, a in enumerate(firsts) if a is not None and b is not None}
+Coarse = tuple[tuple[Volume, ...], tuple[Volume, ...]]
+"""The coarse volumes of the first volume and of the second one."""
+
+
+def choices_of(volumes: tuple[Volume, Volume], coarse: Coarse) -> list[tuple[Volume, Volume]]:
+    """Returns the two volumes that a leaf's plane separates, by the leaf's choice; ``coarse`` is as in the proof."""
+    firsts, seconds = ((volume, *others) for volume, others in zip(volumes, coarse, strict=True))
+    return [(a, b) for b in seconds for a in firsts]
 
 
 @dataclass(frozen=True)
@@ -61,13 +66,13 @@ class PartitionProof(Separation):
     """Holds planes that separate two volumes on the cells of a partition, with the multipliers that prove it.
 
     Attributes:
-        coarse: a coarse volume for the first volume and one for the second, or None; its geometries are those of the volume.
+        coarse: the coarse volumes for the first volume and those for the second; their geometries are those of the volume.
         nodes: int8, the tree of cuts: the position index of the joint that is cut, or PLANE, or EMPTY.
         cuts: where each cut is, in s, in the order of the nodes.
         planes: (leaves with a plane, 5, 1 + k), the four rows of Z of each and then kappa, in the order of the nodes. kappa is affine in s
             as well, and bounds |a| on the cell; it counts where a radius is positive.
-        choices: int8, of each leaf with a plane: 0, plus 1 where the plane separates ``coarse[0]`` instead of the first volume, plus 2
-            where it separates ``coarse[1]`` instead of the second.
+        choices: int8, of each leaf with a plane: i + (1 + len(coarse[0])) j. The plane separates the first volume, or ``coarse[0][i - 1]``
+            for i > 0, from the second, or ``coarse[1][j - 1]`` for j > 0.
         pieces: int8, the trees of pieces: for every leaf with a plane, for either volume chosen, for every vertex in order. An axis that
             is halved is numbered: first the joints between the frame and the volume's body, ascending, then the others in play, ascending.
         counts: int16, the number of multipliers of every piece and of every EMPTY node, in the order of the nodes.
@@ -78,7 +83,7 @@ class PartitionProof(Separation):
     KIND: ClassVar[str] = "partition"
     HEADER: ClassVar[tuple[str, ...]] = ("coarse",)
 
-    coarse: tuple[Volume | None, Volume | None]
+    coarse: Coarse
     nodes: np.ndarray
     cuts: Array
     planes: Array
@@ -90,18 +95,18 @@ class PartitionProof(Separation):
 
     @property
     def all_volumes(self) -> tuple[Volume, ...]:
-        return (*self.volumes, *(volume for volume in self.coarse if volume is not None))
+        return (*self.volumes, *self.coarse[0], *self.coarse[1])
 
     @property
-    def chosen(self) -> dict[int, tuple[Volume, Volume]]:
-        """Maps every choice that a leaf has to the two volumes that its plane separates."""
+    def chosen(self) -> list[tuple[Volume, Volume]]:
+        """Returns the two volumes that a leaf's plane separates, by the leaf's choice."""
         return choices_of(self.volumes, self.coarse)
 
     def own(self, number: Callable[[Volume], int]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-        coarse = [None if volume is None else number(volume) for volume in self.coarse]
+        coarse = [[number(volume) for volume in volumes] for volumes in self.coarse]
         return {"coarse": coarse}, {name: getattr(self, name) for name in STREAMS}
 
     @classmethod
     def read(cls, common: Common, header: dict[str, Node], volumes: Sequence[Volume], arrays: Arrays, prefix: str) -> Self:
-        first, second = (None if node.value is None else item(node, volumes) for node in header["coarse"].two())
+        first, second = (tuple(item(node, volumes) for node in side.items(limits.COARSE)) for side in header["coarse"].two())
         return cls(*common, (first, second), *(arrays.take(f"{prefix}/{name}", kind) for name, kind in STREAMS.items()))

@@ -26,11 +26,6 @@ class Method(StrEnum):
 
 
 IRIS = (Method.IRIS_NP2, Method.IRIS_ZO)
-MOST_IRIS_JOINTS = 8
-"""IRIS is the default up to this many joints.
-
-IRIS' faces have normals in all joints, which is dear where a pair has few of them between its bodies.
-"""
 
 
 @dataclass(frozen=True)
@@ -38,7 +33,7 @@ class SeedOptions:
     """The options say what to propose.
 
     Attributes:
-        method: one of :class:`Method`; None for IRIS_NP2 up to MOST_IRIS_JOINTS joints and LIMITS beyond.
+        method: one of :class:`Method`; None for IRIS_NP2.
         q: (n,) the seed as joint positions, in radians or metres; for every method but ``polytope``.
         contain: (n,) each, joint positions that the region has to contain besides q.
         C, d: (m, n), (m,) the polytope in s, for ``polytope``; the joint limits are added to it.

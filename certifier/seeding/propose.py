@@ -16,7 +16,7 @@ from certifier.outcome import Guarantee
 from certifier.polytopes.polytope import chebyshev_center, drop_redundant
 from certifier.scene.drake_model import build_diagram, geometry_name
 from certifier.seeding.iris import iris
-from certifier.seeding.options import MOST_IRIS_JOINTS, Method, SeedOptions
+from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.proposal import Proposal
 
 
@@ -79,7 +79,7 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
             ``seed_cut_off`` when the polytope does not contain the seed and ``contain``; ``seeding_failed`` with Drake's words.
     """
     start = time.perf_counter()
-    method = options.method or (Method.IRIS_NP2 if scene.n <= MOST_IRIS_JOINTS else Method.LIMITS)
+    method = options.method or Method.IRIS_NP2
     for i, q in enumerate(options.contain):
         check_seed(scene, q, f"seed.contain[{i}]")
     contain = scene.to_s(np.array(options.contain)) if options.contain else np.zeros((0, scene.n))

@@ -73,13 +73,12 @@ class PartitionCheck:
             if id(volume) not in self._contained:
                 check_volume(scene, kinematics, volume)
                 self._contained[id(volume)] = volume
-            if coarse is None:
-                continue
-            if coarse.geometries != volume.geometries:
-                raise ProofError("proof_volume", f"{proof.title}: a coarse volume has other geometries than the one that it stands for")
-            if id(coarse) not in self._coarse:
-                check_coarse(scene, kinematics, coarse)
-                self._coarse[id(coarse)] = coarse
+            for other in coarse:
+                if other.geometries != volume.geometries:
+                    raise ProofError("proof_volume", f"{proof.title}: a coarse volume has other geometries than the one that it stands for")
+                if id(other) not in self._coarse:
+                    check_coarse(scene, kinematics, other)
+                    self._coarse[id(other)] = other
         return CellCheck(scene, self._ground, Box.of(self._lower, self._upper), self._lower, self._upper, proof)
 
 
@@ -105,15 +104,12 @@ class CellCheck:
         positive, negative = (
             {
                 id(volume): Side(kinematics, proof.frame, volume, _not_less(volume.radius, scene.padding), sign, self._play)
-                for volume in alternatives
-                if volume is not None
+                for volume in (own, *coarse)
             }
-            for alternatives, sign in zip(zip(proof.volumes, proof.coarse, strict=True), (1.0, -1.0), strict=True)
+            for own, coarse, sign in zip(proof.volumes, proof.coarse, (1.0, -1.0), strict=True)
         )
-        self._sides = {choice: (positive[id(first)], negative[id(second)]) for choice, (first, second) in proof.chosen.items()}
-        self._rounded = {
-            choice: scene.padding > 0 or first.radius > 0 or second.radius > 0 for choice, (first, second) in proof.chosen.items()
-        }
+        self._sides = [(positive[id(first)], negative[id(second)]) for first, second in proof.chosen]
+        self._rounded = [scene.padding > 0 or first.radius > 0 or second.radius > 0 for first, second in proof.chosen]
 
     def cells(self, most: int) -> Iterator[Cells]:
         """Yields all cells, at most ``most`` at a time, which :meth:`gap` checks.
@@ -133,7 +129,7 @@ class CellCheck:
         least, with_plane = np.inf, np.flatnonzero(~cells.empty)
         choices = self._proof.choices[cells.plane[with_plane]]
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
-            for choice, sides in self._sides.items():
+            for choice, sides in enumerate(self._sides):
                 same = with_plane[choices == choice]
                 together = max(1, TOGETHER // max(*(side.vertices * side.entries for side in sides), 2 ** len(self._play)))
                 for first in range(0, len(same), together):

@@ -123,19 +123,17 @@ class Pieces:
     """
 
     def __init__(self, proof: PartitionProof, axes: int) -> None:
-        self._vertices = {choice: (len(first.vertices), len(second.vertices)) for choice, (first, second) in proof.chosen.items()}
+        self._vertices = [(len(first.vertices), len(second.vertices)) for first, second in proof.chosen]
         self._proof = proof
         pieces, choices = proof.pieces, proof.choices
-        if len(choices) != len(proof.planes) or not np.isin(choices, list(self._vertices)).all():
-            raise malformed(proof, f"the {len(choices)} choices are not one of {sorted(self._vertices)} for each of the planes")
+        if len(choices) != len(proof.planes) or not ((choices >= 0) & (choices < len(self._vertices))).all():
+            raise malformed(proof, f"the {len(choices)} choices are not one of 0 to {len(self._vertices) - 1} for each of the planes")
         if len(pieces) > limits.PIECES:
             raise ProofError("proof_too_large", f"{proof.title}: {len(pieces)} nodes of pieces; at most {limits.PIECES} are checked")
         if pieces.size and not (pieces.min() >= EMPTY and pieces.max() < axes):
             raise malformed(proof, f"a piece is halved along an axis that is not there, or is of no kind; there are {axes}")
         self._bounds = np.concatenate([np.zeros(1, dtype=np.int64), _ends(pieces)])
-        trees = np.zeros(len(choices), dtype=np.int64)
-        for choice, counts in self._vertices.items():
-            trees[choices == choice] = sum(counts)
+        trees = np.array([sum(counts) for counts in self._vertices])[choices]
         self._first = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(trees)])
         if len(self._bounds) != 1 + self._first[-1] or self._bounds[-1] != len(pieces):
             raise malformed(proof, f"the pieces are not {self._first[-1]} trees, one for each vertex of each plane")

@@ -244,9 +244,9 @@ def test_a_job_that_asks_for_cells_says_so(client: TestClient, scene: Scene) -> 
     def options(body: dict[str, Any]) -> GrowthOptions:
         return GrowthOptions.from_document(client.post("/v1/jobs", json=body).json()["options"])
 
-    assert [options(body).by_cells(scene.n) for body in (CERTIFY, CERTIFY | {"cells": 300})] == [False, True]
+    assert [options(body).by_cells for body in (CERTIFY, CERTIFY | {"cells": 300})] == [False, True]
     whole = options(GROW | {"options": {"contraction": "whole", "cells": 900}})
-    assert (whole.by_cells(scene.n), whole.cells) == (True, 900)
+    assert (whole.by_cells, whole.cells) == (True, 900)
     refused = client.post("/v1/jobs", json=CERTIFY | {"cells": 0})
     assert (refused.status_code, refused.json()["field"]) == (422, "cells")
 

@@ -48,7 +48,9 @@ def test_pairs_are_chosen_by_name_and_cost() -> None:
 def test_a_way_to_grow_is_a_row_with_its_region(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(growth, "WAYS", {"pushes": {"contraction": "targeted", "max_rounds": 0}})
     document = growth.growth(["planar_2dof"], against=False, limit=growth.LIMIT, progress=lambda _: None)
-    (row,) = document["ways"]
+    iris, row = document["ways"]
+    assert (iris["scene"], iris["way"], iris["share"]) == ("planar_2dof", growth.IRIS, 1.0)
+    assert "not certified; of 10000 samples" in iris["ended"]
     assert (row["scene"], row["way"]) == ("planar_2dof", "pushes")
     assert row["ellipsoid"] > 0.1
     assert row["curve"][-1]["ellipsoid_volume"] == pytest.approx(row["ellipsoid"])
@@ -63,27 +65,34 @@ def test_a_region_that_cannot_be_grown_is_a_row_that_says_why(monkeypatch: pytes
     monkeypatch.setattr(growth, "WAYS", {"nothing": {}})
     monkeypatch.setattr(catalogue, "seed", lambda _: np.array([9.0, 0.0]))
     document = growth.growth(["planar_2dof"], against=False, limit=growth.LIMIT, progress=lambda _: None)
-    (row,) = document["ways"]
-    assert row["ellipsoid"] == 0
-    assert "is at 9," in row["ended"]
+    assert [row["ellipsoid"] for row in document["ways"]] == [0, 0]
+    assert all("is at 9," in row["ended"] for row in document["ways"])
     assert "is at 9," in report.text(document)
 
 
 def test_a_way_that_takes_too_long_is_a_row_that_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(growth, "WAYS", {"whole": growth.WAYS["whole"]})
-    (row,) = growth.growth(["planar_2dof"], against=False, limit=1e-9, progress=lambda _: None)["ways"]
+    (row,) = growth.growth(["planar_2dof"], against=False, limit=1e-9, progress=lambda _: None, only=["whole"])["ways"]
     assert (row["ellipsoid"], row["curve"]) == (0, [])
     assert "the deadline was reached" in row["ended"]
 
 
-def test_examples_measured_anew_replace_their_own_rows_only() -> None:
+def test_what_is_measured_anew_replaces_its_own_rows_only() -> None:
     def rows(*names: tuple[str, str]) -> list[dict[str, Any]]:
         return [{"scene": scene, "way": way} for scene, way in names]
 
-    old = {"benchmark": "growth", "ways": rows(("planar_2dof", "a"), ("arm_3dof", "a"), ("arm_3dof", "b"), ("sphere_arm", "a"))}
-    new = {"benchmark": "growth", "ways": rows(("iiwa_shelf", "c"), ("arm_3dof", "c"), ("arm_3dof", "d")), "against": []}
+    old = {"benchmark": "growth", "ways": rows(("planar_2dof", "a"), ("arm_3dof", "whole"), ("arm_3dof", "targeted"), ("sphere_arm", "a"))}
+    again = rows(("iiwa_shelf", "targeted"), ("iiwa_shelf", growth.IRIS), ("arm_3dof", "whole"))
+    new = {"benchmark": "growth", "ways": [row | {"new": True} for row in again], "against": []}
     merged = growth.merged(old | {"against": rows(("arm_3dof", "a"))}, new)
-    assert merged["ways"] == rows(("planar_2dof", "a"), ("arm_3dof", "c"), ("arm_3dof", "d"), ("iiwa_shelf", "c"), ("sphere_arm", "a"))
+    assert [(row["scene"], row["way"], row.get("new", False)) for row in merged["ways"]] == [
+        ("planar_2dof", "a", False),
+        ("arm_3dof", "whole", True),
+        ("arm_3dof", "targeted", False),
+        ("iiwa_shelf", growth.IRIS, True),
+        ("iiwa_shelf", "targeted", True),
+        ("sphere_arm", "a", False),
+    ]
     assert merged["against"] == rows(("arm_3dof", "a")), "Drake was not asked again"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +17,7 @@ from certifier.growth.actions import Certify, Finish, Outcomes, Propose
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
-from certifier.growth.whole import HARD, PARTS, PIECES, SLICE, STAGES, VERIFIED
+from certifier.growth.whole import HARD, LATE, PARTS, PIECES, SLICE, STAGES, VERIFIED
 from certifier.jobs import local
 from certifier.jobs.local import grow
 from certifier.model import WORLD, Polytope
@@ -48,8 +49,11 @@ def options(cells=SLICE, **others):
     return GrowthOptions(seed={}, contraction="whole", cells=cells, **others)
 
 
-def drive(verdict, asked, limit=40):
+def drive(verdict, asked, limit=40, passed=lambda action: 0.0):
     """Runs the machine against an oracle: (pair, Certify) -> (outcome, weakness or None).
+
+    Args:
+        passed: how much of the time until the deadline has passed after an action.
 
     Returns:
         The certifications asked for, the candidates and the last action.
@@ -71,7 +75,7 @@ def drive(verdict, asked, limit=40):
             made.append(action)
             found = {i: verdict(i, action) for i in action.pairs}
             reached = [(i, *found[i], OPEN if found[i][1] is not None else None) for i, _ in action.work]
-            report = Outcomes.of_parts(action, reached)
+            report = Outcomes.of_parts(action, reached, passed(action))
         transition = advance(SCENE, state, report)
     raise AssertionError("the machine does not end")
 
@@ -111,8 +115,8 @@ def test_where_bodies_touch_is_cut_off_and_what_holds_is_not_asked_for_again():
     assert end.outcome is Outcome.CERTIFIED
 
 
-@pytest.mark.parametrize(("slices", "hard"), [(1, 1), (9, HARD // SLICE // PARTS)])
-def test_what_stays_open_is_cut_off_and_a_face_loses_little_until_the_effort_is_spent(slices, hard):
+@pytest.mark.parametrize("slices", [1, 9])
+def test_what_stays_open_is_cut_off_when_the_effort_is_spent_and_where_bodies_are_near_before(slices):
     def verdict(index, action):
         there = action.polytope.contains(FAR)
         if index == 0 or not there.any():
@@ -121,11 +125,33 @@ def test_what_stays_open_is_cut_off_and_a_face_loses_little_until_the_effort_is_
 
     made, accepted, _ = drive(verdict, options(cells=slices * SLICE))
     later = made[1:]
-    assert [action.ending for action in later] == [[]] * hard + [[1]] * (len(later) - hard)
-    # Faces may lose little first, and any share some rounds after the effort is spent.
+    spent = [round_ * PARTS for round_ in range(len(later))]
+    assert [action.hard for action in later] == [[1] if HARD <= SLICE * s < SLICE * slices else [] for s in spent]
+    assert [action.ending for action in later] == [[1] if s >= slices else [] for s in spent]
+    assert any(action.hard for action in later) == (slices > HARD // SLICE)
+    # Any share may be lost some rounds after the effort is spent.
     assert slices // PARTS + 1 <= len(later) <= slices // PARTS + 9
     assert all(action.cells == SLICE for action in later)
-    assert all(action.polytope.contains(FAR).all() for action in later[: max(slices // PARTS, hard + 1)])
+    assert all(action.polytope.contains(FAR).all() for action in later[: 1 + math.ceil(slices / PARTS)])
+    assert not accepted[-1].polytope.contains(FAR).any()
+
+
+def test_what_is_open_is_cut_off_when_the_deadline_comes_near():
+    """The first stage is certified in one round. The second one goes on until it is late, and ends a few rounds later."""
+
+    def verdict(index, action):
+        there = action.polytope.contains(FAR)
+        if index == 0 or not there.any():
+            return Outcome.CERTIFIED, None
+        return Outcome.INCONCLUSIVE, weak(FAR[there] if index in action.ending else [])
+
+    made, accepted, end = drive(verdict, options(cells=1000 * SLICE), passed=lambda action: 0.05 * action.iteration)
+    late = 1 + next(i for i, action in enumerate(made) if 0.05 * action.iteration >= LATE)
+    assert [i for i, action in enumerate(made) if action.ending] == list(range(late, len(made)))
+    assert all(action.polytope.contains(FAR).all() for action in made[1:late])
+    assert late < len(made) < 2 * late
+    assert end.outcome is Outcome.CERTIFIED
+    assert len(accepted) == len(STAGES)
     assert not accepted[-1].polytope.contains(FAR).any()
 
 

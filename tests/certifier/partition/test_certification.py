@@ -245,7 +245,7 @@ def test_a_search_that_is_ending_names_points_of_every_open_cell():
     scene, polytope = passing(0.6, CLOSE)
     shared = CellCertification(scene, polytope)
     assert len(shared.certify(0, 1).weakness.points) == 0
-    result = shared.certify(0, 1, ending=True)
+    result = shared.certify(0, 1, within=np.inf)
     assert result.outcome is Outcome.INCONCLUSIVE
     points, cells = result.weakness.points, open_cells([result.subtrees])
     assert polytope.contains(points).all()

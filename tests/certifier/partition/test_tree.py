@@ -11,7 +11,7 @@ from certifier.partition.tree import OPEN, Node, OpenCell, Streams, joined, of_s
 from certifier.proof.partition import EMPTY, PLANE, STREAMS
 
 N, K = 3, 2
-VERTICES = {0: 4, 1: 2, 2: 3, 3: 1}
+VERTICES = (4, 2, 3, 1)
 """Of both volumes together, for every choice of volumes."""
 
 
@@ -42,7 +42,7 @@ def random_tree(rng, lower, upper, depth):
         return Node()
     if kind == EMPTY:
         return Node(EMPTY, streams=random_streams(rng, [], 1))
-    choice = int(rng.choice(list(VERTICES)))
+    choice = int(rng.integers(len(VERTICES)))
     pieces = [code for _ in range(VERTICES[choice]) for code in random_pieces(rng)]
     streams = random_streams(rng, pieces, sum(code < 0 for code in pieces))
     return Node(PLANE, plane=rng.normal(size=(5, 1 + K)), choice=choice, streams=streams)
@@ -109,14 +109,14 @@ def test_subtrees_of_rounds_in_parts_are_put_together_to_the_tree_that_was_grown
             for node, lower, upper in mine:
                 depth = 0 if len(rounds) == 3 else int(rng.integers(4))
                 vars(node).update(vars(random_tree(rng, lower, upper, depth)))
-                node.coarse = bool(rng.integers(2))
+                node.level = int(rng.integers(4))
             left = Subtrees.of(mine, faces)
             files.append(left.to_bytes(K))
             following += left.open_cells
         rounds.append(files)
         read = open_cells(files)
-        assert [(cell.node.coarse, cell.lower.tolist(), cell.upper.tolist()) for cell in read] == [
-            (cell.node.coarse, cell.lower.tolist(), cell.upper.tolist()) for cell in following
+        assert [(cell.node.level, cell.lower.tolist(), cell.upper.tolist()) for cell in read] == [
+            (cell.node.level, cell.lower.tolist(), cell.upper.tolist()) for cell in following
         ]
         given, parts = following, int(rng.integers(1, most_parts + 1))
     together = put_together(rounds, faces, 2, VERTICES)

@@ -2,11 +2,9 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,7 +12,6 @@ from certifier.errors import RegionError
 from certifier.model import Geometry, Joint, JointKind, Pair, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.polytope import bounds
-from certifier.scene import load_scene
 from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.propose import check_seed, propose
 
@@ -247,10 +244,7 @@ def test_defaults_are_valid():
     assert SeedOptions.from_document({"q": [0, 1]}) == replace(SeedOptions(), q=(0.0, 1.0))
 
 
-def test_the_limits_are_a_proposal_without_faces_and_the_default_for_many_joints():
+def test_the_limits_are_a_proposal_without_faces():
     proposal = propose(crane(), SeedOptions(Method.LIMITS, q=(0.3, 0.2)))
     assert proposal.C.shape == (0, 2)
     assert proposal.info["method"] == "limits"
-    directory = Path(__file__).parents[3] / "examples" / "dual_ur3e"
-    q = tuple(yaml.safe_load((directory / "seed.yaml").read_text())["q"])
-    assert propose(load_scene(directory / "scene.yaml"), SeedOptions(q=q)).info["method"] == "limits"

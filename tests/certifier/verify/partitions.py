@@ -62,7 +62,7 @@ class Producer:
     Every cell takes the first of the choices that has a plane, coarse volumes before others.
     """
 
-    def __init__(self, scene: Scene, pair: Pair, frame: str, mid, half, C=None, d=None, interior=None, coarse=(None, None)) -> None:
+    def __init__(self, scene: Scene, pair: Pair, frame: str, mid, half, C=None, d=None, interior=None, coarse=((), ())) -> None:
         n = scene.n
         self.scene, self.frame = scene, frame
         self.volumes = tuple(Volume.of(scene.geometry(name)) for name in (pair.a, pair.b))
@@ -76,9 +76,9 @@ class Producer:
         self.kinematics = Kinematics.of(scene)
         self.interior = chebyshev_center(Polytope(C, d))[0] if interior is None else interior
         self.coarse = coarse
-        alternatives = [[a for a in (fine, other) if a is not None] for fine, other in zip(self.volumes, coarse, strict=True)]
+        alternatives = [(fine, *others) for fine, others in zip(self.volumes, coarse, strict=True)]
         self.play = sorted({j for v in (*alternatives[0], *alternatives[1]) for j in self.kinematics.chain(frame, v.body)})
-        self.chosen = {i + 2 * j: (a, b) for i, a in enumerate(alternatives[0]) for j, b in enumerate(alternatives[1])}
+        self.chosen = {i + len(alternatives[0]) * j: (a, b) for i, a in enumerate(alternatives[0]) for j, b in enumerate(alternatives[1])}
 
     def proof(self, depth: int = DEPTH, least: int = 0, halvings: int = 0) -> PartitionProof | None:
         """The proof, with cells cut and pieces halved at least so many times; None where ``depth`` cuts are not enough."""

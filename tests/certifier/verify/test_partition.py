@@ -47,15 +47,16 @@ def folding():
 
 
 def coarse_proof(scene, first: str, second: str, frame: str, mid, half, **least) -> PartitionProof | None:
-    """The last pair's, with a ball fixed to a body for either volume, or a capsule where the body is "", where there is such a thing."""
+    """The last pair's, with balls fixed to the bodies named for either volume, and a capsule for "capsule", where there is such a thing."""
     pair = scene.pairs[-1]
-    coarse = tuple(coarse_volume(scene, name, body) for name, body in ((pair.a, first), (pair.b, second)))
+    found = [[coarse_volume(scene, name, body) for body in bodies.split()] for name, bodies in ((pair.a, first), (pair.b, second))]
+    coarse = tuple(tuple(volume for volume in volumes if volume) for volumes in found)
     return Producer(scene, pair, frame, mid, half, coarse=coarse).proof(**least)
 
 
 def coarse_volume(scene, name: str, body: str) -> Volume | None:
     kinematics, geometry = Kinematics.of(scene), scene.geometry(name)
-    return ball_about(kinematics, [geometry], body) if body else capsule(kinematics, geometry)
+    return ball_about(kinematics, [geometry], body) if body != "capsule" else capsule(kinematics, geometry)
 
 
 def with_tip():
@@ -64,12 +65,15 @@ def with_tip():
     return replace(scene, geometries=(*scene.geometries, tip), pairs=(Pair(tip.name, "world/obstacle"),))
 
 
+SEVERAL = "capsule world", "capsule right/link1 world"
+
+
 @cache
 def proof(name: str) -> PartitionProof:
     """A true proof: many cells; balls and padding; cells and pieces that the polytope misses; sliding joints; two arms; wide ranges.
 
     Those named in COARSE have coarse volumes in some cells: a ball; a capsule; for both bodies; for the second; seen from the body itself;
-    with a joint in play that moves none of the volumes that any cell chooses.
+    with a joint in play that moves none of the volumes that any cell chooses; two for either body.
     """
     far = box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (2.5, 1.0, 0.0))
     above = box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.5, 0.2, 0.4))
@@ -83,10 +87,13 @@ def proof(name: str) -> PartitionProof:
         "slides": lambda: Producer(slides, slides.pairs[1], WORLD, [-0.1, 0.0], [0.4, 0.3]).proof(least=2),
         "arms": lambda: Producer(arms, arms.pairs[0], WORLD, 0.1, 0.3).proof(),
         "ball": lambda: coarse_proof(arm(place=(1.7, 0.8, 0.0)), "arm/link1", "world", WORLD, [-0.2, -0.3], [0.25, 0.3], least=2),
-        "capsule": lambda: coarse_proof(arm(place=(1.7, 0.8, 0.0), padding=0.01), "", "world", WORLD, [-0.2, -0.3], [0.25, 0.3], least=2),
-        "both": lambda: coarse_proof(two_arms(2, apart=4.0), "", "right/link1", WORLD, [0.1, 0.3, 0.1, 0.5], 0.15, least=1),
+        "capsule": lambda: coarse_proof(
+            arm(place=(1.7, 0.8, 0.0), padding=0.01), "capsule", "world", WORLD, [-0.2, -0.3], [0.25, 0.3], least=2
+        ),
+        "both": lambda: coarse_proof(two_arms(2, apart=4.0), "capsule", "right/link1", WORLD, [0.1, 0.3, 0.1, 0.5], 0.15, least=1),
         "second": lambda: coarse_proof(two_arms(2, apart=4.0), "left/link2", "right/link1", WORLD, [0.1, 0.3, 0.1, 0.5], 0.15, least=1),
-        "below": lambda: coarse_proof(arm(), "", "world", "arm/link2", [-0.4, -0.1], [0.5, 0.35]),
+        "below": lambda: coarse_proof(arm(), "capsule", "world", "arm/link2", [-0.4, -0.1], [0.5, 0.35]),
+        "several": lambda: coarse_proof(two_arms(2, apart=4.0), *SEVERAL, WORLD, [0.1, 0.3, 0.1, 0.5], 0.15, least=1),
         "beyond": lambda: coarse_proof(folding(), "world", "arm/link1", "arm/link1", [0.0, 1.0, 0.5], [0.1, 0.2, 0.1], least=1),
         "wide": lambda: Producer(wide, wide.pairs[0], WORLD, 0.0, 11.0).proof(),
     }
@@ -95,15 +102,17 @@ def proof(name: str) -> PartitionProof:
     return found
 
 
-COARSE = ("ball", "capsule", "both", "second", "below", "beyond")
+COARSE = ("ball", "capsule", "both", "second", "below", "several", "beyond")
 NAMES = (*COARSE, "cells", "tip", "band", "corners", "inside", "slides", "arms", "wide")
 
 
 def test_the_proofs_choose_every_combination_of_volumes():
     chosen = {name: set(proof(name).choices.tolist()) for name in NAMES}
-    assert set().union(*chosen.values()) == {0, 1, 2, 3}
+    assert set().union(*(chosen[name] for name in NAMES if name != "several")) == {0, 1, 3}
+    assert len(proof("several").chosen) > 4
+    assert max(chosen["several"]) > 3
     assert all(chosen[name] == {0} for name in NAMES if name not in COARSE)
-    assert all({len(v.vertices) for v in proof(name).coarse if v} == {n} for name, n in (("ball", 1), ("capsule", 2)))
+    assert all({len(v.vertices) for vs in proof(name).coarse for v in vs} == {n} for name, n in (("ball", 1), ("capsule", 2)))
 
 
 def least_distance(of: PartitionProof) -> float:
@@ -280,14 +289,15 @@ def test_large_and_tiny_multipliers_are_refused_or_true():
 def test_changed_coarse_volumes_are_refused_or_true(name):
     true, rng = proof(name), np.random.default_rng(3)
     scene = true.scene
-    for i in [i for i in (0, 1) if true.coarse[i] is not None]:
+    for i, k in [(side, number) for side, volumes in enumerate(true.coarse) for number in range(len(volumes))]:
 
-        def with_coarse(i=i, **changes):
-            coarse = list(true.coarse)
-            coarse[i] = replace(true.coarse[i], **changes)
-            return replace(true, coarse=tuple(coarse))
+        def with_all(others, i=i):
+            return replace(true, coarse=tuple(others if j == i else volumes for j, volumes in enumerate(true.coarse)))
 
-        volume = true.coarse[i]
+        def with_coarse(i=i, k=k, **changes):
+            return with_all(tuple(replace(v, **changes) if number == k else v for number, v in enumerate(true.coarse[i])), i)
+
+        volume = true.coarse[i][k]
         refused(with_coarse(radius=volume.radius * (1 - 1e-6)), "proof_volume")
         refused(with_coarse(vertices=volume.vertices + np.array([0.0, 0.1, 0.0])), "proof_volume")
         refused(with_coarse(geometries=true.volumes[1 - i].geometries), "proof_volume")
@@ -299,12 +309,13 @@ def test_changed_coarse_volumes_are_refused_or_true(name):
         for _ in range(20):
             moved = volume.vertices + rng.normal(size=volume.vertices.shape) * 10.0 ** rng.uniform(-4, 0)
             check(with_coarse(vertices=moved, radius=volume.radius * rng.uniform(0.9, 1.2)), name)
-        refused(replace(true, coarse=tuple(None if j == i else v for j, v in enumerate(true.coarse))), "proof_malformed")
-        refused(replace(true, coarse=tuple(true.volumes[j] if j == i else v for j, v in enumerate(true.coarse))), "proof_volume")
-    for choice in range(-1, 5):
+        if name != "several":
+            refused(with_all(()), "proof_malformed")
+        refused(with_all((true.volumes[i],)), "proof_volume")
+    for choice in range(-1, 1 + len(true.chosen)):
         said = replace(true, choices=np.full_like(true.choices, choice))
         if not np.array_equal(said.choices, true.choices):
-            refused(said, None if choice in true.chosen else "proof_malformed")
+            refused(said, None if 0 <= choice < len(true.chosen) else "proof_malformed")
 
 
 def test_a_ball_that_is_too_small_proves_nothing():
@@ -314,19 +325,19 @@ def test_a_ball_that_is_too_small_proves_nothing():
     small = replace(ball, radius=0.05)
 
     def made(coarse):
-        return Producer(scene, scene.pairs[1], WORLD, [0.3, 0.3], [0.1, 0.1], coarse=(coarse, None)).proof(depth=3)
+        return Producer(scene, scene.pairs[1], WORLD, [0.3, 0.3], [0.1, 0.1], coarse=((coarse,), ())).proof(depth=3)
 
-    assert least_distance(replace(made(small), coarse=(ball, None))) < 0
+    assert least_distance(replace(made(small), coarse=((ball,), ()))) < 0
     assert refused(made(small), "proof_volume").message.endswith("may leave the coarse volume that stands for it")
-    refused(replace(made(small), coarse=(ball, None)), "proof_cell")
+    refused(replace(made(small), coarse=((ball,), ())), "proof_cell")
     assert made(ball) is None
 
 
 def test_a_coarse_volume_is_no_volume_of_another_proof():
     """Not even where it is known to hold its geometries, because a cell chose it."""
     true = proof("ball")
-    coarse, obstacle = true.coarse[0], true.volumes[1]
-    alone = replace(true, volumes=(coarse, obstacle), coarse=(None, None), choices=np.zeros_like(true.choices))
+    coarse, obstacle = true.coarse[0][0], true.volumes[1]
+    alone = replace(true, volumes=(coarse, obstacle), coarse=((), ()), choices=np.zeros_like(true.choices))
     refused(alone, "proof_volume")
     with pytest.raises(ProofError, match="not welded"):
         statements(true.scene, [true, alone])
@@ -351,12 +362,13 @@ def test_files_name_coarse_volumes_strictly():
     true = proof("both")
     header, arrays = unpack(true.to_bytes(), "partition")
     entry = header["proofs"][0]
-    assert entry["coarse"] == [2, 3]
-    for coarse in ([2], [2, 3, 3], [2, 4], [2, -1], [2, 3.0], [2, "3"], [2, None], [None, None], 2, None, {}):
+    assert entry["coarse"] == [[2], [3]]
+    others = [2, 3], [[2]], [[2], [3], [3]], [[2], 3], [[2], []], [[], []], [[2], [None]], [None, None], 2, None, {}
+    for coarse in (*([[2], [number]] for number in (4, -1, 3.0, "3", [3])), *others, [[2] * 11, [3]]):
         with pytest.raises(ProofError) as refusal:
             PartitionProof.from_bytes(pack({**header, "proofs": [{**entry, "coarse": coarse}]}, arrays), true.scene)
         assert refusal.value.code == "proof_malformed"
-    swapped = PartitionProof.from_bytes(pack({**header, "proofs": [{**entry, "coarse": [3, 2]}]}, arrays), true.scene)
+    swapped = PartitionProof.from_bytes(pack({**header, "proofs": [{**entry, "coarse": [[3], [2]]}]}, arrays), true.scene)
     refused(swapped, "proof_volume")
 
 

@@ -41,10 +41,10 @@ def planar(radius):
 
 
 def wrist():
-    """A pair in six joints, with a coarse volume for the hand."""
+    """A pair in six joints, with two coarse volumes for the hand."""
     scene = load_scene(EXAMPLES / "ur3e_bin" / "scene.yaml")
     q = np.array(yaml.safe_load((EXAMPLES / "ur3e_bin" / "seed.yaml").read_text())["q"])
-    index = next(i for i, pair in enumerate(scene.pairs) if "wrist_3" in pair.a + pair.b and "top" in pair.a + pair.b)
+    index = next(i for i, pair in enumerate(scene.pairs) if "wrist_3" in pair.a + pair.b and "tray/right" in pair.a + pair.b)
     return scene, cube(scene, scene.to_s(q), 0.3), index
 
 
@@ -62,13 +62,13 @@ def proofs():
         assert np.count_nonzero(proof.nodes < 0) >= 4, "the tree has cuts to move"
         verify_separation(proof)
         found.append((proof, uniform_in_q(polytope, scene.revolute, SAMPLES // 20, 20, seed=5).reshape(-1, scene.n)))
-    assert any(proof.choices.any() for proof, _ in found)
+    assert any(len(set(proof.choices.tolist())) > 1 for proof, _ in found)
     assert any(len(proof.multipliers) for proof, _ in found)
     return found
 
 
 def tree_of(proof):
-    vertices = {choice: len(a.vertices) + len(b.vertices) for choice, (a, b) in proof.chosen.items()}
+    vertices = [len(a.vertices) + len(b.vertices) for a, b in proof.chosen]
     return of_streams({name: getattr(proof, name) for name in STREAMS}, vertices, 1)[0]
 
 

@@ -1,0 +1,69 @@
+"""Which coarse volumes are tried in the cells of a pair is chosen here: fat balls that few joints move, then slim ones, then the bodies.
+
+A volume that many joints move takes many cells, because each of them has to be narrow in all of these joints. A fat ball that stands for
+all of the hand, whatever the wrist does, takes few as long as the bodies are far apart, and all pairs with the hand share what is found for
+it (certifier.partition.shared). Where the balls come too close, a cell goes on to the next level.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from certifier.model import Array, Volume
+from certifier.partition.area import Area
+from certifier.partition.coarse import common_balls, slim_volume
+from certifier.partition.hulls import gaps, hull
+from certifier.proof import limits
+from certifier.proof.partition import Coarse
+
+APART, LOOKED = (0.99, 1.0), 500
+"""The fattest balls are apart at the first share of the configurations, the next ones at the second; so many are looked at."""
+
+Level = tuple[int, int]
+"""The numbers of the volumes of a level: 0 for a volume itself, i for the coarse one with the number i - 1."""
+
+
+def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> tuple[Coarse, list[Level]]:
+    """Returns the coarse volumes of two volumes, which do not depend on the polytope, and the levels, which do.
+
+    A cell tries the last level first; level 0 is that of the volumes themselves.
+
+    Args:
+        frame: any body; distances are computed in its frame.
+    """
+    kinematics, (a, b) = area.kinematics, volumes
+    slim = slim_volume(kinematics, a, b), slim_volume(kinematics, b, a)
+    balls = common_balls(kinematics, a, b), common_balls(kinematics, b, a)
+    first, second = ((*([one] if one else []), *more)[: limits.COARSE] for one, more in zip(slim, balls, strict=True))
+    known = (a, *first), (b, *second)
+
+    def moving(level: Level) -> int:
+        return len(kinematics.chain(known[0][level[0]].body, known[1][level[1]].body))
+
+    levels: list[Level] = [(0, 0)]
+    slender = int(slim[0] is not None), int(slim[1] is not None)
+    if slender != (0, 0):
+        levels.append(slender)
+    fat = itertools.product(*([0, *range(1 + number, len(volumes))] for number, volumes in zip(slender, known, strict=True)))
+    candidates = sorted((level for level in fat if 0 < moving(level) < moving(levels[-1])), key=moving)
+    fats: list[Level] = []
+    shares = list(range(len(APART)))
+    for _, alternatives in itertools.groupby(candidates, key=moving):
+        room = {level: _room(area, frame, (known[0][level[0]], known[1][level[1]])) for level in alternatives}
+        best = max(room, key=lambda level: float(room[level][shares[0]]))
+        if room[best][shares[0]] > 0:
+            fats.append(best)
+        shares = [share for share in shares if room[best][share] <= 0]
+        if not shares:
+            break
+    return (first, second), levels + fats[::-1]
+
+
+def _room(area: Area, frame: str, volumes: Sequence[Volume]) -> Array:
+    """Returns how far apart the volumes are at each share in APART of the configurations, in metres; not positive if they touch."""
+    hulls = [hull(area.kinematics, frame, v, v.radius + area.scene.padding, np.zeros(3), 1.0) for v in volumes]
+    room: Array = np.quantile(gaps(*hulls, area.samples[:LOOKED]), [1 - share for share in APART])
+    return room

@@ -1,0 +1,53 @@
+"""Pairs with the same coarse volumes share here what was found for them in a cell, because it does not depend on the pair.
+
+What is found in a cell is a function of the polytope, the volumes, the cell and the points that are known in it. So it does not matter to
+the result which pairs a process was asked for before.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import OrderedDict
+from dataclasses import dataclass
+
+from certifier.model import Array, Volume
+from certifier.partition.area import Area
+from certifier.partition.bodies import Bodies, Separated, Undecided
+from certifier.partition.cell import Cell
+
+MOST = 2000
+"""What was found in so many cells is kept."""
+
+
+@dataclass(eq=False)
+class Tried:
+    """Holds what was found in a cell, and the joint to cut it in, once that was asked for."""
+
+    found: Separated | Undecided
+    joint: int | None = None
+
+
+class Shared:
+    """Holds the coarse volumes of the pairs of one polytope, and what was found for them."""
+
+    def __init__(self, area: Area) -> None:
+        self._area = area
+        self._bodies: dict[tuple[object, ...], Bodies] = {}
+        self._tried: OrderedDict[bytes, Tried] = OrderedDict()
+
+    def bodies(self, frame: str, volumes: tuple[Volume, Volume]) -> Bodies:
+        """Returns two volumes as bodies, the same ones for volumes of the same shape, whatever geometries they stand for."""
+        key = frame, *((volume.body, volume.vertices.tobytes(), volume.radius) for volume in volumes)
+        if key not in self._bodies:
+            self._bodies[key] = Bodies(self._area, frame, volumes)
+        return self._bodies[key]
+
+    def tried(self, bodies: Bodies, cell: Cell, start: Array) -> Tried:
+        """Returns what is found for two of these bodies in a cell; ``start`` is a point of the polytope in it."""
+        parts = (cell.lower, cell.upper, start, cell.points)
+        key = hashlib.blake2b(id(bodies).to_bytes(8, "little") + b"".join(part.tobytes() for part in parts), digest_size=16).digest()
+        if key not in self._tried:
+            self._tried[key] = Tried(bodies.separate(cell, start))
+            if len(self._tried) > MOST:
+                self._tried.popitem(last=False)
+        return self._tried[key]

@@ -1,0 +1,123 @@
+"""The volumes that the cells of a pair are tried with, and what pairs share of what was found for them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from certifier.kinematics import Kinematics
+from certifier.model import Volume
+from certifier.outcome import Outcome
+from certifier.partition.area import Area
+from certifier.partition.bodies import Bodies
+from certifier.partition.certification import CellCertification
+from certifier.partition.frames import choose_frame
+from certifier.partition.levels import APART, LOOKED, levels_of
+from certifier.proof.partition import PartitionProof, choices_of
+from certifier.scene import load_scene
+from certifier.verify.coarse import check_coarse
+from certifier.verify.kinematics import ExactKinematics
+from certifier.verify.separations import verify_separation
+from tests.certifier.scenes import box, cube, two_arms
+from tests.certifier.truth import distances_at
+
+EXAMPLE = Path(__file__).parents[3] / "examples" / "ur3e_bin"
+CELLS = 60
+HANDS = 8
+"""The pair of both last links, which six joints move."""
+
+
+@cache
+def facing(apart=5.0, half=0.6):
+    """Two arms of three links, with a second body on either last link, and a polytope about a configuration where they are folded."""
+    scene = two_arms(3, apart=apart)
+    tips = [box(f"{arm}/link3/tip", f"{arm}/link3", (0.2, 0.2, 0.2), (0.9, 0.0, 0.0)) for arm in ("left", "right")]
+    links = [f"{arm}/link3/{part}" for arm in ("left", "right") for part in ("bar", "tip")]
+    pairs = tuple(pair for pair in scene.pairs) + tuple(
+        replace(scene.pairs[0], a=a, b=b) for a in links[:2] for b in links[2:] if "tip" in a + b
+    )
+    scene = replace(scene, geometries=(*scene.geometries, *tips), pairs=pairs)
+    return scene, cube(scene, 0.3, half)
+
+
+def levels(scene, polytope, index):
+    area, pair = Area.of(scene, polytope, 0), scene.pairs[index]
+    volumes = Volume.of(scene.geometry(pair.a)), Volume.of(scene.geometry(pair.b))
+    frame, _ = choose_frame(area.kinematics, volumes, area.lower, area.upper)
+    coarse, found = levels_of(area, frame, volumes)
+    chosen = choices_of(volumes, coarse)
+    return area, coarse, [chosen[i + (1 + len(coarse[0])) * j] for i, j in found]
+
+
+@pytest.mark.parametrize(("apart", "half", "joints"), [(5.0, 0.6, [6]), (5.5, 0.35, [6, 5]), (6.0, 0.6, [6, 4, 3]), (8.0, 0.6, [6, 1])])
+def test_the_farther_bodies_are_apart_the_fewer_joints_move_the_coarsest_level(apart, half, joints):
+    scene, polytope = facing(apart, half)
+    area, coarse, found = levels(scene, polytope, HANDS)
+    assert [len(area.kinematics.chain(a.body, b.body)) for a, b in found] == joints
+    for a, b in found[-1:] if len(joints) > 1 else []:
+        assert fat_balls_apart(area, a, b) >= APART[0] - 1 / LOOKED
+    exact = ExactKinematics.at(scene, [])
+    for volume in (*coarse[0], *coarse[1]):
+        check_coarse(scene, exact, volume)
+
+
+def fat_balls_apart(area, a, b):
+    """At which share of the samples the balls, or the boxes' corners in their place, do not come as near as their radii."""
+    A, B = (area.kinematics.points("world", v.body, v.vertices, area.samples[:LOOKED]) for v in (a, b))
+    distances = np.linalg.norm(A[:, :, None] - B[:, None], axis=3).min(axis=(1, 2))
+    return (distances > a.radius + b.radius).mean()
+
+
+def hands(scene):
+    kinematics = Kinematics.of(scene)
+    return [i for i, pair in enumerate(scene.pairs) if len(kinematics.chain(scene.geometry(pair.a).body, scene.geometry(pair.b).body)) == 6]
+
+
+def test_pairs_share_what_is_found_for_coarse_volumes_and_come_to_the_same_bytes_as_alone(monkeypatch):
+    scene, polytope = facing(6.0)
+    asked = []
+    separate = Bodies.separate
+    monkeypatch.setattr(Bodies, "separate", lambda self, *given: asked.append(1) or separate(self, *given))
+    together = CellCertification(scene, polytope)
+    indices = hands(scene)
+    assert len(indices) == 4
+    counts = []
+    for index in indices:
+        asked.clear()
+        shared, with_others = together.certify(index, CELLS), len(asked)
+        asked.clear()
+        alone = CellCertification(scene, polytope).certify(index, CELLS)
+        assert (shared.outcome, shared.subtrees, shared.proof) == (alone.outcome, alone.subtrees, alone.proof)
+        assert shared.open_cells > 0
+        counts.append((with_others, len(asked)))
+    # The first pair asks as often as alone. A pair with the same fat balls asks for nothing as long as they are enough.
+    assert counts[0][0] == counts[0][1] >= CELLS
+    assert [with_others for with_others, _ in counts].count(0) == 2
+
+
+def test_a_pair_is_certified_on_several_levels_and_its_twin_is_refuted():
+    scene, q = load_scene(EXAMPLE / "scene.yaml"), np.array(yaml.safe_load((EXAMPLE / "seed.yaml").read_text())["q"])
+    index = next(i for i, pair in enumerate(scene.pairs) if "wrist_3" in pair.a + pair.b and "table" in pair.a + pair.b)
+    polytope = cube(scene, scene.to_s(q), 0.4)
+    result = CellCertification(scene, polytope).certify(index, 600)
+    assert result.outcome is Outcome.CERTIFIED, result
+    proof = PartitionProof.from_bytes(result.proof, scene)
+    samples = Area.of(scene, polytope, 3).samples
+    assert 0 < verify_separation(proof).gap <= min(distances_at(replace(scene, pairs=(scene.pairs[index],)), samples).values())
+    assert set(proof.choices.tolist()) == {0, 1, 2}
+    larger = CellCertification(scene, cube(scene, scene.to_s(q), 0.8)).certify(index, 600)
+    assert larger.outcome is Outcome.REFUTED
+
+
+def test_a_proof_names_only_the_coarse_volumes_that_its_cells_choose():
+    scene, polytope = facing(8.0)
+    proof = PartitionProof.from_bytes(CellCertification(scene, polytope).certify(HANDS, 10).proof, scene)
+    _, coarse, _ = levels(scene, polytope, HANDS)
+    assert sum(map(len, coarse)) > 2
+    assert list(map(len, proof.coarse)) == [1, 1]
+    assert set(proof.choices.tolist()) == {3}
