@@ -64,7 +64,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "scaling": lambda args, screen: scaling.curves(args.against is not None, screen.line),
     "service": lambda args, screen: service.beside_local(args.example, args.processes, args.turns, screen.line),
     "store": lambda args, screen: store.store(args.postgresql, store.COUNTS, screen.line),
-    "survey": lambda args, screen: survey.survey(args.scenes, args.most, screen.line),
+    "survey": lambda args, screen: survey.survey(args.scenes, args.most, screen.line, args.cells),
 }
 
 
@@ -100,6 +100,7 @@ def _parser() -> ArgumentParser:
     surveyed = kinds.add_parser("survey", parents=[as_json], help="certify every pair of every scene on every region")
     surveyed.add_argument("scenes", nargs="*", metavar="SCENE", default=list(catalogue.SCENES), help="default: all")
     surveyed.add_argument("--most", type=float, default=5.0, metavar="SECONDS", help="leave pairs with a longer forecast out; default 5")
+    surveyed.add_argument("--cells", type=int, default=1, metavar="N", help="certify cell by cell, with so many cells of a pair at most")
     served = kinds.add_parser("service", parents=[as_json], help="measure the service beside --local")
     served.add_argument("example", nargs="?", default="iiwa_shelf", metavar="EXAMPLE", help="default iiwa_shelf")
     served.add_argument("--processes", type=int, default=1, metavar="N", help="number of the service's solving processes; default 1")

@@ -235,10 +235,12 @@ def _survey(document: Document) -> list[str]:
     rows = [
         [row["scene"], row["region"], _counts(row["outcomes"]), str(row["left_out"]), seconds(row["seconds"])] for row in document["counts"]
     ]
-    fit = document["forecast"]
     parts = [_table(["scene", "region", "outcomes", "left out", "seconds"], rows)]
     if document["undecided"]:
         parts.append(_table(list(document["undecided"][0]), (list(row.values()) for row in document["undecided"])))
+    if "forecast" not in document:
+        return parts
+    fit = document["forecast"]
     least, low, median, high, most = fit["quantiles"]["present"]
     parts.append(
         f"Forecast divided by measured time of {fit['size_classes']} size classes: median {median:.2f}, "

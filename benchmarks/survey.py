@@ -1,4 +1,4 @@
-"""The survey certifies every pair of every scene on every region, with our certifier alone.
+"""The survey certifies every pair of every scene on every region, with our certifier alone: by the program (11), or cell by cell.
 
 It shows the outcomes, what is left undecided, and what a pair costs by its size.
 """
@@ -9,6 +9,7 @@ import time
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,10 @@ from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import Certification
 from certifier.pair.forecast import SECONDS, forecast, terms
 from certifier.pair.result import PairResult
+from certifier.partition.certification import CellCertification
 from certifier.proof.pair import PairProof
 
-DECIDED = (Outcome.CERTIFIED, Outcome.REFUTED, Outcome.NOT_CERTIFIABLE)
+DECIDED = (Outcome.CERTIFIED, Outcome.REFUTED, Outcome.NOT_CERTIFIABLE, Outcome.TOO_CLOSE)
 
 SizeClass = tuple[int, tuple[int, int], tuple[int, int]]
 """A size class is the number of joints that the plane moves with, the numbers of vertices of A and B, and the dimensions N of their
@@ -32,48 +34,54 @@ polynomial spaces.
 """
 
 
-def survey(names: Iterable[str], most: float, progress: Progress) -> dict[str, Any]:
+def survey(names: Iterable[str], most: float, progress: Progress, cells: int = 1) -> dict[str, Any]:
     """Certifies every pair of these scenes on every region of the catalogue, and returns the document of ``ciris bench survey``.
 
     Args:
-        most: seconds; pairs with a longer forecast are left out, and counted.
+        most: seconds; pairs with a longer forecast of the program (11) are left out, and counted.
+        cells: so many cells of a pair are looked at; 1 for the program (11). Only its times are compared with the forecast.
     """
     counts, undecided = [], []
     spent: dict[SizeClass, list[float]] = defaultdict(list)
     for name in names:
         whole = catalogue.scene(name)
-        scene = replace(whole, pairs=tuple(Pair(cost.a, cost.b) for cost in forecast(whole) if cost.seconds <= most))
+        scene = replace(whole, pairs=tuple(Pair(cost.a, cost.b) for cost in forecast(whole) if cells > 1 or cost.seconds <= most))
         sizes, left_out = _sizes(scene), len(whole.pairs) - len(scene.pairs)
         for kind in catalogue.REGIONS:
             outcomes: Counter[str] = Counter()
             total = 0.0
-            for pair, size, (result, seconds) in zip(scene.pairs, sizes, _certified(scene, catalogue.region(name, kind)), strict=True):
+            for pair, size, (result, seconds) in zip(
+                scene.pairs, sizes, _certified(scene, catalogue.region(name, kind), cells), strict=True
+            ):
                 outcomes[result.outcome.value] += 1
                 total += seconds
                 if result.outcome not in DECIDED:
                     found = {"scene": name, "region": kind, "a": pair.a, "b": pair.b, "outcome": result.outcome.value}
                     undecided.append(found | {"detail": result.detail})
                     progress(" ".join(undecided[-1].values()))
-                elif result.outcome is Outcome.CERTIFIED and len(PairProof.from_bytes(result.proof or b"", scene).pairs) == 1:
+                elif (
+                    cells == 1 and result.outcome is Outcome.CERTIFIED and len(PairProof.from_bytes(result.proof or b"", scene).pairs) == 1
+                ):
                     spent[size].append(seconds)
             counts.append({"scene": name, "region": kind, "outcomes": dict(outcomes), "left_out": left_out, "seconds": total})
             progress(f"{name} {kind}: {dict(outcomes)}, {total:.1f} s")
-    return {
-        "benchmark": "survey",
-        "machine": measure.machine(),
-        "counts": counts,
-        "undecided": undecided,
-        "forecast": _fit({size: float(np.mean(seconds)) for size, seconds in spent.items()}),
-    }
+    document = {"benchmark": "survey", "machine": measure.machine(), "cells": cells, "counts": counts, "undecided": undecided}
+    if cells == 1:
+        document["forecast"] = _fit({size: float(np.mean(seconds)) for size, seconds in spent.items()})
+    return document
 
 
-def _certified(scene: Scene, region: Region) -> Iterator[tuple[PairResult, float]]:
+def _certified(scene: Scene, region: Region, cells: int) -> Iterator[tuple[PairResult, float]]:
     """Yields the result of every pair and its processor time. As in the service, an exception becomes the outcome ``error``."""
-    certification = Certification(scene, scene.polytope(region.C, region.d), region.center)
+    polytope = scene.polytope(region.C, region.d)
+    if cells == 1:
+        certify = Certification(scene, polytope, region.center).certify
+    else:
+        certify = partial(CellCertification(scene, polytope).certify, cells=cells)
     for index in range(len(scene.pairs)):
         start = time.process_time()
         try:
-            result = certification.certify(index)
+            result = certify(index)
         except Exception as error:
             result = PairResult(Outcome.ERROR, Stage.SOS, detail=repr(error))
         yield result, time.process_time() - start

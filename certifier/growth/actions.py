@@ -46,7 +46,8 @@ class Certify:
         box: the root cell of all partitions; None for the polytope's smallest box.
         begun: the iteration in which the partitions of all pairs were begun; None where they begin in this one.
         parts: pair index -> how many parts its open cells are dealt to; 1 for a pair that is left out.
-        ending: pairs whose open cells are all going to be cut off.
+        ending: pairs whose open cells are going to be cut off where the volumes touch that these are tried with next; all of them where the
+            pair is hard as well.
     """
 
     kind: ClassVar[str] = "certify"

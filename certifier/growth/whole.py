@@ -41,6 +41,8 @@ FAST_LOSS = 0.05
 """They lose this share at most before a pair is hard, and when its effort is spent. Then it is twice as much in every round."""
 CONTACT_LOSS = 0.01
 """For contacts, which have to go sooner or later, they lose this share at least where that is needed."""
+ENDING = 60 * SLICE
+"""When the effort is spent, open cells are cut off where coarse volumes touch; after so many cells more, wherever they are."""
 LATE = 0.6
 """When this share of the time until the deadline has passed, the effort counts as spent, so that a region comes of what was done."""
 LATE_LOSS = 0.01
@@ -92,7 +94,8 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     most = {i: _most_loss(state, whole, i) for i in failing}
     corners = [corner for i in failing for corner in _corners(scene, i, report.weaknesses[i], most[i])]
     smaller = cut(scene, whole.polytope, start.keep, corners, _proposal(scene, start, whole.stage))
-    if smaller is whole.polytope and min(most[i] if i in action.ending else 0.0 for i in failing) >= 1:
+    final = {*action.ending} & {*action.hard}
+    if smaller is whole.polytope and all(i in final and most[i] >= 1 for i in failing):
         pair = scene.pairs[failing[0]]
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing more could be cut off for them")
     if smaller is None:
@@ -105,7 +108,7 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
 def _corners(scene: Scene, pair: int, weakness: Weakness, most: float) -> list[tuple[tuple[int, ...], Array, float]]:
     """Returns what is to be cut off for a pair: its contacts, which have to go sooner or later, and other points where it fails."""
     joints, points, k = joints_between(scene, pair), weakness.points, weakness.contacts
-    return [(joints, points[:k], max(most, CONTACT_LOSS)), (joints, points[k:], most)]
+    return [(joints, points[:k], max(most, CONTACT_LOSS)), (weakness.joints or joints, points[k:], most)]
 
 
 def _most_loss(state: GrowthState, whole: Whole, pair: int) -> float:
@@ -143,6 +146,7 @@ def _next(scene: Scene, state: GrowthState) -> Transition:
     whole = state.whole
     assert whole is not None
     pairs = [i for i in by_joints(scene) if i not in whole.holds]
+    spent, effort = {i: whole.spent.get(i, 0) for i in pairs}, {i: _effort(state, whole, i) for i in pairs}
     action = Certify(
         state.next,
         "cells",
@@ -150,12 +154,12 @@ def _next(scene: Scene, state: GrowthState) -> Transition:
         None,
         pairs,
         reuse=dict(whole.holds),
-        hard=[i for i in pairs if HARD <= whole.spent.get(i, 0) < _effort(state, whole, i)],
+        hard=[i for i in pairs if HARD <= spent[i] < effort[i] or spent[i] >= effort[i] + ENDING],
         failures=None,
         cells=SLICE,
         box=Box(whole.mid, whole.half),
         begun=whole.begun,
         parts=_parts(pairs, whole),
-        ending=[i for i in pairs if whole.spent.get(i, 0) >= _effort(state, whole, i)],
+        ending=[i for i in pairs if spent[i] >= effort[i]],
     )
     return Transition(replace(state, next=state.next + 1), action)

@@ -21,12 +21,14 @@ class Weakness:
         pull: (n,) how much it would help to shorten each joint's range; only the proportions matter. 0 where the bodies are in contact.
         ranges_alone: only planes at rest were tried; for them nothing of the polytope counts but the joints' ranges.
         contacts: at so many of the first points the bodies touch, as far as a search over partitions knows.
+        joints: position indices of the joints that matter at the points after these; empty for those between the bodies.
     """
 
     points: Array
     pull: Array
     ranges_alone: bool = False
     contacts: int = 0
+    joints: tuple[int, ...] = ()
 
     @classmethod
     def of_contact(cls, s: Array) -> Weakness:
@@ -44,18 +46,21 @@ class Weakness:
         if len(parts) == 1:
             return parts[0]
         points = [part.points[: part.contacts] for part in parts] + [part.points[part.contacts :] for part in parts]
-        return cls(np.concatenate(points), parts[0].pull, parts[0].ranges_alone, sum(part.contacts for part in parts))
+        others = [part.joints for part in parts if len(part.points) > part.contacts]
+        joints = () if () in others else tuple(sorted({joint for some in others for joint in some}))
+        return cls(np.concatenate(points), parts[0].pull, parts[0].ranges_alone, sum(part.contacts for part in parts), joints)
 
     def to_document(self) -> dict[str, Any]:
         """Returns the weakness as JSON-able data."""
-        return {"points": self.points.tolist(), "pull": self.pull.tolist(), "ranges_alone": self.ranges_alone, "contacts": self.contacts}
+        document = {"points": self.points.tolist(), "pull": self.pull.tolist(), "ranges_alone": self.ranges_alone}
+        return document | {"contacts": self.contacts, "joints": list(self.joints)}
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> Weakness:
         """Does the inverse of :meth:`to_document`."""
         pull = np.array(document["pull"], dtype=float)
         points = np.array(document["points"], dtype=float).reshape(-1, len(pull))
-        return cls(points, pull, bool(document["ranges_alone"]), int(document["contacts"]))
+        return cls(points, pull, bool(document["ranges_alone"]), int(document["contacts"]), tuple(document["joints"]))
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,8 @@ CALM = 0.3
 """So much less weight is on the slopes of a plane than on the rest: it turns less, and its normal's length has a tight affine bound."""
 LEAST, ENOUGH = 3e-4, 0.8
 """A plane's margin is at least LEAST, relative to the bodies' extent, and at least ENOUGH of the widest one."""
-SAFE = 1e-9
-"""The bound of a normal's length is larger than it by this part."""
+SAFE, ROUNDING = 1e-9, 1e-12
+"""The bound of a normal's length is larger than it by the first part, and by the second part of the terms that it is made of."""
 LOOKS, ROUNDS = 20, 8
 """So many planes are tried against configurations, and so many of those that hold there are tried to be proved, before a cell is cut."""
 PIECES, MANY_PIECES = 25, 60
@@ -209,4 +209,7 @@ class Bodies:
         plane[:, 1:] *= CALM / cell.half[self.joints]
         plane[:, 0] -= plane[:, 1:] @ cell.mid[self.joints]
         normed: Array = plane / np.abs(plane[:3]).max()
+        # In a narrow cell, terms that nearly cancel leave a short normal, and the verifier adds up their rounding errors.
+        farthest = np.maximum(np.abs(cell.lower), np.abs(cell.upper))[self.joints]
+        normed[4, 0] += ROUNDING * (np.abs(normed[[0, 1, 2, 4], 0]).sum() + (np.abs(normed[[0, 1, 2, 4], 1:]) @ farthest).sum())
         return normed

@@ -12,8 +12,10 @@ Of a pair that was begun, a part that leaves no cell open is inconclusive as wel
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
+from enum import Enum
 
 import numpy as np
 
@@ -25,6 +27,7 @@ from certifier.pair.broad_phase import BroadPhase, Volumes
 from certifier.pair.closest import closest
 from certifier.pair.result import PairResult, Weakness
 from certifier.partition.area import Area
+from certifier.partition.bodies import Bodies
 from certifier.partition.chords import chords
 from certifier.partition.hulls import approach, gaps
 from certifier.partition.search import Report, Search
@@ -45,8 +48,23 @@ NEAR_CONTACTS = 48
 SCALES = (0.5, 0.2, 0.07, 0.02)
 NEAR, POINTS_OF_A_CELL = 0.002, 8
 """Points of an open cell are named at which the bodies are as near as this, relative to their extent, and one at least."""
+AROUND = 0.1
+"""Open cells of hard pairs are cut off where the bodies are nearer than this, relative to their extent."""
 MOST_POINTS = 2000
 """A result names at most this many configurations."""
+
+
+class CutOff(Enum):
+    """Says of which open cells a result names points, because they will be cut off. Contacts are named in any case."""
+
+    CONTACTS = "contacts"
+    """None of them."""
+    NEAR = "near"
+    """Of those where the bodies are as near as AROUND."""
+    COARSELY = "coarsely"
+    """Of those where the volumes touch that they are tried with next, so that these volumes become enough."""
+    ALL = "all"
+    """All of them."""
 
 
 class CellCertification:
@@ -70,23 +88,24 @@ class CellCertification:
         self._shared = Shared(self._area)
         self._broad_phase = BroadPhase(Kinematics.of(scene), self._together)
 
-    def certify(self, index: int, cells: int, within: float = 0.0) -> PairResult:
+    def certify(self, index: int, cells: int, cut_off: CutOff = CutOff.CONTACTS) -> PairResult:
         """Certifies pair ``scene.pairs[index]``, alone or with others that the same proof covers.
 
         Args:
             cells: end after so many cells.
-            within: what is open and cannot be certified soon will be cut off. So the result names points of open cells where the bodies are
-                nearer than this, relative to their extent.
+            cut_off: which points of open cells the result names, because they will be cut off.
         """
         start, pair = time.perf_counter(), self._scene.pairs[index]
-        result = self._broad_phase.find(pair) or self._begin(self._volumes(index), cells, within)
+        result = self._broad_phase.find(pair) or self._begin(self._volumes(index), cells, cut_off)
         return replace(result, seconds=time.perf_counter() - start)
 
-    def go_on(self, index: int, cells: int, left: Sequence[bytes], part: int = 0, parts: int = 1, within: float = 0.0) -> PairResult:
+    def go_on(
+        self, index: int, cells: int, left: Sequence[bytes], part: int = 0, parts: int = 1, cut_off: CutOff = CutOff.CONTACTS
+    ) -> PairResult:
         """Goes on with the open cells of a pair that are dealt to one part.
 
         Args:
-            cells, within: as for :meth:`certify`.
+            cells, cut_off: as for :meth:`certify`.
             left: the ``subtrees`` of the round before, in the order of its parts, on a polytope of which this one is a part.
             part: the number of this part, from 0.
             parts: how many parts the round has.
@@ -95,7 +114,7 @@ class CellCertification:
         search = Search(self._area, self._shared, volumes)
         given, contacts = dealt(open_cells(left), part, parts), search.scout(1 + part)
         report = search.run(given, cells)
-        result = self._left(search, volumes, given, replace(report, contacts=contacts + report.contacts), within)
+        result = self._left(search, volumes, given, replace(report, contacts=contacts + report.contacts), cut_off)
         return replace(result, seconds=time.perf_counter() - start)
 
     def put_together(self, index: int, rounds: Sequence[Sequence[bytes]], part: int = 0, parts: int = 1) -> PairResult:
@@ -117,16 +136,16 @@ class CellCertification:
         return Volume.of(self._scene.geometry(pair.a)), Volume.of(self._scene.geometry(pair.b))
 
     def _together(self, volumes: Volumes) -> PairResult | None:
-        result = self._begin(volumes, GROUP_CELLS, 0.0)
+        result = self._begin(volumes, GROUP_CELLS, CutOff.CONTACTS)
         return result if result.outcome is Outcome.CERTIFIED else None
 
-    def _begin(self, volumes: Volumes, cells: int, within: float) -> PairResult:
+    def _begin(self, volumes: Volumes, cells: int, cut_off: CutOff) -> PairResult:
         search, root = Search(self._area, self._shared, volumes), Node()
         given = [OpenCell(root, self._area.lower, self._area.upper)]
         contacts = search.scout(0)
         report = Report(contacts=contacts) if contacts else search.run(given, cells)
         if any(node.kind == OPEN for node in root.preorder()):
-            return self._left(search, volumes, given, report, within)
+            return self._left(search, volumes, given, report, cut_off)
         return self._proved(search, volumes, root)
 
     def _proved(self, search: Search, volumes: Volumes, root: Node, part: int = 0, parts: int = 1) -> PairResult:
@@ -142,27 +161,32 @@ class CellCertification:
         margin = gap if np.isfinite(gap) else None
         return PairResult(Outcome.CERTIFIED, Stage.CELLS, margin=margin, proof=None if part else proof.to_bytes())
 
-    def _left(self, search: Search, volumes: Volumes, given: Sequence[OpenCell], report: Report, within: float) -> PairResult:
+    def _left(self, search: Search, volumes: Volumes, given: Sequence[OpenCell], report: Report, cut_off: CutOff) -> PairResult:
         """Returns the result of a pair that is not certified yet, with what its search has left."""
         left = Subtrees.of(given, len(self._area.ground.d))
         cells = [(lower, upper) for _, lower, upper in left.open_cells]
         points = self._contacts(search, report.contacts)
         contacts = min(len(points), MOST_POINTS)
-        if within > 0:
-            points += self._of_cells(search, cells, within)
-        points += [point for cell in report.narrow for point in cell]
-        weakness = Weakness(np.array(points[:MOST_POINTS]).reshape(-1, self._scene.n), np.zeros(self._scene.n), contacts=contacts)
+        bodies = search.bodies
+        if cut_off is not CutOff.CONTACTS:
+            bodies, of_cells = self._of_cells(search, left.open_cells, cut_off)
+            points += of_cells
+        if bodies is search.bodies:
+            points += [point for cell in report.narrow for point in cell]
+        found = np.array(points[:MOST_POINTS]).reshape(-1, self._scene.n)
+        joints = () if bodies is search.bodies else tuple(bodies.joints)
+        weakness = Weakness(found, np.zeros(self._scene.n), contacts=contacts, joints=joints)
         subtrees = left.to_bytes(len(search.joints))
-        found = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, subtrees=subtrees, open_cells=len(cells), weakness=weakness)
+        result = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, subtrees=subtrees, open_cells=len(cells), weakness=weakness)
         if report.contacts:
-            return self._refuted(search, volumes, report.contacts[0], found)
+            return self._refuted(search, volumes, report.contacts[0], result)
         if report.narrow:
             s, distance = self._nearest(search, np.concatenate(report.narrow))
             detail = f"the padded bodies are {distance:.3g} m apart at the configuration named, too close for a plane"
-            return replace(found, outcome=Outcome.TOO_CLOSE, witness_s=s, detail=detail)
+            return replace(result, outcome=Outcome.TOO_CLOSE, witness_s=s, detail=detail)
         inside = sum(((self._area.samples >= low) & (self._area.samples <= up)).all(axis=1).mean() for low, up in cells)
         detail = f"{len(cells)} cells, {100 * float(inside):.2g} % of the polytope, are open after {report.cells} cells"
-        return replace(found, detail=detail)
+        return replace(result, detail=detail)
 
     def _refuted(self, search: Search, volumes: Volumes, s: Array, found: PairResult) -> PairResult:
         """Returns the result of a pair that touches at s, with the proof of that, which the verifier has checked."""
@@ -196,23 +220,30 @@ class CellCertification:
             found += [contact, *near[gaps(*search.bodies.hulls, near) <= 0]]
         return found
 
-    def _of_cells(self, search: Search, cells: Iterable[tuple[Array, Array]], within: float) -> list[Array]:
-        """Returns points of the polytope in the cells where the bodies are as near as that: the nearest one, and those that are NEAR."""
+    def _of_cells(self, search: Search, cells: Sequence[OpenCell], cut_off: CutOff) -> tuple[Bodies, list[Array]]:
+        """Returns bodies, and points of the polytope in the cells where these are near.
+
+        Coarsely, the bodies are the volumes that most of the cells are tried with next.
+        """
         found: list[Array] = []
-        for lower, upper in cells:
+        bodies = search.bodies
+        if cut_off is CutOff.COARSELY and cells:
+            bodies = Counter(search.at_hand(node) for node, _, _ in cells).most_common(1)[0][0]
+            cells = [cell for cell in cells if search.at_hand(cell.node) is bodies]
+        for _, lower, upper in cells:
             _, C, d = self._area.inside(lower, upper)
             middle, depth, _ = deepest(C, d, (lower + upper) / 2)
             if depth <= 0:
                 continue
             X = np.concatenate([middle[None], chords(C, d, middle, np.zeros((0, len(lower))), POINTS_OF_A_CELL, 0)])
-            nearest = np.argsort(gaps(*search.bodies.hulls, X), kind="stable")
+            nearest = np.argsort(gaps(*bodies.hulls, X), kind="stable")
             s = X[nearest[0]].copy()
-            approach(*search.bodies.hulls, np.array(search.bodies.joints), (upper - lower) / 2, C, d, s, 4, 0.0)
+            approach(*bodies.hulls, np.array(bodies.joints), (upper - lower) / 2, C, d, s, 4, 0.0)
             X = np.concatenate([s[None], X[nearest]])
-            distances = gaps(*search.bodies.hulls, X)
-            if distances[0] < within:
+            distances = gaps(*bodies.hulls, X)
+            if cut_off is CutOff.ALL or distances[0] < (NEAR if cut_off is CutOff.COARSELY else AROUND):
                 found += [X[0], *X[1:][distances[1:] < NEAR]]
-        return found
+        return bodies, found
 
     def _nearest(self, search: Search, configurations: Array) -> tuple[Array, float]:
         """Returns the configuration at which the bodies are nearest, and their distance there in metres, padding subtracted."""

@@ -194,6 +194,10 @@ class Search:
                 return None
         return self._cut(cell, self.bodies, found), found.points
 
+    def at_hand(self, node: Node) -> Bodies:
+        """Returns the volumes that an open cell is tried with next."""
+        return self._levels[min(node.level, len(self._levels)) - 1]
+
     def _worth_a_cut(self, cell: Cell, bodies: Bodies, found: Undecided) -> bool:
         """Returns whether a cell is cut for coarse volumes, or goes on to the next level."""
         turn = self._turn(cell, bodies)[bodies.joints].max(initial=0.0)
@@ -219,12 +223,13 @@ class Search:
         For coarse volumes it is, of the CUTS joints with the farthest points, the one that makes most room for planes in both halves.
         A bad cut there takes several times as many cells.
         """
-        if found.joint in bodies.joints or found.support is None:
-            return int(found.joint or 0)
+        turn = self._turn(cell, bodies)
+        wide = turn > NARROW / 2
+        if found.support is None:
+            return found.joint if found.joint in bodies.joints and wide[found.joint] else max(bodies.joints, key=lambda j: float(turn[j]))
         q = np.where(self._area.scene.revolute, 2 * np.arctan(found.support), found.support / bodies.extent)
         mean = found.weights @ q / found.weights.sum()
         spread = found.weights @ (q - mean) ** 2
-        wide = self._turn(cell, bodies) > NARROW / 2
         order = sorted(bodies.joints, key=lambda j: -float(spread[j]) if wide[j] else 1.0)
         if bodies is self.bodies:
             return order[0]

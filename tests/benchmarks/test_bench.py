@@ -182,6 +182,9 @@ def test_the_survey_decides_every_pair() -> None:
     document = survey.survey(["planar_2dof", "rail_arm"], 5.0, lambda _: None)
     assert document["undecided"] == []
     assert [sum(row["outcomes"].values()) for row in document["counts"]] == [6] * 4 + [18] * 4
+    by_cells = survey.survey(["planar_2dof"], 5.0, lambda _: None, cells=500)
+    assert by_cells["undecided"] == []
+    assert {outcome for row in by_cells["counts"] for outcome in row["outcomes"]} <= {"certified", "refuted", "too_close"}
 
 
 def test_the_page_shows_the_figures_that_lie_beside_it() -> None:

@@ -14,7 +14,7 @@ from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import certify_pair
 from certifier.pair.closest import first_within
 from certifier.partition import bodies
-from certifier.partition.certification import CellCertification
+from certifier.partition.certification import CellCertification, CutOff
 from certifier.partition.search import Search
 from certifier.partition.subtrees import open_cells
 from certifier.partition.tree import OPEN
@@ -245,7 +245,7 @@ def test_a_search_that_is_ending_names_points_of_every_open_cell():
     scene, polytope = passing(0.6, CLOSE)
     shared = CellCertification(scene, polytope)
     assert len(shared.certify(0, 1).weakness.points) == 0
-    result = shared.certify(0, 1, within=np.inf)
+    result = shared.certify(0, 1, cut_off=CutOff.ALL)
     assert result.outcome is Outcome.INCONCLUSIVE
     points, cells = result.weakness.points, open_cells([result.subtrees])
     assert polytope.contains(points).all()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +14,19 @@ from certifier.kinematics import Kinematics
 from certifier.model import Volume
 from certifier.outcome import Outcome
 from certifier.partition.area import Area
-from certifier.partition.bodies import Bodies
-from certifier.partition.certification import CellCertification
+from certifier.partition.bodies import Bodies, Undecided
+from certifier.partition.cell import Cell
+from certifier.partition.certification import CellCertification, CutOff
 from certifier.partition.frames import choose_frame
 from certifier.partition.levels import APART, LOOKED, levels_of
+from certifier.partition.search import Search
+from certifier.partition.shared import Shared
+from certifier.partition.tree import Node
 from certifier.proof.partition import PartitionProof, choices_of
 from certifier.scene import load_scene
 from certifier.verify.coarse import check_coarse
 from certifier.verify.kinematics import ExactKinematics
+from certifier.verify.partition import _norms
 from certifier.verify.separations import verify_separation
 from tests.certifier.scenes import box, cube, two_arms
 from tests.certifier.truth import distances_at
@@ -121,3 +126,59 @@ def test_a_proof_names_only_the_coarse_volumes_that_its_cells_choose():
     assert sum(map(len, coarse)) > 2
     assert list(map(len, proof.coarse)) == [1, 1]
     assert set(proof.choices.tolist()) == {3}
+
+
+class Facing:
+    """The hands of two arms on a cell that is a sliver in one joint, far from 0 in it."""
+
+    def __init__(self, width: float) -> None:
+        scene, polytope = facing(8.0)
+        scene = replace(scene, padding=0.05)
+        self.area, pair = Area.of(scene, polytope, 0), scene.pairs[HANDS]
+        volumes = Volume.of(scene.geometry(pair.a)), Volume.of(scene.geometry(pair.b))
+        frame, joints = choose_frame(self.area.kinematics, volumes, self.area.lower, self.area.upper)
+        self.search, self.bodies = Search(self.area, Shared(self.area), volumes), Bodies(self.area, frame, volumes)
+        lower, upper = self.area.center - 0.05, self.area.center + 0.05
+        self.sliver = joints[-1]
+        lower[self.sliver], upper[self.sliver] = 0.7, 0.7 + width
+        start = (lower + upper) / 2
+        self.cell = Cell(self.area, Node(), lower, upper, start[None], start[None])
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-6, 1e-10, 1e-13])
+def test_the_bound_of_a_normals_length_holds_for_the_verifier_in_a_sliver_too(width):
+    given = Facing(width)
+    rng, k = np.random.default_rng(0), len(given.bodies.joints)
+    for _ in range(50):
+        plane = given.bodies._in_s(given.cell, rng.normal(size=4 * (1 + k)) * 10.0 ** rng.uniform(-6, 0, size=4 * (1 + k)))
+        bounds = given.cell.lower[given.bodies.joints], given.cell.upper[given.bodies.joints]
+        _, room = _norms(plane[None], bounds[0][None], bounds[1][None])
+        assert room[0] >= 0
+
+
+def test_a_cell_is_not_cut_where_it_is_a_sliver():
+    given = Facing(1e-6)
+    points = given.cell.points
+    cut = partial(given.search._cut, given.cell, given.bodies)
+    assert cut(Undecided(points, None, np.ones(1), joint=given.sliver)) != given.sliver
+    wide = given.bodies.joints[0]
+    assert cut(Undecided(points, None, np.ones(1), joint=wide)) == wide
+    assert cut(Undecided(points, None, np.ones(1))) in set(given.bodies.joints) - {given.sliver}
+
+
+def test_points_are_named_where_the_volumes_at_hand_touch_so_that_these_become_enough():
+    """The fat balls of the hands touch in some open cells, the hands themselves do not."""
+    scene, polytope = facing(6.0)
+    certification = CellCertification(scene, polytope)
+    assert len(certification.certify(HANDS, CELLS).weakness.points) == 0
+    found = certification.certify(HANDS, CELLS, cut_off=CutOff.COARSELY)
+    area, _, alternatives = levels(scene, polytope, HANDS)
+    weakness, (a, b) = found.weakness, alternatives[-1]
+    assert (found.outcome, weakness.contacts) == (Outcome.INCONCLUSIVE, 0)
+    assert weakness.joints == tuple(sorted(area.kinematics.chain(a.body, b.body)))
+    assert len(weakness.points) > 0
+    assert polytope.contains(weakness.points).all()
+    ends = [area.kinematics.points("world", volume.body, volume.vertices, weakness.points) for volume in (a, b)]
+    reach = np.linalg.norm(ends[0][:, :, None] - ends[1][:, None], axis=3).min(axis=(1, 2))
+    assert (reach < a.radius + b.radius + 0.05).all()
+    assert len(weakness.points) <= len(certification.certify(HANDS, CELLS, cut_off=CutOff.ALL).weakness.points)
