@@ -38,7 +38,7 @@ HARD = 6 * SLICE
 LOSS, PATIENCE = 0.002, 36 * SLICE
 """While a hard pair is worked on, its faces lose this share of the polytope in a round at most, and twice as much after PATIENCE cells."""
 FAST_LOSS = 0.05
-"""They lose this share at most before a pair is hard, and when its effort is spent. Then it is twice as much in every round."""
+"""They lose this share at most before a pair is hard, and when its effort is spent. Then it is twice as much after PIECES slices more."""
 CONTACT_LOSS = 0.01
 """For contacts, which have to go sooner or later, they lose this share at least where that is needed."""
 ENDING = 60 * SLICE
@@ -46,7 +46,7 @@ ENDING = 60 * SLICE
 LATE = 0.6
 """When this share of the time until the deadline has passed, the effort counts as spent, so that a region comes of what was done."""
 LATE_LOSS = 0.01
-"""From then on faces for a pair lose this share at most in a round, and twice as much after PIECES slices more."""
+"""From then on faces for a pair lose this share at most in a round, and twice as much after PIECES slices more, too."""
 EARLY_EFFORT = 24 * SLICE
 """The effort of all stages but the last one, so that the first region comes soon."""
 
@@ -116,8 +116,8 @@ def _most_loss(state: GrowthState, whole: Whole, pair: int) -> float:
     effort, spent = _effort(state, whole, pair), whole.spent[pair]
     if whole.stage + 1 == len(STAGES) and HARD < spent < effort:
         return float(LOSS * 2.0 ** ((spent - HARD) // PATIENCE))
-    loss, more = (LATE_LOSS, PIECES * SLICE) if pair in whole.late else (FAST_LOSS, PARTS * SLICE)
-    return float(min(loss * 2.0 ** max((spent - effort) // more, 0), 1.0))
+    loss = LATE_LOSS if pair in whole.late else FAST_LOSS
+    return float(min(loss * 2.0 ** max((spent - effort) // (PIECES * SLICE), 0), 1.0))
 
 
 def _effort(state: GrowthState, whole: Whole, pair: int) -> int:

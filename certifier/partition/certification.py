@@ -62,7 +62,7 @@ class CutOff(Enum):
     NEAR = "near"
     """Of those where the bodies are as near as AROUND."""
     COARSELY = "coarsely"
-    """Of those where the volumes touch that they are tried with next, so that these volumes become enough."""
+    """Of those where the fat balls touch that they are tried with next, so that these become enough; else of those without fat balls."""
     ALL = "all"
     """All of them."""
 
@@ -223,13 +223,14 @@ class CellCertification:
     def _of_cells(self, search: Search, cells: Sequence[OpenCell], cut_off: CutOff) -> tuple[Bodies, list[Array]]:
         """Returns bodies, and points of the polytope in the cells where these are near.
 
-        Coarsely, the bodies are the volumes that most of the cells are tried with next.
+        Coarsely, the bodies are the fat balls that most of the cells are tried with next, if they are.
         """
         found: list[Array] = []
         bodies = search.bodies
         if cut_off is CutOff.COARSELY and cells:
             bodies = Counter(search.at_hand(node) for node, _, _ in cells).most_common(1)[0][0]
             cells = [cell for cell in cells if search.at_hand(cell.node) is bodies]
+        within = AROUND if cut_off is CutOff.NEAR else np.inf if bodies is search.bodies else NEAR
         for _, lower, upper in cells:
             _, C, d = self._area.inside(lower, upper)
             middle, depth, _ = deepest(C, d, (lower + upper) / 2)
@@ -241,7 +242,7 @@ class CellCertification:
             approach(*bodies.hulls, np.array(bodies.joints), (upper - lower) / 2, C, d, s, 4, 0.0)
             X = np.concatenate([s[None], X[nearest]])
             distances = gaps(*bodies.hulls, X)
-            if cut_off is CutOff.ALL or distances[0] < (NEAR if cut_off is CutOff.COARSELY else AROUND):
+            if distances[0] < within:
                 found += [X[0], *X[1:][distances[1:] < NEAR]]
         return bodies, found
 

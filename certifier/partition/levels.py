@@ -26,8 +26,8 @@ Level = tuple[int, int]
 """The numbers of the volumes of a level: 0 for a volume itself, i for the coarse one with the number i - 1."""
 
 
-def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> tuple[Coarse, list[Level]]:
-    """Returns the coarse volumes of two volumes, which do not depend on the polytope, and the levels, which do.
+def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> tuple[Coarse, list[Level], int]:
+    """Returns the coarse volumes of two volumes, which the polytope does not matter to, the levels, and the first one of fat balls.
 
     A cell tries the last level first; level 0 is that of the volumes themselves.
 
@@ -59,7 +59,7 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> tuple[C
         shares = [share for share in shares if room[best][share] <= 0]
         if not shares:
             break
-    return (first, second), levels + fats[::-1]
+    return (first, second), levels + fats[::-1], len(levels)
 
 
 def _room(area: Area, frame: str, volumes: Sequence[Volume]) -> Array:

@@ -88,8 +88,9 @@ class Search:
         self.frame, self.joints = choose_frame(area.kinematics, volumes, area.lower, area.upper)
         self.coarse: Coarse = ((), ())
         levels: list[Level] = [(0, 0)]
+        self._fat = 1
         if len(self.joints) >= LONG:
-            self.coarse, levels = levels_of(area, self.frame, volumes)
+            self.coarse, levels, self._fat = levels_of(area, self.frame, volumes)
         chosen = choices_of(volumes, self.coarse)
         self._choices = [i + (1 + len(self.coarse[0])) * j for i, j in levels]
         self.bodies = Bodies(area, self.frame, volumes)
@@ -195,8 +196,9 @@ class Search:
         return self._cut(cell, self.bodies, found), found.points
 
     def at_hand(self, node: Node) -> Bodies:
-        """Returns the volumes that an open cell is tried with next."""
-        return self._levels[min(node.level, len(self._levels)) - 1]
+        """Returns the fat balls that an open cell is tried with next; the volumes themselves where it is tried with slimmer ones."""
+        level = min(node.level, len(self._levels)) - 1
+        return self._levels[level] if level >= self._fat else self.bodies
 
     def _worth_a_cut(self, cell: Cell, bodies: Bodies, found: Undecided) -> bool:
         """Returns whether a cell is cut for coarse volumes, or goes on to the next level."""

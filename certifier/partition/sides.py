@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -33,8 +34,6 @@ class Side:
         self._order = [factor.index for factor in self._path if factor.index is not None]
         self.own = sorted(self._order)
         self.outside = [j for j in joints if j not in self.own]
-        self._stack = np.empty((bernstein.DEPTH, 1 + len(self.outside), 4 ** len(self.own)))
-        self._room = (np.empty(ROOM, np.int8), np.empty(ROOM, np.int16), np.empty(10 * ROOM, np.int16), np.empty(10 * ROOM, np.float32))
         self._revolute = area.scene.revolute[self.own]
 
     def control_matrices(self, lower: Array, upper: Array) -> tuple[Array, Array]:
@@ -111,10 +110,10 @@ class Side:
         )
         found: dict[int, Streams] = {}
         for vertex in np.argsort((c[:, 0] - np.abs(c[:, 1:]).sum(axis=1)).min(axis=1)):
-            codes, counts, numbers, values = self._room
+            codes, counts, numbers, values = _room()
             lengths, point, halvings = np.zeros(3, np.int64), np.zeros(len(mid)), np.zeros(len(own) + len(outside), np.int64)
             out = (codes, counts, numbers, values, lengths, point, halvings)
-            status = bernstein.prove(c[vertex], factors, ends, *g, PRECISION, most, *out, self._stack)
+            status = bernstein.prove(c[vertex], factors, ends, *g, PRECISION, most, *out, _stack(len(outside), len(own)))
             if status == bernstein.REFUTED:
                 s = mid.copy()
                 place = len(own) + len(outside)
@@ -127,3 +126,15 @@ class Side:
             a, b, e = lengths
             found[int(vertex)] = Streams(codes[:a].copy(), counts[:b].copy(), faces[numbers[:e]].astype(np.int16), values[:e].copy())
         return joined([found[vertex] for vertex in range(len(c))])
+
+
+@lru_cache(maxsize=8)
+def _stack(outside: int, own: int) -> Array:
+    """Returns memory to work in, which all sides share, because a process may have hundreds of them."""
+    return np.empty((bernstein.DEPTH, 1 + outside, 4**own))
+
+
+@lru_cache(maxsize=1)
+def _room() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Returns room for the codes, counts, faces and multipliers of one vertex, which all sides share."""
+    return np.empty(ROOM, np.int8), np.empty(ROOM, np.int16), np.empty(10 * ROOM, np.int16), np.empty(10 * ROOM, np.float32)

@@ -130,7 +130,7 @@ def test_what_stays_open_is_cut_off_when_the_effort_is_spent_and_where_bodies_ar
     assert [action.ending for action in later] == [[1] if s >= slices else [] for s in spent]
     assert any(action.hard for action in later) == (slices > HARD // SLICE)
     # Any share may be lost some rounds after the effort is spent.
-    assert slices // PARTS + 1 <= len(later) <= slices // PARTS + 9
+    assert slices // PARTS + 1 <= len(later) <= slices // PARTS + 5 * PIECES // PARTS
     assert all(action.cells == SLICE for action in later)
     assert all(action.polytope.contains(FAR).all() for action in later[: 1 + math.ceil(slices / PARTS)])
     assert not accepted[-1].polytope.contains(FAR).any()

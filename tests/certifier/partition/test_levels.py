@@ -54,7 +54,7 @@ def levels(scene, polytope, index):
     area, pair = Area.of(scene, polytope, 0), scene.pairs[index]
     volumes = Volume.of(scene.geometry(pair.a)), Volume.of(scene.geometry(pair.b))
     frame, _ = choose_frame(area.kinematics, volumes, area.lower, area.upper)
-    coarse, found = levels_of(area, frame, volumes)
+    coarse, found, _ = levels_of(area, frame, volumes)
     chosen = choices_of(volumes, coarse)
     return area, coarse, [chosen[i + (1 + len(coarse[0])) * j] for i, j in found]
 
