@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -76,7 +76,7 @@ def _parser() -> ArgumentParser:
     against = ArgumentParser(add_help=False, parents=[as_json])
     against.add_argument("--against", choices=["drake"], help="measure Drake with Clarabel too, in the same run")
     repeat = ArgumentParser(add_help=False)
-    repeat.add_argument("--repeat", type=int, default=1, metavar="N", help="run ciris this often; the fastest run counts")
+    repeat.add_argument("--repeat", type=_count, default=1, metavar="N", help="run ciris this often; the fastest run counts")
     kinds.add_parser(
         "pairs", parents=[against, repeat], help="measure pairs with longer and longer chains, each one feasible and infeasible"
     )
@@ -85,7 +85,7 @@ def _parser() -> ArgumentParser:
     regions = "; ".join(f"{name}: {what}" for name, what in catalogue.REGIONS.items())
     scene.add_argument("--region", choices=list(catalogue.REGIONS), default="middle", help=f"default middle; {regions}")
     scene.add_argument("--match", default="", metavar="TEXT", help="measure only pairs with this text in their names")
-    scene.add_argument("--pairs", type=int, metavar="N", help="measure only the N cheapest of these pairs")
+    scene.add_argument("--pairs", type=_count, metavar="N", help="measure only the N cheapest of these pairs")
     grown = kinds.add_parser("growth", parents=[against], help="grow regions in several ways")
     grown.add_argument("scenes", nargs="*", metavar="EXAMPLE", default=list(catalogue.EXAMPLES), help="default: all")
     grown.add_argument(
@@ -100,15 +100,22 @@ def _parser() -> ArgumentParser:
     surveyed = kinds.add_parser("survey", parents=[as_json], help="certify every pair of every scene on every region")
     surveyed.add_argument("scenes", nargs="*", metavar="SCENE", default=list(catalogue.SCENES), help="default: all")
     surveyed.add_argument("--most", type=float, default=5.0, metavar="SECONDS", help="leave pairs with a longer forecast out; default 5")
-    surveyed.add_argument("--cells", type=int, default=1, metavar="N", help="certify cell by cell, with so many cells of a pair at most")
+    surveyed.add_argument("--cells", type=_count, default=1, metavar="N", help="certify cell by cell, with so many cells of a pair at most")
     served = kinds.add_parser("service", parents=[as_json], help="measure the service beside --local")
     served.add_argument("example", nargs="?", default="iiwa_shelf", metavar="EXAMPLE", help="default iiwa_shelf")
-    served.add_argument("--processes", type=int, default=1, metavar="N", help="number of the service's solving processes; default 1")
-    served.add_argument("--turns", type=int, default=5, metavar="N", help="how often each is run; default 5")
+    served.add_argument("--processes", type=_count, default=1, metavar="N", help="number of the service's solving processes; default 1")
+    served.add_argument("--turns", type=_count, default=5, metavar="N", help="how often each is run; default 5")
     stored = kinds.add_parser("store", parents=[as_json], help="measure what the database takes for a pair in jobs of 1000 and of 100000")
     stored.add_argument("--postgresql", metavar="URL", help="measure this empty PostgreSQL database too, besides SQLite")
     kinds.add_parser("docs", help="write the tables of docs/benchmarks.md from docs/benchmarks/*.json")
     return parser
+
+
+def _count(text: str) -> int:
+    """Returns the whole number, 1 or larger, that a text stands for."""
+    if not text.isdecimal() or int(text) < 1:
+        raise ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
+    return int(text)
 
 
 if __name__ == "__main__":

@@ -80,13 +80,12 @@ def growth(names: list[str], against: bool, limit: float, progress: Progress, on
 
 def merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
     """Returns the document ``old`` with the rows of ``new`` in place of the same examples' rows of the same ways, in order."""
-    order, rows = [IRIS, *WAYS], {}
+    place = {way: number for number, way in enumerate([IRIS, *WAYS])}
+    rows = {}
     for part in ("ways", "against"):
         again = {(row["scene"], row["way"]) for row in new[part]}
         kept = [row for row in old[part] if (row["scene"], row["way"]) not in again]
-        known = [row["way"] for row in kept + new[part]]
-        places = {way: (order.index(way) if way in order else len(order), known.index(way)) for way in known}
-        rows[part] = sorted(kept + new[part], key=lambda row: (catalogue.SCENES.index(row["scene"]), places[row["way"]]))
+        rows[part] = sorted(kept + new[part], key=lambda row: (catalogue.SCENES.index(row["scene"]), place.get(row["way"], len(place))))
     return {**new, **rows}
 
 
@@ -153,11 +152,7 @@ def _grown(name: str, seed: dict[str, Any], options: dict[str, Any], limit: floa
 
     ``seconds`` are of the clock and ``processor_seconds`` of this process, with the seeding and the proof's first verification.
     """
-    start, processor = time.perf_counter(), time.process_time()
-
-    def spent() -> dict[str, float]:
-        return {"seconds": time.perf_counter() - start, "processor_seconds": time.process_time() - processor}
-
+    spent = _stopwatch()
     try:
         region = grow(catalogue.scene(name), GrowthOptions(seed=seed, **options), deadline_s=limit, processes=cores())
     except CirisError as error:
@@ -179,6 +174,12 @@ def _grown(name: str, seed: dict[str, Any], options: dict[str, Any], limit: floa
     }
 
 
+def _stopwatch() -> Callable[[], dict[str, float]]:
+    """Returns what tells the seconds of the clock and of this process since now, as a row holds them."""
+    start, processor = time.perf_counter(), time.process_time()
+    return lambda: {"seconds": time.perf_counter() - start, "processor_seconds": time.process_time() - processor}
+
+
 def _leaves(data: bytes) -> int:
     """Returns how many cells the partitions in a region's proof have."""
     proofs = RegionProof.from_bytes(data).proofs
@@ -187,11 +188,7 @@ def _leaves(data: bytes) -> int:
 
 def _proposed(name: str) -> dict[str, Any]:
     """Measures the seeding alone. The proposal is no certified region; ``ended`` says which part of its q-volume is in collision."""
-    scene, start, processor = catalogue.scene(name), time.perf_counter(), time.process_time()
-
-    def spent() -> dict[str, float]:
-        return {"seconds": time.perf_counter() - start, "processor_seconds": time.process_time() - processor}
-
+    scene, spent = catalogue.scene(name), _stopwatch()
     try:
         proposal = propose(scene, SeedOptions.from_document(_seed(name)))
     except CirisError as error:
