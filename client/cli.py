@@ -167,7 +167,8 @@ def _parser() -> argparse.ArgumentParser:
         choices=["whole", "targeted", "uniform"],
         help="whole (default) keeps the first polytope and certifies it cell by cell; the others shrink it until every pair has one plane",
     )
-    grow.add_argument("--cells", type=int, metavar="N", help="for whole: what is open after N cells of a pair is cut off")
+    grow.add_argument("--cells", type=int, metavar="N", help="for whole: what is open after N cells of a pair in a stage is cut off")
+    grow.add_argument("--deadline", type=float, metavar="SECONDS", help="end after so long with the best region by then; default: none")
     grow.add_argument("--pushes", type=int, help="how often the faces are pushed out again; default: more often for smaller arms")
     grow.add_argument("--rounds", type=int, help="rounds of the polytope step; default: a few for small arms, none for large ones")
     grow.add_argument("--random-seed", type=int, help="seed of every random choice; default 0")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import re
 import sys
@@ -102,6 +103,8 @@ def grow(args: Namespace) -> int:
         )
         if value is not None
     }
+    if args.deadline is not None and not 0 < args.deadline < math.inf:
+        raise CirisError("option", f"{args.deadline:g} is no number of seconds above 0", field="--deadline")
     if len(seeds) > 1:
         return _grow_many(args, seeds, options, screen)
     check_writable(args.out)
@@ -109,11 +112,11 @@ def grow(args: Namespace) -> int:
     if args.local:
         from client import local
 
-        grown, url = local.grow(args.scene, seed, options, screen), None
+        grown, url = local.grow(args.scene, seed, options, args.deadline, screen), None
     else:
         with _client(args) as client:
             scene = service.known_scene(client, args.scene)
-            grown = service.grow(client, {"kind": "grow", "scene": scene["id"], "seed": seed, "options": options}, screen, args.watch)
+            grown = service.grow(client, _request(args, scene, seed, options), screen, args.watch)
             url = f"{client.url}/regions/{grown.region}"
     path = save_proof(grown.manifest, grown.proof, args.out)
     if args.json:
@@ -124,6 +127,12 @@ def grow(args: Namespace) -> int:
     return OK
 
 
+def _request(args: Namespace, scene: dict[str, Any], seed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
+    """Returns the request for a job that grows a region."""
+    request = {"kind": "grow", "scene": scene["id"], "seed": seed, "options": options}
+    return request if args.deadline is None else {**request, "deadline_seconds": args.deadline}
+
+
 def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, Any], screen: Screen) -> int:
     """Has the service run one job a seed. The regions stay on the service."""
     if args.local or args.out is not None:
@@ -132,7 +141,7 @@ def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, 
         )
     with _client(args) as client:
         scene = service.known_scene(client, args.scene)
-        requests = [{"kind": "grow", "scene": scene["id"], "seed": seed, "options": options} for seed in seeds]
+        requests = [_request(args, scene, seed, options) for seed in seeds]
         jobs = service.grow_many(client, requests, screen, args.watch)
         grown = {job["region"]: client.region(job["region"]) for job in jobs if job["region"]}
     if args.json:

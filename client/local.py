@@ -26,14 +26,14 @@ def load(scene: str) -> Scene:
     return load_scene(scene)
 
 
-def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], screen: Screen) -> Grown:
-    """Grows a region in this process and children of it."""
+def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], deadline_s: float | None, screen: Screen) -> Grown:
+    """Grows a region in this process and children of it; ``deadline_s`` is as for :func:`certifier.jobs.local.grow`."""
     loaded = load(scene)
     from certifier.growth.options import GrowthOptions
     from certifier.jobs import local
 
     asked = GrowthOptions.from_document({"kind": "grow", "seed": seed, **options})
-    region = local.grow(loaded, asked, screen.status, processes=cores())
+    region = local.grow(loaded, asked, screen.status, deadline_s, processes=cores())
     screen.clear()
     provenance = region.manifest["provenance"]
     return Grown(region.manifest, region.proof, provenance["seconds"], remark=provenance["reason"])

@@ -38,7 +38,7 @@ class GrowOptions(Request):
     ] = DEFAULTS.contraction
     cells: Annotated[
         int | None,
-        _whole("cells", f"For `whole`: so many cells of each pair are looked at, then what is open is cut off. Default: {MOST_CELLS}."),
+        _whole("cells", f"For `whole`: what is open after so many cells of a pair, in a stage, is cut off. Default: {MOST_CELLS}."),
     ] = DEFAULTS.cells
     contractions: Annotated[
         int | None,

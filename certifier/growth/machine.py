@@ -21,7 +21,7 @@ from certifier.growth.state import Best, Bisection, GrowthState, Start
 from certifier.growth.targeted import contraction_starts, cut, next_contraction
 from certifier.growth.trials import certify
 from certifier.growth.uniform import bisect, shrink
-from certifier.growth.whole import after_cells, begin_stage, keeps_more
+from certifier.growth.whole import after_cells, begin_whole, keeps_more
 from certifier.model import Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
@@ -75,7 +75,7 @@ def _proposed(scene: Scene, state: GrowthState, proposal: Proposal) -> Transitio
     if contraction != "uniform":
         start = Start(rows, proposal.center, np.concatenate([proposal.center[None], proposal.contain]), given)
         if contraction == "whole":
-            return begin_stage(scene, replace(state, start=start), start)
+            return begin_whole(scene, replace(state, start=start), start)
         transition = next_contraction(scene, replace(state, start=start), start)
         assert transition is not None, "before there is a region every contraction is worth it"
         return transition

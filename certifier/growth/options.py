@@ -33,7 +33,7 @@ WHOLE_NUMBERS = {
     "random_seed": (0, 2**63 - 1),
 }
 """Maps an option to its least and its greatest value."""
-MOST_CELLS = 20_000
+MOST_CELLS = 6000
 LARGEST_TOLERANCE = 10.0
 """A tolerance lies between 0 and this."""
 
@@ -48,8 +48,8 @@ class GrowthOptions:
         contraction: ``whole`` keeps the proposal and certifies it cell by cell; ``targeted`` and ``uniform`` shrink it until every pair
             has one plane that moves with the joints (11). None is ``whole`` where IRIS makes the proposal. Where a box, a polytope or the
             joint limits are the proposal, None is ``targeted``: much may collide in them, or much more be free.
-        cells: so many cells of each pair are looked at. Of ``grow``, what is open then is cut off, and None is MOST_CELLS; of ``certify``,
-            1 and None give the program (11) of the papers.
+        cells: so many cells of each pair are looked at. Of ``grow`` it is in every stage, what is open then is cut off, and None is
+            MOST_CELLS; of ``certify``, 1 and None give the program (11) of the papers.
         contractions: how many targeted contractions of the proposal are tried; each is given up when it is smaller than the best so far.
             None, for this and for ``pushes`` and ``max_rounds``, takes the default that pays: see EFFORT.
         bisection_steps: certifications spent on uniform contraction after the two ends are known.

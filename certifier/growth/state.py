@@ -105,17 +105,20 @@ class Whole:
     """Says how far certifying the whole proposal has come.
 
     Attributes:
-        stage: how much of the proposal is being certified (certifier.growth.whole).
+        reach: the faces of the region before were moved out to so many times their distance from the seed, or those of the proposal in the
+            first stage, where it is 1 at most (certifier.growth.whole).
+        kept: the share of the proposal that the best region kept when this stage began.
         polytope: what is left of it; faces are added before the joint limits, which are its last 2n rows, and none is dropped.
         mid, half: (n,) of the box that is the root cell of all partitions of this stage.
         holds: pair index -> iteration whose proof, on a larger polytope, holds on the present one.
         begun: the iteration with which this stage began; None before it.
         open_cells: pair index -> how many cells of its partition are open.
         spent: pair index -> how many cells were looked at.
-        late: pair index -> how many these were when the deadline came near; empty before.
+        since, passed: the shares of the time until the deadline that had passed when this stage began, and now; 0 without a deadline.
     """
 
-    stage: int
+    reach: float
+    kept: float
     polytope: Polytope
     mid: Array
     half: Array
@@ -123,7 +126,8 @@ class Whole:
     begun: int | None = None
     open_cells: dict[int, int] = field(default_factory=dict)
     spent: dict[int, int] = field(default_factory=dict)
-    late: dict[int, int] = field(default_factory=dict)
+    since: float = 0.0
+    passed: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +201,7 @@ class GrowthState:
 def _whole(document: dict[str, Any] | None) -> Whole | None:
     if document is None:
         return None
-    counts = {name: _by_pair(document[name]) for name in ("holds", "open_cells", "spent", "late")}
+    counts = {name: _by_pair(document[name]) for name in ("holds", "open_cells", "spent")}
     return replace(_part(Whole, {**document, **dict.fromkeys(counts, None)}), **counts)
 
 

@@ -4,7 +4,9 @@ One round looks at so many cells of every pair that is not certified yet. Then f
 What is proved stays proved, because the polytope only shrinks. The rounds go on until every pair is certified. When the effort is spent,
 all cells that are open still are cut off as well.
 
-The first region comes from a smaller copy of the proposal about the seed, so there is a certified region early.
+The first region comes from a smaller copy of the proposal about the seed, so there is a certified region early. In every further stage
+the faces of the region move out, as far as the proposal, and what is between is certified in the same way. So faces that were found where
+cells are cheap show where the next ones have to be, which takes a fraction of the cells that the proposal itself would take.
 """
 
 from __future__ import annotations
@@ -24,8 +26,12 @@ from certifier.outcome import Outcome, combine
 from certifier.pair.result import Weakness
 from certifier.polytopes.polytope import bounds
 
-STAGES = (0.7, 1.0)
-"""The faces of the proposal lie this part of their distance from the seed, in one stage after the other."""
+FIRST = 0.7
+"""In the first stage the faces of the proposal lie this part of their distance from the seed."""
+FARTHEST, FAR = 1.45, 1.2
+"""The faces of the region of the first stage move out to FARTHEST times their distance from the seed, and those of others to FAR times."""
+GAIN = 0.02
+"""Growth ends with a stage that gains less than this share of the proposal."""
 SLICE = 100
 """So many cells of every part of a pair are looked at in one round."""
 PARTS, PIECES = 3, 12
@@ -44,31 +50,54 @@ CONTACT_LOSS = 0.01
 ENDING = 60 * SLICE
 """When the effort is spent, open cells are cut off where coarse volumes touch; after so many cells more, wherever they are."""
 LATE = 0.6
-"""When this share of the time until the deadline has passed, the effort counts as spent, so that a region comes of what was done."""
-LATE_LOSS = 0.01
-"""From then on faces for a pair lose this share at most in a round, and twice as much after PIECES slices more, too."""
+"""When this share of a stage's time until the deadline has passed, its effort counts as spent, so that a region comes of what was done."""
+LATE_LOSS, LATER = 0.01, 0.05
+"""From then on faces for a pair lose LATE_LOSS of the polytope at most in a round, and twice as much when LATER more of the time has
+passed, so that the rounds end before the deadline, however long they take."""
+LATEST = 0.75
+"""When this share has passed, all open cells are cut off, not only those where coarse volumes touch."""
 EARLY_EFFORT = 24 * SLICE
-"""The effort of all stages but the last one, so that the first region comes soon."""
+"""The effort of the first two stages, so that the first regions come soon."""
 
 
-def begin_stage(scene: Scene, state: GrowthState, start: Start, stage: int = 0) -> Transition:
-    """Asks to certify the proposal, or a smaller copy of it that has all points to keep inside."""
-    polytope = _proposal(scene, start, stage)
-    if stage + 1 < len(STAGES) and not (start.keep @ polytope.C.T < polytope.d).all():
-        return begin_stage(scene, state, start, stage + 1)
+def begin_whole(scene: Scene, state: GrowthState, start: Start) -> Transition:
+    """Asks to certify a smaller copy of the proposal; all of it where the copy has not all points to keep inside."""
+    copy = _copy(scene, start, FIRST)
+    reach = FIRST if (start.keep @ copy.C.T < copy.d).all() else 1.0
+    return _begin_stage(scene, state, reach, _copy(scene, start, reach), 0.0, 0.0)
+
+
+def _next_stage(scene: Scene, state: GrowthState, start: Start, passed: float) -> Transition:
+    """Moves the faces of the best region out, after a stage; ends when this one gained little."""
+    whole, best = state.whole, state.best
+    assert whole is not None
+    assert best is not None
+    kept = _kept(scene, start, best.polytope)
+    if kept == 1 or (whole.reach > 1 and kept < whole.kept + GAIN):
+        return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
+    reach = FARTHEST if whole.reach < 1 else FAR
+    return _begin_stage(scene, state, reach, pushed(scene, best.polytope, start.seed, reach, start.rows), kept, passed)
+
+
+def _begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float, passed: float) -> Transition:
+    """Asks to certify all pairs on a polytope; what was proved on the one of the stage before says nothing about it."""
     box = Box.around(*bounds(polytope))
-    return _next(scene, replace(state, whole=Whole(stage, polytope, box.mid, box.half)))
+    return _next(scene, replace(state, whole=Whole(reach, kept, polytope, box.mid, box.half, since=passed, passed=passed)))
 
 
-def _proposal(scene: Scene, start: Start, stage: int) -> Polytope:
-    """Returns the copy of the proposal that a stage begins with."""
-    return pushed(scene, start.rows, start.seed, STAGES[stage], scene.polytope([], []))
+def _copy(scene: Scene, start: Start, scale: float) -> Polytope:
+    """Returns the proposal with its faces at this part of their distance from the seed."""
+    return pushed(scene, start.rows, start.seed, scale, scene.polytope([], []))
+
+
+def _kept(scene: Scene, start: Start, polytope: Polytope) -> float:
+    """Returns the share of the proposal's q-volume that a polytope keeps."""
+    return float(polytope.contains(samples_of(scene, start.rows)).mean())
 
 
 def keeps_more(scene: Scene, start: Start, polytope: Polytope, other: Polytope) -> bool:
     """Returns whether a region keeps more of the proposal than another one does, by q-volume."""
-    samples = samples_of(scene, _proposal(scene, start, len(STAGES) - 1))
-    return int(polytope.contains(samples).sum()) > int(other.contains(samples).sum())
+    return _kept(scene, start, polytope) > _kept(scene, start, other)
 
 
 def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes) -> Transition:
@@ -78,12 +107,9 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     holds = whole.holds | {i: action.iteration for i, outcome in report.outcomes.items() if outcome is Outcome.CERTIFIED}
     begun = action.iteration if action.begun is None else action.begun
     spent = whole.spent | {i: whole.spent.get(i, 0) + SLICE * max(action.parts.get(i, 1), PARTS) for i in action.pairs}
-    late = whole.late or (spent if report.passed >= LATE else {})
-    whole = replace(whole, holds=holds, begun=begun, open_cells=dict(report.open_cells), spent=spent, late=late)
+    whole = replace(whole, holds=holds, begun=begun, open_cells=dict(report.open_cells), spent=spent, passed=report.passed)
     if report.complete:
-        if whole.stage + 1 < len(STAGES):
-            return begin_stage(scene, state, start, whole.stage + 1)
-        return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
+        return _next_stage(scene, state, start, report.passed)
     unknown = next((i for i in report.failures if i not in report.weaknesses), None)
     if unknown is not None:  # Nothing can be cut off for it, so it would fail again and again.
         pair = scene.pairs[unknown]
@@ -93,7 +119,8 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         return _next(scene, replace(state, whole=whole))
     most = {i: _most_loss(state, whole, i) for i in failing}
     corners = [corner for i in failing for corner in _corners(scene, i, report.weaknesses[i], most[i])]
-    smaller = cut(scene, whole.polytope, start.keep, corners, _proposal(scene, start, whole.stage))
+    around = start.rows if whole.reach >= 1 else _copy(scene, start, whole.reach)
+    smaller = cut(scene, whole.polytope, start.keep, corners, around)
     final = {*action.ending} & {*action.hard}
     if smaller is whole.polytope and all(i in final and most[i] >= 1 for i in failing):
         pair = scene.pairs[failing[0]]
@@ -113,18 +140,24 @@ def _corners(scene: Scene, pair: int, weakness: Weakness, most: float) -> list[t
 
 def _most_loss(state: GrowthState, whole: Whole, pair: int) -> float:
     """Returns which share of the polytope the faces for a pair may lose in this round, for points that are no contacts."""
+    if _gone(whole) >= LATE:
+        return float(min(LATE_LOSS * 2.0 ** ((_gone(whole) - LATE) / LATER), 1.0))
     effort, spent = _effort(state, whole, pair), whole.spent[pair]
-    if whole.stage + 1 == len(STAGES) and HARD < spent < effort:
+    if whole.reach >= 1 and HARD < spent < effort:
         return float(LOSS * 2.0 ** ((spent - HARD) // PATIENCE))
-    loss = LATE_LOSS if pair in whole.late else FAST_LOSS
-    return float(min(loss * 2.0 ** max((spent - effort) // (PIECES * SLICE), 0), 1.0))
+    return float(min(FAST_LOSS * 2.0 ** max((spent - effort) // (PIECES * SLICE), 0), 1.0))
 
 
 def _effort(state: GrowthState, whole: Whole, pair: int) -> int:
     """Returns how many cells of a pair are looked at before its open cells are cut off."""
     effort = state.options.cells or MOST_CELLS
-    early = EARLY_EFFORT if whole.stage + 1 < len(STAGES) else effort
-    return min(effort, early, whole.late.get(pair, effort))
+    early = EARLY_EFFORT if whole.reach < 1 or whole.reach > FAR else effort
+    return min(effort, early, whole.spent.get(pair, 0) if _gone(whole) >= LATE else effort)
+
+
+def _gone(whole: Whole) -> float:
+    """Returns which share of the time from the stage's beginning to the deadline has passed; 0 without a deadline."""
+    return min((whole.passed - whole.since) / (1 - whole.since), 1.0) if whole.since < 1 else 1.0
 
 
 def _parts(pairs: Sequence[int], whole: Whole) -> dict[int, int]:
@@ -146,6 +179,7 @@ def _next(scene: Scene, state: GrowthState) -> Transition:
     whole = state.whole
     assert whole is not None
     pairs = [i for i in by_joints(scene) if i not in whole.holds]
+    ending = 0 if _gone(whole) >= LATEST else ENDING
     spent, effort = {i: whole.spent.get(i, 0) for i in pairs}, {i: _effort(state, whole, i) for i in pairs}
     action = Certify(
         state.next,
@@ -154,7 +188,7 @@ def _next(scene: Scene, state: GrowthState) -> Transition:
         None,
         pairs,
         reuse=dict(whole.holds),
-        hard=[i for i in pairs if HARD <= spent[i] < effort[i] or spent[i] >= effort[i] + ENDING],
+        hard=[i for i in pairs if HARD <= spent[i] < effort[i] or spent[i] >= effort[i] + ending],
         failures=None,
         cells=SLICE,
         box=Box(whole.mid, whole.half),

@@ -7,6 +7,7 @@ import json
 import signal
 import subprocess
 import time
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import httpx2
@@ -91,6 +92,8 @@ def files(tmp_path: Path) -> Path:
         (("grow", PLANAR, "--q", "0,9"), "seed.q[1]: joint arm/elbow is at 9"),
         (("grow", PLANAR, "--q", "-1.2,1.0"), "arm/lower/bar and obstacles/body/post overlap"),
         (("grow", PLANAR, "--method", "magic"), "seed.method"),
+        (("grow", PLANAR, "--deadline", "0"), "--deadline: 0 is no number of seconds above 0"),
+        (("grow", PLANAR, "--deadline", "nan"), "--deadline: nan is no number"),
         (("grow", PLANAR, "--out", "nowhere/region.proof"), "the proof cannot be written into"),
         (("grow", PLANAR, "--out", "."), ". is a directory"),
     ],
@@ -100,6 +103,13 @@ def test_bad_input_is_one_line_that_says_where(ciris: Ciris, files: Path, argume
     done = ciris(*arguments, "--local", "--json")
     assert (done.status, done.raw) == (2, b"")
     assert words in done.error
+
+
+@pytest.mark.usefixtures("parsed_once")
+def test_a_deadline_that_no_region_keeps_is_a_negative_answer(ciris: Ciris) -> None:
+    done = ciris("grow", PLANAR, "--deadline", "0.001", "--local", "--json")
+    assert (done.status, done.raw) == (1, b"")
+    assert "the deadline was reached (allow more time)" in done.error
 
 
 @pytest.mark.parametrize("name", ["../../elsewhere", "/tmp/elsewhere", "..", "a b/c"])
@@ -259,7 +269,8 @@ def test_contains_answers_by_its_exit_status(ciris: Ciris, url: str, region: str
 
 def test_an_interrupted_wait_leaves_the_job_alone(url: str, scene: Scene, tmp_path: Path) -> None:
     environment = surroundings(CIRIS_DATA_DIR=str(tmp_path), CIRIS_URL=url)
-    waiting = subprocess.Popen(command("grow", "slider", "--q", "0"), cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True)
+    asked = command("grow", "slider", "--q", "0", "--deadline", "3600")
+    waiting = subprocess.Popen(asked, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True)
     assert waiting.stderr is not None
     assert waiting.stderr.readline().startswith("job ")
     time.sleep(1)
@@ -272,6 +283,9 @@ def test_an_interrupted_wait_leaves_the_job_alone(url: str, scene: Scene, tmp_pa
     assert lines[-1] == "error: interrupted"
     (job,) = httpx2.get(f"{url}/v1/jobs").json()["jobs"]
     assert job["state"] == "queued"
+    job = httpx2.get(f"{url}/v1/jobs/{job['id']}").json()
+    made, ends = (datetime.fromisoformat(job[name]) for name in ("created_at", "deadline_at"))
+    assert abs(ends - made - timedelta(hours=1)) < timedelta(seconds=1)
 
 
 def test_a_queue_that_is_down_is_one_warning(url: str, scene: Scene, environment: pytest.MonkeyPatch, tmp_path: Path) -> None:

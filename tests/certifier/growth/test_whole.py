@@ -17,7 +17,7 @@ from certifier.growth.actions import Certify, Finish, Outcomes, Propose
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
-from certifier.growth.whole import HARD, LATE, PARTS, PIECES, SLICE, STAGES, VERIFIED
+from certifier.growth.whole import FAR, FIRST, GAIN, HARD, LATE, LATEST, PARTS, PIECES, SLICE, VERIFIED
 from certifier.jobs import local
 from certifier.jobs.local import grow
 from certifier.model import WORLD, Polytope
@@ -40,7 +40,7 @@ PROPOSAL = Proposal(
     contain=np.array([[0.2, 0.0]]),
     info={},
 )
-FAR = np.array([[0.9, 0.9], [0.85, 0.9]])
+CORNER = np.array([[0.9, 0.9], [0.85, 0.9]])
 OPEN = 1
 """So many cells does the oracle leave open in every part."""
 
@@ -80,15 +80,21 @@ def drive(verdict, asked, limit=40, passed=lambda action: 0.0):
     raise AssertionError("the machine does not end")
 
 
+def stages(made):
+    """Splits certifications where a new stage begins."""
+    begins = [i for i, action in enumerate(made) if action.begun is None]
+    return [made[i:j] for i, j in zip(begins, [*begins[1:], len(made)], strict=True)]
+
+
 def weak(points):
     return Weakness(np.asarray(points, dtype=float).reshape(-1, 2), np.zeros(2))
 
 
 def test_a_proposal_that_certifies_is_kept_whole_after_a_smaller_copy_of_it():
     made, accepted, end = drive(lambda i, action: (Outcome.CERTIFIED, None), options())
-    assert [action.polytope.d[:4].tolist() for action in made] == [[stage] * 4 for stage in STAGES]
-    assert [action.label for action in made] == ["cells"] * len(STAGES)
-    assert [(action.box.mid - action.box.half < -stage).all() for action, stage in zip(made, STAGES, strict=True)] == [True, True]
+    assert [action.polytope.d[:4].tolist() for action in made] == [[scale] * 4 for scale in (FIRST, 1.0)]
+    assert [action.label for action in made] == ["cells"] * 2
+    assert [(action.box.mid - action.box.half < -scale).all() for action, scale in zip(made, (FIRST, 1.0), strict=True)] == [True, True]
     assert accepted[-1].polytope.d[:4].tolist() == [1.0] * 4
     assert accepted[-1].proofs == {0: 1, 1: 1}
     assert end.outcome is Outcome.CERTIFIED
@@ -96,35 +102,57 @@ def test_a_proposal_that_certifies_is_kept_whole_after_a_smaller_copy_of_it():
 
 def test_where_bodies_touch_is_cut_off_and_what_holds_is_not_asked_for_again():
     def verdict(index, action):
-        touching = action.polytope.contains(FAR)
+        touching = action.polytope.contains(CORNER)
         if index == 1 and touching.any():
-            return Outcome.REFUTED, weak(FAR[touching])
+            return Outcome.REFUTED, weak(CORNER[touching])
         return Outcome.CERTIFIED, None
 
     made, accepted, end = drive(verdict, options())
-    assert [action.pairs for action in made] == [[0, 1], [0, 1], [1]]
-    last = made[-1]
+    small, (first, last), *others = stages(made)
+    assert len(small) == len(others) == 1, "one more stage sees that there is little to gain"
+    assert [action.pairs for action in (first, last)] == [[0, 1], [1]]
     assert last.reuse == {0: 1}
     assert last.begun == 1
-    assert last.box.mid.tolist() == made[-2].box.mid.tolist()
-    assert last.box.half.tolist() == made[-2].box.half.tolist()
-    assert not last.polytope.contains(FAR).any()
+    assert last.box.mid.tolist() == first.box.mid.tolist()
+    assert last.box.half.tolist() == first.box.half.tolist()
+    assert not last.polytope.contains(CORNER).any()
     assert last.polytope.contains(np.array([[0.0, 0.0], [0.2, 0.0]])).all()
-    assert (last.polytope.C[:4] == made[-2].polytope.C[:4]).all()
-    assert accepted[-1].proofs == {0: 1, 1: 2}
+    assert (last.polytope.C[:4] == first.polytope.C[:4]).all()
+    assert accepted[1].proofs == {0: 1, 1: 2}
     assert end.outcome is Outcome.CERTIFIED
+
+
+def test_faces_move_out_stage_by_stage_as_far_as_the_proposal():
+    """A face in the second stage cuts off much too much; the stages after it win that back."""
+    corner = np.array([[0.4, 0.8], [0.8, 0.4]])
+
+    def verdict(index, action):
+        return (Outcome.REFUTED, weak(corner)) if (index, action.iteration) == (1, 1) else (Outcome.CERTIFIED, None)
+
+    made, accepted, end = drive(verdict, options())
+    assert [len(stage) for stage in stages(made)] == [1, 2, 1, 1]
+    cut, wider, widest = (candidate.polytope for candidate in accepted[1:])
+    (face,) = (i for i, row in enumerate(cut.C) if (row != 0).all())
+    (moved,) = (i for i, row in enumerate(wider.C) if (row != 0).all())
+    assert wider.C[moved].tolist() == cut.C[face].tolist()
+    assert wider.d[moved] == pytest.approx(FAR * cut.d[face])
+    samples = uniform_in_q(Polytope(PROPOSAL.C, PROPOSAL.d), SCENE.revolute, 100, 10, 0).reshape(-1, 2)
+    shares = [candidate.polytope.contains(samples).mean() for candidate in accepted]
+    assert shares[0] + GAIN < shares[1] < shares[2] - GAIN < shares[3] == 1.0, "the third stage gained enough for a fourth one"
+    assert (widest.C != 0).all(axis=1).sum() == 0
+    assert end.reason == "certified"
 
 
 @pytest.mark.parametrize("slices", [1, 9])
 def test_what_stays_open_is_cut_off_when_the_effort_is_spent_and_where_bodies_are_near_before(slices):
     def verdict(index, action):
-        there = action.polytope.contains(FAR)
+        there = action.polytope.contains(CORNER)
         if index == 0 or not there.any():
             return Outcome.CERTIFIED, None
-        return Outcome.INCONCLUSIVE, weak(FAR[there] if index in action.ending else [])
+        return Outcome.INCONCLUSIVE, weak(CORNER[there] if index in action.ending else [])
 
     made, accepted, _ = drive(verdict, options(cells=slices * SLICE))
-    later = made[1:]
+    later = stages(made)[1]
     spent = [round_ * PARTS for round_ in range(len(later))]
     assert [action.hard for action in later] == [[1] if HARD <= SLICE * s < SLICE * slices else [] for s in spent]
     assert [action.ending for action in later] == [[1] if s >= slices else [] for s in spent]
@@ -132,27 +160,30 @@ def test_what_stays_open_is_cut_off_when_the_effort_is_spent_and_where_bodies_ar
     # Any share may be lost some rounds after the effort is spent.
     assert slices // PARTS + 1 <= len(later) <= slices // PARTS + 5 * PIECES // PARTS
     assert all(action.cells == SLICE for action in later)
-    assert all(action.polytope.contains(FAR).all() for action in later[: 1 + math.ceil(slices / PARTS)])
-    assert not accepted[-1].polytope.contains(FAR).any()
+    assert all(action.polytope.contains(CORNER).all() for action in later[: 1 + math.ceil(slices / PARTS)])
+    assert not accepted[-1].polytope.contains(CORNER).any()
 
 
-def test_what_is_open_is_cut_off_when_the_deadline_comes_near():
-    """The first stage is certified in one round. The second one goes on until it is late, and ends a few rounds later."""
+@pytest.mark.parametrize(("touching", "when"), [(True, LATE), (False, LATEST)])
+def test_what_is_open_is_cut_off_when_the_deadline_comes_near(touching, when):
+    """The second stage goes on until it is late, and ends a few rounds later: where coarse volumes touch at once, elsewhere at last."""
 
     def verdict(index, action):
-        there = action.polytope.contains(FAR)
+        there = action.polytope.contains(CORNER)
         if index == 0 or not there.any():
             return Outcome.CERTIFIED, None
-        return Outcome.INCONCLUSIVE, weak(FAR[there] if index in action.ending else [])
+        named = index in action.ending and (touching or index in action.hard)
+        return Outcome.INCONCLUSIVE, weak(CORNER[there] if named else [])
 
-    made, accepted, end = drive(verdict, options(cells=1000 * SLICE), passed=lambda action: 0.05 * action.iteration)
-    late = 1 + next(i for i, action in enumerate(made) if 0.05 * action.iteration >= LATE)
-    assert [i for i, action in enumerate(made) if action.ending] == list(range(late, len(made)))
-    assert all(action.polytope.contains(FAR).all() for action in made[1:late])
-    assert late < len(made) < 2 * late
+    made, accepted, end = drive(verdict, options(cells=1000 * SLICE), passed=lambda action: 0.1 * action.iteration)
+    second = stages(made)[1]
+    passed = [0.1 * (action.iteration - 1) for action in second]
+    assert [bool(action.ending) for action in second] == [share >= LATE for share in passed]
+    assert [bool({*action.hard} & {*action.ending}) for action in second] == [share >= LATEST for share in passed]
+    assert all(action.polytope.contains(CORNER).all() for action, share in zip(second, passed, strict=True) if share < when)
+    assert when < passed[-1] < when + 0.25
     assert end.outcome is Outcome.CERTIFIED
-    assert len(accepted) == len(STAGES)
-    assert not accepted[-1].polytope.contains(FAR).any()
+    assert not accepted[1].polytope.contains(CORNER).any()
 
 
 def test_open_cells_are_dealt_to_parts_and_a_pair_without_any_is_put_together_in_the_next_round():
