@@ -63,11 +63,12 @@ EARLY_EFFORT = 24 * SLICE
 def begin_whole(scene: Scene, state: GrowthState, start: Start) -> Transition:
     """Asks to certify a smaller copy of the proposal; all of it where the copy has not all points to keep inside."""
     copy = _copy(scene, start, FIRST)
-    reach = FIRST if (start.keep @ copy.C.T < copy.d).all() else 1.0
-    return _begin_stage(scene, state, reach, _copy(scene, start, reach), 0.0, 0.0)
+    if (start.keep @ copy.C.T < copy.d).all():
+        return _begin_stage(scene, state, FIRST, copy)
+    return _begin_stage(scene, state, 1.0, _copy(scene, start, 1.0))
 
 
-def _next_stage(scene: Scene, state: GrowthState, start: Start, passed: float) -> Transition:
+def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     """Moves the faces of the best region out, after a stage; ends when this one gained little."""
     whole, best = state.whole, state.best
     assert whole is not None
@@ -76,10 +77,10 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start, passed: float) -
     if kept == 1 or (whole.reach > 1 and kept < whole.kept + GAIN):
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
     reach = FARTHEST if whole.reach < 1 else FAR
-    return _begin_stage(scene, state, reach, pushed(scene, best.polytope, start.seed, reach, start.rows), kept, passed)
+    return _begin_stage(scene, state, reach, pushed(scene, best.polytope, start.seed, reach, start.rows), kept, whole.passed)
 
 
-def _begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float, passed: float) -> Transition:
+def _begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float = 0.0, passed: float = 0.0) -> Transition:
     """Asks to certify all pairs on a polytope; what was proved on the one of the stage before says nothing about it."""
     box = Box.around(*bounds(polytope))
     return _next(scene, replace(state, whole=Whole(reach, kept, polytope, box.mid, box.half, since=passed, passed=passed)))
@@ -109,7 +110,7 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     spent = whole.spent | {i: whole.spent.get(i, 0) + SLICE * max(action.parts.get(i, 1), PARTS) for i in action.pairs}
     whole = replace(whole, holds=holds, begun=begun, open_cells=dict(report.open_cells), spent=spent, passed=report.passed)
     if report.complete:
-        return _next_stage(scene, state, start, report.passed)
+        return _next_stage(scene, replace(state, whole=whole), start)
     unknown = next((i for i in report.failures if i not in report.weaknesses), None)
     if unknown is not None:  # Nothing can be cut off for it, so it would fail again and again.
         pair = scene.pairs[unknown]
