@@ -9,7 +9,7 @@ from certifier.growth.actions import Certify, Transition
 from certifier.growth.options import EFFORT
 from certifier.growth.state import GrowthState
 from certifier.kinematics import Kinematics
-from certifier.model import Array, Polytope, Scene
+from certifier.model import WORLD, Array, Polytope, Scene
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume_bound
 
 
@@ -62,3 +62,10 @@ def effort(scene: Scene, state: GrowthState, option: str) -> int:
 def by_joints(scene: Scene) -> list[int]:
     """Returns the pairs' indices, those with few joints between their bodies first."""
     return sorted(range(len(scene.pairs)), key=lambda i: len(joints_between(scene, i)))
+
+
+def alike(scene: Scene, index: int) -> frozenset[str]:
+    """Returns the rigid parts of a pair, by their first bodies; for the world's part, the geometry. Pairs of the same parts are alike."""
+    kinematics, pair = Kinematics.of(scene), scene.pairs[index]
+    roots = {name: kinematics.rigid_root(scene.geometry(name).body) for name in (pair.a, pair.b)}
+    return frozenset(name if root == WORLD else root for name, root in roots.items())

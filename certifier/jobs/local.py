@@ -13,6 +13,7 @@ from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcome
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import Start
+from certifier.growth.trials import alike
 from certifier.jobs.pairs import part_certifier
 from certifier.jobs.parallel import side_by_side
 from certifier.jobs.region import Region, certified_region, growth_point, versions
@@ -76,7 +77,7 @@ class _Run:
         found = self.results.setdefault(action.iteration, {})
         failures, work = 0, action.work
         # The program (11) of a pair takes milliseconds, so children would not pay.
-        results = side_by_side(certify, work, 1 if action.cells == 1 else self.processes)
+        results = side_by_side(certify, work, 1 if action.cells == 1 else self.processes, lambda index: alike(self.scene, index))
         for count, ((index, _), result) in enumerate(zip(work, results, strict=False), start=1):
             found.setdefault(index, []).append(result)
             pair = self.scene.pairs[index]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 
 from certifier.jobs.pairs import CertifyPart
@@ -13,20 +13,30 @@ Asked = tuple[int, int]
 """A pair's index, and the number of the part."""
 
 
-def side_by_side(certify: CertifyPart, asked: Sequence[Asked], processes: int) -> Iterator[PairResult]:
+def side_by_side(certify: CertifyPart, asked: Sequence[Asked], processes: int, kind: Callable[[int], Hashable]) -> Iterator[PairResult]:
     """Yields the results of parts of pairs in their order, which do not depend on the number of processes.
 
     Args:
         processes: so many children work; 1 for this process alone.
+        kind: returns the same for pairs, by their indices, that are alike. One child takes the same part of all of them, because what it
+            finds for one helps with the next.
     """
     if processes == 1 or len(asked) == 1:
         for index, part in asked:
             yield certify(index, part)
         return
+    tasks: dict[tuple[Hashable, int], list[Asked]] = {}
+    for index, part in asked:
+        tasks.setdefault((kind(index), part), []).append((index, part))
     # The children are forked, so they have what the pairs share, and what earlier rounds left, without preparing it.
-    with ProcessPoolExecutor(min(processes, len(asked)), multiprocessing.get_context("fork"), _adopt, (certify,)) as executor:
+    with ProcessPoolExecutor(min(processes, len(tasks)), multiprocessing.get_context("fork"), _adopt, (certify,)) as executor:
         try:
-            yield from executor.map(_run, asked)
+            found: dict[Asked, PairResult] = {}
+            done = zip(tasks.values(), executor.map(_run, tasks.values()), strict=True)
+            for one in asked:
+                while one not in found:
+                    found |= zip(*next(done), strict=True)
+                yield found.pop(one)
         finally:
             executor.shutdown(cancel_futures=True)
 
@@ -39,5 +49,5 @@ def _adopt(certify: CertifyPart) -> None:
     _adopted.append(certify)
 
 
-def _run(asked: Asked) -> PairResult:
-    return _adopted[0](*asked)
+def _run(asked: list[Asked]) -> list[PairResult]:
+    return [_adopted[0](*one) for one in asked]

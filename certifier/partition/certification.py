@@ -136,7 +136,11 @@ class CellCertification:
         return Volume.of(self._scene.geometry(pair.a)), Volume.of(self._scene.geometry(pair.b))
 
     def _together(self, volumes: Volumes) -> PairResult | None:
-        result = self._begin(volumes, GROUP_CELLS, CutOff.CONTACTS)
+        search, root = Search(self._area, self._shared, volumes), Node()
+        search.run([OpenCell(root, self._area.lower, self._area.upper)], GROUP_CELLS)
+        if any(node.kind == OPEN for node in root.preorder()):
+            return None
+        result = self._proved(search, volumes, root)
         return result if result.outcome is Outcome.CERTIFIED else None
 
     def _begin(self, volumes: Volumes, cells: int, cut_off: CutOff) -> PairResult:

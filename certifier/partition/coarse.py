@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -162,11 +163,17 @@ def common_balls(kinematics: Kinematics, volume: Volume, other: Volume) -> list[
     for body in _roots(kinematics, volume, other):
         way = kinematics.bodies_between(body, volume.body)[1:]
         moved = next((there for there in way if kinematics.scene.joint_above[there].index is not None), None)
-        together = [g for g in kinematics.scene.geometries if moved in {g.body, *kinematics.ancestors(g.body)}]
-        fat = ball(kinematics, together, body)
+        fat = _ball_about(kinematics, body, moved)
         if fat is not None:
             found.append(replace(fat, geometries=volume.geometries))
     return found
+
+
+@lru_cache(maxsize=1024)
+def _ball_about(kinematics: Kinematics, body: str, moved: str | None) -> Volume | None:
+    """Returns the ball fixed to a body that holds all geometries that a moved body carries, itself included."""
+    together = [g for g in kinematics.scene.geometries if moved in {g.body, *kinematics.ancestors(g.body)}]
+    return ball(kinematics, together, body)
 
 
 def _roots(kinematics: Kinematics, volume: Volume, other: Volume) -> list[str]:
