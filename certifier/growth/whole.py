@@ -28,15 +28,17 @@ from certifier.polytopes.polytope import bounds
 
 FIRST = 0.7
 """In the first stage the faces of the proposal lie this part of their distance from the seed."""
-FARTHEST, FAR = 1.45, 1.2
+FARTHEST, FARTHER, FAR = 1.45, 1.25, 1.2
 """The faces of the region of the first stage move out to FARTHEST times their distance from the seed, and those of others to FAR times."""
+SOON = 0.25
+"""When the first stage has taken more than this share of the time until the deadline, its faces move out to FARTHER times only."""
 GAIN = 0.02
 """Growth ends with a stage that gains less than this share of the proposal."""
 SLICE = 100
 """So many cells of every part of a pair are looked at in one round."""
 PARTS, PIECES = 3, 12
 """The open cells of a pair are dealt to PARTS parts, or to more, so that a round has PIECES parts for the solvers to share. A round counts
-as so many slices of its effort even where it has fewer parts."""
+as so many slices of its effort even where it has fewer parts. When a stage is late, one part will do, so that rounds are short."""
 VERIFIED = 5 * SLICE
 """When no cell is open, what so many cells came to is a part to verify."""
 HARD = 6 * SLICE
@@ -49,12 +51,12 @@ CONTACT_LOSS = 0.01
 """For contacts, which have to go sooner or later, they lose this share at least where that is needed."""
 ENDING = 60 * SLICE
 """When the effort is spent, open cells are cut off where coarse volumes touch; after so many cells more, wherever they are."""
-LATE = 0.6
+LATE = 0.5
 """When this share of a stage's time until the deadline has passed, its effort counts as spent, so that a region comes of what was done."""
 LATE_LOSS, LATER = 0.01, 0.05
 """From then on faces for a pair lose LATE_LOSS of the polytope at most in a round, and twice as much when LATER more of the time has
 passed, so that the rounds end before the deadline, however long they take."""
-LATEST = 0.75
+LATEST = 0.65
 """When this share has passed, all open cells are cut off, not only those where coarse volumes touch."""
 EARLY_EFFORT = 24 * SLICE
 """The effort of the first two stages, so that the first regions come soon."""
@@ -76,7 +78,7 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     kept = _kept(scene, start, best.polytope)
     if kept == 1 or (whole.reach > 1 and kept < whole.kept + GAIN):
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
-    reach = FARTHEST if whole.reach < 1 else FAR
+    reach = FAR if whole.reach >= 1 else FARTHEST if whole.passed <= SOON else FARTHER
     return _begin_stage(scene, state, reach, pushed(scene, best.polytope, start.seed, reach, start.rows), kept, whole.passed)
 
 
@@ -164,7 +166,7 @@ def _gone(whole: Whole) -> float:
 def _parts(pairs: Sequence[int], whole: Whole) -> dict[int, int]:
     """Returns how many parts each pair is dealt to, where there are several: its open cells, or those to verify when none is open."""
     known = [i for i in pairs if i in whole.open_cells]
-    each = max(PARTS, math.ceil(PIECES / max(len(known), 1)))
+    each = max(1 if _gone(whole) >= LATE else PARTS, math.ceil(PIECES / max(len(known), 1)))
     parts = {i: min(each, whole.open_cells[i] or whole.spent[i] // VERIFIED) for i in known}
     return {i: count for i, count in parts.items() if count > 1}
 

@@ -13,11 +13,12 @@ import pytest
 import yaml
 
 from certifier.errors import CirisError
+from certifier.growth import whole
 from certifier.growth.actions import Certify, Finish, Outcomes, Propose
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
-from certifier.growth.state import GrowthState
-from certifier.growth.whole import FAR, FIRST, GAIN, HARD, LATE, LATEST, PARTS, PIECES, SLICE, VERIFIED
+from certifier.growth.state import GrowthState, Whole
+from certifier.growth.whole import FAR, FARTHER, FIRST, GAIN, HARD, LATE, LATEST, PARTS, PIECES, SLICE, SOON, VERIFIED
 from certifier.jobs import local
 from certifier.jobs.local import grow
 from certifier.model import WORLD, Polytope
@@ -162,6 +163,19 @@ def test_what_stays_open_is_cut_off_when_the_effort_is_spent_and_where_bodies_ar
     assert all(action.cells == SLICE for action in later)
     assert all(action.polytope.contains(CORNER).all() for action in later[: 1 + math.ceil(slices / PARTS)])
     assert not accepted[-1].polytope.contains(CORNER).any()
+
+
+@pytest.mark.parametrize(("gone", "reach"), [(0.0, 1.0), (SOON, 1.0), (SOON + 0.01, FARTHER * FIRST)])
+def test_after_a_slow_first_stage_the_faces_move_out_less(gone, reach):
+    made, _, _ = drive(lambda i, action: (Outcome.CERTIFIED, None), options(), passed=lambda action: gone)
+    assert made[1].polytope.d[:4].tolist() == pytest.approx([reach] * 4)
+
+
+@pytest.mark.parametrize(("passed", "parts"), [(0.0, PARTS), (LATE, 1)])
+def test_rounds_of_many_pairs_are_shorter_when_a_stage_is_late(passed, parts):
+    pairs = range(2 * PIECES)
+    state = Whole(1.2, 0.5, SCENE.polytope([], []), np.zeros(2), np.ones(2), open_cells=dict.fromkeys(pairs, 50), passed=passed)
+    assert whole._parts(pairs, state) == (dict.fromkeys(pairs, parts) if parts > 1 else {})
 
 
 @pytest.mark.parametrize(("touching", "when"), [(True, LATE), (False, LATEST)])
