@@ -10,6 +10,7 @@ import numpy as np
 from api.schemas.jobs import PolytopeBody, Seed, WebhookRequest
 from certifier.errors import CirisError, RegionError
 from certifier.model import Array, Scene
+from certifier.seeding.limits import check_limits
 from certifier.seeding.options import SeedOptions
 from db.settings import settings
 from workers.addresses import is_public
@@ -21,26 +22,16 @@ def seed(scene: Scene, body: Seed) -> SeedOptions:
     It refuses options that contradict each other, a configuration of the wrong length, and one outside the joint limits.
 
     Raises:
-        RegionError: seed_wrong_length, seed_outside_limits, polytope_shape, or as SeedOptions.from_document; the field names the place.
+        RegionError: seed_wrong_length, seed_outside_limits, seed_outside_window, polytope_shape, or as SeedOptions.from_document; the field
+            names the place.
     """
     options = SeedOptions.from_document(body.model_dump(exclude_none=True))
     for i, row in enumerate(options.C or ()):
         _length(scene, row, f"seed.C[{i}]", "polytope_shape")
     if options.q is not None:
         _length(scene, options.q, "seed.q", "seed_wrong_length")
-        _within_limits(scene, options.q)
+        check_limits(scene, options.q, "seed.q")
     return options
-
-
-def _within_limits(scene: Scene, q: Sequence[float]) -> None:
-    for i, (joint, value) in enumerate(zip(scene.moving, q, strict=True)):
-        lower, upper = scene.q_lower[i], scene.q_upper[i]
-        if not lower < value < upper:
-            raise RegionError(
-                "seed_outside_limits",
-                f"joint {joint.name} is at {value:g}, not between its limits {lower:g} and {upper:g}",
-                field=f"seed.q[{i}]",
-            )
 
 
 def polytope(scene: Scene, body: PolytopeBody) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -19,26 +20,42 @@ def manifest(row: RegionRow) -> tuple[bytes, str]:
 
 
 def npz(row: RegionRow) -> tuple[bytes, str]:
-    """Writes arrays in s as npz: C (m, n) and d (m,) with the joint limits, center (n,), ellipsoid_center (n,), ellipsoid_shape (n, n)."""
+    """Writes arrays in s as npz.
+
+    C (m, n) and d (m,) with the joint limits, center (n,), ellipsoid_center (n,), ellipsoid_shape (n, n); and what s means: joints (n,) by
+    name, q_star, q_lower and q_upper (n,), and revolute (n,), which is true where s = tan((q - q_star) / 2) and false where s = q - q_star.
+    """
     buffer = io.BytesIO()
-    ellipsoid = row.manifest["inscribed_ellipsoid"]
-    np.savez(
-        buffer,
-        C=row.arrays["C"],
-        d=row.arrays["d"],
-        center=np.array(row.manifest["interior_point"]),
-        ellipsoid_center=np.array(ellipsoid["center"]),
-        ellipsoid_shape=np.array(ellipsoid["shape"]),
-    )
+    ellipsoid, space = row.manifest["inscribed_ellipsoid"], row.manifest["space"]
+    arrays = {
+        "C": row.arrays["C"],
+        "d": row.arrays["d"],
+        "center": np.array(row.manifest["interior_point"]),
+        "ellipsoid_center": np.array(ellipsoid["center"]),
+        "ellipsoid_shape": np.array(ellipsoid["shape"]),
+    }
+    # Regions that an earlier checkout stored do not say which joints turn.
+    arrays |= {name: np.array(space[name]) for name in ("joints", "q_star", "q_lower", "q_upper", "revolute") if name in space}
+    np.savez(buffer, allow_pickle=False, **arrays)
     return buffer.getvalue(), "npz"
 
 
 def drake_yaml(row: RegionRow) -> tuple[bytes, str]:
-    """Writes the region as Drake's IrisRegions in YAML: one HPolyhedron in s, named after the region."""
-    C, d = row.arrays["C"], row.arrays["d"]
+    """Writes the region as Drake's IrisRegions in YAML: one HPolyhedron in s, named after the region. Comments say what s means."""
+    C, d, space = row.arrays["C"], row.arrays["d"], row.manifest["space"]
     rows = "\n".join(f"    - [{_numbers(c)}]" for c in C)
-    text = f'"{row.id}":\n  ambient_dimension: {C.shape[1]}\n  A:\n{rows}\n  b: [{_numbers(d)}]\n'
+    joints = "\n".join(f"#   {_meaning(space, i)}" for i in range(len(space["joints"])))
+    head = f"# A certified region of {row.manifest['scene']['name']} in tangent-space coordinates s, one for each joint:\n{joints}\n"
+    text = f'{head}"{row.id}":\n  ambient_dimension: {C.shape[1]}\n  A:\n{rows}\n  b: [{_numbers(d)}]\n'
     return text.encode(), "yaml"
+
+
+def _meaning(space: dict[str, Any], i: int) -> str:
+    """Returns what one coordinate of s means. Regions that an earlier checkout stored do not say which joints turn."""
+    name, center = space["joints"][i], repr(float(space["q_star"][i]))
+    if "revolute" not in space:
+        return f"{name}, q_star = {center}"
+    return f"{name}: s = tan((q - {center}) / 2), q in radians" if space["revolute"][i] else f"{name}: s = q - {center}, q in metres"
 
 
 def _numbers(values: np.ndarray) -> str:

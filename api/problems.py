@@ -24,6 +24,7 @@ _STATUS_OF_CODE = {
     **dict.fromkeys(("scene_not_found", "job_not_found", "region_not_found", "proof_not_found", "webhook_not_found"), HTTPStatus.NOT_FOUND),
     "idempotency_conflict": HTTPStatus.CONFLICT,
     "job_not_retryable": HTTPStatus.CONFLICT,
+    "ambiguous_id": HTTPStatus.CONFLICT,
     "too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
     "bundle_too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
     **dict.fromkeys(("child_timeout", "child_memory", "child_died"), HTTPStatus.SERVICE_UNAVAILABLE),

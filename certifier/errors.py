@@ -1,5 +1,7 @@
 """The errors here tell a user what is wrong, where, and what to do."""
 
+import difflib
+
 
 class CirisError(Exception):
     """This error reports a problem that the user can mend.
@@ -38,3 +40,12 @@ class RegionError(CirisError):
 
 class ProofError(CirisError):
     """The proof does not hold, or the file is not a proof."""
+
+
+def close_matches(name: str, known: list[str]) -> str:
+    """Returns a hint with the known names that are most like ``name``; the hint is empty when none is like it."""
+    tails = {k.rsplit("/", 1)[-1]: k for k in known}
+    matches = difflib.get_close_matches(name, known, n=3) or [
+        tails[t] for t in difflib.get_close_matches(name.rsplit("/", 1)[-1], list(tails), n=3)
+    ]
+    return f"did you mean {' or '.join(matches)}?" if matches else ""

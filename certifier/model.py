@@ -73,6 +73,8 @@ class Joint:
         index: position index in q and s; None for a weld.
         lower: lower limit of q in radians or metres; None for a weld.
         upper: upper limit of q in radians or metres; None for a weld.
+        own_limits: the limits of the joint itself, in radians, where those above are a window that is narrower, because s stands for less
+            than a whole turn; None on a side without one. None where the limits above are its own.
     """
 
     name: str
@@ -85,6 +87,7 @@ class Joint:
     index: int | None = None
     lower: float | None = None
     upper: float | None = None
+    own_limits: tuple[float | None, float | None] | None = None
 
 
 @dataclass(frozen=True)
@@ -178,6 +181,23 @@ class Scene:
     @cached_property
     def q_upper(self) -> Array:
         return np.array([j.upper for j in self.moving], dtype=float)
+
+    @cached_property
+    def own_limits(self) -> tuple[Array, Array]:
+        """The lower and the upper limits of the joints themselves, (n,) each; windows may be narrower."""
+        own = [(j.lower, j.upper) if j.own_limits is None else j.own_limits for j in self.moving]
+        lower = [-np.inf if limits[0] is None else limits[0] for limits in own]
+        return np.array(lower), np.array([np.inf if limits[1] is None else limits[1] for limits in own])
+
+    def in_windows(self, q: ArrayLike) -> Array:
+        """Returns positions q, (..., n), shifted by whole turns to half a turn about q* for every joint that has a window.
+
+        The robot is in the same pose there. Positions beyond a joint's own limits are shifted as well.
+        """
+        given = np.asarray(q, dtype=float)
+        windowed = np.array([j.own_limits is not None for j in self.moving])
+        turns = np.where(windowed, np.round((given - self.q_star) / (2 * np.pi)), 0.0)
+        return given - 2 * np.pi * turns
 
     @cached_property
     def s_lower(self) -> Array:
@@ -284,6 +304,8 @@ class Scene:
                     "index": j.index,
                     "lower": j.lower,
                     "upper": j.upper,
+                    # Scenes without windows keep the hash that they had before there were any.
+                    **({} if j.own_limits is None else {"own_limits": list(j.own_limits)}),
                 }
                 for j in self.joints
             ],
@@ -372,7 +394,7 @@ def _read(document: Any) -> Scene:
 
 
 def _joint(node: Node) -> Joint:
-    joint = node.fields("name", "kind", "parent", "child", "axis", "X_PF", "X_BM", "index", "lower", "upper")
+    joint = node.fields("name", "kind", "parent", "child", "axis", "X_PF", "X_BM", "index", "lower", "upper", optional=("own_limits",))
     kind = joint["kind"].text()
     if kind not in set(JointKind):
         joint["kind"].refuse("a kind of joint: " + ", ".join(JointKind))
@@ -387,7 +409,13 @@ def _joint(node: Node) -> Joint:
         index=None if joint["index"].value is None else joint["index"].count(),
         lower=None if joint["lower"].value is None else joint["lower"].number(),
         upper=None if joint["upper"].value is None else joint["upper"].number(),
+        own_limits=_own_limits(joint["own_limits"]) if "own_limits" in joint else None,
     )
+
+
+def _own_limits(node: Node) -> tuple[float | None, float | None]:
+    lower, upper = (None if limit.value is None else float(limit.number()) for limit in node.two())
+    return lower, upper
 
 
 def _geometry(node: Node) -> Geometry:

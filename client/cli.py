@@ -135,7 +135,19 @@ def _parser() -> argparse.ArgumentParser:
     revoked.add_argument("name", metavar="NAME")
     revoked.set_defaults(run="client.commands:key", verb="revoke", words=lambda args: [args.name])
 
-    scene = _group(verbs.add_parser("scene", help="add, list and show scenes"))
+    scene = _group(verbs.add_parser("scene", help="draft, check, add, list and show scenes"))
+    init = scene.add_parser("init", help="write a scene file and a seed for a robot's model", epilog="Nothing is overwritten.")
+    init.add_argument("robot", metavar="ROBOT", help="model file: URDF, SDFormat or MJCF")
+    init.add_argument("--world", metavar="FILE", action="append", default=[], help="model of what stands around it; may be repeated")
+    init.add_argument("--package", metavar="NAME=DIR", action="append", default=[], help="where a package is that a model names")
+    init.add_argument(
+        "--out", metavar="FILE", default="scene.yaml", help="the scene file; default: scene.yaml here, with seed.yaml beside it"
+    )
+    init.set_defaults(run="client.scenes:scene_init")
+    check = scene.add_parser("check", parents=[json], help="say what a scene file makes of its models, without a service")
+    check.add_argument("path", metavar="PATH.yaml")
+    check.add_argument("--q", metavar="Q", help="a configuration to look at; default: the seed.yaml beside the file, or else q*")
+    check.set_defaults(run="client.scenes:scene_check")
     add = scene.add_parser("add", parents=[remote, json], help="upload a scene file and all files it refers to")
     add.add_argument("path", metavar="PATH.yaml")
     add.set_defaults(run="client.commands:scene_add")
@@ -181,9 +193,9 @@ def _parser() -> argparse.ArgumentParser:
     certify.add_argument("scene", metavar="SCENE")
     certify.add_argument(
         "--polytope",
-        metavar="FILE.npz",
+        metavar="FILE",
         required=True,
-        help="arrays C (m x n), d (m) and optionally center (n), in s; ciris adds the joint limits",
+        help="npz, JSON or YAML with C (m x n), d (m) and optionally center (n), in s; ciris adds the joint limits",
     )
     certify.add_argument(
         "--cells",
@@ -193,6 +205,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     certify.add_argument("--watch", action="store_true", help="print a line for every pair as it is settled")
     certify.add_argument("--local", action="store_true", help="certify in this process, without a service")
+    certify.add_argument("--out", metavar="FILE", help="file for the proof, where the polytope is certified; default: none")
     certify.add_argument("--backend", choices=["ciris", "drake"], default="ciris", help="drake asks Drake's own program, as a cross-check")
     certify.add_argument("--solver", metavar="NAME", help="solver that Drake uses: clarabel (default), scs, csdp or mosek")
     certify.set_defaults(run="client.commands:certify")
@@ -200,6 +213,24 @@ def _parser() -> argparse.ArgumentParser:
     verify = verbs.add_parser("verify", parents=[json], help="check a proof file offline and say what was proved")
     verify.add_argument("proof", metavar="PROOF")
     verify.set_defaults(run="client.verify:verify")
+
+    job = _group(verbs.add_parser("job", help="list, show, follow, cancel and retry jobs of the service"))
+    ls = job.add_parser("ls", parents=[remote, json], help="list jobs, newest first")
+    ls.add_argument("--state", help="list only jobs in this state: queued, running, succeeded, failed, cancelled and others")
+    ls.add_argument("--scene", help="list only the jobs of this scene")
+    ls.add_argument("--most", type=int, default=50, metavar="N", help="list so many at most; default 50")
+    ls.set_defaults(run="client.jobs:job_ls")
+    for verb, about in (
+        ("show", "show a job and its regions"),
+        ("follow", "tell what happens until a job has ended"),
+        ("cancel", "ask a job to end; regions that it has certified remain"),
+        ("retry", "run a job again that failed or was cancelled"),
+    ):
+        of_one = job.add_parser(verb, parents=[remote, json], help=about)
+        of_one.add_argument("job", metavar="ID", help="its id, or the first characters of it")
+        if verb == "follow":
+            of_one.add_argument("--watch", action="store_true", help="print a line for every pair as it is settled")
+        of_one.set_defaults(run=f"client.jobs:job_{verb}")
 
     region = _group(verbs.add_parser("region", help="list, show and export regions"))
     ls = region.add_parser("ls", parents=[remote, json], help="list regions, newest first")

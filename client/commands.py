@@ -112,7 +112,7 @@ def grow(args: Namespace) -> int:
     if args.local:
         from client import local
 
-        grown, url = local.grow(args.scene, seed, options, args.deadline, screen), None
+        grown, url = local.grow(args.scene, seed, options, args.deadline, screen, args.watch), None
     else:
         with _client(args) as client:
             scene = service.known_scene(client, args.scene)
@@ -196,13 +196,20 @@ def certify(args: Namespace) -> int:
     screen = Screen()
     polytope = polytope_file(args.polytope)
     drake, cells = _drake(args), 1 if args.cells is None else args.cells
+    proof: bytes | None
+    if args.out is not None:
+        check_writable(args.out)
     if args.local:
         from client import local
 
-        document = local.certify(args.scene, polytope, screen, args.watch, drake, cells)
+        document, proof = local.certify(args.scene, polytope, screen, args.watch, drake, cells, args.out is not None)
     else:
         with _client(args) as client:
             document = service.certify(client, service.known_scene(client, args.scene), polytope, screen, args.watch, cells)
+            proof = client.proof(document["region"]) if args.out is not None and document["region"] else None
+    if proof is not None:
+        Path(args.out).write_bytes(proof)
+    document = {**document, "proof": args.out if proof is not None else None}
     if args.json:
         print_json(document)
     else:
@@ -215,6 +222,10 @@ def certify(args: Namespace) -> int:
                 print(f"{how} at q = {where}")
         scene = document["scene"]["name"]
         print(f"{scene}: {output.plain(document['outcome'])}, guarantee {document['guarantee']}, {output.seconds(document['seconds'])}")
+        if document["region"] is not None:
+            print(f"region {document['region']}")
+        if proof is not None:
+            print(f"proof {args.out} (check it: ciris verify {args.out})")
     return OK if document["outcome"] == "certified" else NO
 
 
@@ -226,6 +237,8 @@ def _drake(args: Namespace) -> str | None:
         return None
     if args.cells is not None:
         raise CirisError("option", "Drake's own program knows no cells", field="--cells", hint="leave --cells or --backend drake out")
+    if args.out is not None:
+        raise CirisError("option", "Drake writes no proof", field="--out", hint="leave --out or --backend drake out")
     if not args.local:
         raise CirisError("option", "the service asks its own certifier only", field="--backend", hint="add --local")
     return args.solver or "clarabel"

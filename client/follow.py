@@ -59,9 +59,13 @@ class Teller:
                 self._screen.line(f"  {self._done}/{self._total} {text} ({seconds(pair['seconds'])})")
             self._screen.status(f"iteration {data['iteration']}: {self._done}/{self._total} {self._what}, {text}")
 
+    def _tell_note(self, data: dict[str, Any]) -> None:
+        self._screen.status(data["text"])
+
     def _tell_region(self, data: dict[str, Any]) -> None:
         kept = f", {share(data['share'])} of the proposal" if data["share"] else ""
-        self._screen.line(f"certified region of iteration {data['iteration']}: ellipsoid volume {data['ellipsoid_volume']:.4g}{kept}")
+        name = f" {data['region_id'][:8]}" if "region_id" in data else ""
+        self._screen.line(f"certified region{name} of iteration {data['iteration']}: ellipsoid volume {data['ellipsoid_volume']:.4g}{kept}")
 
 
 def follow(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:

@@ -95,8 +95,23 @@ class Client:
         response = self._send("POST", "/v1/jobs", json=request, headers=headers)
         return response.json(), response.status_code == httpx2.codes.CREATED
 
+    def jobs(self, *, state: str | None = None, scene: str | None = None, most: int = 50) -> list[Document]:
+        """Returns the newest jobs, at most so many, in one state or of one scene where that is given."""
+        wanted: Document = {key: value for key, value in (("state", state), ("scene", scene)) if value is not None}
+        found: list[Document] = []
+        after = None
+        while len(found) < most:
+            page = self._json(
+                "GET", "/v1/jobs", params={**wanted, "limit": min(most - len(found), 200), **({"after": after} if after else {})}
+            )
+            found += page["jobs"]
+            after = page["next"]
+            if after is None:
+                break
+        return found
+
     def job(self, job_id: str) -> Document:
-        """Returns a job as it is now."""
+        """Returns a job as it is now; the first characters of its id are enough."""
         return self._json("GET", f"/v1/jobs/{_segment(job_id)}")
 
     def cancel(self, job_id: str) -> Document:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
@@ -73,18 +75,21 @@ class PolytopeFile:
 
 
 def polytope_file(path: str) -> PolytopeFile:
-    """Reads an npz file with C, d and optionally center.
+    """Reads C, d and optionally center from an npz, JSON or YAML file. A region that was exported as JSON will do as well.
 
     Raises:
         RegionError: polytope_file, polytope_shape, or as :meth:`Polytope.given`.
     """
+    suffix = Path(path).suffix.lower()
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            content = {name: arrays[name].astype(float, casting="same_kind") for name in arrays.files if name in ("C", "d", "center")}
+        content = _arrays(path) if suffix == ".npz" else _document(path) if suffix in (".json", ".yaml", ".yml") else None
     except FileNotFoundError:
         raise RegionError("polytope_file", f"there is no file {path}", field="--polytope") from None
-    except (OSError, ValueError, TypeError, BadZipFile, EOFError):
-        raise RegionError("polytope_file", f"{path} is no npz file of numbers", field="--polytope", hint=_NPZ) from None
+    except (OSError, ValueError, TypeError, BadZipFile, EOFError, yaml.YAMLError, RecursionError):
+        kind = "npz" if suffix == ".npz" else suffix[1:].upper()
+        raise RegionError("polytope_file", f"{path} is no {kind} file of numbers", field="--polytope", hint=_NPZ) from None
+    if content is None:
+        raise RegionError("polytope_file", f"{path} is neither .npz nor .json nor .yaml", field="--polytope", hint=_NPZ)
     missing = {"C", "d"} - content.keys()
     if missing:
         raise RegionError("polytope_file", f"{path} has no array {' and no array '.join(sorted(missing))}", field="--polytope")
@@ -94,3 +99,18 @@ def polytope_file(path: str) -> PolytopeFile:
             "polytope_shape", f"center must be {polytope.C.shape[1]} finite numbers, as many as C has columns", field="--polytope"
         )
     return PolytopeFile(polytope, center)
+
+
+def _arrays(path: str) -> dict[str, Array]:
+    with np.load(path, allow_pickle=False) as arrays:
+        return {name: arrays[name].astype(float, casting="same_kind") for name in arrays.files if name in ("C", "d", "center")}
+
+
+def _document(path: str) -> dict[str, Array]:
+    text = Path(path).read_text(encoding="utf-8")
+    document: Any = json.loads(text) if path.lower().endswith(".json") else yaml.safe_load(text)
+    if not isinstance(document, dict):
+        raise TypeError("not a mapping")
+    names = {"C": ("C", "halfspace_normals"), "d": ("d", "halfspace_offsets"), "center": ("center", "interior_point")}
+    found = {name: next((document[key] for key in keys if key in document), None) for name, keys in names.items()}
+    return {name: np.array(value, dtype=float) for name, value in found.items() if value is not None}

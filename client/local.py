@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from certifier.errors import SceneError
 from certifier.model import Scene
 from client import verdicts
 from client.cores import cores
+from client.follow import Teller
 from client.inputs import PolytopeFile, is_scene_file
 from client.output import Screen
 from client.service import Grown
@@ -26,36 +28,46 @@ def load(scene: str) -> Scene:
     return load_scene(scene)
 
 
-def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], deadline_s: float | None, screen: Screen) -> Grown:
+def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], deadline_s: float | None, screen: Screen, watch: bool = False) -> Grown:
     """Grows a region in this process and children of it; ``deadline_s`` is as for :func:`certifier.jobs.local.grow`."""
     loaded = load(scene)
     from certifier.growth.options import GrowthOptions
     from certifier.jobs import local
 
     asked = GrowthOptions.from_document({"kind": "grow", "seed": seed, **options})
-    region = local.grow(loaded, asked, screen.status, deadline_s, processes=cores())
+    region = local.grow(loaded, asked, _teller(loaded, screen, watch), deadline_s, processes=cores())
     screen.clear()
     provenance = region.manifest["provenance"]
     return Grown(region.manifest, region.proof, provenance["seconds"], remark=provenance["reason"])
 
 
-def certify(scene: str, given: PolytopeFile, screen: Screen, watch: bool, drake: str | None, cells: int) -> dict[str, Any]:
+def _teller(scene: Scene, screen: Screen, watch: bool) -> Callable[[str, dict[str, Any]], None]:
+    """Returns what tells people of a job of this process, in the words in which they hear of one of the service."""
+    teller = Teller(screen, [f"{pair.a} - {pair.b}" for pair in scene.pairs], watch)
+    return lambda kind, data: teller.tell({"kind": kind, "data": data})
+
+
+def certify(
+    scene: str, given: PolytopeFile, screen: Screen, watch: bool, drake: str | None, cells: int, prove: bool = False
+) -> tuple[dict[str, Any], bytes | None]:
     """Certifies a polytope in this process, and returns the document of ``ciris certify --json``.
+
+    The proof comes with it where that is asked for (``prove``) and the polytope is certified.
 
     Args:
         drake: name of the solver with which Drake is asked instead; None asks our certifier.
         cells: as in :class:`certifier.growth.options.GrowthOptions`, for our certifier.
     """
     loaded = load(scene)
-    progress = screen.line if watch else screen.status
+    tell = _teller(loaded, screen, watch)
     if drake is None:
         from certifier.jobs import local
 
-        verdict = local.certify(loaded, given.polytope, given.center, progress, cells, cores())
+        verdict = local.certify(loaded, given.polytope, given.center, tell, cells, cores(), prove)
     else:
         from certifier.jobs import reference
 
-        verdict = reference.certify(loaded, given.polytope, drake, progress)
+        verdict = reference.certify(loaded, given.polytope, drake, screen.line if watch else screen.status)
     screen.clear()
     pairs = [
         {
@@ -66,4 +78,5 @@ def certify(scene: str, given: PolytopeFile, screen: Screen, watch: bool, drake:
         }
         for index, result in sorted(verdict.results.items())
     ]
-    return verdicts.document(loaded.name, loaded.hash, verdict.outcome, verdict.guarantee, verdict.seconds, pairs)
+    document = verdicts.document(loaded.name, loaded.hash, verdict.outcome, verdict.guarantee, verdict.seconds, pairs)
+    return document, None if verdict.region is None else verdict.region.proof

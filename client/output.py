@@ -101,6 +101,13 @@ def print_pairs(pairs: Iterable[dict[str, Any]]) -> None:
     print_table(("pair", "outcome", "margin", *(("stage", "time") if timed else ())), rows, right="margin time")
 
 
+def _range(known: dict[str, Any]) -> str:
+    """Returns a joint's range as a text for people. Regions that an earlier checkout stored say nothing about the range at the seed."""
+    alone = known.get("through_seed")
+    through = f", {alone[0]:.4g} to {alone[1]:.4g} with the others at the seed" if alone else ""
+    return f"{known['lower']:.4g} to {known['upper']:.4g} {known['unit']}{through}"
+
+
 def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()) -> None:
     """Prints a region's manifest in a few lines."""
     volume, pairs, space = manifest["volume"], manifest["pairs"], manifest["space"]
@@ -110,7 +117,7 @@ def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()
     error = volume["polytope_stderr"]
     # Regions that an earlier checkout stored have neither.
     ranges, kept = manifest.get("joint_ranges", {}), manifest.get("share")
-    moves = [f"{name}: {r['lower']:.4g} to {r['upper']:.4g} {r['unit']}" for name, r in ranges.items()] or space["joints"]
+    moves = [f"{name}: {_range(r)}" for name, r in ranges.items()] or space["joints"]
     polytope = f"{volume['polytope']:.4g}" + ("" if error is None else f" +- {error:.1g}")
     print_facts(
         [

@@ -88,7 +88,7 @@ def certify(client: Client, scene: Document, given: PolytopeFile, screen: Screen
     guarantee = Guarantee.EXACT if outcome is Outcome.CERTIFIED else Guarantee.NONE
     settled = [cell for cell in matrix["cells"] if cell["state"] in set(Outcome)]
     pairs = [{**cell, "outcome": cell["state"], "a": names[cell["pair"]]["a"], "b": names[cell["pair"]]["b"]} for cell in settled]
-    return verdicts.document(scene["name"], scene["hash"], outcome, guarantee, _seconds(job), pairs)
+    return verdicts.document(scene["name"], scene["hash"], outcome, guarantee, _seconds(job), pairs, job["region"])
 
 
 def _wait(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:
@@ -100,6 +100,7 @@ def _wait(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:
         return follow(client, job_id, screen, watch)
     except KeyboardInterrupt:
         screen.line(f"job {job_id} goes on while the service runs: {client.url}/jobs/{job_id}")
+        screen.line(f"come back to it with `ciris job follow {job_id[:8]}`, or end it with `ciris job cancel {job_id[:8]}`")
         raise
 
 

@@ -11,15 +11,23 @@ _RESULT = ("outcome", "margin", "seconds", "stage", "witness_q", "detail")
 
 
 def document(
-    name: str, scene_hash: str, outcome: Outcome, guarantee: Guarantee, seconds: float, pairs: Sequence[dict[str, Any]]
+    name: str,
+    scene_hash: str,
+    outcome: Outcome,
+    guarantee: Guarantee,
+    seconds: float,
+    pairs: Sequence[dict[str, Any]],
+    region: str | None = None,
 ) -> dict[str, Any]:
     """Returns the document: one outcome for each pair, with stable keys.
 
     Args:
         guarantee: of the whole polytope.
+        region: id of the region on the service; None where there is none.
         pairs: each with ``a`` and ``b``, ``outcome``, ``margin``, ``seconds``, ``stage``, ``witness_q`` and ``detail``.
     """
     return {
+        "region": region,
         "scene": {"name": name, "hash": scene_hash},
         "outcome": outcome.value,
         "guarantee": guarantee.value,

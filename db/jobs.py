@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
 from db import events, leases, pages, webhooks
+from db.ids import expanded
 from db.models import GrowthRow, JobRow, StepRow
 from db.pages import Page
 from db.session import insert_new
@@ -95,7 +96,7 @@ def retry(session: Session, job_id: str, key_id: str | None = None) -> JobRow:
     Raises:
         CirisError: job_not_found, or job_not_retryable when it has not ended or has succeeded.
     """
-    job = lock(session, job_id)
+    job = lock(session, get(session, job_id).id)
     if job.state not in (JobState.FAILED, JobState.CANCELLED):
         raise CirisError("job_not_retryable", f"the job is {job.state}; only a failed or cancelled one can be retried", field="job")
     again, made = create(
@@ -116,12 +117,12 @@ def retry(session: Session, job_id: str, key_id: str | None = None) -> JobRow:
 
 
 def get(session: Session, job_id: str) -> JobRow:
-    """Returns the job with this id.
+    """Returns the job with this id, or with the only id that begins like this.
 
     Raises:
-        CirisError: job_not_found.
+        CirisError: job_not_found, or ambiguous_id.
     """
-    return _found(session.get(JobRow, job_id), job_id)
+    return _found(session.get(JobRow, job_id) or session.get(JobRow, expanded(session, JobRow.id, job_id)), job_id)
 
 
 def lock(session: Session, job_id: str) -> JobRow:
@@ -137,7 +138,7 @@ def lock(session: Session, job_id: str) -> JobRow:
 
 def _found(job: JobRow | None, job_id: str) -> JobRow:
     if job is None:
-        raise CirisError("job_not_found", f"there is no job {job_id!r}", field="job")
+        raise CirisError("job_not_found", f"there is no job {job_id!r}", field="job", hint="`ciris job ls` lists them")
     return job
 
 
@@ -165,10 +166,10 @@ def cancel(session: Session, job_id: str) -> JobRow:
 
     Nothing changes when the job has ended or is being cancelled already.
     """
-    job = lock(session, job_id)
+    job = lock(session, get(session, job_id).id)
     if job.state == JobState.QUEUED:
         finish(session, job, JobState.CANCELLED, reason="cancelled before it started")
-    elif transition(session, JobRow, JobState.CANCELLING, JobRow.id == job_id):
+    elif transition(session, JobRow, JobState.CANCELLING, JobRow.id == job.id):
         events.emit(session, job, "job", {"state": JobState.CANCELLING})
     return job
 

@@ -14,6 +14,7 @@ from sqlalchemy.orm import Session, defer
 from certifier.errors import CirisError
 from certifier.model import Array
 from db import events, jobs, pages, proofs
+from db.ids import expanded
 from db.models import IterationRow, JobRow, ProofRow, RegionRow
 from db.pages import Page
 
@@ -47,14 +48,15 @@ def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any],
 
 
 def get(session: Session, region_id: str) -> RegionRow:
-    """Returns the region with this id.
+    """Returns the region with this id, or with the only id that begins like this.
 
     Raises:
-        CirisError: region_not_found.
+        CirisError: region_not_found, or ambiguous_id.
     """
-    row = session.get(RegionRow, region_id)
+    row = session.get(RegionRow, region_id) or session.get(RegionRow, expanded(session, RegionRow.id, region_id))
     if row is None:
-        raise CirisError("region_not_found", f"there is no region {region_id!r}", field="region")
+        hint = "`ciris region ls` lists them"
+        raise CirisError("region_not_found", f"there is no region {region_id!r}", field="region", hint=hint)
     return row
 
 
@@ -96,10 +98,14 @@ def polytopes(session: Session, scene_id: str) -> list[StoredPolytope]:
 def delete(session: Session, region_id: str) -> None:
     """Deletes a region, and its proof file unless another region has it. The job then names its latest remaining region, if any.
 
+    Only a whole id will do.
+
     Raises:
         CirisError: region_not_found.
     """
     region = get(session, region_id)
+    if region.id != region_id:
+        raise CirisError("region_not_found", f"there is no region {region_id!r}", field="region", hint="give all of its id to delete it")
     job = jobs.lock(session, region.job_id)
     session.delete(region)
     session.flush()

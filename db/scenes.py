@@ -7,14 +7,17 @@ from functools import lru_cache
 from sqlalchemy import or_, select
 from sqlalchemy.orm import Session
 
-from certifier.errors import SceneError
+from certifier.errors import SceneError, close_matches
 from certifier.model import Scene
 from db import pages
+from db.ids import expanded
 from db.models import SceneRow
 from db.pages import Page
 from db.session import Database, insert_new
 
 ID_LENGTH = 16
+SUGGESTED_AMONG = 1000
+"""Names are suggested among those of so many scenes, the newest."""
 
 
 def add(session: Session, scene: Scene) -> SceneRow:
@@ -28,18 +31,24 @@ def add(session: Session, scene: Scene) -> SceneRow:
 
 
 def find(session: Session, name: str) -> str:
-    """Returns the id of the scene with this id, or else of the newest scene with this name.
+    """Returns the id of the scene with this id, or else of the newest scene with this name, or else the only id that begins like this.
 
     It does not read the scene's document, which may be long.
 
     Raises:
-        SceneError: scene_not_found.
+        SceneError: scene_not_found, with the names that are most like it.
+        CirisError: ambiguous_id.
     """
     named = select(SceneRow.id).where(or_(SceneRow.id == name, SceneRow.name == name))
     found = session.scalar(named.order_by((SceneRow.id == name).desc(), SceneRow.created_at.desc()).limit(1))
-    if found is None:
-        raise SceneError("scene_not_found", f"there is no scene {name!r}", field="scene")
-    return found
+    if found is not None:
+        return found
+    longer = expanded(session, SceneRow.id, name)
+    if longer == name:
+        known = session.scalars(select(SceneRow.name).order_by(SceneRow.created_at.desc()).limit(SUGGESTED_AMONG)).all()
+        hint = close_matches(name, list(dict.fromkeys(known))) or "`ciris scene ls` lists them"
+        raise SceneError("scene_not_found", f"there is no scene {name!r}", field="scene", hint=hint)
+    return longer
 
 
 @lru_cache(maxsize=16)

@@ -54,7 +54,10 @@ class MembershipIndex:
 def to_s(scene: Scene, q: Array) -> Array:
     """Returns the tangent-space coordinates (k, n) of configurations q (k, n), with a row of NaN where a joint is outside its limits.
 
-    s has period 2 pi in a revolute joint, so without this check a configuration a full turn away would count as inside.
+    A joint that can turn a whole turn and more is in the same pose a turn later, so its position is taken to the window that the scene
+    covers. s itself has period 2 pi in every revolute joint, so without the check of the limits any configuration a turn away would count.
     """
-    within = ((q >= scene.q_lower) & (q <= scene.q_upper)).all(axis=1, keepdims=True)
-    return np.where(within, scene.to_s(q), np.nan)
+    lower, upper = scene.own_limits
+    shifted = scene.in_windows(q)
+    within = (q >= lower) & (q <= upper) & (shifted >= scene.q_lower) & (shifted <= scene.q_upper)
+    return np.where(within.all(axis=1, keepdims=True), scene.to_s(shifted), np.nan)

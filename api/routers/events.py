@@ -33,8 +33,8 @@ def list_job_events(
 ) -> EventList:
     """Returns what happened to the job, in order."""
     with db.read() as session:
-        jobs.get(session, job_id)
-        return EventList(events=[Event.of(row) for row in events.since(session, job_id, after, limit)])
+        job = jobs.get(session, job_id)
+        return EventList(events=[Event.of(row) for row in events.since(session, job.id, after, limit)])
 
 
 def _existing(job_id: str, db: Db) -> str:

@@ -136,7 +136,7 @@ def cancel_job(job_id: str, db: Db, background: BackgroundTasks, announcements: 
     """
     with db.write() as session:
         job = jobs.cancel(session, job_id)
-    background.add_task(announcements.announce, job_id)
+    background.add_task(announcements.announce, job.id)
     return Job.of(job)
 
 
@@ -165,8 +165,8 @@ def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge
     """Returns the pair matrix: the result of every pair on the polytope of every iteration, or of the given one."""
     with db.read() as session:
         job = jobs.get(session, job_id)
-        rows = pairs.of_job(session, job_id) if iteration is None else pairs.of_iteration(session, job_id, iteration)
-        iterations = [row for row in pairs.iterations(session, job_id) if iteration in (None, row.index)]
+        rows = pairs.of_job(session, job.id) if iteration is None else pairs.of_iteration(session, job.id, iteration)
+        iterations = [row for row in pairs.iterations(session, job.id) if iteration in (None, row.index)]
     scene = scenes.load(db, job.scene_id)
     return PairMatrix(
         pairs=[PairInfo(index=index, a=pair.a, b=pair.b) for index, pair in enumerate(scene.pairs)],
@@ -183,12 +183,12 @@ def download_pair_proof(job_id: str, pair: int, iteration: Annotated[int, Query(
     """
     with db.read() as session:
         job = jobs.get(session, job_id)
-        rows = [row for row in pairs.of_iteration(session, job_id, iteration) if row.pair_index == pair]
+        rows = [row for row in pairs.of_iteration(session, job.id, iteration) if row.pair_index == pair]
         digest = _cell(scenes.load(db, job.scene_id), rows).proof if rows else None
         if digest is None:
             raise CirisError("proof_not_found", f"there is no proof of pair {pair} in iteration {iteration}", field="pair")
         data = proofs.get(session, digest)
-    headers = {"Content-Disposition": f'attachment; filename="{job_id}-{iteration}-{pair}.proof"'}
+    headers = {"Content-Disposition": f'attachment; filename="{job.id}-{iteration}-{pair}.proof"'}
     return Response(with_scene(data, scenes.load(db, job.scene_id)), media_type="application/octet-stream", headers=headers)
 
 
@@ -233,7 +233,7 @@ def get_job_growth(job_id: str, db: Db) -> GrowthCurve:
     """Returns the regions that were certified during the job, with their volumes and shares of the proposal."""
     with db.read() as session:
         job = jobs.get(session, job_id)
-        rows = regions.of_job(session, job_id)
+        rows = regions.of_job(session, job.id)
     start = job.started_at or job.created_at
     points = [
         GrowthPoint(

@@ -20,13 +20,18 @@ from certifier.jobs.region import Region, certified_region, growth_point, versio
 from certifier.jobs.share import SampledProposal
 from certifier.jobs.verdict import Verdict
 from certifier.model import Array, Polytope, Scene
-from certifier.outcome import Guarantee, Outcome
+from certifier.outcome import Guarantee, Outcome, combine
 from certifier.pair.result import PairResult
 from certifier.seeding.options import SeedOptions
 from certifier.seeding.propose import propose
 from certifier.step.step import step
 
-Progress = Callable[[str], None]
+Tell = Callable[[str, dict[str, Any]], None]
+"""Hears of what happens, as the events of the service say it (docs/architecture.md): their kind and their data."""
+
+
+def _silent(kind: str, data: dict[str, Any]) -> None:
+    """Hears nothing."""
 
 
 @dataclass
@@ -44,7 +49,7 @@ class _Run:
 
     scene: Scene
     seed: int
-    progress: Progress
+    tell: Tell
     processes: int = 1
     deadline_s: float | None = None
     start: float = field(default_factory=lambda: time.perf_counter())
@@ -68,23 +73,28 @@ class _Run:
 
     def accept(self, candidate: Candidate, start: Start) -> None:
         self.proposal = self.proposal or SampledProposal.of(self.scene, start.rows)
-        share = self.proposal.share(candidate.polytope)["value"]
-        self.curve.append(growth_point(candidate.iteration, self.seconds, candidate.ellipsoid_volume, share))
+        kept = self.proposal.share(candidate.polytope)
+        self.curve.append(growth_point(candidate.iteration, self.seconds, candidate.ellipsoid_volume, kept["value"]))
         self.candidate = candidate
+        self.tell("region", {"iteration": candidate.iteration, "ellipsoid_volume": candidate.ellipsoid_volume, "share": kept})
 
     def certify(self, action: Certify) -> Outcomes:
         certify = part_certifier(self.scene, action, self.seed, self.left)
         found = self.results.setdefault(action.iteration, {})
         failures, work = 0, action.work
+        said = {"index": action.iteration, "label": action.label, "pairs": len(action.pairs), "parts": len(work)}
+        self.tell("iteration", {**said, "state": "running"})
         # The program (11) of a pair takes milliseconds, so children would not pay.
         results = side_by_side(certify, work, 1 if action.cells == 1 else self.processes, lambda index: alike(self.scene, index))
-        for count, ((index, _), result) in enumerate(zip(work, results, strict=False), start=1):
+        for (index, _), result in zip(work, results, strict=False):
             found.setdefault(index, []).append(result)
-            pair = self.scene.pairs[index]
-            self.progress(f"{action.label} {action.iteration}: {count}/{len(work)} {pair.a} - {pair.b}: {result.outcome}")
+            settled = {"index": index, "state": result.outcome.value, "seconds": result.seconds}
+            self.tell("pairs", {"iteration": action.iteration, "pairs": [settled]})
             failures += result.outcome is not Outcome.CERTIFIED
             if failures == action.failures:
                 break
+        outcomes = [result.outcome for parts in found.values() for result in parts]
+        self.tell("iteration", {**said, "state": combine(outcomes).value})
         reached = ((index, r.outcome, r.weakness, r.open_cells) for index, parts in found.items() for r in parts)
         return Outcomes.of_parts(action, reached, self.passed)
 
@@ -98,27 +108,29 @@ class _Run:
         if isinstance(action, Certify):
             return self.certify(action)
         if isinstance(action, Propose):
-            self.progress("seeding")
+            self.tell("step", {"kind": "propose", "state": "running", "seconds": None})
             found = propose(self.scene, SeedOptions.from_document(action.seed))
             self.seeding_seconds = found.info["seconds"]
+            self.tell("step", {"kind": "propose", "state": "done", "seconds": self.seeding_seconds})
             return found
         assert self.candidate is not None, "a step follows an accepted region"
-        return step(self.scene, action.polytope, self.proofs(self.candidate), action.contain, self.progress)
+        return step(
+            self.scene, action.polytope, self.proofs(self.candidate), action.contain, lambda text: self.tell("note", {"text": text})
+        )
 
 
-def grow(
-    scene: Scene, options: GrowthOptions, progress: Progress = lambda _: None, deadline_s: float | None = None, processes: int = 1
-) -> Region:
+def grow(scene: Scene, options: GrowthOptions, tell: Tell = _silent, deadline_s: float | None = None, processes: int = 1) -> Region:
     """Grows a certified region in this process, or with so many children of it; the region is the same.
 
     Args:
+        tell: hears of what happens.
         deadline_s: after so many seconds growth ends with the best region so far, as soon as the action under way is carried out; None for
             no deadline.
 
     Raises:
         CirisError: no region could be certified; the code is ``not_grown`` or that of the seeding's error.
     """
-    run = _Run(scene, options.random_seed, progress, processes, deadline_s)
+    run = _Run(scene, options.random_seed, tell, processes, deadline_s)
     transition, late = begin(scene, options), False
     while not isinstance(transition.action, Finish):
         failure: CirisError | None = None
@@ -155,15 +167,17 @@ def certify(
     scene: Scene,
     polytope: Polytope,
     center: Array | None = None,
-    progress: Progress = lambda _: None,
+    tell: Tell = _silent,
     cells: int = 1,
     processes: int = 1,
+    assemble: bool = False,
 ) -> Verdict:
     """Certifies every pair on a polytope and the joint limits.
 
     Args:
         cells: as in :class:`certifier.growth.options.GrowthOptions`.
         processes: as for :func:`grow`.
+        assemble: make a region of a polytope that is certified, with its proof.
 
     Raises:
         RegionError: the polytope is malformed, empty or unbounded, or ``cells`` is out of range.
@@ -171,10 +185,23 @@ def certify(
     start = time.perf_counter()
     seed = {"C": polytope.C.tolist(), "d": polytope.d.tolist(), "center": None if center is None else center.tolist()}
     options = GrowthOptions.from_document({"kind": "certify", "seed": seed, "cells": cells})
-    action = begin(scene, options).action
+    first = begin(scene, options)
+    action = first.action
     assert isinstance(action, Certify)
-    run = _Run(scene, options.random_seed, progress, processes)
-    run.certify(action)
-    return Verdict(
-        {index: result for index, (result,) in run.results[action.iteration].items()}, Guarantee.EXACT, time.perf_counter() - start
-    )
+    run = _Run(scene, options.random_seed, tell, processes)
+    report = run.certify(action)
+    results = {index: result for index, (result,) in run.results[action.iteration].items()}
+    candidate = advance(scene, first.state, report).candidate if assemble else None
+    region = None
+    if candidate is not None:
+        provenance = {
+            "options": options.to_document(),
+            "versions": versions(scene),
+            "reason": "certified",
+            "growth_curve": [],
+            "seeding_seconds": 0.0,
+            "pair_seconds": sum(result.seconds for result in results.values()),
+            "seconds": run.seconds,
+        }
+        region = certified_region(scene, candidate, run.proofs(candidate), provenance, None, processes)
+    return Verdict(results, Guarantee.EXACT, time.perf_counter() - start, region)

@@ -26,7 +26,6 @@ from pydrake.solvers import (
 )
 
 from certifier.errors import CirisError, SceneError
-from certifier.jobs.local import Progress
 from certifier.jobs.verdict import Verdict
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee, Outcome, Stage
@@ -172,7 +171,7 @@ class Reference:
         return [int(np.abs(s - value).argmin()) for value in theirs]
 
 
-def certify(scene: Scene, polytope: Polytope, solver: str, progress: Progress = lambda _: None) -> Verdict:
+def certify(scene: Scene, polytope: Polytope, solver: str, progress: Callable[[str], None] = lambda _: None) -> Verdict:
     """Lets Drake certify every pair on a polytope and the joint limits.
 
     Raises:

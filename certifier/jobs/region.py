@@ -11,7 +11,7 @@ import numpy as np
 from certifier.growth.actions import Candidate
 from certifier.jobs.archimedean import archimedean
 from certifier.jobs.share import SampledProposal
-from certifier.model import SCHEMA_VERSION, Polytope, Scene
+from certifier.model import SCHEMA_VERSION, Array, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume
 from certifier.polytopes.polytope import bounds, chebyshev_center, drop_redundant, support
@@ -71,6 +71,7 @@ def certified_region(
         "space": {
             "kind": "tangent",
             "joints": [joint.name for joint in scene.moving],
+            "revolute": scene.revolute.tolist(),
             "q_star": scene.q_star.tolist(),
             "q_lower": scene.q_lower.tolist(),
             "q_upper": scene.q_upper.tolist(),
@@ -80,7 +81,7 @@ def certified_region(
         **_halfspaces(polytope),
         "interior_point": interior.tolist(),
         "inscribed_ellipsoid": {"center": ellipsoid.center.tolist(), "shape": ellipsoid.shape.tolist()},
-        "joint_ranges": _joint_ranges(scene, polytope),
+        "joint_ranges": _joint_ranges(scene, polytope, candidate.seed),
         "volume": {"ellipsoid": ellipsoid.volume, "polytope": size, "polytope_stderr": error},
         "share": None if proposal is None else proposal.share(polytope),
         "seed": None if candidate.seed is None else scene.to_q(candidate.seed).tolist(),
@@ -97,20 +98,43 @@ def certified_region(
     return Region(manifest, data, statement)
 
 
-def _joint_ranges(scene: Scene, polytope: Polytope) -> dict[str, dict[str, Any]]:
+def _joint_ranges(scene: Scene, polytope: Polytope, seed: Array | None) -> dict[str, dict[str, Any]]:
     """Returns how far each joint moves within the polytope: name -> ``lower``, ``upper`` and their ``unit``, degrees or metres.
 
-    The bounds come from linear programs. A joint reaches them, though seldom all joints at once.
+    The bounds come from linear programs. A joint reaches them, though seldom all joints at once. ``through_seed`` is how far it moves while
+    the others stay at the seed, [lower, upper]; None without a seed.
 
     Raises:
         RegionError: as :func:`certifier.polytopes.polytope.bounds`.
     """
     lower, upper = (scene.to_q(s) for s in bounds(polytope))
     unit = np.where(scene.revolute, np.rad2deg(1.0), 1.0)
+    alone = [None] * scene.n if seed is None else _through(scene, polytope, seed)
     return {
-        joint.name: {"lower": low, "upper": high, "unit": "deg" if revolute else "m"}
-        for joint, low, high, revolute in zip(scene.moving, (lower * unit).tolist(), (upper * unit).tolist(), scene.revolute, strict=True)
+        joint.name: {
+            "lower": float(scale * low),
+            "upper": float(scale * high),
+            "unit": "deg" if turns else "m",
+            "through_seed": None if ends is None else [float(scale * end) for end in ends],
+        }
+        for joint, low, high, scale, turns, ends in zip(scene.moving, lower, upper, unit, scene.revolute, alone, strict=True)
     }
+
+
+def _through(scene: Scene, polytope: Polytope, seed: Array) -> list[tuple[float, float] | None]:
+    """Returns the positions between which each joint moves while the others stay at the seed, in s, as q."""
+    slack = polytope.d - polytope.C @ seed
+    found: list[tuple[float, float] | None] = []
+    for i in range(scene.n):
+        slope = polytope.C[:, i]
+        ends = []
+        for sign in (-1.0, 1.0):
+            towards = sign * slope > 0
+            s = seed.copy()
+            s[i] += sign * (slack[towards] / (sign * slope[towards])).min()
+            ends.append(float(scene.to_q(s)[i]))
+        found.append((ends[0], ends[1]))
+    return found
 
 
 def growth_point(iteration: int, seconds: float, ellipsoid_volume: float | None, share: float | None) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from certifier.jobs.region import Region
 from certifier.outcome import Guarantee, Outcome, combine
 from certifier.pair.result import PairResult
 
@@ -16,11 +17,13 @@ class Verdict:
         results: pair index -> its result.
         worth: what it is worth that every pair is certified.
         seconds: how long the certification took altogether.
+        region: the polytope as a region with its proof, where that was asked for and every pair is certified.
     """
 
     results: dict[int, PairResult]
     worth: Guarantee
     seconds: float
+    region: Region | None = None
 
     @property
     def outcome(self) -> Outcome:

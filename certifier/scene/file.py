@@ -6,7 +6,6 @@ numbers. Only their relative ``file`` paths are made absolute, because in a stri
 
 from __future__ import annotations
 
-import difflib
 import json
 import math
 import re
@@ -16,9 +15,11 @@ from typing import Any
 
 import yaml
 
-from certifier.errors import SceneError
+from certifier.errors import SceneError, close_matches
 from certifier.model import MAX_NAME, MAX_SENTENCE, is_name, is_sentence
 
+KEYS = ("name", "packages", "directives", "q_star", "limits", "fix", "padding", "ignore", "mesh", "cylinder_sides")
+"""The keys of a scene file."""
 MAX_BYTES = 2**20
 MAX_DEPTH = 50
 MIN_HULL_VERTICES = 8
@@ -47,6 +48,8 @@ class SceneFile:
         resolved_directives: a document for Drake, the same directives with absolute paths, at the line numbers of the file.
         models: every ``file`` of the directives, as written.
         q_star: (n,) centre of the parametrisation, radians or metres; None for the middle of the joint limits.
+        limits: narrower limits by joint, radians or metres.
+        fix: positions by joint, radians or metres, at which joints are held.
         padding: metres that are added around every geometry.
         ignore: the pairs that are not certified.
         max_vertices: greatest number of vertices that stand for a mesh or an ellipsoid.
@@ -60,6 +63,8 @@ class SceneFile:
     resolved_directives: str
     models: tuple[str, ...]
     q_star: tuple[float, ...] | None = None
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+    fix: dict[str, float] = field(default_factory=dict)
     padding: float = 0.0
     ignore: tuple[IgnoreEntry, ...] = field(default=())
     max_vertices: int = 32
@@ -82,8 +87,7 @@ def read_scene_file(path: Path) -> SceneFile:
     """
     text = _text(path)
     root = compose(text, path.name)
-    keys = ("name", "packages", "directives", "q_star", "padding", "ignore", "mesh", "cylinder_sides")
-    nodes = _mapping(root, "", keys)
+    nodes = _mapping(root, "", KEYS)
     if "directives" not in nodes:
         raise _wrong("directives", "is missing", hint="a list of Drake Model Directives that adds the robot and its surroundings")
     values = {key: _construct(node, key) for key, node in nodes.items() if key != "directives"}
@@ -100,6 +104,8 @@ def read_scene_file(path: Path) -> SceneFile:
         resolved_directives=_resolved(text, directives, path.parent),
         models=tuple(node.value for _, node in _file_nodes(directives)),
         q_star=_q_star(values.get("q_star")),
+        limits=_limits(values.get("limits", {})),
+        fix={name: _number(value, f"fix.{name}") for name, value in _by_joint(values.get("fix", {}), "fix").items()},
         padding=_number(values.get("padding", 0.0), "padding", minimum=0.0),
         ignore=_ignore(values.get("ignore", [])),
         max_vertices=_integer(mesh.get("max_vertices", 32), "mesh.max_vertices", minimum=MIN_HULL_VERTICES),
@@ -141,15 +147,6 @@ def directive_files(text: str, name: str) -> list[tuple[str, str]]:
     entries = root.value if isinstance(root, yaml.MappingNode) else []
     lists = [value for key, value in entries if key.value == "directives" and isinstance(value, yaml.SequenceNode)]
     return [(kind, node.value) for directives in lists for kind, node in _file_nodes(directives)]
-
-
-def close_matches(name: str, known: list[str]) -> str:
-    """Returns a hint with the known names that are most like ``name``; the hint is empty when none is like it."""
-    tails = {k.rsplit("/", 1)[-1]: k for k in known}
-    matches = difflib.get_close_matches(name, known, n=3) or [
-        tails[t] for t in difflib.get_close_matches(name.rsplit("/", 1)[-1], list(tails), n=3)
-    ]
-    return f"did you mean {' or '.join(matches)}?" if matches else ""
 
 
 def _text(path: Path) -> str:
@@ -255,6 +252,25 @@ def _q_star(value: Any) -> tuple[float, ...] | None:
     if not isinstance(value, list):
         raise _wrong("q_star", "must be a list of numbers, one per joint")
     return tuple(_number(x, f"q_star[{i}]") for i, x in enumerate(value))
+
+
+def _by_joint(value: Any, where: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise _wrong(where, "must map names of joints to numbers")
+    return {_name(name, where): content for name, content in value.items()}
+
+
+def _limits(value: Any) -> dict[str, tuple[float, float]]:
+    found = {}
+    for name, limits in _by_joint(value, "limits").items():
+        where = f"limits.{name}"
+        if not isinstance(limits, list) or len(limits) != 2:
+            raise _wrong(where, "must be two numbers, [lower, upper], in radians or metres")
+        lower, upper = (_number(limit, f"{where}[{i}]") for i, limit in enumerate(limits))
+        if lower >= upper:
+            raise _wrong(where, f"must have an interior: {lower:g} is not less than {upper:g}", hint="hold a joint by fix")
+        found[name] = (lower, upper)
+    return found
 
 
 def _ignore(value: Any) -> tuple[IgnoreEntry, ...]:

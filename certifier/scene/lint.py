@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from certifier.model import Geometry, Pair, Scene
-from certifier.scene.drake_model import build_diagram, geometry_name
+from certifier.model import Geometry, Scene
+from certifier.scene.contacts import touching
 from certifier.scene.tree import Tree
 from certifier.verify.decimals import at_most_mm
 
@@ -23,6 +23,7 @@ def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn:
     """
     return [
         *(_substituted(g) for g in scene.geometries if g.substitution),
+        *_windows(scene),
         *_filtered(scene, tree, candidates),
         *_unguarded(scene, tree, drawn),
         *_steep(scene),
@@ -34,6 +35,15 @@ def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn:
 
 def _substituted(g: Geometry) -> str:
     return f"{g.name}: {g.substitution}" + (f", reaching at most {at_most_mm(g.inflation)} outside" if g.inflation else "")
+
+
+def _windows(scene: Scene) -> list[str]:
+    """Returns a finding about every joint of which the scene covers a window."""
+    return [
+        f"joint {j.name} may turn half a turn from q* and farther: the scene covers {lower:.6g} to {upper:.6g} degrees"
+        for j, lower, upper in zip(scene.moving, np.degrees(scene.q_lower), np.degrees(scene.q_upper), strict=True)
+        if j.own_limits is not None
+    ]
 
 
 def _filtered(scene: Scene, tree: Tree, candidates: list[tuple[str, str]]) -> list[str]:
@@ -81,22 +91,14 @@ def _always_touching(scene: Scene) -> list[str]:
 
     The configurations are q*, moved into the joint limits, and a few random ones.
     """
-    diagram = build_diagram(scene)
-    context = diagram.CreateDefaultContext()
-    plant, scene_graph = diagram.plant(), diagram.scene_graph()
-    plant_context = plant.GetMyContextFromRoot(context)
-    query_port, inspector = scene_graph.get_query_output_port(), scene_graph.model_inspector()
     rng = np.random.default_rng(0)
-    touching = set(scene.pairs)
-    for q in [scene.q_star.clip(scene.q_lower, scene.q_upper), *rng.uniform(scene.q_lower, scene.q_upper, (_SAMPLES, scene.n))]:
-        plant.SetPositions(plant_context, q)
-        query = query_port.Eval(scene_graph.GetMyContextFromRoot(context))
-        touching &= {
-            Pair(*sorted((geometry_name(inspector, p.id_A), geometry_name(inspector, p.id_B)))) for p in query.ComputePointPairPenetration()
-        }
-        if not touching:
+    tried = [scene.q_star.clip(scene.q_lower, scene.q_upper), *rng.uniform(scene.q_lower, scene.q_upper, (_SAMPLES, scene.n))]
+    always = set(scene.pairs)
+    for found in touching(scene, tried):
+        always &= found
+        if not always:
             break
     return [
         f"{p.a} and {p.b} overlap in every configuration tried: mend the geometry, or ignore the pair with a reason"
-        for p in sorted(touching, key=lambda p: (p.a, p.b))
+        for p in sorted(always, key=lambda p: (p.a, p.b))
     ]

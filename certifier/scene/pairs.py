@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from certifier.errors import SceneError
+from certifier.errors import SceneError, close_matches
 from certifier.model import WORLD, Geometry, Ignored, Pair
-from certifier.scene.file import IgnoreEntry, close_matches
+from certifier.scene.file import IgnoreEntry
 from certifier.scene.tree import Tree
 
 

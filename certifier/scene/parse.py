@@ -41,6 +41,7 @@ from certifier.errors import SceneError
 from certifier.model import MAX_NAME, MAX_SENTENCE, WORLD, Array, Geometry, Joint, JointKind, Scene, escaped, is_name
 from certifier.scene import shapes
 from certifier.scene.file import ALPHABET, SceneFile, read_scene_file
+from certifier.scene.joints import Coupling, centered, held, narrowed
 from certifier.scene.lint import findings
 from certifier.scene.pairs import pairs
 from certifier.scene.strict import StrictReader
@@ -66,8 +67,8 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     strict.check(scene_file.resolved_directives, path.name)
     warnings = _read_models(scene_file, plant)
     inspector = scene_graph.model_inspector()
-    tree = Tree(*_joints(plant))
-    q_star = _center(scene_file, tree)
+    joints, q_star = centered(narrowed(held(_joints(plant), scene_file.fix, _couplings(plant)), scene_file.limits), scene_file.q_star)
+    tree = Tree(joints, _bodies(plant))
     by_id = _geometries(scene_file, strict, plant, inspector, tree)
     candidates = [(by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()]
     geometries = tuple(by_id.values())
@@ -174,12 +175,12 @@ def _body_name(plant: MultibodyPlant, body: RigidBody) -> str:
     return _named(f"{plant.GetModelInstanceName(body.model_instance())}/{body.name()}", "body")
 
 
-def _joints(plant: MultibodyPlant) -> tuple[list[Joint], list[str]]:
-    joints = [_joint(plant, plant.get_joint(index)) for index in plant.GetJointIndices()]
-    if plant.num_constraints():
-        raise _coupled(plant, joints)
-    bodies = [_body_name(plant, plant.get_body(BodyIndex(i))) for i in range(plant.num_bodies())]
-    return joints, bodies
+def _joints(plant: MultibodyPlant) -> list[Joint]:
+    return [_joint(plant, plant.get_joint(index)) for index in plant.GetJointIndices()]
+
+
+def _bodies(plant: MultibodyPlant) -> list[str]:
+    return [_body_name(plant, plant.get_body(BodyIndex(i))) for i in range(plant.num_bodies())]
 
 
 def _joint(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
@@ -206,39 +207,31 @@ def _joint(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
     return Joint(name, kind, parent, child, np.array(axis), X_PF, X_BM, joint.position_start(), lower, upper)
 
 
-def _coupled(plant: MultibodyPlant, joints: list[Joint]) -> SceneError:
+def _couplings(plant: MultibodyPlant) -> list[Coupling]:
+    """Returns what mimic joints keep to.
+
+    Raises:
+        SceneError: ``unsupported_joint``, when other constraints close a loop.
+    """
+    if not plant.num_constraints():
+        return []
     program = MathematicalProgram()
     q = program.NewContinuousVariables(plant.num_positions(), "q")
     AddMultibodyPlantConstraints(plant=plant, q=q, prog=program, plant_context=plant.CreateDefaultContext())
-    position = {v.get_id(): i for i, v in enumerate(q)}
-    coupled = {position[v.get_id()] for c in program.linear_equality_constraints() for v in c.variables()}
-    names = [j.name for j in joints if j.index in coupled]
-    what = f"joints {' and '.join(names)} are coupled (mimic)" if names else "the models close a loop by a constraint"
-    return SceneError("unsupported_joint", f"{what}; only independent joints are supported", field="directives")
-
-
-def _center(scene_file: SceneFile, tree: Tree) -> Array:
-    """Returns q*, (n,), after it has checked that every joint's range has an interior and no revolute joint's reaches q* +- pi."""
-    moving = sorted((j for j in tree.joints if j.index is not None), key=lambda j: j.index or 0)
-    if not moving:
-        raise SceneError("no_joints", "no joint of the scene can move, so there is no configuration space", field="directives")
-    if scene_file.q_star is not None and len(scene_file.q_star) != len(moving):
-        names = ", ".join(j.name for j in moving)
-        raise SceneError("scene_field", f"has {len(scene_file.q_star)} numbers for {len(moving)} joints: {names}", field="q_star")
-    limits = np.array([[j.lower, j.upper] for j in moving], dtype=float)
-    for j, (lower, upper) in zip(moving, limits, strict=True):
-        if not (np.isfinite(lower) and np.isfinite(upper)):
-            hint = "give it limits in the model file" + (" less than 2 pi apart" if j.kind is JointKind.REVOLUTE else "")
-            raise SceneError("joint_range", f"joint {j.name} has no finite limits", field="directives", hint=hint)
-        if lower >= upper:
-            message = f"joint {j.name} cannot move: its limits are {lower:g} and {upper:g}"
-            raise SceneError("joint_range", message, field="directives", hint="make it a fixed joint")
-    q_star = limits.mean(axis=1) if scene_file.q_star is None else np.array(scene_file.q_star)
-    for j, (lower, upper), center in zip(moving, limits, q_star, strict=True):
-        if j.kind is JointKind.REVOLUTE and not center - np.pi < lower < upper < center + np.pi:
-            message = f"joint {j.name} turns from {lower:.6g} to {upper:.6g} rad, which reaches q* +- pi with q* = {center:.6g}"
-            raise SceneError("joint_range", message, field="q_star", hint="narrow the joint's limits or move q_star")
-    return q_star
+    names = {joint.position_start(): joint for joint in map(plant.get_joint, plant.GetJointIndices()) if joint.num_positions()}
+    position = {v.get_id(): _joint(plant, names[i]).name for i, v in enumerate(q) if i in names}
+    found = []
+    for binding in program.linear_equality_constraints():
+        matrix, constants = binding.evaluator().GetDenseA(), binding.evaluator().lower_bound()
+        joints = [position[v.get_id()] for v in binding.variables()]
+        found += [
+            Coupling({name: float(factor) for name, factor in zip(joints, row, strict=True) if factor}, float(constant))
+            for row, constant in zip(matrix, constants, strict=True)
+        ]
+    if len(found) < plant.num_constraints():
+        message = "the models close a loop by a constraint; only independent joints are supported"
+        raise SceneError("unsupported_joint", message, field="directives")
+    return found
 
 
 def _geometries(

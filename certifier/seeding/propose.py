@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydrake.geometry import QueryObject
 
 from certifier.errors import RegionError
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.polytope import chebyshev_center, drop_redundant
-from certifier.scene.drake_model import build_diagram, geometry_name
+from certifier.seeding.free import check_free
 from certifier.seeding.iris import iris
+from certifier.seeding.limits import check_limits
 from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.proposal import Proposal
 
@@ -24,8 +24,8 @@ def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> None:
     """Refuses joint positions around which no region can be certified.
 
     Raises:
-        RegionError: ``seed_wrong_length``, ``seed_not_finite``, ``seed_outside_limits`` (the limits themselves are outside) or
-            ``seed_in_collision``; the error names the joint or the pair.
+        RegionError: ``seed_wrong_length``, ``seed_not_finite``, ``seed_in_collision``, or as
+            :func:`certifier.seeding.limits.check_limits`; the error names the joint or the pair.
     """
     q = np.asarray(q, dtype=float)
     if q.shape != (scene.n,):
@@ -34,39 +34,10 @@ def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> None:
             "seed_wrong_length", f"the seed has {q.size} numbers, the scene {scene.n} joints", field=field, hint=f"in order: {names}"
         )
     for joint, value in zip(scene.moving, q, strict=True):
-        where = f"{field}[{joint.index}]"
         if not np.isfinite(value):
-            raise RegionError("seed_not_finite", f"joint {joint.name} is at {value}", field=where)
-        if value <= joint.lower or value >= joint.upper:
-            raise RegionError(
-                "seed_outside_limits",
-                f"joint {joint.name} is at {value:g}, not between its limits {joint.lower:g} and {joint.upper:g}",
-                field=where,
-            )
-    _check_free(scene, q, field)
-
-
-def _check_free(scene: Scene, q: Array, field: str) -> None:
-    """Refuses a configuration in which a pair is not farther apart than twice the padding."""
-    if not scene.pairs:
-        return
-    diagram = build_diagram(scene)
-    context = diagram.CreateDefaultContext()
-    diagram.plant().SetPositions(diagram.mutable_plant_context(context), q)
-    query: QueryObject = diagram.scene_graph().get_query_output_port().Eval(diagram.mutable_scene_graph_context(context))
-    ids = {geometry_name(query.inspector(), g): g for g in query.inspector().GetAllGeometryIds()}
-    distance, pair = min(
-        ((query.ComputeSignedDistancePairClosestPoints(ids[p.a], ids[p.b]).distance, p) for p in scene.pairs), key=lambda found: found[0]
-    )
-    if distance <= 2 * scene.padding:
-        how = (
-            f"overlap by {-distance:.3g} m"
-            if distance <= 0
-            else f"are {distance:.3g} m apart, with a padding of {scene.padding:g} m on each"
-        )
-        raise RegionError(
-            "seed_in_collision", f"{pair.a} and {pair.b} {how}", field=field, hint="move the seed, or ignore the pair in the scene"
-        )
+            raise RegionError("seed_not_finite", f"joint {joint.name} is at {value}", field=f"{field}[{joint.index}]")
+    check_limits(scene, q, field)
+    check_free(scene, q, field)
 
 
 def propose(scene: Scene, options: SeedOptions) -> Proposal:

@@ -98,6 +98,10 @@ def _check_joint(scene: Scene, joint: Joint) -> None:
     _require(_finite(joint.lower, joint.upper), f"the limits of {joint.name}")
     lower, upper = np.array([joint.lower, joint.upper], dtype=float)
     _require(lower < upper, f"the limits of {joint.name}")
+    if joint.own_limits is not None:
+        _require(joint.kind is JointKind.REVOLUTE, f"the window of {joint.name}, which does not turn")
+        own = [end if limit is None else limit for limit, end in zip(joint.own_limits, (lower, upper), strict=True)]
+        _require(_finite(*own) and own[0] <= lower and upper <= own[1], f"the window of {joint.name}")
     if joint.kind is JointKind.REVOLUTE:
         reach = np.abs(np.array([lower, upper]) - scene.q_star[joint.index])
         _require(reach.max() < math.pi, f"{joint.name} may turn more than half a turn away from q*")

@@ -1,6 +1,7 @@
 """Regions over HTTP: a really certified one, its proof and its exports, read by those they are for."""
 
 import io
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -93,7 +94,28 @@ def test_the_manifest_and_the_arrays_are_exported(client: TestClient, region: st
     with np.load(io.BytesIO(client.get(f"/v1/regions/{region}/export?format=npz").content)) as arrays:
         assert arrays["C"].tolist() == certified.manifest["halfspace_normals"]
         assert arrays["d"].tolist() == certified.manifest["halfspace_offsets"]
-        assert set(arrays.files) == {"C", "d", "center", "ellipsoid_center", "ellipsoid_shape"}
+        meaning = {"joints", "q_star", "q_lower", "q_upper", "revolute"}
+        assert set(arrays.files) == {"C", "d", "center", "ellipsoid_center", "ellipsoid_shape", *meaning}
+        assert {name: arrays[name].tolist() for name in meaning} == {name: certified.manifest["space"][name] for name in meaning}
+
+
+@pytest.mark.parametrize("heading", ["## npz, for NumPy", "## JSON, for any language", "## YAML, for Drake"])
+def test_the_documents_snippets_say_what_the_service_says(client: TestClient, region: str, heading: str, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for format, suffix in (("json", "json"), ("npz", "npz"), ("drake-yaml", "yaml")):
+        (tmp_path / f"region.{suffix}").write_bytes(client.get(f"/v1/regions/{region}/export?format={format}").content)
+    text = (Path(__file__).parents[2] / "docs" / "exports.md").read_text()
+    snippet = text.split(heading)[1].split("```python\n")[1].split("```")[0]
+    space = client.get(f"/v1/regions/{region}").json()["manifest"]["space"]
+    turning = "YAML" in heading and not all(space["revolute"])
+    for q in (0.1, 0.19, 0.21, -0.29, -0.31, 0.9):
+        known = client.post("/v1/planning/contains", json={"scene": "slider", "q": [[q]]}).json()["points"][0]["inside"]
+        # The snippet for Drake is for joints that turn, and the slider slides: s = q, so tan(q / 2) is undone.
+        given = 2 * np.arctan(q) if turning else q
+        names = {"q": np.array([given]), "q_star": np.array(space["q_star"])}
+        exec(snippet, names)
+        assert bool(names["inside"]) is known
+    assert "model/slide: s = q - 0.0, q in metres" in (tmp_path / "region.yaml").read_text()
 
 
 def test_drake_reads_its_yaml_to_the_last_bit(client: TestClient, region: str, certified: Region, tmp_path) -> None:

@@ -109,7 +109,7 @@ def test_bad_input_is_one_line_that_says_where(ciris: Ciris, files: Path, argume
 def test_a_deadline_that_no_region_keeps_is_a_negative_answer(ciris: Ciris) -> None:
     done = ciris("grow", PLANAR, "--deadline", "0.001", "--local", "--json")
     assert (done.status, done.raw) == (1, b"")
-    assert "the deadline was reached (allow more time)" in done.error
+    assert "the deadline was reached (allow more time)" in done.stderr.splitlines()[-1]
 
 
 @pytest.mark.parametrize("name", ["../../elsewhere", "/tmp/elsewhere", "..", "a b/c"])
@@ -147,6 +147,49 @@ def test_certifying_here_prints_the_stable_document(spawn: Ciris, files: Path) -
 
 
 @pytest.mark.usefixtures("parsed_once")
+def test_a_certified_polytope_gets_its_proof(ciris: Ciris, files: Path) -> None:
+    done = ciris("certify", PLANAR, "--polytope", "small.npz", "--local", "--out", "small.proof", "--json")
+    assert (done.status, done.json["outcome"], done.json["proof"]) == (0, "certified", "small.proof")
+    checked = ciris("verify", "small.proof", "--json")
+    assert checked.status == 0
+    refused = ciris("certify", PLANAR, "--polytope", "small.npz", "--local", "--backend", "drake", "--out", "small.proof")
+    assert (refused.status, "Drake writes no proof" in refused.error) == (2, True)
+
+
+def test_a_polytope_may_be_a_document(ciris: Ciris, files: Path) -> None:
+    with np.load("small.npz") as arrays:
+        document = {name: arrays[name].tolist() for name in arrays.files}
+    Path("small.json").write_text(json.dumps(document))
+    Path("small.yaml").write_text(json.dumps(document))
+    region = {"halfspace_normals": document["C"], "halfspace_offsets": document["d"], "interior_point": document["center"]}
+    Path("region.json").write_text(json.dumps(region))
+    for name in ("small.json", "small.yaml", "region.json"):
+        assert ciris("certify", PLANAR, "--polytope", name, "--local", "--json").json["outcome"] == "certified"
+    Path("broken.json").write_text("{")
+    Path("list.yaml").write_text("[1, 2]")
+    Path("words.yaml").write_text("C: hello\nd: [1]")
+    Path("poly.txt").write_text("1 2 3")
+    for name, words in (
+        ("broken.json", "is no JSON file of numbers"),
+        ("list.yaml", "is no YAML file of numbers"),
+        ("words.yaml", "is no YAML file of numbers"),
+        ("poly.txt", "is neither .npz nor .json nor .yaml"),
+    ):
+        done = ciris("certify", PLANAR, "--polytope", name, "--local")
+        assert (done.status, words in done.error) == (2, True)
+
+
+def test_growing_here_says_what_happens(ciris: Ciris) -> None:
+    quiet = ciris("grow", PLANAR, "--local", "--out", "a.proof")
+    assert quiet.status == 0
+    said = quiet.stderr.splitlines()
+    assert any(line.startswith("seeding: done after") for line in said)
+    assert any(line.startswith("certified region of iteration") and "% of the proposal" in line for line in said)
+    assert not any(line.startswith("  1/") for line in said)
+    watched = ciris("grow", PLANAR, "--local", "--watch", "--out", "a.proof").stderr
+    assert "  1/" in watched
+
+
 def test_a_polytope_is_certified_cell_by_cell(ciris: Ciris, files: Path) -> None:
     document = ciris("certify", PLANAR, "--polytope", "small.npz", "--local", "--cells", "300", "--json").json
     assert document["outcome"] == "certified"
@@ -230,7 +273,7 @@ def test_scenes_are_added_listed_and_shown(ciris: Ciris, url: str) -> None:
     assert "arm/lower/bar - obstacles/body/post" in shown.stdout
     assert len(ciris("scene", "show", "planar-2dof", "--json", CIRIS_URL=url).json["pair_list"]) == 6
     unknown = ciris("scene", "show", "nope", CIRIS_URL=url)
-    assert (unknown.status, unknown.error) == (2, "scene: there is no scene 'nope'")
+    assert (unknown.status, unknown.error) == (2, "scene: there is no scene 'nope' (`ciris scene ls` lists them)")
 
 
 def test_regions_are_listed_shown_and_exported(ciris: Ciris, url: str, region: str, certified: Region) -> None:
@@ -279,9 +322,11 @@ def test_an_interrupted_wait_leaves_the_job_alone(url: str, scene: Scene, tmp_pa
     assert waiting.returncode == 130
     assert "Traceback" not in said
     lines = said.splitlines()
-    assert "goes on while the service runs" in lines[-2]
+    assert "goes on while the service runs" in lines[-3]
     assert lines[-1] == "error: interrupted"
     (job,) = httpx2.get(f"{url}/v1/jobs").json()["jobs"]
+    short = job["id"][:8]
+    assert lines[-2] == f"come back to it with `ciris job follow {short}`, or end it with `ciris job cancel {short}`"
     assert job["state"] == "queued"
     job = httpx2.get(f"{url}/v1/jobs/{job['id']}").json()
     made, ends = (datetime.fromisoformat(job[name]) for name in ("created_at", "deadline_at"))

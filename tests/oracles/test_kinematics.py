@@ -6,7 +6,7 @@ from pydrake.multibody.rational import RationalForwardKinematics
 
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, JointKind, Scene
-from certifier.scene.parse import _joints
+from certifier.scene.parse import _bodies, _joints
 from certifier.scene.tree import Tree
 from tests.oracles.trees import random_plant
 
@@ -14,7 +14,7 @@ SEEDS = range(12)
 
 
 def scene_of(plant, q_star):
-    tree = Tree(*_joints(plant))
+    tree = Tree(_joints(plant), _bodies(plant))
     return Scene("tree", tree.joints, tree.bodies, (), (), (), q_star)
 
 
@@ -53,7 +53,8 @@ def test_numerators_are_drakes_poses_times_the_denominator(seed):
 
 
 def test_the_trees_have_every_kind_of_joint():
-    kinds = {joint.kind for seed in SEEDS for joint in Tree(*_joints(random_plant(np.random.default_rng(seed), 7))).joints}
+    plants = [random_plant(np.random.default_rng(seed), 7) for seed in SEEDS]
+    kinds = {joint.kind for plant in plants for joint in Tree(_joints(plant), _bodies(plant)).joints}
     assert kinds == set(JointKind)
 
 

@@ -130,3 +130,7 @@ def test_a_grown_regions_manifest_tells_the_share_the_proposal_and_the_ranges(ki
         ends = [sign * linprog(sign * np.eye(2)[i], region.C, region.d, bounds=(None, None)).fun for sign in (1, -1)]
         in_q = [scale * scene.to_q(np.full(2, end))[i] for end in ends]
         assert [known["lower"], known["upper"], known["unit"]] == [*map(pytest.approx, in_q), unit]
+        line = np.tile(scene.to_s(manifest["seed"]), (20_001, 1))
+        line[:, i] = np.linspace(scene.s_lower[i], scene.s_upper[i], len(line))
+        inside = scale * scene.to_q(line[region.contains(line)])[:, i]
+        assert known["through_seed"] == pytest.approx([inside.min(), inside.max()], abs=0.02 * scale)

@@ -1,6 +1,7 @@
 """Proposals: what is refused, what each method gives, and what IRIS may claim."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -68,6 +69,29 @@ def test_seeds_that_are_refused(q, code, words):
     assert error.value.code == code
     assert words in error.value.message
     assert error.value.field.startswith("seed.q")
+
+
+@pytest.mark.parametrize("padding", [0.0, 0.03])
+@pytest.mark.parametrize("q", [[1.5, math.pi / 2], [1.4, 1.4], [1.5 - 0.22, math.pi / 2]])
+def test_a_seed_in_collision_gets_a_free_one_near_by(q, padding):
+    scene = crane(padding=padding)
+    if clearance(scene, scene.to_s(np.array([q])))[0] > 0:
+        check_seed(scene, q)
+        return
+    with pytest.raises(RegionError) as error:
+        check_seed(scene, q)
+    said = re.search(r"q = ([-\d., ]+); it moves crane/(slide|turn) most, by", error.value.hint)
+    found = np.array([float(x) for x in said[1].split(",")])
+    gap = clearance(scene, scene.to_s(found[None]))[0]
+    assert 0 < gap < 0.05
+    check_seed(scene, found)
+
+
+def test_where_nothing_is_free_the_hint_says_so_much():
+    scene = crane(padding=9.0)
+    with pytest.raises(RegionError) as error:
+        check_seed(scene, [0.0, 0.0])
+    assert error.value.hint == "move the seed, or ignore the pair in the scene"
 
 
 def test_padding_counts_against_the_seed():

@@ -1,0 +1,171 @@
+"""What a scene file says about the joints of its models is applied here: which are held, narrower limits, and q*.
+
+s = tan((q - q*)/2) stands for less than a whole turn. So of a joint that turns farther, the scene covers a window about q*. The robot is in
+the same pose a turn later, so seeds and questions are taken to the window (:meth:`certifier.model.Scene.in_windows`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from certifier.errors import SceneError, close_matches
+from certifier.model import Array, Joint, JointKind
+
+WINDOW = np.radians(170.0)
+"""A window reaches at most so far to either side of q*. Nearer to half a turn, s changes so fast that certificates become hard."""
+EXACT = 1e-9
+"""Positions at which coupled joints are held fit to each other this well, in radians or metres."""
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A linear equation that joint positions keep to, as a mimic joint does: sum of factor times position = constant.
+
+    Attributes:
+        factors: by the joints' names.
+    """
+
+    factors: Mapping[str, float]
+    constant: float
+
+
+def held(joints: Sequence[Joint], positions: Mapping[str, float], couplings: Sequence[Coupling]) -> list[Joint]:
+    """Returns the joints, those that are held as welds; the positions of the others are numbered anew, in their order.
+
+    A joint that is coupled to held ones alone is held as well.
+
+    Raises:
+        SceneError: ``unknown_name``; ``scene_field`` where a joint cannot be there; ``unsupported_joint`` where coupled joints are free.
+    """
+    by_name = {j.name: j for j in joints if j.index is not None}
+    at = {_known(name, by_name, "fix"): value for name, value in positions.items()}
+    for name, value in at.items():
+        _check_within(by_name[name], value)
+    _follow(at, by_name, couplings)
+    free = sorted((j for j in by_name.values() if j.name not in at), key=lambda j: j.index or 0)
+    number = {j.name: i for i, j in enumerate(free)}
+    return [_welded(j, at[j.name]) if j.name in at else replace(j, index=number.get(j.name)) for j in joints]
+
+
+def narrowed(joints: Sequence[Joint], limits: Mapping[str, tuple[float, float]]) -> list[Joint]:
+    """Returns the joints with the limits that the scene file gives them, which are within their own.
+
+    Raises:
+        SceneError: ``unknown_name``; ``scene_field`` for limits outside of the joint's own.
+    """
+    by_name = {j.name: j for j in joints if j.index is not None}
+    given = {_known(name, by_name, "limits"): pair for name, pair in limits.items()}
+    for name, (lower, upper) in given.items():
+        own_lower, own_upper = _range(by_name[name])
+        if lower < own_lower - EXACT or upper > own_upper + EXACT:
+            message = f"{lower:g} to {upper:g} is not within the joint's own limits, {own_lower:g} to {own_upper:g}"
+            raise SceneError("scene_field", message, field=f"limits.{name}")
+    return [replace(j, lower=given[j.name][0], upper=given[j.name][1]) if j.name in given else j for j in joints]
+
+
+def centered(joints: Sequence[Joint], q_star: Sequence[float] | None) -> tuple[list[Joint], Array]:
+    """Returns the joints, with windows for those that turn farther than s stands for, and q*, (n,).
+
+    Args:
+        q_star: as in the scene file; None for the middle of the joint limits, or 0 where a joint has none.
+
+    Raises:
+        SceneError: ``no_joints``, ``scene_field``, or ``joint_range`` for a range without an interior or a slide without limits.
+    """
+    moving = sorted((j for j in joints if j.index is not None), key=lambda j: j.index or 0)
+    if not moving:
+        raise SceneError("no_joints", "no joint of the scene can move, so there is no configuration space", field="directives")
+    if q_star is not None and len(q_star) != len(moving):
+        names = ", ".join(j.name for j in moving)
+        raise SceneError("scene_field", f"has {len(q_star)} numbers for {len(moving)} joints: {names}", field="q_star")
+    centers = [_middle(j) for j in moving] if q_star is None else list(q_star)
+    found = {j.name: _windowed(j, center) for j, center in zip(moving, centers, strict=True)}
+    return [found.get(j.name, j) for j in joints], np.array(centers)
+
+
+def _range(joint: Joint) -> tuple[float, float]:
+    assert joint.lower is not None, "a joint that moves has limits, which may be infinite"
+    assert joint.upper is not None
+    return joint.lower, joint.upper
+
+
+def _middle(joint: Joint) -> float:
+    lower, upper = _range(joint)
+    if np.isfinite(lower) and np.isfinite(upper):
+        return (lower + upper) / 2
+    return float(np.clip(0.0, lower, upper))
+
+
+def _windowed(joint: Joint, center: float) -> Joint:
+    """Returns a joint with a window where its limits reach half a turn from the centre."""
+    lower, upper = _range(joint)
+    if lower >= upper:
+        message = f"joint {joint.name} cannot move: its limits are {lower:g} and {upper:g}"
+        raise SceneError("joint_range", message, field="directives", hint=f"hold it, with fix: {{{joint.name}: {lower:g}}}")
+    if joint.kind is not JointKind.REVOLUTE:
+        if not (np.isfinite(lower) and np.isfinite(upper)):
+            message = f"joint {joint.name} has no finite limits"
+            raise SceneError(
+                "joint_range", message, field="directives", hint=f"give it some, with limits: {{{joint.name}: [LOWER, UPPER]}}"
+            )
+        return joint
+    if center - np.pi < lower and upper < center + np.pi:
+        return joint
+    window = max(lower, center - WINDOW), min(upper, center + WINDOW)
+    if window[0] >= window[1]:
+        message = f"joint {joint.name} turns from {lower:.6g} to {upper:.6g} rad, and q* = {center:.6g} is more than 170 degrees away"
+        raise SceneError("joint_range", message, field="q_star", hint="move q_star into the joint's limits")
+    own = tuple(limit if np.isfinite(limit) else None for limit in (lower, upper))
+    return replace(joint, lower=window[0], upper=window[1], own_limits=(own[0], own[1]))
+
+
+def _known(name: str, joints: Mapping[str, Joint], field: str) -> str:
+    """Returns the full name of a joint that can move, which a scene file may give without its model where this is clear."""
+    fitting = [full for full in joints if name in (full, full.rsplit("/", 1)[-1])]
+    if len(fitting) != 1:
+        what = f"fits {' and '.join(fitting)}" if fitting else "is no joint of the scene that can move"
+        hint = "write model/joint" if fitting else close_matches(name, list(joints)) or f"joints: {', '.join(joints)}"
+        raise SceneError("unknown_name", f"{name!r} {what}", field=f"{field}.{name}", hint=hint)
+    return fitting[0]
+
+
+def _check_within(joint: Joint, value: float) -> None:
+    lower, upper = _range(joint)
+    if not lower - EXACT <= value <= upper + EXACT:
+        message = f"{value:g} is not within the joint's limits, {lower:g} to {upper:g}"
+        raise SceneError("scene_field", message, field=f"fix.{joint.name}")
+
+
+def _follow(at: dict[str, float], by_name: Mapping[str, Joint], couplings: Sequence[Coupling]) -> None:
+    """Adds to the positions of held joints those of joints that are coupled to held ones alone."""
+    waiting = list(couplings)
+    while waiting:
+        known = next((c for c in waiting if sum(name not in at for name in c.factors) <= 1), None)
+        if known is None:
+            names = " and ".join(waiting[0].factors)
+            hint = f"hold one of them, as in fix: {{{next(iter(waiting[0].factors))}: 0}}; the other follows"
+            raise SceneError("unsupported_joint", f"joints {names} are coupled (mimic), and none is held", field="directives", hint=hint)
+        waiting.remove(known)
+        rest = known.constant - sum(factor * at[name] for name, factor in known.factors.items() if name in at)
+        follower = next((name for name in known.factors if name not in at), None)
+        if follower is not None:
+            at[follower] = rest / known.factors[follower]
+            _check_within(by_name[follower], at[follower])
+        elif abs(rest) > EXACT:
+            names = " and ".join(known.factors)
+            raise SceneError("scene_field", f"joints {names} are coupled (mimic), and cannot be held at these positions", field="fix")
+
+
+def _welded(joint: Joint, value: float) -> Joint:
+    """Returns the weld that holds a joint at a position."""
+    X_FM = np.eye(4)
+    if joint.kind is JointKind.REVOLUTE:
+        x, y, z = joint.axis
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        X_FM[:3, :3] += np.sin(value) * cross + (1 - np.cos(value)) * cross @ cross
+    else:
+        X_FM[:3, 3] = value * joint.axis
+    return Joint(joint.name, JointKind.WELD, joint.parent, joint.child, np.zeros(3), joint.X_PF @ X_FM, joint.X_BM)

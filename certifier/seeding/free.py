@@ -1,0 +1,96 @@
+"""A seed in collision is refused here, with the pair, how deep it is in, and a free configuration nearby."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.geometry import QueryObject
+
+from certifier.errors import RegionError
+from certifier.model import Array, JointKind, Pair, Scene
+from certifier.scene.drake_model import build_diagram, geometry_name
+
+SHELLS, EACH = np.geomspace(0.004, 1.0, 12), 40
+"""A free configuration is looked for at these parts of the joints' half ranges from the seed, EACH times."""
+STEPS = 8
+"""What was found is moved back towards the seed in so many steps of bisection."""
+
+
+class Clearance:
+    """Tells how far apart the pairs of a scene are, by Drake."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._diagram = build_diagram(scene)
+        self._context = self._diagram.CreateDefaultContext()
+
+    def least(self, q: Array) -> tuple[float, Pair]:
+        """Returns the least distance of a pair at q, (n,), without the padding, in metres, and the pair."""
+        query = self._query(q)
+        ids = {geometry_name(query.inspector(), g): g for g in query.inspector().GetAllGeometryIds()}
+        distances = [
+            (query.ComputeSignedDistancePairClosestPoints(ids[p.a], ids[p.b]).distance, i) for i, p in enumerate(self._scene.pairs)
+        ]
+        distance, i = min(distances)
+        return float(distance), self._scene.pairs[i]
+
+    def free(self, q: Array) -> bool:
+        """Returns whether all pairs are farther apart at q, (n,), than twice the padding."""
+        near = self._query(q).ComputeSignedDistancePairwiseClosestPoints(2 * self._scene.padding)
+        return all(pair.distance > 2 * self._scene.padding for pair in near)
+
+    def _query(self, q: Array) -> QueryObject:
+        self._diagram.plant().SetPositions(self._diagram.mutable_plant_context(self._context), q)
+        found: QueryObject = (
+            self._diagram.scene_graph().get_query_output_port().Eval(self._diagram.mutable_scene_graph_context(self._context))
+        )
+        return found
+
+
+def check_free(scene: Scene, q: Array, field: str) -> None:
+    """Refuses a configuration in which a pair is not farther apart than twice the padding.
+
+    Raises:
+        RegionError: ``seed_in_collision``; the hint names a free configuration near by, if one was found.
+    """
+    if not scene.pairs:
+        return
+    clearance = Clearance(scene)
+    distance, pair = clearance.least(q)
+    if distance > 2 * scene.padding:
+        return
+    how = f"overlap by {-distance:.3g} m" if distance <= 0 else f"are {distance:.3g} m apart, with a padding of {scene.padding:g} m on each"
+    found = nearest_free(scene, clearance, scene.in_windows(q))
+    hint = "move the seed, or ignore the pair in the scene" if found is None else _said(scene, scene.in_windows(q), found)
+    raise RegionError("seed_in_collision", f"{pair.a} and {pair.b} {how}", field=field, hint=hint)
+
+
+def nearest_free(scene: Scene, clearance: Clearance, q: Array) -> Array | None:
+    """Returns a free configuration near q, (n,), within the joint limits; None where none was found."""
+    half = (scene.q_upper - scene.q_lower) / 2
+    lower, upper = scene.q_lower + 1e-3 * half, scene.q_upper - 1e-3 * half
+    rng = np.random.default_rng(0)
+    for shell in SHELLS:
+        directions = rng.normal(size=(EACH, scene.n))
+        directions *= shell / np.linalg.norm(directions, axis=1, keepdims=True)
+        near = np.clip(q + directions * half, lower, upper)
+        found = [x for x in near if clearance.free(x)]
+        if found:
+            best = min(found, key=lambda x: float(np.linalg.norm((x - q) / half)))
+            return _towards(clearance, q, best)
+    return None
+
+
+def _towards(clearance: Clearance, q: Array, free: Array) -> Array:
+    """Returns the free configuration nearest to q that bisection finds on the way to a free one."""
+    inside, outside = free, q
+    for _ in range(STEPS):
+        middle = (inside + outside) / 2
+        inside, outside = (middle, outside) if clearance.free(middle) else (inside, middle)
+    return inside
+
+
+def _said(scene: Scene, q: Array, found: Array) -> str:
+    moved = int(np.abs(found - q).argmax())
+    joint, by = scene.moving[moved], abs(found[moved] - q[moved])
+    how = f"{np.degrees(by):.2g} degrees" if joint.kind is JointKind.REVOLUTE else f"{by:.2g} m"
+    return f"the nearest free configuration found is q = {', '.join(f'{x:.4f}' for x in found)}; it moves {joint.name} most, by {how}"

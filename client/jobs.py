@@ -1,0 +1,103 @@
+"""Commands about jobs of the service: list, show, follow, cancel and retry them."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from typing import Any
+
+from client import output
+from client.find import api_key, service_url
+from client.follow import follow
+from client.http import Client, Document
+from client.output import Screen, print_json
+
+OK, NO = 0, 1
+SHORT = 8
+"""So many characters of an id are shown in lists; the service knows a job by them."""
+
+
+def job_ls(args: Namespace) -> int:
+    with _client(args) as client:
+        jobs = client.jobs(state=args.state, scene=args.scene, most=args.most)
+        names = {scene["id"]: scene["name"] for scene in client.scenes()}
+    if args.json:
+        print_json(jobs)
+        return OK
+    rows = [
+        (
+            job["id"][:SHORT],
+            job["kind"],
+            job["state"],
+            names.get(job["scene"]) or job["scene"],
+            job["created_at"][:19],
+            job["region"][:SHORT] if job["region"] else "",
+            job["reason"] or "",
+        )
+        for job in jobs
+    ]
+    output.print_table(("id", "kind", "state", "scene", "created", "region", "reason"), rows)
+    return OK
+
+
+def job_show(args: Namespace) -> int:
+    with _client(args) as client:
+        job = client.job(args.job)
+        regions = client.regions(job=job["id"])
+    if args.json:
+        print_json({**job, "regions": regions})
+        return OK
+    _print(job)
+    for region in regions:
+        print(f"  region {region['id'][:SHORT]}: {output.share(region['share'])} of the proposal, {region['faces']} faces")
+    return OK
+
+
+def job_follow(args: Namespace) -> int:
+    """Tells what happens until the job has ended. Its exit status is 0 for a certified one."""
+    with _client(args) as client:
+        job = follow(client, client.job(args.job)["id"], Screen(), args.watch)
+    if args.json:
+        print_json(job)
+    else:
+        _print(job)
+    return OK if job["outcome"] == "certified" else NO
+
+
+def job_cancel(args: Namespace) -> int:
+    with _client(args) as client:
+        job = client.cancel(client.job(args.job)["id"])
+    return _say(job, args)
+
+
+def job_retry(args: Namespace) -> int:
+    with _client(args) as client:
+        job = client.retry(client.job(args.job)["id"])
+    return _say(job, args)
+
+
+def _say(job: Document, args: Namespace) -> int:
+    if args.json:
+        print_json(job)
+    else:
+        _print(job)
+    return OK
+
+
+def _print(job: dict[str, Any]) -> None:
+    error = job["error"]
+    facts = [
+        ("job", job["id"]),
+        ("kind", job["kind"]),
+        ("state", job["state"]),
+        ("scene", job["scene"]),
+        ("created", job["created_at"][:19]),
+        ("outcome", output.plain(job["outcome"])),
+        *([("reason", job["reason"])] if job["reason"] else []),
+        *([("error", error["message"])] if error else []),
+        *([("region", job["region"])] if job["region"] else []),
+    ]
+    output.print_facts(facts)
+
+
+def _client(args: Namespace) -> Client:
+    return Client(service_url(args.url), api_key())

@@ -1,0 +1,130 @@
+"""Scene files are drafted and checked here, on this machine and without a service."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+import numpy as np
+
+from certifier.errors import CirisError
+from certifier.kinematics import Kinematics
+from certifier.model import JointKind, Scene
+from certifier.pair.forecast import PairCost, forecast
+from certifier.scene.contacts import touching
+from certifier.scene.draft import draft
+from certifier.scene.load import load_scene
+from certifier.seeding.limits import check_limits
+from client import output
+from client.inputs import SEED_FILE, configuration, seed_of
+
+COSTLIEST = 5
+
+
+def scene_init(args: Namespace) -> int:
+    """Writes a scene file, and a seed beside it."""
+    out = Path(args.out)
+    seed_file = out.parent / SEED_FILE
+    if out.suffix not in (".yaml", ".yml"):
+        raise CirisError("scene_file", f"a scene file ends in .yaml, not as {out.name}", field="--out")
+    for path in (out, seed_file):
+        if path.exists():
+            raise CirisError(
+                "file_exists", f"{path} is there already", field="--out", hint="move it away, or name another file in a new directory"
+            )
+    out.parent.mkdir(parents=True, exist_ok=True)
+    packages = dict(_package(text) for text in args.package)
+    drafted = draft(Path(args.robot), [Path(world) for world in args.world], out, packages)
+    out.write_text(drafted.text, encoding="utf-8")
+    scene = drafted.scene
+    print(f"{out}: {scene.n} joints, {len(scene.geometries)} geometries, {len(scene.pairs)} pairs; {len(drafted.ignored)} ignored")
+    for warning in scene.warnings:
+        print("warning:", warning, file=sys.stderr)
+    if drafted.seed is None:
+        print("warning: every configuration that was tried is in collision, so there is no seed", file=sys.stderr)
+        return 0
+    text = (
+        f"q: {[round(float(x), 6) for x in drafted.seed]}\nabout: The free configuration nearest to q_star that ciris scene init found.\n"
+    )
+    seed_file.write_text(text, encoding="utf-8")
+    print(f"{seed_file}: a configuration that is free of collision")
+    print(f"next: ciris scene check {out}, then ciris grow {out} --local")
+    return 0
+
+
+def _package(text: str) -> tuple[str, Path]:
+    name, _, directory = text.partition("=")
+    if not name or not directory:
+        raise CirisError("bad_option", f"{text!r} is not NAME=DIRECTORY", field="--package")
+    return name, Path(directory)
+
+
+def scene_check(args: Namespace) -> int:
+    """Says what was read, what was replaced and ignored, what touches at a configuration, and what the pairs will cost."""
+    scene = load_scene(args.path)
+    q, whence = _configuration(scene, args)
+    check_limits(scene, q, "q")
+    (touches,) = touching(scene, [scene.in_windows(q)])
+    bad = sorted((pair for pair in touches if pair in set(scene.pairs)), key=lambda p: (p.a, p.b))
+    costs = sorted(forecast(scene), key=lambda cost: -cost.seconds)
+    if args.json:
+        output.print_json(_document(scene, q, [[p.a, p.b] for p in bad], costs))
+        return 1 if bad else 0
+    print(f"{scene.name}: {scene.n} joints, {len(scene.geometries)} geometries, {len(scene.pairs)} pairs, {len(scene.ignored)} ignored")
+    print()
+    output.print_table(("joint", "kind", "lower", "upper", "q*", "q", ""), _joints(scene, q), right="lower upper q* q")
+    print()
+    for warning in scene.warnings:
+        print(f"warning: {warning}")
+    for ignored in scene.ignored:
+        print(f"ignored: {ignored.a} and {ignored.b}: {ignored.reason}")
+    for pair in bad:
+        print(f"touching at {whence}: {pair.a} and {pair.b}")
+    if not bad:
+        print(f"nothing touches at {whence}")
+    print(f"one plane for a pair: {output.seconds(sum(cost.seconds for cost in costs))} for all pairs on one core; most for")
+    kinematics = Kinematics.of(scene)
+    for cost in costs[:COSTLIEST]:
+        joints = len(kinematics.chain(*(scene.geometry(name).body for name in (cost.a, cost.b))))
+        print(f"  {cost.a} and {cost.b}: {joints} joints between them, {output.seconds(cost.seconds)}")
+    return 1 if bad else 0
+
+
+def _configuration(scene: Scene, args: Namespace) -> tuple[np.ndarray, str]:
+    if args.q is None and not (Path(args.path).parent / SEED_FILE).is_file():
+        return scene.q_star.clip(scene.q_lower, scene.q_upper), "q*"
+    q = configuration(args.q) if args.q is not None else seed_of(args.path, None)
+    if len(q) != scene.n:
+        names = ", ".join(joint.name for joint in scene.moving)
+        raise CirisError("seed_wrong_length", f"{len(q)} numbers for {scene.n} joints", field="--q", hint=f"in order: {names}")
+    return np.array(q), "--q" if args.q is not None else SEED_FILE
+
+
+def _joints(scene: Scene, q: np.ndarray) -> list[tuple[str, ...]]:
+    rows = []
+    for i, joint in enumerate(scene.moving):
+        turns = joint.kind is JointKind.REVOLUTE
+        values = (scene.q_lower[i], scene.q_upper[i], scene.q_star[i], q[i])
+        texts = [f"{np.degrees(x):.2f} deg" if turns else f"{x:.4f} m" for x in values]
+        rows.append((joint.name, joint.kind.value, *texts, "window" if joint.own_limits is not None else ""))
+    return rows
+
+
+def _document(scene: Scene, q: np.ndarray, bad: list[list[str]], costs: list[PairCost]) -> dict[str, object]:
+    return {
+        "name": scene.name,
+        "hash": scene.hash,
+        "joints": [
+            {"name": j.name, "kind": j.kind.value, "lower": j.lower, "upper": j.upper, "own_limits": j.own_limits, "q_star": float(c)}
+            for j, c in zip(scene.moving, scene.q_star, strict=True)
+        ],
+        "q": q.tolist(),
+        "touching": bad,
+        "warnings": list(scene.warnings),
+        "substitutions": [
+            {"geometry": g.name, "what": g.substitution, "inflation": g.inflation} for g in scene.geometries if g.substitution
+        ],
+        "ignored": [{"a": i.a, "b": i.b, "reason": i.reason} for i in scene.ignored],
+        "pairs": [{"a": cost.a, "b": cost.b, "seconds": cost.seconds} for cost in costs],
+    }

@@ -1,0 +1,72 @@
+"""Jobs on the command line: lists, short ids, following, cancelling, retrying; and what is said of what is unknown."""
+
+from __future__ import annotations
+
+import pytest
+
+from certifier.model import Scene
+from db import jobs, scenes
+from db.session import Database
+from tests.client.conftest import Ciris
+
+SEED = {"kind": "grow", "seed": {"q": [0.0]}, "random_seed": 0}
+
+
+def queued(database: Database, scene: Scene) -> str:
+    """The id of a job that nobody works on."""
+    with database.write() as session:
+        row = scenes.add(session, scene)
+        return jobs.create(session, kind="grow", scene_id=row.id, options=SEED)[0].id
+
+
+def test_jobs_are_listed_shown_and_followed_by_the_first_characters_of_their_ids(
+    ciris: Ciris, url: str, database: Database, region: str, scene: Scene
+) -> None:
+    done = ciris("job", "ls", CIRIS_URL=url)
+    assert done.status == 0
+    (_, row) = done.stdout.splitlines()
+    short, kind, state, name, *_ = row.split()
+    assert (kind, state, name, len(short)) == ("grow", "succeeded", scene.name, 8)
+    waiting = queued(database, scene)
+    assert [job["id"] for job in ciris("job", "ls", "--state", "queued", "--json").json] == [waiting]
+    assert len(ciris("job", "ls", "--most", "1", "--json").json) == 1
+    shown = ciris("job", "show", short)
+    assert shown.status == 0
+    assert f"region {region[:8]}" in shown.stdout
+    followed = ciris("job", "follow", short)
+    assert (followed.status, "succeeded" in followed.stdout) == (0, True)
+    assert ciris("region", "show", region[:8], "--json").json["guarantee"] == "exact"
+
+
+def test_a_job_is_cancelled_and_retried(ciris: Ciris, url: str, database: Database, scene: Scene) -> None:
+    waiting = queued(database, scene)
+    done = ciris("job", "cancel", waiting[:8], CIRIS_URL=url)
+    assert (done.status, "cancelled before it started" in done.stdout) == (0, True)
+    again = ciris("job", "retry", waiting[:8], "--json").json
+    assert (again["state"], again["id"] == waiting) == ("queued", False)
+    refused = ciris("job", "retry", again["id"][:8])
+    assert refused.status == 2
+    assert "only a failed or cancelled one can be retried" in refused.error
+    assert ciris("job", "follow", waiting).status == 1
+
+
+def test_what_is_unknown_or_ambiguous_is_said(
+    ciris: Ciris, url: str, database: Database, scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waiting = queued(database, scene)
+    monkeypatch.setattr("db.jobs.uuid4", lambda: waiting[:-1] + ("0" if waiting[-1] != "0" else "1"))
+    queued(database, scene)
+    cases = [
+        (("job", "show", "00000000-nothing"), "`ciris job ls` lists them"),
+        (("job", "show", waiting[:4]), "there is no job"),
+        (("job", "show", waiting[:8]), "give more of it"),
+        (("region", "show", "00000000-nothing"), "`ciris region ls` lists them"),
+        (("scene", "show", scene.name[:-1] + "x"), f"did you mean {scene.name}"),
+        (("scene", "show", "nothing like it"), "`ciris scene ls` lists them"),
+    ]
+    for words, said in cases:
+        done = ciris(*words, CIRIS_URL=url)
+        assert done.status == 2
+        assert said in done.error
+    assert ciris("job", "show", waiting, "--json").json["id"] == waiting
+    assert ciris("scene", "show", scene.hash[:8], "--json").json["name"] == scene.name

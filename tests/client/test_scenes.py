@@ -1,0 +1,125 @@
+"""Scene files are drafted and checked without a service, as a new user would do it first."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from certifier.scene import load_scene
+from tests.certifier.scene.workshop import ARM, BOX, EXAMPLES, LIMIT, ROOM
+from tests.client.conftest import Ciris
+
+GRIPPER = """<link name="left"><collision><geometry><box size="0.02 0.02 0.1"/></geometry></collision></link>
+  <joint name="grip" type="prismatic"><parent link="hand"/><child link="left"/><origin xyz="0.4 0.03 0"/><axis xyz="0 1 0"/>
+    <limit lower="0.01" upper="0.05" effort="1" velocity="1"/></joint>
+  <link name="right"><collision><geometry><mesh filename="package://tools/meshes/finger.obj"/></geometry></collision></link>
+  <joint name="other" type="prismatic"><parent link="hand"/><child link="right"/><origin xyz="0.4 -0.03 0"/><axis xyz="0 -1 0"/>
+    <limit lower="0" upper="0.05" effort="1" velocity="1"/><mimic joint="grip"/></joint>
+  <link name="cover"><collision><geometry><sphere radius="0.4"/></geometry></collision></link>
+  <joint name="on" type="fixed"><parent link="hand"/><child link="cover"/></joint>"""
+FINGER = "v 0 0 0\nv 0.02 0 0\nv 0 0.02 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+def robot(directory: Path, more: str = GRIPPER, limit: str = "", kind: str = "continuous") -> Path:
+    """A hand on a continuous joint, with fingers that mimic each other, a mesh of a package, and a cover that is always in the base."""
+    (directory / "ws" / "tools" / "meshes").mkdir(parents=True)
+    (directory / "ws" / "tools" / "meshes" / "finger.obj").write_text(FINGER)
+    (directory / "ws" / "robot").mkdir()
+    (directory / "ws" / "robot" / "arm.urdf").write_text(ARM.format(kind=kind, limit=limit, shape=BOX, more=more))
+    (directory / "room.sdf").write_text(ROOM.replace("0.6 0 0.3", "1.2 0 0.3"))
+    return directory / "ws" / "robot" / "arm.urdf"
+
+
+def test_a_draft_of_a_robot_as_people_ship_it_is_a_scene_with_a_free_seed(ciris: Ciris, tmp_path: Path) -> None:
+    model, out = robot(tmp_path), tmp_path / "cell" / "scene.yaml"
+    done = ciris("scene", "init", model, "--world", tmp_path / "room.sdf", "--out", out)
+    assert done.status == 0, done.stderr
+    text = out.read_text()
+    document = yaml.safe_load(text.replace("!Rpy", ""))
+    assert document["fix"] == {"arm/grip": 0.01}
+    assert (out.parent / document["packages"]["tools"]).resolve() == tmp_path / "ws" / "tools"
+    assert [entry["reason"] for entry in document["ignore"]] == ["they overlap at every configuration that was tried"]
+    assert set(document["ignore"][0]["pair"]) == {"arm/base/foot", "arm/cover/Sphere"}
+    scene = load_scene(out)
+    assert [j.name for j in scene.moving] == ["arm/turn"]
+    assert "arm/turn: -170 to 170 degrees, a window" in text
+    assert yaml.safe_load((out.parent / "seed.yaml").read_text())["q"] == [0.0]
+    checked = ciris("scene", "check", out)
+    assert checked.status == 0
+    for words in (
+        "1 joints",
+        "window",
+        "ignored: arm/base/foot and arm/cover/Sphere",
+        "nothing touches at seed.yaml",
+        "0 joints" not in checked.stdout,
+    ):
+        assert words is True or str(words) in checked.stdout
+    grown = ciris("grow", out, "--local", "--out", tmp_path / "proof")
+    assert grown.status == 0, grown.stderr
+
+
+def test_every_example_can_be_drafted_anew(ciris: Ciris, tmp_path: Path) -> None:
+    for name, robots in (("planar_2dof", "*.urdf"), ("sphere_arm", "*.urdf")):
+        (model,) = (EXAMPLES / name).glob(robots)
+        worlds = [word for world in sorted((EXAMPLES / name).glob("*.sdf")) for word in ("--world", world)]
+        out = tmp_path / name / "scene.yaml"
+        done = ciris("scene", "init", model, *worlds, "--out", out)
+        assert done.status == 0, done.stderr
+        scene, known = load_scene(out), load_scene(EXAMPLES / name / "scene.yaml")
+        assert scene.n == known.n
+        np.testing.assert_allclose(scene.q_lower, known.q_lower)
+
+
+def test_nothing_is_overwritten(ciris: Ciris, tmp_path: Path) -> None:
+    model, out = robot(tmp_path), tmp_path / "scene.yaml"
+    (tmp_path / "seed.yaml").write_text("q: [1]\n")
+    done = ciris("scene", "init", model, "--out", out)
+    assert (done.status, out.exists()) == (2, False)
+    assert "seed.yaml is there already" in done.error
+    assert (tmp_path / "seed.yaml").read_text() == "q: [1]\n"
+
+
+def test_what_cannot_be_drafted_is_named_and_leaves_nothing(ciris: Ciris, tmp_path: Path) -> None:
+    model = robot(tmp_path)
+    (tmp_path / "alone").mkdir()
+    (tmp_path / "alone" / "arm.urdf").write_text(model.read_text())
+    cases = [
+        ((tmp_path / "alone" / "arm.urdf",), "--package tools=DIRECTORY"),
+        ((tmp_path / "nothing.urdf",), "there is no file"),
+        ((model, "--world", tmp_path / "ws" / "tools" / "meshes" / "finger.obj"), "finger.obj"),
+        ((model, "--package", "tools"), "'tools' is not NAME=DIRECTORY"),
+    ]
+    for i, (arguments, words) in enumerate(cases):
+        out = tmp_path / f"case{i}" / "scene.yaml"
+        done = ciris("scene", "init", *arguments, "--out", out)
+        assert done.status == 2
+        assert words in done.stderr
+        assert not out.parent.exists() or not list(out.parent.iterdir())
+    done = ciris(
+        "scene", "init", tmp_path / "alone" / "arm.urdf", "--package", f"tools={tmp_path / 'ws' / 'tools'}", "--out", tmp_path / "s.yaml"
+    )
+    assert done.status == 0, done.stderr
+
+
+def test_a_check_says_what_touches(ciris: Ciris, tmp_path: Path) -> None:
+    done = ciris("scene", "check", EXAMPLES / "planar_2dof" / "scene.yaml", "--json")
+    assert done.status == 0
+    assert done.json["touching"] == []
+    assert [joint["name"] for joint in done.json["joints"]] == [j.name for j in load_scene(EXAMPLES / "planar_2dof" / "scene.yaml").moving]
+    wall = ROOM.replace("0.6 0 0.3", "0.3 0 0.3")
+    for name, text in (("arm.urdf", ARM.format(kind="revolute", limit=LIMIT, shape=BOX, more="")), ("room.sdf", wall)):
+        (tmp_path / name).write_text(text)
+    directives = "".join(
+        f"  - add_model: {{name: {n}, file: {f}}}\n  - add_weld: {{parent: world, child: {n}::{r}}}\n"
+        for n, f, r in (("arm", "arm.urdf", "base"), ("room", "room.sdf", "walls"))
+    )
+    (tmp_path / "scene.yaml").write_text("directives:\n" + directives)
+    done = ciris("scene", "check", tmp_path / "scene.yaml", "--q", "0")
+    assert done.status == 1
+    assert "touching at --q: arm/hand/palm and room/walls/wall" in done.stdout
+    for q, words in (("0,0", "2 numbers for 1 joints"), ("5", "not between its limits"), ("x", "not a finite number")):
+        done = ciris("scene", "check", tmp_path / "scene.yaml", "--q", q)
+        assert done.status == 2
+        assert words in done.error
