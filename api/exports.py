@@ -52,10 +52,11 @@ def drake_yaml(row: RegionRow) -> tuple[bytes, str]:
 
 def _meaning(space: dict[str, Any], i: int) -> str:
     """Returns what one coordinate of s means. Regions that an earlier checkout stored do not say which joints turn."""
-    name, center = space["joints"][i], repr(float(space["q_star"][i]))
+    name, center, lower, upper = space["joints"][i], *(repr(float(space[key][i])) for key in ("q_star", "q_lower", "q_upper"))
     if "revolute" not in space:
-        return f"{name}, q_star = {center}"
-    return f"{name}: s = tan((q - {center}) / 2), q in radians" if space["revolute"][i] else f"{name}: s = q - {center}, q in metres"
+        return f"{name}, q_star = {center}, q from {lower} to {upper}"
+    meaning = f"s = tan((q - {center}) / 2), q in radians" if space["revolute"][i] else f"s = q - {center}, q in metres"
+    return f"{name}: {meaning}, from {lower} to {upper}"
 
 
 def _numbers(values: np.ndarray) -> str:

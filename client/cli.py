@@ -24,6 +24,19 @@ SCENE is the path of a scene file (.yaml), or the name or id of a scene that the
 INTERRUPTED = 130
 
 
+OPTIONS = {
+    "options.max_rounds": "--rounds",
+    "options.pushes": "--pushes",
+    "options.cells": "--cells",
+    "options.contraction": "--contraction",
+    "options.random_seed": "--random-seed",
+    "seed.method": "--method",
+    "seed.q": "--q",
+    "deadline_seconds": "--deadline",
+}
+"""The fields of a request, and the options that people type for them."""
+
+
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"error: {escaped(message)} (see {self.prog} --help)\n")
@@ -38,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()  # what cannot be written is said below, not when Python ends
         return status
     except CirisError as error:
-        return _fail(str(error), 1 if error.code in NEGATIVE else 2)
+        return _fail(_in_options(str(error)), 1 if error.code in NEGATIVE else 2)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -80,6 +93,15 @@ def _command(where: str) -> Callable[[argparse.Namespace], int]:
             "not_installed", problem, hint="pip install '.[service]'; `ciris verify` needs no more than '.[verify]'"
         ) from error
     return command
+
+
+def _in_options(message: str) -> str:
+    """Returns an error's text with the option that was typed in the place of the field that it becomes."""
+    for field, option in OPTIONS.items():
+        if message.startswith(f"{field}: "):
+            said = message.removeprefix(f"{field}: ").removeprefix(f"{field.rpartition('.')[2]} ")
+            return f"{option}: {said}"
+    return message
 
 
 def _fail(message: str, status: int) -> int:

@@ -27,6 +27,9 @@ def running_stack(data: Path) -> str | None:
         return None
 
 
+NO_SERVICE = "start one with `ciris up`, or name one with --url; grow --local, certify --local and scene check need none"
+
+
 def service_url(given: str | None) -> str:
     """Returns the service's URL: ``given``, or CIRIS_URL, or that of the running stack.
 
@@ -35,7 +38,7 @@ def service_url(given: str | None) -> str:
     """
     url = given or os.environ.get("CIRIS_URL") or running_stack(data_dir())
     if url is None:
-        raise CirisError("no_service", "no service is running here", hint="start one with `ciris up`, name one with --url, or use --local")
+        raise CirisError("no_service", "no service is running here", hint=NO_SERVICE)
     return url
 
 

@@ -33,14 +33,22 @@ def scene_init(args: Namespace) -> int:
             raise CirisError(
                 "file_exists", f"{path} is there already", field="--out", hint="move it away, or name another file in a new directory"
             )
-    out.parent.mkdir(parents=True, exist_ok=True)
     packages = dict(_package(text) for text in args.package)
-    drafted = draft(Path(args.robot), [Path(world) for world in args.world], out, packages)
+    made = not out.parent.exists()
+    out.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        drafted = draft(Path(args.robot), [Path(world) for world in args.world], out, packages)
+    except CirisError:
+        if made:
+            out.parent.rmdir()
+        raise
     out.write_text(drafted.text, encoding="utf-8")
     scene = drafted.scene
     print(f"{out}: {scene.n} joints, {len(scene.geometries)} geometries, {len(scene.pairs)} pairs; {len(drafted.ignored)} ignored")
     for warning in scene.warnings:
         print("warning:", warning, file=sys.stderr)
+    for pair in drafted.overlapping:
+        print(f"warning: {pair.a} and {pair.b} overlap at every configuration that was tried: move the weld of one", file=sys.stderr)
     if drafted.seed is None:
         print("warning: every configuration that was tried is in collision, so there is no seed", file=sys.stderr)
         return 0
@@ -93,11 +101,13 @@ def scene_check(args: Namespace) -> int:
 
 def _configuration(scene: Scene, args: Namespace) -> tuple[np.ndarray, str]:
     if args.q is None and not (Path(args.path).parent / SEED_FILE).is_file():
-        return scene.q_star.clip(scene.q_lower, scene.q_upper), "q*"
+        inside = 1e-3 * (scene.q_upper - scene.q_lower)
+        return scene.q_star.clip(scene.q_lower + inside, scene.q_upper - inside), "q*"
     q = configuration(args.q) if args.q is not None else seed_of(args.path, None)
     if len(q) != scene.n:
         names = ", ".join(joint.name for joint in scene.moving)
-        raise CirisError("seed_wrong_length", f"{len(q)} numbers for {scene.n} joints", field="--q", hint=f"in order: {names}")
+        field = SEED_FILE if args.q is None else "--q"
+        raise CirisError("seed_wrong_length", f"{len(q)} numbers for {scene.n} joints", field=field, hint=f"in order: {names}")
     return np.array(q), "--q" if args.q is not None else SEED_FILE
 
 

@@ -7,7 +7,7 @@ from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from certifier.errors import CirisError
 
-SHORTEST = 6
+SHORTEST = 4
 """So many characters of an id are needed at least."""
 
 

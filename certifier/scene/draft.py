@@ -15,9 +15,10 @@ from pathlib import Path
 from xml.parsers import expat
 
 import numpy as np
+import yaml
 
 from certifier.errors import SceneError
-from certifier.model import Array, JointKind, Pair, Scene
+from certifier.model import WORLD, Array, JointKind, Pair, Scene
 from certifier.scene.contacts import touching
 from certifier.scene.load import load_scene
 from certifier.scene.references import references
@@ -37,13 +38,15 @@ class Draft:
     Attributes:
         text: the scene file.
         seed: (n,) the free configuration that is nearest to q* of those tried; None where all of them are in collision.
-        ignored: the pairs that the draft ignores.
+        ignored: the pairs of the robot with itself that overlap at every configuration tried, which the draft ignores.
+        overlapping: other pairs that do. They are not ignored, because something else stands in the wrong place.
     """
 
     text: str
     scene: Scene
     seed: Array | None
     ignored: tuple[Pair, ...]
+    overlapping: tuple[Pair, ...]
 
 
 @dataclass
@@ -60,7 +63,7 @@ class _Model:
 
     @property
     def roots(self) -> list[str]:
-        return [] if self.static else [link for link in self.links if link not in self.children]
+        return [] if self.static else [link for link in self.links if link not in self.children and link != WORLD]
 
 
 def draft(robot: Path, worlds: Sequence[Path], out: Path, packages: Mapping[str, Path]) -> Draft:
@@ -76,10 +79,10 @@ def draft(robot: Path, worlds: Sequence[Path], out: Path, packages: Mapping[str,
     """
     models = [_read(path) for path in (robot, *worlds)]
     for model in models:
-        model.name = _unused(model.name, [other.name for other in models if other is not model])
-    directory = out.absolute().parent
+        model.name = _unused(model.name, [other.name for other in models[: models.index(model)]])
+    directory = out.resolve().parent
     found = {name: root for model in models for name, root in _packages(model.path, packages).items()}
-    held = {f"{model.name}/{master}": _at_rest(model, master) for model in models for master in dict.fromkeys(model.mimics.values())}
+    held = {f"{model.name}/{joint}": _at_rest(model, joint) for model in models for joint in _coupled(model)}
     head = _head(out, models, found, held, directory)
     scene = _loaded(head, directory)
     rng = np.random.default_rng(0)
@@ -88,12 +91,14 @@ def draft(robot: Path, worlds: Sequence[Path], out: Path, packages: Mapping[str,
     always = set(scene.pairs)
     for touches in touching(scene, [middle, *random[:TRIED]]):
         always &= touches
-    ignored = tuple(sorted(always, key=lambda p: (p.a, p.b)))
+    robot_alone = [p for p in always if all(name.startswith(f"{models[0].name}/") for name in (p.a, p.b))]
+    ignored = tuple(sorted(robot_alone, key=lambda p: (p.a, p.b)))
     near = np.linalg.norm((random[TRIED:] - middle) / (scene.q_upper - scene.q_lower), axis=1)
     candidates = [middle, *random[TRIED:][np.argsort(near)]]
     seed = next((q for q, touches in zip(candidates, touching(scene, candidates), strict=True) if touches <= always), None)
     text = head + _joints(scene) + _ignore(ignored, scene)
-    return Draft(text, _loaded(text, directory), seed, ignored)
+    others = tuple(sorted(always - {*ignored}, key=lambda p: (p.a, p.b)))
+    return Draft(text, _loaded(text, directory), seed, ignored, others)
 
 
 def _read(path: Path) -> _Model:
@@ -165,6 +170,12 @@ def _packages(path: Path, given: Mapping[str, Path]) -> dict[str, Path]:
     return found
 
 
+def _coupled(model: _Model) -> list[str]:
+    """Returns the joints to hold: those that others mimic, and in SDFormat, where Drake does not read this, the others as well."""
+    followers = [] if model.path.suffix.lower() == ".urdf" else list(model.mimics)
+    return list(dict.fromkeys([*model.mimics.values(), *followers]))
+
+
 def _at_rest(model: _Model, joint: str) -> float:
     lower, upper = model.limits.get(joint, (0.0, 0.0))
     return float(np.clip(0.0, lower, upper))
@@ -178,10 +189,11 @@ def _head(out: Path, models: Sequence[_Model], packages: Mapping[str, Path], hel
         lines += [f"  {_quoted(package)}: {_quoted(os.path.relpath(root, directory))}" for package, root in packages.items()]
     lines.append("directives:")
     for model in models:
-        lines.append(f"  - add_model: {{name: {_quoted(model.name)}, file: {_quoted(os.path.relpath(model.path, directory))}}}")
+        lines.append(f"  - add_model: {{name: {_quoted(model.name)}, file: {_quoted(os.path.relpath(model.path.resolve(), directory))}}}")
         lines += [f"  - add_weld: {{parent: world, child: {_quoted(f'{model.name}::{root}')}}}" for root in model.roots]
     if any(model.roots for model in models[1:]):
-        lines.append("# A weld may have a pose: X_PC: {translation: [0.5, 0, 0], rotation: !Rpy {deg: [0, 0, 90]}}")
+        lines.append("# The welds say where things stand, not the poses of links in their files. A weld may have a pose:")
+        lines.append("#   X_PC: {translation: [0.5, 0, 0], rotation: !Rpy {deg: [0, 0, 90]}}")
     if held:
         lines += ["# Other joints mimic these, so they are held, and the others with them. Choose where.", "fix:"]
         lines += [f"  {_quoted(joint)}: {value:g}" for joint, value in held.items()]
@@ -218,4 +230,5 @@ def _ignore(pairs: Sequence[Pair], scene: Scene) -> str:
 
 def _quoted(text: str) -> str:
     """Returns a text as YAML has it, in quotes where it needs them."""
-    return text if all(c.isalnum() or c in "_-./" for c in text) and text[0].isalpha() else json.dumps(text)
+    plain = all((c.isalnum() and c.isascii()) or c in "_-./" for c in text) and text[:1].isalpha()
+    return text if plain and yaml.safe_load(text) == text else json.dumps(text)

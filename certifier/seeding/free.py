@@ -24,18 +24,28 @@ class Clearance:
         self._context = self._diagram.CreateDefaultContext()
 
     def least(self, q: Array) -> tuple[float, Pair]:
-        """Returns the least distance of a pair at q, (n,), without the padding, in metres, and the pair."""
+        """Returns the least distance of a pair at q, (n,), without the padding, in metres, and the pair.
+
+        It is minus infinity where Drake cannot tell how deep two bodies are in each other.
+        """
         query = self._query(q)
         ids = {geometry_name(query.inspector(), g): g for g in query.inspector().GetAllGeometryIds()}
-        distances = [
-            (query.ComputeSignedDistancePairClosestPoints(ids[p.a], ids[p.b]).distance, i) for i, p in enumerate(self._scene.pairs)
-        ]
-        distance, i = min(distances)
-        return float(distance), self._scene.pairs[i]
+        least, nearest = np.inf, self._scene.pairs[0]
+        for pair in self._scene.pairs:
+            try:
+                distance = query.ComputeSignedDistancePairClosestPoints(ids[pair.a], ids[pair.b]).distance
+            except RuntimeError:  # Drake gives up on some bodies that are deep in each other.
+                return -np.inf, pair
+            if distance < least:
+                least, nearest = distance, pair
+        return float(least), nearest
 
     def free(self, q: Array) -> bool:
         """Returns whether all pairs are farther apart at q, (n,), than twice the padding."""
-        near = self._query(q).ComputeSignedDistancePairwiseClosestPoints(2 * self._scene.padding)
+        try:
+            near = self._query(q).ComputeSignedDistancePairwiseClosestPoints(2 * self._scene.padding)
+        except RuntimeError:  # as above
+            return False
         return all(pair.distance > 2 * self._scene.padding for pair in near)
 
     def _query(self, q: Array) -> QueryObject:
@@ -58,7 +68,8 @@ def check_free(scene: Scene, q: Array, field: str) -> None:
     distance, pair = clearance.least(q)
     if distance > 2 * scene.padding:
         return
-    how = f"overlap by {-distance:.3g} m" if distance <= 0 else f"are {distance:.3g} m apart, with a padding of {scene.padding:g} m on each"
+    overlap = f"overlap by {-distance:.3g} m" if np.isfinite(distance) else "overlap"
+    how = overlap if distance <= 0 else f"are {distance:.3g} m apart, with a padding of {scene.padding:g} m on each"
     found = nearest_free(scene, clearance, scene.in_windows(q))
     hint = "move the seed, or ignore the pair in the scene" if found is None else _said(scene, scene.in_windows(q), found)
     raise RegionError("seed_in_collision", f"{pair.a} and {pair.b} {how}", field=field, hint=hint)

@@ -14,6 +14,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Sequence
 
+import numpy as np
 from flint import fmpq
 
 from certifier.errors import ProofError
@@ -74,8 +75,9 @@ def check_shape(scene: Scene, volume: Volume) -> None:
     """
     if not _is_known(scene, volume):
         raise ProofError("proof_volume", "a volume stands for nothing, or for what is no geometry of the scene")
-    if volume.vertices.ndim != 2 or volume.vertices.shape[1] != 3 or len(volume.vertices) == 0 or not volume.radius >= 0:
-        raise ProofError("proof_malformed", "a volume has no vertices or a negative radius")
+    shaped = volume.vertices.ndim == 2 and volume.vertices.shape[1] == 3 and len(volume.vertices) > 0
+    if not (shaped and np.isfinite(volume.vertices).all() and 0 <= volume.radius < np.inf):
+        raise ProofError("proof_malformed", "a volume has no vertices, or numbers that are no lengths")
     if volume.body not in scene.bodies:
         raise ProofError("proof_volume", f"the scene has no body {volume.body!r}")
 

@@ -112,10 +112,10 @@ def test_the_documents_snippets_say_what_the_service_says(client: TestClient, re
         known = client.post("/v1/planning/contains", json={"scene": "slider", "q": [[q]]}).json()["points"][0]["inside"]
         # The snippet for Drake is for joints that turn, and the slider slides: s = q, so tan(q / 2) is undone.
         given = 2 * np.arctan(q) if turning else q
-        names = {"q": np.array([given]), "q_star": np.array(space["q_star"])}
+        names = {"q": np.array([given])} | {key: np.array(space[key]) for key in ("q_star", "q_lower", "q_upper")}
         exec(snippet, names)
         assert bool(names["inside"]) is known
-    assert "model/slide: s = q - 0.0, q in metres" in (tmp_path / "region.yaml").read_text()
+    assert "model/slide: s = q - 0.0, q in metres, from -1.0 to 1.0" in (tmp_path / "region.yaml").read_text()
 
 
 def test_drake_reads_its_yaml_to_the_last_bit(client: TestClient, region: str, certified: Region, tmp_path) -> None:

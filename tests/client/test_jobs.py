@@ -58,8 +58,8 @@ def test_what_is_unknown_or_ambiguous_is_said(
     queued(database, scene)
     cases = [
         (("job", "show", "00000000-nothing"), "`ciris job ls` lists them"),
-        (("job", "show", waiting[:4]), "there is no job"),
-        (("job", "show", waiting[:8]), "give more of it"),
+        (("job", "show", waiting[:3]), "there is no job"),
+        (("job", "show", waiting[:4]), "give more of it"),
         (("region", "show", "00000000-nothing"), "`ciris region ls` lists them"),
         (("scene", "show", scene.name[:-1] + "x"), f"did you mean {scene.name}"),
         (("scene", "show", "nothing like it"), "`ciris scene ls` lists them"),

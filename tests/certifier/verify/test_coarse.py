@@ -235,7 +235,9 @@ def test_a_coarse_volume_makes_sense():
     refused(arm(), bar([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]], WORLD, 100.0), "2 joints")
     refused(arm(), bar([[1.0, 0.0, 0.0]] * 3, "arm/link1", 100.0), "neither a ball nor a capsule")
     refused(arm(), bar(np.zeros((0, 3)), "arm/link1", 100.0), "no vertices")
-    refused(arm(), bar([[1.0, 0.0, 0.0]], "arm/link1", -1.0), "negative radius")
+    for radius in (-1.0, np.inf, np.nan):
+        refused(arm(), bar([[1.0, 0.0, 0.0]], "arm/link1", radius), "numbers that are no lengths")
+    refused(arm(), bar([[1.0, np.nan, 0.0]], "arm/link1", 1.0), "numbers that are no lengths")
     refused(arm(), bar([[1.0, 0.0, 0.0]], "arm/link3", 100.0), "no body")
     refused(arm(), replace(bar([[1.0, 0.0, 0.0]], "arm/link1", 100.0), geometries=()), "stands for nothing")
     refused(arm(), replace(bar([[1.0, 0.0, 0.0]], "arm/link1", 100.0), geometries=("arm/link2/rod",)), "no geometry of the scene")
