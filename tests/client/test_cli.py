@@ -103,7 +103,7 @@ def files(tmp_path: Path) -> Path:
         (("grow", PLANAR, "--q", "0"), "2 joints"),
         (("grow", PLANAR, "--q", "0,9"), "seed.q[1]: joint arm/elbow is at 9"),
         (("grow", PLANAR, "--q", "-1.2,1.0"), "arm/lower/bar and obstacles/body/post overlap"),
-        (("grow", PLANAR, "--method", "magic"), "seed.method"),
+        (("grow", PLANAR, "--method", "magic"), "--method"),
         (("grow", PLANAR, "--deadline", "0"), "--deadline: 0 is no number of seconds above 0"),
         (("grow", PLANAR, "--deadline", "nan"), "--deadline: nan is no number"),
         (("grow", PLANAR, "--out", "nowhere/region.proof"), "the proof cannot be written into"),
@@ -239,7 +239,7 @@ def test_drakes_answer_is_numeric_at_most(ciris: Ciris, files: Path) -> None:
         (("--local", "--solver", "scs"), "add --backend drake"),
         (("--backend", "drake"), "add --local"),
         (("--local", "--backend", "drake", "--cells", "9"), "knows no cells"),
-        (("--local", "--cells", "0"), "cells must be an integer from 1"),
+        (("--local", "--cells", "0"), "--cells: must be an integer from 1"),
     ],
 )
 def test_drake_and_its_solvers_are_asked_for_properly(ciris: Ciris, files: Path, arguments: tuple[str, ...], words: str) -> None:
