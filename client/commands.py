@@ -15,8 +15,6 @@ from certifier.errors import CirisError
 from certifier.outcome import Outcome
 from certifier.verify.decimals import at_most_mm, exactly
 from client import output, service
-from client.find import api_key, service_url
-from client.http import Client
 from client.inputs import configuration, polytope_file, seed_of
 from client.output import Screen, print_json
 
@@ -38,7 +36,7 @@ def key(args: Namespace) -> int:
 
 
 def scene_add(args: Namespace) -> int:
-    with _client(args) as client:
+    with service.connect(args.url) as client:
         scene = client.add_scene(args.path)
         warnings = client.lint(scene["id"])["warnings"]
     for warning in warnings:
@@ -51,7 +49,7 @@ def scene_add(args: Namespace) -> int:
 
 
 def scene_ls(args: Namespace) -> int:
-    with _client(args) as client:
+    with service.connect(args.url) as client:
         scenes = client.scenes()
     if args.json:
         print_json(scenes)
@@ -62,7 +60,7 @@ def scene_ls(args: Namespace) -> int:
 
 
 def scene_show(args: Namespace) -> int:
-    with _client(args) as client:
+    with service.connect(args.url) as client:
         scene = client.scene(args.scene)
         lint, pairs = client.lint(args.scene), client.scene_pairs(args.scene)
     if args.json:
@@ -114,7 +112,7 @@ def grow(args: Namespace) -> int:
 
         grown, url = local.grow(args.scene, seed, options, args.deadline, screen, args.watch), None
     else:
-        with _client(args) as client:
+        with service.connect(args.url) as client:
             scene = service.known_scene(client, args.scene)
             grown = service.grow(client, _request(args, scene, seed, options), screen, args.watch)
             url = f"{client.url}/regions/{grown.region}"
@@ -139,7 +137,7 @@ def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, 
         raise CirisError(
             "several_seeds", "several seeds need a service, which keeps their regions", field="--q", hint="leave --local and --out out"
         )
-    with _client(args) as client:
+    with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
         requests = [_request(args, scene, seed, options) for seed in seeds]
         jobs = service.grow_many(client, requests, screen, args.watch)
@@ -204,7 +202,7 @@ def certify(args: Namespace) -> int:
 
         document, proof = local.certify(args.scene, polytope, screen, args.watch, drake, cells, args.out is not None)
     else:
-        with _client(args) as client:
+        with service.connect(args.url) as client:
             document = service.certify(client, service.known_scene(client, args.scene), polytope, screen, args.watch, cells)
             proof = client.proof(document["region"]) if args.out is not None and document["region"] else None
     if proof is not None:
@@ -245,7 +243,7 @@ def _drake(args: Namespace) -> str | None:
 
 
 def region_ls(args: Namespace) -> int:
-    with _client(args) as client:
+    with service.connect(args.url) as client:
         regions = client.regions(scene=args.scene)
         names = {scene["id"]: scene["name"] for scene in client.scenes()}
     if args.json:
@@ -268,7 +266,7 @@ def region_ls(args: Namespace) -> int:
 
 
 def region_show(args: Namespace) -> int:
-    with _client(args) as client:
+    with service.connect(args.url) as client:
         region = client.region(args.region)
     if args.json:
         print_json(region["manifest"])
@@ -280,7 +278,7 @@ def region_show(args: Namespace) -> int:
 
 
 def region_export(args: Namespace) -> int:
-    with _client(args) as client:
+    with service.connect(args.url) as client:
         data = client.proof(args.region) if args.format == "proof" else client.export(args.region, args.format)
     if args.out is not None:
         Path(args.out).write_bytes(data)
@@ -293,7 +291,7 @@ def region_export(args: Namespace) -> int:
 
 def contains(args: Namespace) -> int:
     points = [configuration(text) for text in args.q]
-    with _client(args) as client:
+    with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
         answer = client.contains(scene["id"], points)
     inside = all(point["inside"] for point in answer["points"])
@@ -319,7 +317,3 @@ def doctor(args: Namespace) -> int:
     else:
         output.print_facts([(finding.name, f"{'' if finding.good else 'PROBLEM: '}{finding.text}") for finding in findings])
     return OK if all(finding.good for finding in findings) else NO
-
-
-def _client(args: Namespace) -> Client:
-    return Client(service_url(args.url), api_key())

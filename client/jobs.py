@@ -6,10 +6,10 @@ from argparse import Namespace
 from typing import Any
 
 from client import output
-from client.find import api_key, service_url
 from client.follow import follow
-from client.http import Client, Document
+from client.http import Document
 from client.output import Screen, print_json
+from client.service import connect
 
 OK, NO = 0, 1
 SHORT = 8
@@ -17,7 +17,7 @@ SHORT = 8
 
 
 def job_ls(args: Namespace) -> int:
-    with _client(args) as client:
+    with connect(args.url) as client:
         jobs = client.jobs(state=args.state, scene=args.scene, most=args.most)
         names = {scene["id"]: scene["name"] for scene in client.scenes()}
     if args.json:
@@ -40,7 +40,7 @@ def job_ls(args: Namespace) -> int:
 
 
 def job_show(args: Namespace) -> int:
-    with _client(args) as client:
+    with connect(args.url) as client:
         job = client.job(args.job)
         regions = client.regions(job=job["id"])
     if args.json:
@@ -54,8 +54,8 @@ def job_show(args: Namespace) -> int:
 
 def job_follow(args: Namespace) -> int:
     """Tells what happens until the job has ended. Its exit status is 0 for a certified one."""
-    with _client(args) as client:
-        job = follow(client, client.job(args.job)["id"], Screen(), args.watch)
+    with connect(args.url) as client:
+        job = follow(client, args.job, Screen(), args.watch)
     if args.json:
         print_json(job)
     else:
@@ -64,14 +64,14 @@ def job_follow(args: Namespace) -> int:
 
 
 def job_cancel(args: Namespace) -> int:
-    with _client(args) as client:
-        job = client.cancel(client.job(args.job)["id"])
+    with connect(args.url) as client:
+        job = client.cancel(args.job)
     return _say(job, args)
 
 
 def job_retry(args: Namespace) -> int:
-    with _client(args) as client:
-        job = client.retry(client.job(args.job)["id"])
+    with connect(args.url) as client:
+        job = client.retry(args.job)
     return _say(job, args)
 
 
@@ -97,7 +97,3 @@ def _print(job: dict[str, Any]) -> None:
         *([("region", job["region"])] if job["region"] else []),
     ]
     output.print_facts(facts)
-
-
-def _client(args: Namespace) -> Client:
-    return Client(service_url(args.url), api_key())

@@ -10,6 +10,7 @@ from typing import Any
 from certifier.errors import CirisError
 from certifier.outcome import Guarantee, Outcome
 from client import verdicts
+from client.find import api_key, service_url
 from client.follow import follow
 from client.http import Client, Document
 from client.inputs import PolytopeFile, is_scene_file
@@ -33,6 +34,15 @@ class Grown:
     seconds: float
     region: str | None = None
     remark: str = ""
+
+
+def connect(url: str | None) -> Client:
+    """Returns a client of the service at this address, or of the one that is found (:func:`client.find.service_url`).
+
+    Raises:
+        CirisError: no_service.
+    """
+    return Client(service_url(url), api_key())
 
 
 def known_scene(client: Client, scene: str) -> Document:

@@ -104,6 +104,18 @@ class _Run:
     def proofs(self, candidate: Candidate) -> dict[int, bytes]:
         return {index: self.results[iteration][index][0].proof or b"" for index, iteration in candidate.proofs.items()}
 
+    def provenance(self, options: GrowthOptions, reason: str) -> dict[str, Any]:
+        """Returns what the manifest says of how a region came about."""
+        return {
+            "options": options.to_document(),
+            "versions": versions(self.scene),
+            "reason": reason,
+            "growth_curve": self.curve,
+            "seeding_seconds": self.seeding_seconds,
+            "pair_seconds": sum(result.seconds for found in self.results.values() for parts in found.values() for result in parts),
+            "seconds": self.seconds,
+        }
+
     def carry_out(self, action: Propose | Certify | Step) -> Report:
         if isinstance(action, Certify):
             return self.certify(action)
@@ -151,15 +163,7 @@ def grow(scene: Scene, options: GrowthOptions, tell: Tell = _silent, deadline_s:
     if run.candidate is None:
         hint = "allow more time" if late else "try another seed, or look at the pair named"
         raise CirisError("not_grown", transition.action.reason, hint=hint)
-    provenance = {
-        "options": options.to_document(),
-        "versions": versions(scene),
-        "reason": transition.action.reason,
-        "growth_curve": run.curve,
-        "seeding_seconds": run.seeding_seconds,
-        "pair_seconds": sum(result.seconds for found in run.results.values() for parts in found.values() for result in parts),
-        "seconds": run.seconds,
-    }
+    provenance = run.provenance(options, transition.action.reason)
     return certified_region(scene, run.candidate, run.proofs(run.candidate), provenance, run.proposal, processes)
 
 
@@ -194,14 +198,6 @@ def certify(
     candidate = advance(scene, first.state, report).candidate if assemble else None
     region = None
     if candidate is not None:
-        provenance = {
-            "options": options.to_document(),
-            "versions": versions(scene),
-            "reason": "certified",
-            "growth_curve": [],
-            "seeding_seconds": 0.0,
-            "pair_seconds": sum(result.seconds for result in results.values()),
-            "seconds": run.seconds,
-        }
+        provenance = run.provenance(options, "certified")
         region = certified_region(scene, candidate, run.proofs(candidate), provenance, None, processes)
     return Verdict(results, Guarantee.EXACT, time.perf_counter() - start, region)
