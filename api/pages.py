@@ -242,31 +242,25 @@ def progress(matrix: PairMatrix) -> Progress | None:
 
 @dataclass(frozen=True)
 class Chart:
-    """A chart is a step line in an SVG of ``width`` by ``height`` pixels. Its vertical axis is logarithmic in the volume."""
+    """A chart is a step line in an SVG of ``width`` by ``height`` pixels, from 0 at the bottom to ``top`` at the top."""
 
     width: int
     height: int
+    top: float
     line: str
     dots: list[tuple[float, float, str]]
 
 
 def growth_chart(curve: list[GrowthPoint]) -> Chart | None:
-    """Draws the certified volume over time; returns None before the first region."""
-    if not curve:
+    """Draws over time how much of the proposal is certified; returns None before the first region, and where no share is known."""
+    known = [(point, point.share) for point in curve if point.share is not None]
+    if not known:
         return None
     width, height = _CHART
     pad = 10
-    end = max(point.seconds for point in curve) or 1.0
-    logs = [math.log10(max(point.ellipsoid_volume, 1e-300)) for point in curve]
-    low, high = min(logs), max(logs)
-    spread = high - low or 1.0
-    xs = [pad + (width - 2 * pad) * point.seconds / end for point in curve]
-    ys = [height - pad - (height - 2 * pad) * ((value - low) / spread if high > low else 0.5) for value in logs]
+    end, top = max(point.seconds for point, _ in known) or 1.0, max(share for _, share in known)
+    xs = [pad + (width - 2 * pad) * point.seconds / end for point, _ in known]
+    ys = [height - pad - (height - 2 * pad) * (share / top if top else 0.0) for _, share in known]
     line = f"M{xs[0]:.1f},{ys[0]:.1f}" + "".join(f"H{x:.1f}V{y:.1f}" for x, y in zip(xs[1:], ys[1:], strict=True))
-    labels = [
-        f"iteration {p.iteration}: volume {p.ellipsoid_volume:.4g}"
-        + ("" if p.share is None else f", {100 * p.share:.3g} % of the proposal")
-        + f", after {p.seconds:.1f} s"
-        for p in curve
-    ]
-    return Chart(width, height, line, list(zip(xs, ys, labels, strict=True)))
+    labels = [f"iteration {point.iteration}: {100 * share:.3g} % of the proposal after {point.seconds:.1f} s" for point, share in known]
+    return Chart(width, height, top, line, list(zip(xs, ys, labels, strict=True)))

@@ -30,6 +30,8 @@ SCHEMA_VERSION = 1
 WORLD = "world"
 MAX_NAME, MAX_SENTENCE = 200, 500
 """A name has at most MAX_NAME characters, and a sentence of free text has at most MAX_SENTENCE."""
+ALPHABET = f"at most {MAX_NAME} ASCII letters, digits, _-./:+@#()[],= and single spaces inside"
+"""This text tells people what a name may consist of (:func:`is_name`)."""
 _NAME = re.compile(r"[\w\-./:+@#()\[\],=]+(?: [\w\-./:+@#()\[\],=]+)*", re.ASCII)
 
 

@@ -264,6 +264,7 @@ def _parser() -> argparse.ArgumentParser:
     export = region.add_parser("export", parents=[remote], help="write a region to a file")
     export.add_argument("region", metavar="ID")
     export.add_argument("--format", choices=["json", "npz", "drake-yaml", "proof"], default="json")
+    export.add_argument("--name", help="what the region is called in the file; default: its id")
     export.add_argument("--out", metavar="FILE", help="file to write; default: standard output")
     export.set_defaults(run="client.commands:region_export")
 

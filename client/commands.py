@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
-import re
 import sys
 from argparse import Namespace
 from pathlib import Path
@@ -17,6 +15,7 @@ from certifier.verify.decimals import at_most_mm, exactly
 from client import output, service
 from client.inputs import configuration, polytope_file, seed_of
 from client.output import Screen, print_json
+from client.proof_file import ProofFile
 
 OK, NO = 0, 1
 
@@ -105,18 +104,22 @@ def grow(args: Namespace) -> int:
         raise CirisError("option", f"{args.deadline:g} is no number of seconds above 0", field="--deadline")
     if len(seeds) > 1:
         return _grow_many(args, seeds, options, screen)
-    check_writable(args.out)
-    seed = seeds[0]
+    proof, seed = ProofFile(args.out), seeds[0]
     if args.local:
         from client import local
 
-        grown, url = local.grow(args.scene, seed, options, args.deadline, screen, args.watch), None
+        try:
+            grown, url = local.grow(args.scene, seed, options, args.deadline, screen, args.watch, proof.write), None
+        except KeyboardInterrupt:
+            if proof.path is not None:
+                screen.line(f"the proof of the best region so far: {proof.path} (check it: ciris verify {proof.path})")
+            raise
     else:
         with service.connect(args.url) as client:
             scene = service.known_scene(client, args.scene)
             grown = service.grow(client, _request(args, scene, seed, options), screen, args.watch)
             url = f"{client.url}/regions/{grown.region}"
-    path = save_proof(grown.manifest, grown.proof, args.out)
+    path = proof.write(grown.manifest["scene"]["name"], grown.proof)
     if args.json:
         print_json({**grown.manifest, "seconds": grown.seconds, "proof": str(path)})
         return OK
@@ -149,45 +152,14 @@ def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, 
             (
                 ", ".join(f"{x:g}" for x in seed["q"]),
                 job["region"] or "none",
-                f"{grown[job['region']]['ellipsoid_volume']:.4g}" if job["region"] else "",
+                _box(grown[job["region"]]) if job["region"] else "",
                 output.share(grown[job["region"]]["share"]) if job["region"] else "",
                 job["reason"] or "",
             )
             for seed, job in zip(seeds, jobs, strict=True)
         ]
-        output.print_table(("q", "region", "ellipsoid", "share", "ended"), rows, right="ellipsoid share")
+        output.print_table(("q", "region", "box", "share", "ended"), rows, right="box share")
     return OK if len(grown) == len(jobs) else NO
-
-
-def file_name(name: str) -> str:
-    """Returns a scene's name as part of a file's name: a name may hold slashes and dots, which must not lead elsewhere."""
-    return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-") or "scene"
-
-
-def check_writable(out: str | None) -> None:
-    """Refuses, before a job takes minutes, a place that its proof cannot be written to.
-
-    Raises:
-        CirisError: not_writable.
-    """
-    path = Path(out or ".")
-    directory = path.parent if out else path
-    if path.is_dir() and out:
-        raise CirisError("not_writable", f"{out} is a directory", field="--out", hint="name a file")
-    if not directory.is_dir() or not os.access(directory, os.W_OK):
-        raise CirisError(
-            "not_writable", f"the proof cannot be written into {directory.absolute()}", field="--out", hint="name a file elsewhere"
-        )
-
-
-def save_proof(manifest: dict[str, Any], proof: bytes, out: str | None) -> Path:
-    """Writes the proof file and returns its path, which is in this directory unless the user named another one.
-
-    The file's name holds the proof's digest, so the same proof gives the same file.
-    """
-    path = Path(out or f"{file_name(manifest['scene']['name'])}-{hashlib.sha256(proof).hexdigest()[:8]}.proof")
-    path.write_bytes(proof)
-    return path
 
 
 def certify(args: Namespace) -> int:
@@ -195,19 +167,17 @@ def certify(args: Namespace) -> int:
     polytope = polytope_file(args.polytope)
     drake, cells = _drake(args), 1 if args.cells is None else args.cells
     proof: bytes | None
-    if args.out is not None:
-        check_writable(args.out)
+    kept = None if args.out is None else ProofFile(args.out)
     if args.local:
         from client import local
 
-        document, proof = local.certify(args.scene, polytope, screen, args.watch, drake, cells, args.out is not None)
+        document, proof = local.certify(args.scene, polytope, screen, args.watch, drake, cells, kept is not None)
     else:
         with service.connect(args.url) as client:
             document = service.certify(client, service.known_scene(client, args.scene), polytope, screen, args.watch, cells)
-            proof = client.proof(document["region"]) if args.out is not None and document["region"] else None
-    if proof is not None:
-        Path(args.out).write_bytes(proof)
-    document = {**document, "proof": args.out if proof is not None else None}
+            proof = client.proof(document["region"]) if kept is not None and document["region"] else None
+    path = None if kept is None or proof is None else kept.write(document["scene"]["name"], proof)
+    document = {**document, "proof": None if path is None else str(path)}
     if args.json:
         print_json(document)
     else:
@@ -222,8 +192,8 @@ def certify(args: Namespace) -> int:
         print(f"{scene}: {output.plain(document['outcome'])}, guarantee {document['guarantee']}, {output.seconds(document['seconds'])}")
         if document["region"] is not None:
             print(f"region {document['region']}")
-        if proof is not None:
-            print(f"proof {args.out} (check it: ciris verify {args.out})")
+        if path is not None:
+            print(f"proof {path} (check it: ciris verify {path})")
     return OK if document["outcome"] == "certified" else NO
 
 
@@ -254,15 +224,21 @@ def region_ls(args: Namespace) -> int:
             r["id"],
             names.get(r["scene"]) or r["scene"],
             str(r["faces"]),
-            f"{r['ellipsoid_volume']:.4g}",
+            _box(r),
             output.share(r["share"]),
             r["guarantee"],
             r["created_at"][:19],
         )
         for r in regions
     ]
-    output.print_table(("id", "scene", "faces", "volume", "share", "guarantee", "created"), rows, right="faces volume share")
+    output.print_table(("id", "scene", "faces", "box", "share", "guarantee", "created"), rows, right="faces box share")
     return OK
+
+
+def _box(region: dict[str, Any]) -> str:
+    """Returns the size of a region in a list: the side of a box that is as large, or its q-volume where joints slide."""
+    size = region["q_volume"]
+    return "-" if size is None else f"{size['box_side']:.3g} deg" if size["box_side"] else f"{size['value']:.3g} {size['unit']}"
 
 
 def region_show(args: Namespace) -> int:
@@ -279,7 +255,7 @@ def region_show(args: Namespace) -> int:
 
 def region_export(args: Namespace) -> int:
     with service.connect(args.url) as client:
-        data = client.proof(args.region) if args.format == "proof" else client.export(args.region, args.format)
+        data = client.proof(args.region) if args.format == "proof" else client.export(args.region, args.format, args.name)
     if args.out is not None:
         Path(args.out).write_bytes(data)
     elif args.format in ("npz", "proof") and sys.stdout.isatty():

@@ -19,11 +19,11 @@ from typing import Any
 import certifier
 from certifier.errors import CirisError
 from client import output, service
-from client.commands import file_name, save_proof
 from client.find import api_key, data_dir, running_stack
 from client.http import Client
 from client.inputs import seed_of
 from client.output import Screen
+from client.proof_file import ProofFile, file_name
 
 SCENE = Path(__file__).resolve().parent.parent / "examples" / "iiwa_shelf" / "scene.yaml"
 DEADLINE_SECONDS = 120
@@ -62,7 +62,7 @@ def _demonstrate(url: str) -> tuple[bool, str | None]:
         print(f"scene {scene['name']}: {size}", flush=True)
         request = {"kind": "grow", "scene": scene["id"], "seed": {"q": seed_of(str(SCENE), None)}, "deadline_seconds": DEADLINE_SECONDS}
         grown = service.grow(client, request, Screen(), idempotency_key=_key(request))
-    path = save_proof(grown.manifest, grown.proof, str(data_dir() / f"{file_name(scene['name'])}.proof"))
+    path = ProofFile(str(data_dir() / f"{file_name(scene['name'])}.proof")).write(scene["name"], grown.proof)
     print("\nevery pair of bodies:")
     output.print_pairs(grown.manifest["pairs"])
     print("\ncertified region:")

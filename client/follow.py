@@ -6,7 +6,7 @@ from typing import Any
 
 from certifier.outcome import Outcome
 from client.http import Client, Document
-from client.output import Screen, plain, seconds, share
+from client.output import Screen, plain, q_volume, seconds, share
 
 _STEPS = {"propose": "seeding", "step": "polytope step", "accept": "assembling and verifying the region"}
 
@@ -22,7 +22,7 @@ class Teller:
     def __init__(self, screen: Screen, pairs: list[str], watch: bool) -> None:
         self._screen, self._pairs, self._watch = screen, pairs, watch
         self._total = self._done = 0
-        self._failure, self._what = "", "pairs"
+        self._failure, self._what, self._kept = "", "pairs", ""
 
     def tell(self, event: Document) -> None:
         """Says what the event means. It ignores kinds that it does not know."""
@@ -47,7 +47,7 @@ class Teller:
             return
         self._total, self._done, self._failure = data["parts"], 0, ""
         self._what = "pairs" if data["parts"] == data["pairs"] else f"parts of {data['pairs']} pairs"
-        self._screen.status(f"iteration {data['index']} ({data['label']}): {self._total} {self._what}")
+        self._screen.status(f"iteration {data['index']} ({data['label']}): {self._total} {self._what}{self._kept}", 0.0)
 
     def _tell_pairs(self, data: dict[str, Any]) -> None:
         for pair in data["pairs"]:
@@ -57,15 +57,18 @@ class Teller:
                 self._failure = f"; {text}"
             if self._watch:
                 self._screen.line(f"  {self._done}/{self._total} {text} ({seconds(pair['seconds'])})")
-            self._screen.status(f"iteration {data['iteration']}: {self._done}/{self._total} {self._what}, {text}")
+            state = f"iteration {data['iteration']}: {self._done} of {self._total} {self._what} settled{self._kept}, {text}"
+            self._screen.status(state, self._done / self._total)
 
     def _tell_note(self, data: dict[str, Any]) -> None:
-        self._screen.status(data["text"])
+        self._screen.status(data["text"], data["part"])
 
     def _tell_region(self, data: dict[str, Any]) -> None:
-        kept = f", {share(data['share'])} of the proposal" if data["share"] else ""
         name = f" {data['region_id'][:8]}" if "region_id" in data else ""
-        self._screen.line(f"certified region{name} of iteration {data['iteration']}: ellipsoid volume {data['ellipsoid_volume']:.4g}{kept}")
+        kept = f"{share(data['share'])} of the proposal, " if data["share"] else ""
+        self._screen.line(f"certified region{name} of iteration {data['iteration']}: {kept}{q_volume(data['q_volume'])}")
+        if data["share"] and data["share"]["value"] is not None:
+            self._kept = f", {100 * data['share']['value']:.0f} % kept so far"
 
 
 def follow(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:

@@ -176,9 +176,10 @@ class Client:
         """Returns the proof of a pair's outcome in one iteration of a job, together with the scene."""
         return self._send("GET", f"/v1/jobs/{_segment(job_id)}/pairs/{pair}/proof", params={"iteration": iteration}).content
 
-    def export(self, region_id: str, format: str) -> bytes:
-        """Returns a region as the bytes of a ``json``, ``npz`` or ``drake-yaml`` file."""
-        return self._send("GET", f"/v1/regions/{_segment(region_id)}/export", params={"format": format}).content
+    def export(self, region_id: str, format: str, name: str | None = None) -> bytes:
+        """Returns a region as the bytes of a ``json``, ``npz`` or ``drake-yaml`` file, in which it has this name, or else its id."""
+        params = {"format": format, **({} if name is None else {"name": name})}
+        return self._send("GET", f"/v1/regions/{_segment(region_id)}/export", params=params).content
 
     def contains(self, scene: str, q: list[list[float]]) -> Document:
         """Returns which regions of a scene contain each of these configurations."""

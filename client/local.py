@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from certifier.errors import SceneError
 from certifier.model import Scene
@@ -13,6 +14,9 @@ from client.follow import Teller
 from client.inputs import PolytopeFile, is_scene_file
 from client.output import Screen
 from client.service import Grown
+
+if TYPE_CHECKING:
+    from certifier.jobs.region import Region
 
 
 def load(scene: str) -> Scene:
@@ -28,14 +32,31 @@ def load(scene: str) -> Scene:
     return load_scene(scene)
 
 
-def grow(scene: str, seed: dict[str, Any], options: dict[str, Any], deadline_s: float | None, screen: Screen, watch: bool = False) -> Grown:
-    """Grows a region in this process and children of it; ``deadline_s`` is as for :func:`certifier.jobs.local.grow`."""
+def grow(
+    scene: str,
+    seed: dict[str, Any],
+    options: dict[str, Any],
+    deadline_s: float | None,
+    screen: Screen,
+    watch: bool,
+    keep: Callable[[str, bytes], Path],
+) -> Grown:
+    """Grows a region in this process and children of it.
+
+    Args:
+        deadline_s: as for :func:`certifier.jobs.local.grow`.
+        keep: writes the proof of a region of the scene with this name; it is called for regions that are certified before the last one too.
+    """
     loaded = load(scene)
     from certifier.growth.options import GrowthOptions
     from certifier.jobs import local
 
     asked = GrowthOptions.from_document({"kind": "grow", "seed": seed, **options})
-    region = local.grow(loaded, asked, _teller(loaded, screen, watch), deadline_s, processes=cores())
+
+    def deliver(region: Region) -> None:
+        screen.line(f"its proof: {keep(loaded.name, region.proof)}")
+
+    region = local.grow(loaded, asked, _teller(loaded, screen, watch), deadline_s, cores(), deliver)
     screen.clear()
     provenance = region.manifest["provenance"]
     return Grown(region.manifest, region.proof, provenance["seconds"], remark=provenance["reason"])

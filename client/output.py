@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+import time
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -17,29 +18,52 @@ NEGATIVE = {"not_grown"}
 
 
 class Screen:
-    """A screen shows progress on standard error: lines that stay, and on a terminal one line that is overwritten."""
+    """A screen shows progress on standard error: lines that stay, and on a terminal one status line below them.
+
+    The status line tells how long the command has run.
+    """
 
     def __init__(self) -> None:
         self._terminal = sys.stderr.isatty()
-        self._status = False
+        self._began = time.monotonic()
+        self._status = ""
 
     def line(self, text: str) -> None:
-        """Prints a line that stays."""
-        self.clear()
+        """Prints a line that stays, above the status line."""
+        self._erase()
         print(text, file=sys.stderr, flush=True)
+        self._draw()
 
-    def status(self, text: str) -> None:
-        """Shows the present state in the status line. It does so on a terminal only."""
+    def status(self, text: str, part: float | None = None) -> None:
+        """Shows the present state in the status line, on a terminal only.
+
+        Args:
+            part: how much of it is done, from 0 to 1, which a bar shows; None where that is not known.
+        """
         if self._terminal:
-            width = shutil.get_terminal_size().columns - 1
-            print(f"\r\x1b[2K{text[:width]}", end="", file=sys.stderr, flush=True)
-            self._status = True
+            self._status = text if part is None else f"{bar(part)} {text}"
+            self._draw()
 
     def clear(self) -> None:
         """Removes the status line."""
+        self._erase()
+        self._status = ""
+
+    def _draw(self) -> None:
+        if self._status:
+            took = seconds(time.monotonic() - self._began, whole=True)
+            width = shutil.get_terminal_size().columns - 1
+            print(f"\r\x1b[2K{f'{self._status}, {took}'[:width]}", end="", file=sys.stderr, flush=True)
+
+    def _erase(self) -> None:
         if self._status:
             print("\r\x1b[2K", end="", file=sys.stderr, flush=True)
-            self._status = False
+
+
+def bar(part: float, width: int = 20) -> str:
+    """Returns a bar that is filled up to this part, from 0 to 1."""
+    filled = int(width * part)
+    return f"[{'#' * filled}{'-' * (width - filled)}]"
 
 
 def print_json(document: Any) -> None:
@@ -71,11 +95,11 @@ def plain(outcome: str | None) -> str:
     return "-" if outcome is None else outcome.replace("_", " ")
 
 
-def seconds(value: float | None) -> str:
+def seconds(value: float | None, whole: bool = False) -> str:
     """Returns a duration, in seconds, as a text for people."""
     if value is None:
         return "-"
-    return f"{value:.2f} s" if value < 10 else f"{value:.0f} s" if value < 600 else f"{value / 60:.0f} min"
+    return f"{value:.2f} s" if value < 10 and not whole else f"{value:.0f} s" if value < 600 else f"{value / 60:.0f} min"
 
 
 def margin(value: float | None) -> str:
@@ -88,6 +112,14 @@ def share(document: dict[str, Any] | None) -> str:
     if document is None or document["value"] is None:
         return "-"
     return f"{100 * document['value']:.3g} +- {100 * document['stderr']:.1g} %"
+
+
+def q_volume(document: dict[str, Any] | None) -> str:
+    """Returns a region's volume in joint positions as a text for people. Regions that an earlier checkout stored do not say it."""
+    if document is None:
+        return "-"
+    side = f", that of a box of {document['box_side']:.3g} deg in each joint" if document["box_side"] else ""
+    return f"{document['value']:.3g} +- {document['stderr']:.1g} {document['unit']}{side}"
 
 
 def print_pairs(pairs: Iterable[dict[str, Any]]) -> None:
@@ -110,22 +142,20 @@ def _range(known: dict[str, Any]) -> str:
 
 def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()) -> None:
     """Prints a region's manifest in a few lines."""
-    volume, pairs, space = manifest["volume"], manifest["pairs"], manifest["space"]
+    pairs, space = manifest["pairs"], manifest["space"]
     limits = 2 * len(space["joints"])
     faces = len(manifest["halfspace_offsets"])
     closest = min((p for p in pairs if p["margin"] is not None), key=lambda p: p["margin"], default=None)
-    error = volume["polytope_stderr"]
     # Regions that an earlier checkout stored have neither.
     ranges, kept = manifest.get("joint_ranges", {}), manifest.get("share")
     moves = [f"{name}: {_range(r)}" for name, r in ranges.items()] or space["joints"]
-    polytope = f"{volume['polytope']:.4g}" + ("" if error is None else f" +- {error:.1g}")
     print_facts(
         [
             ("scene", f"{manifest['scene']['name']} ({manifest['scene']['hash'][:16]})"),
             *(("" if i else "joints", text) for i, text in enumerate(moves)),
             ("faces", f"{faces}, {limits} of them joint limits" if faces > limits else str(faces)),
-            ("volume", f"inscribed ellipsoid {volume['ellipsoid']:.4g}, polytope {polytope} (in s)"),
-            *([("share", f"{share(kept)} of the proposal's collision-free part (in q)")] if kept else []),
+            ("volume", q_volume(manifest.get("q_volume"))),
+            *([("share", f"{share(kept)} of the proposal's collision-free part")] if kept else []),
             ("pairs", f"{sum(p['outcome'] == 'certified' for p in pairs)} of {len(pairs)} certified, {len(manifest['ignored'])} ignored"),
             *([("margin", f"at least {margin(closest['margin'])}: {closest['a']} - {closest['b']}")] if closest else []),
             ("guarantee", manifest["guarantee"]),

@@ -95,7 +95,8 @@ def _progress() -> Iterator[Path]:
         while not ended.wait(0.2):
             numbers = told.read_text().split()
             if len(numbers) == 2:
-                screen.status("checked {} of {} cells and proofs".format(*numbers))
+                done, total = map(int, numbers)
+                screen.status(f"{done} of {total} cells and proofs checked", done / total)
 
     with tempfile.NamedTemporaryFile(prefix="ciris-") as file:
         thread = threading.Thread(target=show, args=(Path(file.name),), daemon=True)

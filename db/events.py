@@ -20,7 +20,7 @@ def emit(session: Session, job: JobRow, kind: str, data: dict[str, Any]) -> None
     - ``iteration``: index, label, state, pairs, parts;
     - ``pairs``: iteration, and pairs (each with index, part, state, stage, margin, seconds);
     - ``step``: kind, state, seconds;
-    - ``region``: region_id, iteration, guarantee, ellipsoid_volume, share (as in the manifest);
+    - ``region``: region_id, iteration, guarantee, ellipsoid_volume, q_volume and share (as in the manifest);
     - ``lost``: worker, reason, and either iteration and pairs or step, which are open again.
     """
     job.event_seq += 1

@@ -124,6 +124,8 @@ class JobRow(Base):
     """No open pair that has killed no process has a lower id. Claims look from here on."""
     region_id: Mapped[str | None] = mapped_column(String(36))
     """Id of the last region accepted."""
+    accept_after: Mapped[datetime] = mapped_column(default=utcnow)
+    """No region is accepted before this time, so that accepting leaves most of the workers' time to the growth (db.steps)."""
     event_seq: Mapped[int] = mapped_column(default=0)
     """``seq`` of the last event."""
     turn: Mapped[int] = mapped_column(default=0)
@@ -259,8 +261,6 @@ class StepRow(Leased, Base):
     state: Mapped[str] = mapped_column(String(16), default=states.StepState.OPEN)
     input: Mapped[Document]
     """What the step works on: the action, or the accepted polytope."""
-    due_at: Mapped[datetime] = mapped_column(default=utcnow)
-    """A worker must not begin the step before this time."""
     report: Mapped[Document | None]
     """What the step found, or the CirisError document that says why it failed."""
     seconds: Mapped[float | None]
@@ -296,6 +296,9 @@ class RegionRow(Base):
     """Number of faces, m."""
     proof_digest: Mapped[str] = mapped_column(ForeignKey("proofs.digest"))
     ellipsoid_volume: Mapped[float]
+    """In s."""
+    q_volume: Mapped[Document | None]
+    """How large the region is in q, as its manifest says it; None for a region of an earlier version."""
     share: Mapped[Document | None]
     """How much of the proposal the region keeps, as its manifest says it; None for a given polytope."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow, index=True)

@@ -36,6 +36,7 @@ def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any],
         faces=len(d),
         proof_digest=proofs.put(session, [proof])[proof],
         ellipsoid_volume=volume,
+        q_volume=manifest["q_volume"],
         share=manifest["share"],
     )
     session.add(region)
@@ -43,7 +44,7 @@ def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any],
     session.flush()
     job.region_id = session.scalar(_latest(job.id))
     data = {"region_id": region.id, "iteration": iteration, "guarantee": region.guarantee, "ellipsoid_volume": volume}
-    events.emit(session, job, "region", data | {"share": region.share})
+    events.emit(session, job, "region", data | {"q_volume": region.q_volume, "share": region.share})
     return region
 
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from datetime import datetime
-from typing import Any, cast
+from typing import Any
 
-from sqlalchemy import BindParameter, ColumnElement, CursorResult, select, update
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, select
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from db import events, jobs, leases
 from db.models import JobRow, StepRow
 from db.states import STEP, StepKind, StepState, transition, unfinished
-from db.types import utcnow
 
 UNFINISHED = unfinished(STEP)
 
@@ -32,9 +30,9 @@ class Claim:
     deaths: int
 
 
-def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any], due_at: datetime | None = None) -> StepRow:
-    """Adds a step of the job's present turn. It is due now unless ``due_at`` says otherwise. The caller holds the job's lock."""
-    step = StepRow(job_id=job.id, turn=job.turn, kind=kind, input=input, due_at=due_at or utcnow())
+def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any]) -> StepRow:
+    """Adds a step of the job's present turn. The caller holds the job's lock."""
+    step = StepRow(job_id=job.id, turn=job.turn, kind=kind, input=input)
     session.add(step)
     session.flush()
     events.emit(session, job, "step", {"kind": kind, "state": StepState.OPEN})
@@ -42,8 +40,8 @@ def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any], du
 
 
 def claim(session: Session, job: JobRow, kinds: Collection[StepKind], *, lease_seconds: float) -> Claim | None:
-    """Claims the job's latest step of these kinds that is open and due; returns None without one. The caller holds the job's lock."""
-    query = select(StepRow).where(StepRow.job_id == job.id, is_due(StepRow, utcnow()), StepRow.kind.in_(kinds))
+    """Claims the job's latest step of these kinds that is open; returns None without one. The caller holds the job's lock."""
+    query = select(StepRow).where(is_open(StepRow, job.id, kinds))
     step = session.scalar(query.order_by(StepRow.turn.desc()).limit(1))
     if step is None:
         return None
@@ -70,16 +68,9 @@ def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any
     return True
 
 
-def is_due(step: type[StepRow], now: datetime | BindParameter[datetime]) -> ColumnElement[bool]:
-    """Returns the condition that the step is open and may be begun."""
-    return (step.state == StepState.OPEN) & (step.due_at <= now)
-
-
-def hasten(session: Session, job_id: str) -> bool:
-    """Makes the job's open steps due now. Returns False when they are due already."""
-    now = utcnow()
-    late = update(StepRow).where(StepRow.job_id == job_id, StepRow.state == StepState.OPEN, StepRow.due_at > now).values(due_at=now)
-    return bool(cast("CursorResult[Any]", session.execute(late)).rowcount)
+def is_open(step: type[StepRow], job_id: str | InstrumentedAttribute[str], kinds: Collection[StepKind]) -> ColumnElement[bool]:
+    """Returns the condition that the step is an open one of the job, of one of these kinds."""
+    return (step.job_id == job_id) & (step.state == StepState.OPEN) & step.kind.in_(kinds)
 
 
 def skip(session: Session, job_id: str) -> None:

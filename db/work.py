@@ -31,17 +31,19 @@ def next_job(session: Session) -> str | None:
 
 
 def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds: float) -> pairs.Claim | steps.Claim | None:
-    """Claims one piece of the job's work: a step that the job waits for, else pairs, else the latest region to accept.
+    """Claims one piece of the job's work: a step that the job waits for, else the latest region to accept, else pairs.
 
-    A job accepts one region at a time. The function returns None when other workers were faster.
+    So a region is there for planners soon after it was certified. A job accepts one region at a time, and rests in between
+    (``jobs.accept_after``). The function returns None when other workers were faster.
     """
     job = jobs.lock(session, job_id)
     claimed: pairs.Claim | steps.Claim | None = None
     if job.state == JobState.RUNNING:
         claimed = steps.claim(session, job, URGENT, lease_seconds=lease_seconds)
-        claimed = claimed or pairs.claim(session, job, lease_seconds=lease_seconds, batch_seconds=batch_seconds)
     if claimed is None and session.scalar(_has_region_now(), {"job": job_id, "now": utcnow()}):
         claimed = steps.claim(session, job, [StepKind.ACCEPT], lease_seconds=lease_seconds)
+    if claimed is None and job.state == JobState.RUNNING:
+        claimed = pairs.claim(session, job, lease_seconds=lease_seconds, batch_seconds=batch_seconds)
     return claimed
 
 
@@ -73,13 +75,13 @@ def _has_region_now() -> Select[str]:
 
 def _has_work() -> ColumnElement[bool]:
     """Returns the condition that :func:`claim` would find work."""
-    step = exists().where(StepRow.job_id == JobRow.id, steps.is_due(StepRow, _NOW), StepRow.kind.in_(URGENT))
+    step = exists().where(steps.is_open(StepRow, JobRow.id, URGENT))
     return or_(and_(JobRow.state == JobState.RUNNING, or_(JobRow.open_pairs > 0, step)), _has_region())
 
 
 def _has_region() -> ColumnElement[bool]:
-    """Returns the condition that the job has a region to accept and nobody is accepting one of its regions."""
+    """Returns the condition that the job has a region to accept, has rested, and nobody is accepting one of its regions."""
     step, other = aliased(StepRow), aliased(StepRow)
-    waits = exists().where(step.job_id == JobRow.id, step.kind == StepKind.ACCEPT, steps.is_due(step, _NOW))
+    waits = exists().where(steps.is_open(step, JobRow.id, [StepKind.ACCEPT]))
     accepting = exists().where(other.job_id == JobRow.id, other.kind == StepKind.ACCEPT, other.state == StepState.RUNNING)
-    return and_(JobRow.state.in_((JobState.RUNNING, JobState.CANCELLING)), waits, ~accepting)
+    return and_(JobRow.state.in_((JobState.RUNNING, JobState.CANCELLING)), JobRow.accept_after <= _NOW, waits, ~accepting)

@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from datetime import timedelta
 from functools import lru_cache
 from typing import Any
 
@@ -18,7 +19,7 @@ from certifier.growth.actions import Candidate
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
 from certifier.isolation.child import run_in_child
-from certifier.jobs.region import certified_region, growth_point, versions
+from certifier.jobs.region import REST, certified_region, growth_point, versions
 from certifier.jobs.share import SampledProposal
 from certifier.model import Array, Polytope, Scene
 from certifier.step.step import step as polytope_step
@@ -71,6 +72,8 @@ def _save(claim: steps.Claim, state: StepState, done: Done, seconds: float) -> b
         job = jobs.lock(session, claim.job_id)
         if not steps.save(session, claim, state, done.report, seconds):
             return False
+        if claim.kind == StepKind.ACCEPT and state == StepState.DONE:
+            job.accept_after = utcnow() + timedelta(seconds=REST * seconds)
         done.save(session, job)
         return True
 

@@ -36,11 +36,6 @@ from workers.transaction import Afterwards, persistently, writing
 
 log = logging.getLogger(__name__)
 
-ACCEPT_SECONDS = 20.0
-"""A certified polytope waits this many seconds for a larger one before it becomes a region.
-
-Making it a region takes as long as verifying all its proofs.
-"""
 COORDINATION_SECONDS = 60.0
 """A coordinator that has not answered after this many seconds is believed dead."""
 
@@ -188,7 +183,7 @@ def _add_acceptance(session: Session, job: JobRow, candidate: Candidate) -> None
         "ellipsoid_volume": candidate.ellipsoid_volume,
         "proofs": candidate.proofs,
     }
-    steps.add(session, job, StepKind.ACCEPT, work_on, utcnow() + timedelta(seconds=ACCEPT_SECONDS))
+    steps.add(session, job, StepKind.ACCEPT, work_on)
 
 
 def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: Afterwards) -> None:
@@ -246,7 +241,8 @@ def _finish(session: Session, job: JobRow, afterwards: Afterwards) -> None:
     """Ends the job once its last region has been accepted or refused."""
     rows = steps.of_job(session, job.id)
     if any(step.state in unfinished(STEP) for step in rows):
-        if steps.hasten(session, job.id):
+        if job.accept_after > utcnow():
+            job.accept_after = utcnow()
             afterwards.append(send_work)
         return
     refused = next((step.report for step in rows if step.kind == StepKind.ACCEPT and step.state == StepState.FAILED), None)

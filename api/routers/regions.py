@@ -15,7 +15,9 @@ from api.children import Children
 from api.reading import ReadingRoute
 from api.schemas.common import Cursor
 from api.schemas.regions import RegionDetail, RegionPage, RegionSummary, Verification
+from certifier.errors import CirisError
 from certifier.isolation.child import run_in_child
+from certifier.model import ALPHABET, escaped, is_name
 from db import jobs, proofs, regions, scenes
 from db.session import Database
 from db.settings import settings
@@ -100,15 +102,17 @@ def _verify(db: Database, region_id: str) -> Verification:
 @router.get(
     "/{region_id}/export", response_class=Response, responses={200: {"content": {kind: {} for kind in exports.MEDIA_TYPES.values()}}}
 )
-def export_region(region_id: str, db: Db, format: ExportFormat = ExportFormat.JSON) -> Response:
+def export_region(region_id: str, db: Db, format: ExportFormat = ExportFormat.JSON, name: str | None = None) -> Response:
     """Returns the region as a file for other programs.
 
     `json` is the manifest. `npz` holds arrays in s for NumPy: C, d, center and the ellipsoid. `drake-yaml` holds Drake's IrisRegions in s,
-    which LoadIrisRegionsYamlFile reads.
+    which LoadIrisRegionsYamlFile reads. `name` is what the region is called in the file; without it, that is its id.
     """
+    if name is not None and not is_name(name):
+        raise CirisError("bad_name", f"{escaped(name)!r} cannot be a region's name", field="name", hint=f"give {ALPHABET}")
     with db.read() as session:
         row = regions.get(session, region_id)
-    data, suffix = exports.WRITERS[format](row)
+    data, suffix = exports.WRITERS[format](row, name or row.id)
     return _download(data, f"{region_id}.{suffix}", exports.MEDIA_TYPES[format])
 
 

@@ -25,6 +25,15 @@ class Share(BaseModel):
     samples: int = Field(description="Number of the proposal's samples, uniform in q.")
 
 
+class QVolume(BaseModel):
+    """Says how large a region is, in joint positions."""
+
+    value: float = Field(description="Volume in q, in `unit`.")
+    stderr: float = Field(description="Standard error of `value`, which is found by sampling.")
+    unit: str = Field(description="`rad^k` for k joints that turn, `m^k` for k joints that slide, or both, as in `rad^2 m`.")
+    box_side: float | None = Field(description="Degrees: a box with this side in every joint has this volume. Null where a joint slides.")
+
+
 class RegionSummary(BaseModel):
     """Describes a certified region in a list."""
 
@@ -34,7 +43,8 @@ class RegionSummary(BaseModel):
     iteration: int
     guarantee: Guarantee
     faces: int = Field(description="Number of rows of C, joint limits included.")
-    ellipsoid_volume: float
+    ellipsoid_volume: float = Field(description="Volume of the inscribed ellipsoid, in s.")
+    q_volume: QVolume | None = Field(description="How large the region is; null for one that an earlier version stored.")
     share: Share | None = Field(description="How much of the proposal the region keeps; null for a region that was not grown.")
     proof: str = Field(description="SHA-256 of the proof file.")
     created_at: datetime
@@ -49,6 +59,7 @@ class RegionSummary(BaseModel):
             guarantee=Guarantee(row.guarantee),
             faces=row.faces,
             ellipsoid_volume=row.ellipsoid_volume,
+            q_volume=None if row.q_volume is None else QVolume(**row.q_volume),
             share=None if row.share is None else Share(**row.share),
             proof=row.proof_digest,
             created_at=row.created_at,

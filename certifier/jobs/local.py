@@ -16,7 +16,7 @@ from certifier.growth.state import Start
 from certifier.growth.trials import alike
 from certifier.jobs.pairs import part_certifier
 from certifier.jobs.parallel import side_by_side
-from certifier.jobs.region import Region, certified_region, growth_point, versions
+from certifier.jobs.region import REST, Region, certified_region, growth_point, versions
 from certifier.jobs.share import SampledProposal
 from certifier.jobs.verdict import Verdict
 from certifier.model import Array, Polytope, Scene
@@ -28,6 +28,8 @@ from certifier.step.step import step
 
 Tell = Callable[[str, dict[str, Any]], None]
 """Hears of what happens, as the events of the service say it (docs/architecture.md): their kind and their data."""
+Deliver = Callable[[Region], None]
+"""Takes a region that has been verified, while a larger one may still come."""
 
 
 def _silent(kind: str, data: dict[str, Any]) -> None:
@@ -42,6 +44,8 @@ class _Run:
         results: iteration -> pair index -> results of its parts.
         seeding_seconds: how long the seeding took.
         candidate: the last accepted candidate; None before there is one.
+        made: the candidate that a region was made of last; None before there is one.
+        rests_until: no region but the last one is made before this many seconds of the job.
         proposal: what the region is grown from; None before there is a candidate.
         curve: the growth curve of the manifest.
         start: when the job began.
@@ -56,6 +60,8 @@ class _Run:
     results: dict[int, dict[int, list[PairResult]]] = field(default_factory=dict)
     seeding_seconds: float = 0.0
     candidate: Candidate | None = None
+    made: Candidate | None = None
+    rests_until: float = 0.0
     proposal: SampledProposal | None = None
     curve: list[dict[str, Any]] = field(default_factory=list)
 
@@ -76,7 +82,31 @@ class _Run:
         kept = self.proposal.share(candidate.polytope)
         self.curve.append(growth_point(candidate.iteration, self.seconds, candidate.ellipsoid_volume, kept["value"]))
         self.candidate = candidate
-        self.tell("region", {"iteration": candidate.iteration, "ellipsoid_volume": candidate.ellipsoid_volume, "share": kept})
+
+    @property
+    def has_news(self) -> bool:
+        """Returns whether there is a candidate that no region was made of, and it is time to make one."""
+        return self.candidate is not self.made and self.seconds >= self.rests_until
+
+    def make_region(self, options: GrowthOptions, reason: str) -> Region:
+        """Makes a region of the last candidate, which verifies its proof, and tells of it."""
+        assert self.candidate is not None, "a region is made of a certified polytope"
+        begun = self.seconds
+        provenance, proofs = self.provenance(options, reason), self.proofs(self.candidate)
+        self.tell("step", {"kind": "accept", "state": "running", "seconds": None})
+        region = certified_region(self.scene, self.candidate, proofs, provenance, self.proposal, self.processes, self._tell_verified)
+        taken = self.seconds - begun
+        self.tell("step", {"kind": "accept", "state": "done", "seconds": taken})
+        said = {name: region.manifest[name] for name in ("q_volume", "share")}
+        self.tell("region", {"iteration": self.candidate.iteration, "ellipsoid_volume": self.candidate.ellipsoid_volume, **said})
+        self.made, self.rests_until = self.candidate, self.seconds + REST * taken
+        return region
+
+    def _tell_note(self, text: str, part: float | None = None) -> None:
+        self.tell("note", {"text": text, "part": part})
+
+    def _tell_verified(self, done: int, total: int) -> None:
+        self._tell_note(f"verifying the region: {done} of {total} cells and proofs", done / total)
 
     def certify(self, action: Certify) -> Outcomes:
         certify = part_certifier(self.scene, action, self.seed, self.left)
@@ -126,18 +156,25 @@ class _Run:
             self.tell("step", {"kind": "propose", "state": "done", "seconds": self.seeding_seconds})
             return found
         assert self.candidate is not None, "a step follows an accepted region"
-        return step(
-            self.scene, action.polytope, self.proofs(self.candidate), action.contain, lambda text: self.tell("note", {"text": text})
-        )
+        return step(self.scene, action.polytope, self.proofs(self.candidate), action.contain, self._tell_note)
 
 
-def grow(scene: Scene, options: GrowthOptions, tell: Tell = _silent, deadline_s: float | None = None, processes: int = 1) -> Region:
+def grow(
+    scene: Scene,
+    options: GrowthOptions,
+    tell: Tell = _silent,
+    deadline_s: float | None = None,
+    processes: int = 1,
+    deliver: Deliver | None = None,
+) -> Region:
     """Grows a certified region in this process, or with so many children of it; the region is the same.
 
     Args:
         tell: hears of what happens.
         deadline_s: after so many seconds growth ends with the best region so far, as soon as the action under way is carried out; None for
             no deadline.
+        deliver: takes regions that come before the last one, which is returned. Not all of them: verifying their proofs takes a fifth of
+            the time at most (``REST``). None for the last one alone.
 
     Raises:
         CirisError: no region could be certified; the code is ``not_grown`` or that of the seeding's error.
@@ -160,11 +197,12 @@ def grow(scene: Scene, options: GrowthOptions, tell: Tell = _silent, deadline_s:
         if late and not isinstance(transition.action, Finish):
             outcome = Outcome.INCONCLUSIVE if run.candidate is None else Outcome.CERTIFIED
             transition = Transition(transition.state, Finish(outcome, "the deadline was reached"))
+        if deliver is not None and run.has_news and not isinstance(transition.action, Finish):
+            deliver(run.make_region(options, "growing"))
     if run.candidate is None:
         hint = "allow more time" if late else "try another seed, or look at the pair named"
         raise CirisError("not_grown", transition.action.reason, hint=hint)
-    provenance = run.provenance(options, transition.action.reason)
-    return certified_region(scene, run.candidate, run.proofs(run.candidate), provenance, run.proposal, processes)
+    return run.make_region(options, transition.action.reason)
 
 
 def certify(
@@ -195,9 +233,6 @@ def certify(
     run = _Run(scene, options.random_seed, tell, processes)
     report = run.certify(action)
     results = {index: result for index, (result,) in run.results[action.iteration].items()}
-    candidate = advance(scene, first.state, report).candidate if assemble else None
-    region = None
-    if candidate is not None:
-        provenance = run.provenance(options, "certified")
-        region = certified_region(scene, candidate, run.proofs(candidate), provenance, None, processes)
+    run.candidate = advance(scene, first.state, report).candidate if assemble else None
+    region = None if run.candidate is None else run.make_region(options, "certified")
     return Verdict(results, Guarantee.EXACT, time.perf_counter() - start, region)

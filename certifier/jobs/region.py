@@ -13,11 +13,15 @@ from certifier.jobs.archimedean import archimedean
 from certifier.jobs.share import SampledProposal
 from certifier.model import SCHEMA_VERSION, Array, Polytope, Scene
 from certifier.outcome import Guarantee
-from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume
+from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume, volume_in_q
 from certifier.polytopes.polytope import bounds, chebyshev_center, drop_redundant, support
 from certifier.proof.region import Implied, RegionProof, read_part
 from certifier.proof.separation import Separation, digest
 from certifier.verify.region import RegionStatement, verify_region
+from certifier.verify.separations import Progress
+
+REST = 4.0
+"""While a region goes on growing, none is made for REST times as long as making the last one took, which is mostly verifying its proof."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,7 @@ def certified_region(
     provenance: dict[str, Any],
     proposal: SampledProposal | None = None,
     processes: int = 1,
+    progress: Progress | None = None,
 ) -> Region:
     """Assembles a region from its pairs' proofs, verifies the whole, and describes it.
 
@@ -50,6 +55,7 @@ def certified_region(
         provenance: options, versions, growth curve, and the seconds of the whole job, of the seeding and of all pairs.
         proposal: what the region was grown from; None for a given polytope.
         processes: how many processes verify.
+        progress: is told how far they have come.
 
     Raises:
         ProofError: the proof does not hold; nothing may be served as certified then.
@@ -62,9 +68,9 @@ def certified_region(
     bound = archimedean(polytope)
     parts = tuple(read_part(data, scene) for data in dict.fromkeys(proofs[index] for index in range(len(scene.pairs))))
     data = RegionProof(scene, C, d, interior, _implied(polytope, parts), bound, parts).to_bytes()
-    statement = verify_region(data, processes)
+    statement = verify_region(data, processes, progress)
     ellipsoid = inscribed_ellipsoid(polytope)
-    size, error = volume(polytope, seed=0)
+    in_s = volume(polytope, seed=0)
     manifest = {
         "schema_version": SCHEMA_VERSION,
         "scene": {"name": scene.name, "hash": scene.hash, "directives": scene.provenance.get("directives")},
@@ -82,7 +88,8 @@ def certified_region(
         "interior_point": interior.tolist(),
         "inscribed_ellipsoid": {"center": ellipsoid.center.tolist(), "shape": ellipsoid.shape.tolist()},
         "joint_ranges": _joint_ranges(scene, polytope, candidate.seed),
-        "volume": {"ellipsoid": ellipsoid.volume, "polytope": size, "polytope_stderr": error},
+        "q_volume": _q_volume(scene, volume_in_q(polytope, scene.revolute, in_s, seed=0)),
+        "volume": {"ellipsoid": ellipsoid.volume, "polytope": in_s[0], "polytope_stderr": in_s[1]},
         "share": None if proposal is None else proposal.share(polytope),
         "seed": None if candidate.seed is None else scene.to_q(candidate.seed).tolist(),
         "pairs": [
@@ -96,6 +103,19 @@ def certified_region(
         "provenance": provenance | {"proposal": None if proposal is None else _halfspaces(proposal.polytope)},
     }
     return Region(manifest, data, statement)
+
+
+def _q_volume(scene: Scene, measured: tuple[float, float]) -> dict[str, Any]:
+    """Returns a volume in joint positions as the manifest says it: ``value`` in ``unit``, and ``stderr``.
+
+    ``box_side`` says it in degrees: a box with sides of that length in every joint has this volume. It is None for arms with joints that
+    slide, whose sides are no angles.
+    """
+    value, error = measured
+    turning = int(scene.revolute.sum())
+    units = [f"{unit}^{count}" if count > 1 else unit for unit, count in (("rad", turning), ("m", scene.n - turning)) if count]
+    side = float(np.rad2deg(value ** (1 / scene.n))) if turning == scene.n else None
+    return {"value": value, "stderr": error, "unit": " ".join(units), "box_side": side}
 
 
 def _joint_ranges(scene: Scene, polytope: Polytope, seed: Array | None) -> dict[str, dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""The largest ellipsoid inside a polytope P = {s : C s <= d}, C (m, n), d (m,), is found here, and the volume of P itself."""
+"""The largest ellipsoid inside a polytope P = {s : C s <= d}, C (m, n), d (m,), is found here, and P's own volume, in s and in q."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from certifier.errors import RegionError
 from certifier.model import Array, Polytope
@@ -150,6 +151,29 @@ def volume(polytope: Polytope, seed: int, rays: int = 200_000, samples: int = 16
     value = E.volume * capped.mean() / inside.mean()
     relative = math.hypot(_standard_error(capped) / capped.mean(), _standard_error(inside) / inside.mean())
     return float(value), float(value * relative)
+
+
+def volume_in_q(
+    polytope: Polytope, revolute: NDArray[np.bool_], in_s: tuple[float, float], seed: int, samples: int = 16_384
+) -> tuple[float, float]:
+    """Returns P's volume in joint positions q and its standard error, by sampling; the same seed gives the same result.
+
+    It is the volume in s times the mean over P of the Jacobian of q = q* + 2 arctan(s), the product of 2 / (1 + s_i^2) over the revolute
+    joints. Hit-and-run in P gives the mean, and its error is taken between independent chains.
+
+    Args:
+        revolute: (n,) True where the joint is revolute.
+        in_s: what :func:`volume` returned for P.
+        samples: a multiple of ``CHAINS``.
+
+    Raises:
+        RegionError: as :func:`inscribed_ellipsoid`.
+    """
+    value, error = in_s
+    s = hit_and_run(polytope, inscribed_ellipsoid(polytope).center, samples, seed)
+    scale = np.prod(2 / (1 + s[:, revolute] ** 2), axis=1).reshape(-1, CHAINS).mean(axis=0)
+    relative = math.hypot(error / value, _standard_error(scale) / scale.mean())
+    return float(value * scale.mean()), float(value * scale.mean() * relative)
 
 
 def _standard_error(x: Array) -> float:

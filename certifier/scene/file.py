@@ -16,15 +16,13 @@ from typing import Any
 import yaml
 
 from certifier.errors import SceneError, close_matches
-from certifier.model import MAX_NAME, MAX_SENTENCE, is_name, is_sentence
+from certifier.model import ALPHABET, MAX_SENTENCE, is_name, is_sentence
 
 KEYS = ("name", "packages", "directives", "q_star", "limits", "fix", "padding", "ignore", "mesh", "cylinder_sides")
 """The keys of a scene file."""
 MAX_BYTES = 2**20
 MAX_DEPTH = 50
 MIN_HULL_VERTICES = 8
-ALPHABET = f"at most {MAX_NAME} ASCII letters, digits, _-./:+@#()[],= and single spaces inside"
-"""This text tells people what a name may consist of (:func:`certifier.model.is_name`)."""
 
 
 @dataclass(frozen=True)

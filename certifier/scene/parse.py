@@ -38,9 +38,9 @@ from pydrake.solvers import MathematicalProgram
 from pydrake.systems.framework import DiagramBuilder
 
 from certifier.errors import SceneError
-from certifier.model import MAX_NAME, MAX_SENTENCE, WORLD, Array, Geometry, Joint, JointKind, Scene, escaped, is_name
+from certifier.model import ALPHABET, MAX_NAME, MAX_SENTENCE, WORLD, Array, Geometry, Joint, JointKind, Scene, escaped, is_name
 from certifier.scene import shapes
-from certifier.scene.file import ALPHABET, SceneFile, read_scene_file
+from certifier.scene.file import SceneFile, read_scene_file
 from certifier.scene.joints import Coupling, centered, held, narrowed
 from certifier.scene.lint import findings
 from certifier.scene.pairs import pairs

@@ -1,6 +1,7 @@
 """Regions over HTTP: a really certified one, its proof and its exports, read by those they are for."""
 
 import io
+import json
 from pathlib import Path
 
 import numpy as np
@@ -90,12 +91,12 @@ def small_region() -> bytes:
 
 
 def test_the_manifest_and_the_arrays_are_exported(client: TestClient, region: str, certified: Region) -> None:
-    assert client.get(f"/v1/regions/{region}/export").json() == certified.manifest
+    assert client.get(f"/v1/regions/{region}/export").json() == {"name": region, **certified.manifest}
     with np.load(io.BytesIO(client.get(f"/v1/regions/{region}/export?format=npz").content)) as arrays:
         assert arrays["C"].tolist() == certified.manifest["halfspace_normals"]
         assert arrays["d"].tolist() == certified.manifest["halfspace_offsets"]
         meaning = {"joints", "q_star", "q_lower", "q_upper", "revolute"}
-        assert set(arrays.files) == {"C", "d", "center", "ellipsoid_center", "ellipsoid_shape", *meaning}
+        assert set(arrays.files) == {"name", "C", "d", "center", "ellipsoid_center", "ellipsoid_shape", *meaning}
         assert {name: arrays[name].tolist() for name in meaning} == {name: certified.manifest["space"][name] for name in meaning}
 
 
@@ -127,6 +128,22 @@ def test_drake_reads_its_yaml_to_the_last_bit(client: TestClient, region: str, c
     assert name == region
     assert polyhedron.A().tolist() == certified.manifest["halfspace_normals"]
     assert polyhedron.b().tolist() == certified.manifest["halfspace_offsets"]
+
+
+def test_people_choose_what_a_region_is_called(client: TestClient, region: str, tmp_path) -> None:
+    from pydrake.geometry.optimization import LoadIrisRegionsYamlFile
+
+    def exported(format: str, name: str) -> bytes:
+        return client.get(f"/v1/regions/{region}/export", params={"format": format, "name": name}).content
+
+    assert json.loads(exported("json", "above the bin"))["name"] == "above the bin"
+    with np.load(io.BytesIO(exported("npz", "above the bin"))) as arrays:
+        assert arrays["name"] == "above the bin"
+    file = tmp_path / "regions.yaml"
+    file.write_bytes(exported("drake-yaml", "above the bin") + exported("drake-yaml", "below"))
+    assert sorted(LoadIrisRegionsYamlFile(str(file))) == ["above the bin", "below"]
+    refused = client.get(f"/v1/regions/{region}/export", params={"name": 'a": b'})
+    assert (refused.status_code, refused.json()["field"]) == (422, "name")
 
 
 def test_an_unknown_format_is_a_problem(client: TestClient, region: str) -> None:

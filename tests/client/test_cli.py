@@ -22,11 +22,11 @@ from certifier.outcome import Guarantee, Outcome, Stage
 from certifier.pair.result import PairResult
 from certifier.verify.region import verify_region
 from client import output
-from client.cli import _joined
-from client.commands import save_proof
+from client.cli import INTERRUPTED, _joined
 from client.find import data_dir
+from client.proof_file import ProofFile
 from db.settings import Settings
-from tests.client.conftest import PLANAR, Ciris, command, surroundings
+from tests.client.conftest import PLANAR, ROOT, Ciris, command, surroundings
 
 
 def test_the_help_documents_the_exit_status(spawn: Ciris) -> None:
@@ -127,7 +127,7 @@ def test_a_deadline_that_no_region_keeps_is_a_negative_answer(ciris: Ciris) -> N
 @pytest.mark.parametrize("name", ["../../elsewhere", "/tmp/elsewhere", "..", "a b/c"])
 def test_a_scenes_name_leads_the_proof_nowhere_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.chdir(tmp_path)
-    path = save_proof({"scene": {"name": name}}, b"proof", None)
+    path = ProofFile(None).write(name, b"proof")
     assert path.resolve().parent == tmp_path.resolve()
     assert path.read_bytes() == b"proof"
 
@@ -200,6 +200,25 @@ def test_growing_here_says_what_happens(ciris: Ciris) -> None:
     assert not any(line.startswith("  1/") for line in said)
     watched = ciris("grow", PLANAR, "--local", "--watch", "--out", "a.proof").stderr
     assert "  1/" in watched
+
+
+def test_who_interrupts_growing_has_the_best_region_so_far(tmp_path: Path) -> None:
+    scene, out = ROOT / "examples" / "ur3e_bin" / "scene.yaml", tmp_path / "so_far.proof"
+    growing = subprocess.Popen(
+        command("grow", scene, "--local", "--method", "box", "--cells", "200", "--out", out),
+        cwd=tmp_path,
+        env=surroundings(CIRIS_DATA_DIR=str(tmp_path / "data")),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert growing.stderr is not None
+    said = [next(line for line in growing.stderr if line.startswith("its proof:"))]
+    growing.send_signal(signal.SIGINT)
+    said += growing.stderr
+    assert growing.wait(60) == INTERRUPTED
+    assert f"the proof of the best region so far: {out}" in "".join(said)
+    assert verify_region(out.read_bytes()).gap > 0
+    assert list(tmp_path.glob("*proof*")) == [out]
 
 
 def test_a_polytope_is_certified_cell_by_cell(ciris: Ciris, files: Path) -> None:
@@ -298,7 +317,7 @@ def test_regions_are_listed_shown_and_exported(ciris: Ciris, url: str, region: s
     kept = output.share(certified.manifest["share"])
     assert f"share      {kept} of the proposal's" in shown
     assert kept in ciris("region", "ls", CIRIS_URL=url).stdout
-    assert ciris("region", "export", region, CIRIS_URL=url).json == certified.manifest
+    assert ciris("region", "export", region, "--name", "here", CIRIS_URL=url).json == {"name": "here", **certified.manifest}
     with np.load(io.BytesIO(ciris("region", "export", region, "--format", "npz", CIRIS_URL=url).raw)) as arrays:
         assert arrays["C"].tolist() == certified.manifest["halfspace_normals"]
     assert verify_region(ciris("region", "export", region, "--format", "proof", CIRIS_URL=url).raw).faces == 4

@@ -15,18 +15,20 @@ class Paper(Screen):
         super().__init__()
         self.lines: list[str] = []
         self.last = ""
+        self.part: float | None = None
 
     def line(self, text: str) -> None:
         self.lines.append(text)
 
-    def status(self, text: str) -> None:
-        self.last = text
+    def status(self, text: str, part: float | None = None) -> None:
+        self.last, self.part = text, part
 
 
 def pair(index: int, state: str) -> dict[str, Any]:
     return {"index": index, "state": state, "stage": "sos", "margin": None, "seconds": 0.25}
 
 
+SIZE = {"value": 0.25, "stderr": 0.003, "unit": "rad^2", "box_side": 28.6}
 SHARE = {"value": 0.634, "stderr": 0.0052, "collision_free": 0.9, "samples": 10000}
 EVENTS: list[tuple[str, dict[str, Any]]] = [
     ("job", {"state": "running"}),
@@ -38,7 +40,7 @@ EVENTS: list[tuple[str, dict[str, Any]]] = [
     ("iteration", {"index": 1, "label": "contract", "state": "running", "pairs": 1, "parts": 1, "reused": 1}),
     ("pairs", {"iteration": 1, "pairs": [pair(1, "certified")]}),
     ("iteration", {"index": 1, "label": "contract", "state": "certified"}),
-    ("region", {"region_id": "r", "iteration": 1, "guarantee": "exact", "ellipsoid_volume": 0.5, "share": SHARE}),
+    ("region", {"region_id": "r", "iteration": 1, "guarantee": "exact", "ellipsoid_volume": 0.5, "q_volume": SIZE, "share": SHARE}),
     ("something_new", {}),
 ]
 
@@ -56,11 +58,20 @@ def test_the_course_of_a_job_in_a_few_lines() -> None:
         "seeding: done after 4.80 s",
         "iteration 0 (contract): failed, 2 of 2 pairs settled; a - c: not certifiable",
         "iteration 1 (contract): certified, 1 of 1 pairs settled",
-        "certified region r of iteration 1: ellipsoid volume 0.5, 63.4 +- 0.5 % of the proposal",
+        "certified region r of iteration 1: 63.4 +- 0.5 % of the proposal, 0.25 +- 0.003 rad^2, that of a box of 28.6 deg in each joint",
     ]
+
+
+def test_after_a_region_the_status_line_says_what_is_kept() -> None:
+    paper = Paper()
+    teller = Teller(paper, ["a - b", "a - c"], watch=False)
+    for kind, data in [*EVENTS, *EVENTS[3:5]]:
+        teller.tell({"kind": kind, "data": data})
+    assert paper.last == "iteration 0: 2 of 2 pairs settled, 63 % kept so far, a - c: not certifiable"
 
 
 def test_watching_tells_of_every_pair() -> None:
     paper = told(watch=True)
     assert "  2/2 a - c: not certifiable (0.25 s)" in paper.lines
-    assert paper.last == "iteration 1: 1/1 pairs, a - c: certified"
+    assert paper.last == "iteration 1: 1 of 1 pairs settled, a - c: certified"
+    assert paper.part == 1.0

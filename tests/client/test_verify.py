@@ -124,12 +124,12 @@ def test_a_proof_over_a_partition_is_checked_by_all_cores(ciris: Ciris, tmp_path
 
 
 def test_the_progress_of_a_check_is_a_status_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    shown: list[str] = []
-    monkeypatch.setattr(Screen, "status", lambda _, text: shown.append(text))
+    shown: list[tuple[str, float]] = []
+    monkeypatch.setattr(Screen, "status", lambda _, text, part: shown.append((text, part)))
     with _progress() as told:
         told.write_text("256\n1000\n")
         for _ in range(100):
             if shown:
                 break
             time.sleep(0.05)
-    assert shown[0] == "checked 256 of 1000 cells and proofs"
+    assert shown[0] == ("256 of 1000 cells and proofs checked", 0.256)

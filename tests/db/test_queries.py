@@ -17,9 +17,11 @@ from db.types import utcnow
 from tests.db.builders import a_job, a_running_job, a_scene
 from tests.scenes import slider
 
+SIZE = {"value": 0.4, "stderr": 0.01, "unit": "m", "box_side": None}
 SHARE = {"value": 0.25, "stderr": 0.01, "collision_free": 0.5, "samples": 100}
 MANIFEST = {
     "volume": {"ellipsoid": 0.5},
+    "q_volume": SIZE,
     "guarantee": "exact",
     "halfspace_normals": [[1.0], [-1.0]],
     "halfspace_offsets": [1.0, 1.0],
@@ -146,7 +148,7 @@ def test_a_region_is_its_jobs_latest_until_it_is_deleted(db: Database) -> None:
     with db.write() as session:
         job = a_running_job(session)
         earlier = regions.add(session, job, 0, MANIFEST, b"first")
-        assert (job.region_id, earlier.ellipsoid_volume, earlier.share) == (earlier.id, 0.5, SHARE)
+        assert (job.region_id, earlier.q_volume, earlier.share) == (earlier.id, SIZE, SHARE)
         assert events.since(session, job.id)[-1].data["share"] == SHARE
         job_id, scene_id, region_id, digest = job.id, job.scene_id, earlier.id, earlier.proof_digest
     with db.read() as session:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
+from datetime import timedelta
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from certifier.errors import CirisError
-from db import jobs, work
+from db import jobs, pairs, steps, work
 from db.models import ApiKeyRow, JobRow
 from db.pairs import batch
 from db.session import Database
 from db.settings import settings
-from db.states import JobState
+from db.states import JobState, StepKind, StepState
+from db.types import utcnow
 from tests.db.builders import a_job, add_pairs
 
 forecasts = st.lists(st.floats(0, 2), max_size=60)
@@ -82,6 +84,35 @@ def test_a_job_that_comes_late_neither_waits_nor_overtakes(db: Database) -> None
     run(db, 20)
     late = a_job_of(db)
     assert Counter(run(db, 10)) == {early: 5, late: 5}
+
+
+def test_a_region_is_accepted_before_more_pairs_and_then_the_job_rests(db: Database) -> None:
+    """Planners wait for regions, and the growth for pairs: accepting takes one worker at a time, and rests in between."""
+    job_id = a_job_of(db)
+
+    def add_region() -> None:
+        with db.write() as session:
+            job = jobs.lock(session, job_id)
+            job.turn += 1
+            steps.add(session, job, StepKind.ACCEPT, {})
+
+    def claimed() -> steps.Claim | pairs.Claim | None:
+        with db.write() as session:
+            return work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5)
+
+    add_region()
+    first = claimed()
+    assert isinstance(first, steps.Claim)
+    add_region()
+    assert isinstance(claimed(), pairs.Claim), "one region at a time"
+    with db.write() as session:
+        job = jobs.lock(session, job_id)
+        assert steps.save(session, first, StepState.DONE, {}, 1.0)
+        job.accept_after = utcnow() + timedelta(seconds=60)
+    assert isinstance(claimed(), pairs.Claim), "the job rests"
+    with db.write() as session:
+        jobs.lock(session, job_id).accept_after = utcnow()
+    assert isinstance(claimed(), steps.Claim)
 
 
 def test_there_is_nothing_to_do_for_jobs_that_do_not_run(db: Database) -> None:

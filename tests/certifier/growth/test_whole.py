@@ -334,6 +334,23 @@ def test_a_deadline_ends_growth_with_the_best_region_so_far(monkeypatch):
     assert (refused.value.code, refused.value.hint) == ("not_grown", "allow more time")
 
 
+def test_regions_are_delivered_as_they_are_certified_and_time_is_left_for_growing(monkeypatch):
+    _, scene, q = example("planar_2dof")
+    asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.35}, contraction="whole", cells=SLICE)
+    monkeypatch.setattr(local, "REST", 0.0)
+    delivered = []
+    last = grow(scene, asked, deliver=delivered.append)
+    assert len(delivered) == len(last.manifest["provenance"]["growth_curve"]) - 1 > 0
+    for region in delivered:
+        assert verify_region(region.proof).faces == len(region.manifest["halfspace_offsets"])
+        assert region.manifest["share"]["value"] < last.manifest["share"]["value"]
+    # Verifying takes no time here, but rests for ever after the first.
+    monkeypatch.setattr(local, "REST", 1e9)
+    few = []
+    assert grow(scene, asked, deliver=few.append).proof == last.proof
+    assert [region.proof for region in few] == [delivered[0].proof]
+
+
 def test_a_seed_in_contact_is_refused():
     scene = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (1.5, 0.0, 0.0)))
     with pytest.raises(CirisError):

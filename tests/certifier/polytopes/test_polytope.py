@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 
 from certifier.errors import RegionError
 from certifier.model import Polytope
-from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume, volume_bound
+from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume, volume_bound, volume_in_q
 from certifier.polytopes.polytope import (
     bound_multipliers,
     bounds,
@@ -284,3 +284,15 @@ def test_volume_is_deterministic_and_affine():
     first = volume(polytope, seed=7, rays=5000, samples=1024)
     assert first == volume(polytope, seed=7, rays=5000, samples=1024)
     assert first != volume(polytope, seed=8, rays=5000, samples=1024)
+
+
+@pytest.mark.parametrize("revolute", [(True, True, True), (True, False, True), (False, False, False)])
+def test_the_volume_in_q_of_a_box_is_within_its_error(revolute):
+    """A box in s is a box in q: its sides are 2 arctan of the ends of those of joints that turn."""
+    lower, upper = np.array([-0.9, 0.1, -0.2]), np.array([0.3, 1.4, 1.1])
+    box = Polytope(np.concatenate([np.eye(3), -np.eye(3)]), np.concatenate([upper, -lower]))
+    ends = [2 * np.arctan(s) if turns else s for s, turns in zip(np.stack([lower, upper], axis=1), revolute, strict=True)]
+    exact = np.prod([high - low for low, high in ends])
+    value, stderr = volume_in_q(box, np.array(revolute), volume(box, seed=3), seed=3)
+    assert abs(value - exact) < 4 * stderr
+    assert stderr < 0.03 * exact

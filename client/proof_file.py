@@ -1,0 +1,61 @@
+"""The proof of a region is kept in a file on this machine."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from pathlib import Path
+
+from certifier.errors import CirisError
+
+
+class ProofFile:
+    """A proof file holds the proof of a job's best region so far.
+
+    Args:
+        out: the file; None for one in this directory whose name holds the proof's digest, so that the same proof gives the same file.
+
+    Attributes:
+        path: where the proof is; None before there is one.
+
+    Raises:
+        CirisError: not_writable, before a job takes minutes.
+    """
+
+    def __init__(self, out: str | None) -> None:
+        self._out = out
+        self.path: Path | None = None
+        path = Path(out or ".")
+        directory = path.parent if out else path
+        if path.is_dir() and out:
+            raise CirisError("not_writable", f"{out} is a directory", field="--out", hint="name a file")
+        if not directory.is_dir() or not os.access(directory, os.W_OK):
+            raise CirisError(
+                "not_writable", f"the proof cannot be written into {directory.absolute()}", field="--out", hint="name a file elsewhere"
+            )
+
+    def write(self, scene: str, proof: bytes) -> Path:
+        """Puts the proof of a region of the scene with this name in the place of the one before, if any, and returns its path.
+
+        Whoever is interrupted meanwhile finds one of the two as a whole.
+        """
+        path = Path(self._out or f"{file_name(scene)}-{hashlib.sha256(proof).hexdigest()[:8]}.proof")
+        if path.exists() and not path.is_file():
+            path.write_bytes(proof)  # a pipe, or a device: nothing can take its place
+            return path
+        beside = path.with_name(f".{path.name}.{os.getpid()}")
+        try:
+            beside.write_bytes(proof)
+            beside.replace(path)
+        finally:
+            beside.unlink(missing_ok=True)
+        if self.path is not None and self.path != path:
+            self.path.unlink(missing_ok=True)
+        self.path = path
+        return path
+
+
+def file_name(name: str) -> str:
+    """Returns a scene's name as part of a file's name: a name may hold slashes and dots, which must not lead elsewhere."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-") or "scene"
