@@ -27,6 +27,7 @@ class Screen:
         self._terminal = sys.stderr.isatty()
         self._began = time.monotonic()
         self._status = ""
+        self._part: float | None = None
 
     def line(self, text: str) -> None:
         """Prints a line that stays, above the status line."""
@@ -41,7 +42,7 @@ class Screen:
             part: how much of it is done, from 0 to 1, which a bar shows; None where that is not known.
         """
         if self._terminal:
-            self._status = text if part is None else f"{bar(part)} {text}"
+            self._status, self._part = text, part
             self._draw()
 
     def clear(self) -> None:
@@ -52,8 +53,9 @@ class Screen:
     def _draw(self) -> None:
         if self._status:
             took = seconds(time.monotonic() - self._began, whole=True)
+            known = "" if self._part is None else f"{bar(self._part)} "
             width = shutil.get_terminal_size().columns - 1
-            print(f"\r\x1b[2K{f'{self._status}, {took}'[:width]}", end="", file=sys.stderr, flush=True)
+            print(f"\r\x1b[2K{f'{known}{took}, {self._status}'[:width]}", end="", file=sys.stderr, flush=True)
 
     def _erase(self) -> None:
         if self._status:
@@ -136,8 +138,13 @@ def print_pairs(pairs: Iterable[dict[str, Any]]) -> None:
 def _range(known: dict[str, Any]) -> str:
     """Returns a joint's range as a text for people. Regions that an earlier checkout stored say nothing about the range at the seed."""
     alone = known.get("through_seed")
-    through = f", {alone[0]:.4g} to {alone[1]:.4g} with the others at the seed" if alone else ""
-    return f"{known['lower']:.4g} to {known['upper']:.4g} {known['unit']}{through}"
+    through = f", {_position(alone[0])} to {_position(alone[1])} with the others at the seed" if alone else ""
+    return f"{_position(known['lower'])} to {_position(known['upper'])} {known['unit']}{through}"
+
+
+def _position(value: float) -> str:
+    """Returns a joint position in degrees or metres for people, to whom a billionth is nothing."""
+    return f"{round(value, 9) + 0.0:.4g}"
 
 
 def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()) -> None:
