@@ -4,16 +4,17 @@ from enum import StrEnum
 
 
 class Outcome(StrEnum):
-    """An outcome says what a certification found out about one pair of bodies, or about a whole polytope."""
+    """An outcome says what a certification found out about one pair of bodies, or about a whole polytope or motion."""
 
     CERTIFIED = "certified"
-    """A proof of separation on the whole polytope exists and has passed the verifier."""
+    """A proof of separation on the whole polytope, or all along the motion, exists and has passed the verifier."""
     REFUTED = "refuted"
-    """A configuration inside the polytope is in collision, and the result names it."""
+    """A configuration inside the polytope, or of the motion, is in collision, and the result names it."""
     NOT_CERTIFIABLE = "not_certifiable"
     """No certificate of the form of the program (11) exists, by a dual proof; a plane may separate the pair all the same."""
     TOO_CLOSE = "too_close"
-    """The bodies come so close to each other that no plane is found in a narrow cell; the result names a configuration and the distance."""
+    """The bodies come so close to each other that no plane is found in a narrow cell, or for a short part of a motion; the result names a
+    configuration and the distance."""
     INCONCLUSIVE = "inconclusive"
     """A limit or numerical trouble stopped the search before either answer was found; the detail says which."""
     ERROR = "error"

@@ -61,3 +61,9 @@ MOMENTS = 1 << 18
 """One body in a dual proof has at most this many moments."""
 LOCALISED = 1 << 23
 """The localising matrices of one body in a dual proof have at most this many entries."""
+
+INTERVALS = 1 << 20
+"""The proof of a motion has at most this many intervals."""
+SWEPT = 1 << 32
+"""Its intervals together have at most this many vertices, a joint on the way counting as JOINT_COST of them."""
+JOINT_COST = 16

@@ -15,6 +15,7 @@ from certifier.model import Scene, escaped
 from certifier.outcome import Guarantee
 from certifier.proof import limits
 from certifier.proof.container import header_of, malformed
+from certifier.proof.motion import MotionProof
 from certifier.proof.negative import DualProof, WitnessProof
 from certifier.proof.pair import PairProof
 from certifier.proof.partition import PartitionProof
@@ -22,6 +23,7 @@ from certifier.proof.region import RegionProof
 from certifier.proof.separation import Separation
 from certifier.verify.decimals import exactly, rounded_down, rounded_up
 from certifier.verify.dual import verify_dual
+from certifier.verify.motion import verify_motion
 from certifier.verify.pair import PairStatement, verify_pair
 from certifier.verify.region import verify_region
 from certifier.verify.separations import Progress, verify_separation
@@ -36,7 +38,7 @@ class FileStatement:
     """States what a valid file proves.
 
     Attributes:
-        kind: ``region``, ``pair``, ``partition``, ``dual`` or ``witness``.
+        kind: ``region``, ``pair``, ``partition``, ``motion``, ``dual`` or ``witness``.
         lines: the statement in plain words, the guarantee last. It follows from the proof and from what the scene's hash covers.
     """
 
@@ -175,6 +177,10 @@ def _apart(proof: Separation, statement: PairStatement) -> list[str]:
     return lines + [f"  '{pair.a}' and '{pair.b}'" for pair in statement.pairs]
 
 
+def _motion(data: bytes, scene: Scene, *_: Any) -> tuple[list[str], Guarantee]:
+    return verify_motion(MotionProof.from_bytes(data, scene)).lines(), Guarantee.EXACT
+
+
 def _dual(data: bytes, scene: Scene, *_: Any) -> tuple[list[str], Guarantee]:
     proof = DualProof.from_bytes(data, scene)
     statement = verify_dual(proof)
@@ -209,6 +215,7 @@ def _witness(data: bytes, scene: Scene, *_: Any) -> tuple[list[str], Guarantee]:
 _READERS: dict[str, Callable[[bytes, Scene, int, Progress | None], tuple[list[str], Guarantee]]] = {
     "pair": _pair,
     "partition": _partition,
+    "motion": _motion,
     "dual": _dual,
     "witness": _witness,
 }

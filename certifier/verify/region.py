@@ -5,9 +5,6 @@ Every pair of the scene is separated on the whole region, or ProofError says why
 
 from __future__ import annotations
 
-import itertools
-import json
-from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,9 +21,7 @@ from certifier.verify.kinematics import exact
 from certifier.verify.pair import check_ground
 from certifier.verify.scene import check_scene
 from certifier.verify.separations import Progress, statements
-
-NAMED = 20
-"""A statement gives at most this many counts of pairs that the scene leaves out; each count is for two bodies."""
+from certifier.verify.uncovered import not_covered
 
 
 @dataclass(frozen=True)
@@ -56,7 +51,6 @@ class RegionStatement:
             f"  '{j.name}': {exactly(lower)} to {exactly(upper)} {'rad' if r else 'm'} (centre {exactly(q)})"
             for j, r, lower, upper, q in zip(scene.moving, scene.revolute, scene.q_lower, scene.q_upper, scene.q_star, strict=True)
         ]
-        unlisted = _unlisted(scene)
         closest = min(self.gaps, key=self.gaps.__getitem__, default=None)
         return [
             f"scene of hash {scene.hash}",
@@ -66,37 +60,9 @@ class RegionStatement:
             f"{len(self.gaps)} pairs of bodies separated at every configuration of it",
             f"padding {exactly(scene.padding)} m around every body",
             *([f"least distance, padded, at least {rounded_down(self.gap)} m: '{closest.a}' and '{closest.b}'"] if closest else []),
-            *(f"not covered: '{i.a}' and '{i.b}', for the reason {json.dumps(i.reason, ensure_ascii=False)}" for i in scene.ignored),
-            *([f"not covered, as the scene has no such pairs: {unlisted}"] if unlisted else []),
+            *not_covered(scene),
             "guarantee: exact (rigorous arithmetic; the parsed model taken at its word)",
         ]
-
-
-def _unlisted(scene: Scene) -> str:
-    """Returns, in words, how many pairs of geometries the scene leaves out: they can move against each other, but it does not list them.
-
-    Listed are the pairs to certify and the ignored ones. The missing ones are counted for each two bodies, and the first NAMED counts
-    are given. The time is linear in what the scene lists: of the bodies looked at, two without a listed pair are among those named.
-    """
-    body = {geometry.name: geometry.body for geometry in scene.geometries}
-    held = Counter(body.values())
-    parts: dict[str, list[str]] = {}
-    for name in sorted(held):
-        parts.setdefault(_rigid_part(scene, name), []).append(name)
-    pairs = {frozenset((p.a, p.b)) for p in scene.pairs} | {frozenset((i.a, i.b)) for i in scene.ignored}
-    listed = Counter(frozenset(map(body.__getitem__, names)) for names in pairs)
-    moving = (bodies for two in itertools.combinations(parts.values(), 2) for bodies in itertools.product(*two))
-    missing = ((a, b, held[a] * held[b] - listed[frozenset((a, b))]) for a, b in moving)
-    named = list(itertools.islice((f"{count} of '{a}' and '{b}'" for a, b, count in missing if count), NAMED + 1))
-    return ", ".join(named[:NAMED]) + (", and more" if len(named) > NAMED else "")
-
-
-def _rigid_part(scene: Scene, body: str) -> str:
-    """Returns the body nearest to the world that this one is welded to, perhaps through others."""
-    above = scene.joint_above
-    while body in above and above[body].index is None:
-        body = above[body].parent
-    return body
 
 
 def verify_region(data: bytes, processes: int = 1, progress: Progress | None = None) -> RegionStatement:

@@ -9,9 +9,12 @@ import numpy as np
 
 from certifier.jobs.region import certified_region
 from certifier.model import WORLD, Pair, Scene
+from certifier.motion.given import given
+from certifier.motion.search import search
 from certifier.outcome import Outcome
 from certifier.pair.certification import Certification
 from certifier.proof.container import with_scene
+from certifier.proof.motion import MotionProof, Space
 from certifier.proof.negative import DualProof, WitnessProof
 from certifier.proof.pair import PairProof
 from tests.certifier.scenes import accepted, ball, box, cube, planar_arm
@@ -65,9 +68,19 @@ def witness() -> tuple[Scene, WitnessProof]:
     return world, WitnessProof.from_bytes(result.proof, world)
 
 
+@cache
+def motion() -> tuple[Scene, MotionProof]:
+    """A two-link arm swings past its obstacle, through three waypoints and with a tube."""
+    world = planar_arm(2, padding=0.01)
+    path = given(world, [[-0.9, -0.4], [-0.2, 0.5], [0.1, -0.7]], Space.Q)
+    found = search(world, path, tube=True)
+    assert isinstance(found, MotionProof)
+    return world, found
+
+
 def files() -> dict[str, bytes]:
     """A file of every kind, its scene in it."""
-    singles = {"dual": dual(), "witness": witness()}
+    singles = {"dual": dual(), "witness": witness(), "motion": motion()}
     world = planar_arm(2)
     singles["pair"] = world, PairProof.from_bytes(Certification(world, cube(world, 0.0, 0.05), np.zeros(2)).certify(1).proof, world)
     return {"region": region(), **{kind: with_scene(proof.to_bytes(), world) for kind, (world, proof) in singles.items()}}

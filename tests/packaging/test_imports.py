@@ -80,6 +80,7 @@ def test_every_proof_is_checked_where_only_numpy_and_flint_are_installed(tmp_pat
         "region": "6 pairs of bodies separated",
         "pair": "are at least",
         "dual": "no certificate of this form",
+        "motion": "all along it the padded bodies",
         "witness": "touch at a configuration",
     }
     for kind, data in files().items():

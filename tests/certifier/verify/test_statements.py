@@ -15,7 +15,8 @@ from certifier.pair.certification import Certification
 from certifier.proof.ground import Ground
 from certifier.proof.pair import PairProof, Side
 from certifier.verify.pair import PairCheck, verify_pair
-from certifier.verify.region import _unlisted, verify_region
+from certifier.verify.region import verify_region
+from certifier.verify.uncovered import unlisted
 from tests.certifier.scenes import accepted, ball, cube, planar_arm, pose
 
 
@@ -76,7 +77,7 @@ def test_what_a_scene_leaves_out_is_named_in_a_line_however_much_it_is():
     balls = tuple(ball(f"{body}/ball", body, 0.1, (0.0, 0.0, 0.0)) for body in bodies)
     crowded = replace(scene, joints=(*scene.joints, *welds), bodies=(*scene.bodies, *bodies), geometries=(*scene.geometries, *balls))
     started = time.process_time()
-    words = _unlisted(crowded)
+    words = unlisted(crowded)
     assert words.count(" of ") == 20
     assert words.endswith(", and more")
     assert time.process_time() - started < 2.0

@@ -1,0 +1,95 @@
+"""Chains of joints lead from a plane's frame to a body. How far its points can be from the joints' axes bounds how they move."""
+
+from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from certifier.kinematics import Kinematics, rigid_inverse
+from certifier.model import Array, Geometry, JointKind
+
+
+class Chain(NamedTuple):
+    """A chain leads from a frame to a body, over m joints: X = L_0 J_0 L_1 J_1 ... L_m, with fixed poses L and the joints' motions J.
+
+    Attributes:
+        rotations: (m + 1, 3, 3) of the fixed poses.
+        offsets: (m + 1, 3) of the fixed poses, metres.
+        axes: (m, 3) unit vectors; that of a joint that is crossed from child to parent is reversed.
+        joints: (m,) position indices.
+        slides: (m,) whether each joint is prismatic.
+    """
+
+    rotations: Array
+    offsets: Array
+    axes: Array
+    joints: np.ndarray
+    slides: np.ndarray
+
+
+class Side(NamedTuple):
+    """A side is one body of a pair, as its planes' frame sees it.
+
+    Attributes:
+        chain: from the planes' frame to the body.
+        vertices: (V, 3) metres in the body's frame.
+        levers: (K - 1, m) for every piece of the motion, how far a vertex can be from each joint's axis at most, in metres; 1 for a
+            prismatic joint. A change of the joint's position moves no vertex farther than by the lever times the change.
+        size: metres; no vertex can be farther than this from the frame's origin.
+    """
+
+    chain: Chain
+    vertices: Array
+    levers: Array
+    size: float
+
+
+def chain(kinematics: Kinematics, frame: str, body: str) -> Chain:
+    """Returns the chain from a body's frame to a body."""
+    fixed, links, axes, moving = np.eye(4), [], [], []
+    for here, there in itertools.pairwise(kinematics.bodies_between(frame, body)):
+        joint = kinematics.scene.joint_above.get(here)
+        upwards = joint is not None and joint.parent == there
+        if joint is None or not upwards:
+            joint = kinematics.scene.joint_above[there]
+        first, last = (joint.X_BM, joint.X_PF) if upwards else (joint.X_PF, joint.X_BM)
+        fixed = fixed @ first
+        if joint.index is not None:
+            links.append(fixed)
+            axes.append(-joint.axis if upwards else joint.axis)
+            moving.append(joint)
+            fixed = np.eye(4)
+        fixed = fixed @ rigid_inverse(last)
+    poses = np.array([*links, fixed])
+    return Chain(
+        np.ascontiguousarray(poses[:, :3, :3]),
+        np.ascontiguousarray(poses[:, :3, 3]),
+        np.array(axes).reshape(-1, 3),
+        np.array([joint.index for joint in moving], dtype=np.int64),
+        np.array([joint.kind is JointKind.PRISMATIC for joint in moving], dtype=np.bool_),
+    )
+
+
+def side(chain: Chain, geometry: Geometry, reaches: Array) -> Side:
+    """Returns a geometry's side.
+
+    Args:
+        reaches: (K - 1, n) for every piece, how far each joint's position is from 0 at most.
+    """
+    vertices = np.ascontiguousarray(geometry.vertices)
+    slid = np.where(chain.slides, reaches[:, chain.joints], 0.0)
+    levers, m = np.ones(slid.shape), len(chain.joints)
+    # Behind a joint come a fixed offset, of which only the part across the axis counts, and what is behind the next joint.
+    tails = vertices @ chain.rotations[m].T + chain.offsets[m]
+    across = float(np.linalg.norm(np.cross(chain.axes[m - 1], tails), axis=1).max()) if m else 0.0
+    behind = np.full(len(slid), float(np.linalg.norm(tails, axis=1).max()))
+    levers[:, m - 1 :] = across
+    for k in range(m - 2, -1, -1):
+        behind += slid[:, k + 1]
+        levers[:, k] = np.linalg.norm(np.cross(chain.axes[k], chain.offsets[k + 1])) + behind
+        behind += np.linalg.norm(chain.offsets[k + 1])
+    levers[:, chain.slides] = 1.0
+    size = float(np.linalg.norm(chain.offsets[0]) + (behind + slid[:, :1].sum(axis=1)).max())
+    return Side(chain, vertices, levers, size)

@@ -1,0 +1,212 @@
+"""The search for planes of one pair: compiled loops over intervals of time that are halved until one plane is enough for each.
+
+Nothing here is trusted: the verifier checks the planes (certifier.verify.motion).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from certifier.model import Array
+from certifier.motion.chains import Side
+from certifier.motion.nearest import separation
+
+DONE, CONTACT, NARROW, MANY = range(4)
+"""How the search for a pair ends: it is apart all along; it touches; an interval is too narrow to be halved; there are too many."""
+RESOLUTION = 1e-7
+"""Padded bodies that are at most this far apart, in metres, count as touching."""
+NARROWEST = 2.0**-40
+"""No interval is narrower than this part of its piece."""
+SHRINK = 0.98
+"""A tube is this part of what the bodies' distance allows, so that intervals need not become too short."""
+
+
+@njit(cache=True)
+def place(side: Side, q: Array, X: Array, Y: Array, points: Array) -> None:
+    """Fills in where the vertices are in the planes' frame, (V, 3), at positions q; X and Y, (3, 4), are overwritten."""
+    chain = side.chain
+    X[:, :3], X[:, 3] = chain.rotations[0], chain.offsets[0]
+    for k in range(len(chain.joints)):
+        u, value = chain.axes[k], q[chain.joints[k]]
+        if chain.slides[k]:
+            for i in range(3):
+                X[i, 3] += value * (X[i, 0] * u[0] + X[i, 1] * u[1] + X[i, 2] * u[2])
+        else:
+            c, s = np.cos(value), np.sin(value)
+            x, y, z, v = u[0], u[1], u[2], 1.0 - c
+            for i in range(3):
+                a, b, d = X[i, 0], X[i, 1], X[i, 2]
+                X[i, 0] = a * (c + v * x * x) + b * (v * x * y + s * z) + d * (v * x * z - s * y)
+                X[i, 1] = a * (v * x * y - s * z) + b * (c + v * y * y) + d * (v * y * z + s * x)
+                X[i, 2] = a * (v * x * z + s * y) + b * (v * y * z - s * x) + d * (c + v * z * z)
+        R, p = chain.rotations[k + 1], chain.offsets[k + 1]
+        for i in range(3):
+            a, b, d = X[i, 0], X[i, 1], X[i, 2]
+            X[i, 3] += a * p[0] + b * p[1] + d * p[2]
+            for j in range(3):
+                Y[i, j] = a * R[0, j] + b * R[1, j] + d * R[2, j]
+        X[:, :3] = Y[:, :3]
+    for v in range(len(side.vertices)):
+        p = side.vertices[v]
+        for i in range(3):
+            points[v, i] = X[i, 0] * p[0] + X[i, 1] * p[1] + X[i, 2] * p[2] + X[i, 3]
+
+
+@njit(cache=True)
+def acceleration(side: Side, levers: Array, rates: Array, changes: Array) -> float:
+    """Returns a bound of every vertex' acceleration, in metres, for bounds of the joints' rates and of the rates' changes, (n,)."""
+    chain, turning, total = side.chain, 0.0, 0.0
+    for k in range(len(chain.joints)):
+        rate = rates[chain.joints[k]]
+        if chain.slides[k]:
+            total += 2.0 * turning * rate
+        else:
+            total += levers[k] * (rate * (rate + 2.0 * turning) + changes[chain.joints[k]])
+            turning += rate
+    return total
+
+
+@njit(cache=True)
+def _moved(side: Side, levers: Array, rates: Array) -> float:
+    """Returns how far joints that move by this much, (n,), move a vertex at most."""
+    total = 0.0
+    for k in range(len(side.chain.joints)):
+        total += levers[k] * rates[side.chain.joints[k]]
+    return total
+
+
+@njit(cache=True)
+def positions(start: Array, end: Array, time: float, turns: Array, q_star: Array, q: Array) -> None:
+    """Fills in the joint positions at a time of a piece.
+
+    Args:
+        turns: (n,) whether the coordinate is the tangent of half an angle from q*.
+        q_star: (n,) 0 for a motion in q.
+    """
+    for i in range(len(q)):
+        x = start[i] + time * (end[i] - start[i])
+        q[i] = q_star[i] + (2.0 * np.arctan(x) if turns[i] else x)
+
+
+@njit(cache=True)
+def _bound_rates(start: Array, end: Array, t0: float, t1: float, turns: Array, rates: Array, changes: Array) -> None:
+    """Fills in bounds of |dq/dt| and |d2q/dt2| in an interval of a piece; for tangents of half angles, q = q* + 2 atan(x)."""
+    for i in range(len(rates)):
+        step = end[i] - start[i]
+        rates[i], changes[i] = abs(step), 0.0
+        if turns[i]:
+            x0, x1 = start[i] + t0 * step, start[i] + t1 * step
+            least = 0.0 if x0 * x1 <= 0.0 else min(abs(x0), abs(x1))
+            norm = 1.0 + least * least
+            rates[i] = 2.0 * abs(step) / norm
+            changes[i] = 4.0 * step * step * max(abs(x0), abs(x1)) / (norm * norm)
+
+
+@njit(cache=True)
+def _gap(normal: Array, A: Array, B: Array) -> float:
+    low, high = np.inf, -np.inf
+    for v in range(len(A)):
+        low = min(low, normal[0] * A[v, 0] + normal[1] * A[v, 1] + normal[2] * A[v, 2])
+    for v in range(len(B)):
+        high = max(high, normal[0] * B[v, 0] + normal[1] * B[v, 1] + normal[2] * B[v, 2])
+    return low - high
+
+
+@njit(cache=True)
+def clearance(a: Side, b: Side, q: Array) -> float:
+    """Returns the distance of two bodies without their radii at positions q, in metres; 0 or less where they meet."""
+    A, B, X, Y = np.empty((len(a.vertices), 3)), np.empty((len(b.vertices), 3)), np.empty((3, 4)), np.empty((3, 4))
+    place(a, q, X, Y, A)
+    place(b, q, X, Y, B)
+    return separation(A, B, np.empty(3))
+
+
+@njit(cache=True)
+def divide(
+    a: Side,
+    b: Side,
+    waypoints: Array,
+    turns: Array,
+    q_star: Array,
+    reach: float,
+    slack: float,
+    rho: float,
+    until: float,
+    ends: Array,
+    normals: Array,
+    counts: Array,
+) -> tuple[int, int, float, float, float, float]:
+    """Divides the motion into intervals with a plane each, from its beginning on, until it ends or the pair touches.
+
+    Args:
+        waypoints: (K, n).
+        turns, q_star: as for :func:`positions`.
+        reach: the radii and paddings of both bodies, metres.
+        slack: metres that the planes have to leave for what the verifier rounds.
+        rho: the tube, radians or metres; it becomes smaller where it has to, if it is above 0.
+        until: the number of the piece and the time in it, added up, after which the search ends.
+        ends, normals: (I,), (I, 3); they are filled in.
+        counts: (K - 1,) is filled in.
+
+    Returns:
+        how it ends; the piece where it does; the beginning and the end of the interval there; how far the padded bodies are apart at its
+        beginning or, for a contact, where they touch; and what is left of rho.
+    """
+    n, V, W = waypoints.shape[1], len(a.vertices), len(b.vertices)
+    # The vertices of the interval's beginning come first, then those of its end.
+    A, B, X, Y = np.empty((2 * V, 3)), np.empty((2 * W, 3)), np.empty((3, 4)), np.empty((3, 4))
+    q, rates, changes, normal, other, stack = np.empty(n), np.empty(n), np.empty(n), np.zeros(3), np.empty(3), np.empty(64)
+    found = 0
+    for piece in range(len(waypoints) - 1):
+        start, end, t0, top = waypoints[piece], waypoints[piece + 1], 0.0, 1
+        stack[0] = 1.0
+        widening = 0.0
+        for k in range(len(a.chain.joints)):
+            widening += a.levers[piece, k]
+        for k in range(len(b.chain.joints)):
+            widening += b.levers[piece, k]
+        positions(start, end, 0.0, turns, q_star, q)
+        place(a, q, X, Y, A[:V])
+        place(b, q, X, Y, B[:W])
+        while top:
+            t1 = stack[top - 1]
+            positions(start, end, t1, turns, q_star, q)
+            place(a, q, X, Y, A[V:])
+            place(b, q, X, Y, B[W:])
+            _bound_rates(start, end, t0, t1, turns, rates, changes)
+            bent = acceleration(a, a.levers[piece], rates, changes) + acceleration(b, b.levers[piece], rates, changes)
+            need = reach + slack + (t1 - t0) ** 2 / 8.0 * bent
+            apart = _gap(normal, A, B) > need + rho * widening
+            if not apart:
+                gap = separation(A, B, normal)
+                if gap <= need + rho * widening and rho > 0.0:
+                    for known in (separation(A[:V], B[:W], other) - reach, separation(A[V:], B[W:], other) - reach):
+                        if known > RESOLUTION and widening > 0.0:
+                            rho = min(rho, SHRINK * known / widening)
+                apart = gap > need + rho * widening
+            if apart:
+                if found == len(ends):
+                    return MANY, piece, t0, t1, separation(A[:V], B[:W], other) - reach, rho
+                ends[found], normals[found] = t1, normal
+                found += 1
+                counts[piece] += 1
+                if piece + t1 > until:
+                    return DONE, piece, t0, t1, 0.0, rho
+                A[:V] = A[V:]
+                B[:W] = B[W:]
+                t0, top = t1, top - 1
+                continue
+            moved = _moved(a, a.levers[piece], rates) + _moved(b, b.levers[piece], rates)
+            narrow = t1 - t0 <= NARROWEST
+            if narrow or (t1 - t0) * moved <= RESOLUTION:
+                now, then = separation(A[:V], B[:W], other) - reach, separation(A[V:], B[W:], other) - reach
+                if now <= RESOLUTION:
+                    return CONTACT, piece, t0, t0, now, rho
+                if then <= RESOLUTION:
+                    return CONTACT, piece, t0, t1, then, rho
+                if narrow:
+                    return NARROW, piece, t0, t1, now, rho
+            stack[top] = (t0 + t1) / 2.0
+            top += 1
+    return DONE, len(waypoints) - 2, 1.0, 1.0, 0.0, rho

@@ -1,0 +1,119 @@
+"""This proof says that a motion is free of collisions: it divides the time of every piece, for every pair, and gives each part a plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from certifier.errors import CirisError, ProofError
+from certifier.model import Array, Scene
+from certifier.proof.container import FORMAT, Arrays, head, malformed, pack, unpack
+from certifier.proof.separation import same_scene
+
+KIND = "motion"
+
+
+class Space(StrEnum):
+    """The space says in which coordinates a motion is straight between its waypoints."""
+
+    Q = "q"
+    S = "s"
+
+    def limits(self, scene: Scene) -> tuple[Array, Array]:
+        """Returns the joint limits that waypoints keep to, (n,) each: the joints' own ones in q; rounded outwards to doubles in s."""
+        return scene.own_limits if self is Space.Q else scene.outer_limits
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion goes straight from waypoint to waypoint; piece k begins at waypoint k, and its time runs from 0 to 1.
+
+    Attributes:
+        space: whether the waypoints are joint positions q, in radians or metres, or the coordinates s.
+        waypoints: (K, n), two or more.
+    """
+
+    space: Space
+    waypoints: Array
+
+    @property
+    def pieces(self) -> int:
+        """Returns the number of pieces, K - 1."""
+        return len(self.waypoints) - 1
+
+    def at(self, piece: int, time: float) -> Array:
+        """Returns the waypoint's coordinates, (n,), at a time of a piece, from 0 to 1; they are rounded."""
+        start, end = self.waypoints[piece], self.waypoints[piece + 1]
+        return start + time * (end - start)
+
+
+@dataclass(frozen=True)
+class MotionProof:
+    """Holds planes that keep every pair of the scene apart all along a motion (docs/proofs.md).
+
+    The arrays of intervals hold, one after the other, those of the first pair: of its first piece in the order of time, of its second
+    piece, and so on; then those of the next pair.
+
+    Attributes:
+        rho: the tube: joint positions that are off by this much, in radians or metres, are proved as well.
+        frames: (P,) int32, for every pair of the scene the number of the body in whose frame its planes are constant.
+        counts: (P, K - 1) int32, in how many intervals the time of each piece is divided for each pair.
+        ends: (I,) when each interval ends; it begins where the one before ends, or at 0.
+        normals: (I, 3) of the planes, unit vectors to rounding that point from b to a.
+    """
+
+    scene: Scene
+    motion: Motion
+    rho: float
+    frames: np.ndarray
+    counts: np.ndarray
+    ends: Array
+    normals: Array
+
+    def to_bytes(self) -> bytes:
+        """Returns the proof as a file."""
+        header = {"format": FORMAT, "kind": KIND, "scene_hash": self.scene.hash, "space": self.motion.space.value, "rho": self.rho}
+        arrays = {name: getattr(self, name) for name in ("frames", "counts", "ends", "normals")}
+        return pack(header, {"waypoints": self.motion.waypoints, **arrays})
+
+    @classmethod
+    def from_bytes(cls, data: bytes, scene: Scene) -> MotionProof:
+        """Reads what :meth:`to_bytes` writes.
+
+        Raises:
+            ProofError: the file is no proof about a motion, or one about another scene.
+        """
+        header, unpacked = unpack(data, KIND)
+        with malformed():
+            fields, arrays = head(header, "space", "rho"), Arrays(unpacked)
+            same_scene(fields, scene)
+            space = fields["space"].text()
+            if space not in set(Space):
+                raise CirisError("document", f"{space[:40]!r} is no space of a motion", field="header.space")
+            frames, counts = arrays.take("frames", "int32"), arrays.take("counts", "int32")
+            waypoints, ends, normals = (arrays.floats(name) for name in ("waypoints", "ends", "normals"))
+            arrays.end()
+        proof = cls(scene, Motion(Space(space), waypoints), float(fields["rho"].number()), frames, counts, ends, normals)
+        proof.check_shapes()
+        return proof
+
+    def check_shapes(self) -> None:
+        """Checks that the arrays fit each other and the scene.
+
+        Raises:
+            ProofError: proof_malformed.
+        """
+        pairs, waypoints = len(self.scene.pairs), self.motion.waypoints
+        if waypoints.ndim != 2 or waypoints.shape[1] != self.scene.n or len(waypoints) < 2:
+            raise ProofError("proof_malformed", f"the waypoints are {waypoints.shape}, where (2 or more, {self.scene.n}) belong")
+        if self.frames.shape != (pairs,) or self.counts.shape != (pairs, self.motion.pieces):
+            problem = f"frames are {self.frames.shape} and counts {self.counts.shape}, for {pairs} pairs on {self.motion.pieces} pieces"
+            raise ProofError("proof_malformed", problem)
+        if self.counts.size and self.counts.min() < 1:
+            raise ProofError("proof_motion", "a pair has no interval on a piece of the motion")
+        total = int(self.counts.sum(dtype=np.int64))
+        if self.ends.shape != (total,) or self.normals.shape != (total, 3):
+            problem = f"ends are {self.ends.shape} and normals {self.normals.shape}, for {total} intervals"
+            raise ProofError("proof_malformed", problem)

@@ -1,0 +1,137 @@
+"""Chains of joints are evaluated here at many configurations, in doubles, with a bound of the error. docs/algorithm.md, 11, has the bounds.
+
+The fixed poses between the joints are the exact ones of certifier.verify.kinematics, rounded to doubles once.
+
+All that is computed of a chain of m joints is a sum of products of rotations and offsets, whose lengths add up to its size at most. In the
+norm that belongs to lengths, a rotation of a fixed pose is wrong by at most 2^-51, one of a joint by at most 2^-45 and the error of its
+angle, and a product of two rotations by at most 2^-48 for its rounding. Rotations have the norm 1, so errors add up. So a position is wrong
+by at most the size times (m + 3) (2^-44 + twice the angles' error), its own sums and a scalar product with a unit vector included, as long
+as this factor is below 2^-10. What prismatic joints are wrong by is added.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from flint import fmpq
+
+from certifier.errors import ProofError
+from certifier.model import Array, JointKind, Scene
+from certifier.verify.kinematics import ExactKinematics
+
+UP = 1 + 2.0**-30
+"""Sums of fewer than 2^20 products of numbers that are not negative, times this, are not below what they stand for."""
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A chain leads from a frame to a body, over m joints that move, in path order.
+
+    Attributes:
+        joints: (m,) position indices.
+        slides: (m,) whether each joint is prismatic.
+        axes: (m, 3) unit vectors, reversed for a joint that is crossed from child to parent, each number rounded to a double.
+        rotations: (m + 1, 3, 3) of the fixed poses before, between and behind the joints, each number rounded to a double.
+        offsets: (m + 1, 3) of the fixed poses, metres, each number rounded to a double.
+    """
+
+    joints: np.ndarray
+    slides: np.ndarray
+    axes: Array
+    rotations: Array
+    offsets: Array
+
+    @classmethod
+    def between(cls, scene: Scene, kinematics: ExactKinematics, frame: str, body: str) -> Chain:
+        """Returns the chain from a body's frame to a body."""
+        moving = [(joint, upwards) for joint, upwards in kinematics.path(frame, body) if joint.index is not None]
+        axes, poses = kinematics.linkage(frame, body)
+        X = np.array([[[_rounded(x) for x in row] for row in pose] for pose in poses])
+        signs = np.array([-1.0 if upwards else 1.0 for _, upwards in moving])
+        return cls(
+            np.array([joint.index for joint, _ in moving], dtype=np.int64),
+            np.array([joint.kind is JointKind.PRISMATIC for joint, _ in moving], dtype=bool),
+            np.array([[_rounded(x) for x in axis] for axis in axes]).reshape(-1, 3) * signs[:, None],
+            X[:, :3, :3],
+            X[:, :3, 3],
+        )
+
+    def levers(self, vertices: Array, slid: Array) -> tuple[Array, Array]:
+        """Returns how far vertices can be from the joints' axes, and from the frame's origin, in metres, rounded upwards.
+
+        Args:
+            vertices: (V, 3) metres in the body's frame.
+            slid: (K, m) how far each joint's position is from 0 at most, metres; only that of a prismatic joint matters.
+
+        Returns:
+            (K, m) distances from the axes, 1 for a prismatic joint; (K,) the sizes. A change of one position moves no vertex farther than
+            by the joint's lever times the change.
+        """
+        m = len(self.joints)
+        levers = np.ones((len(slid), m))
+        tails = vertices @ self.rotations[m].T + self.offsets[m]
+        rounded = 2.0**-45 * (_longest(vertices) + _longest(self.offsets[m:]))
+        behind = np.full(len(slid), _longest(tails) + rounded)
+        across: Array | float = _across(self.axes[m - 1], tails) + rounded if m else 0.0
+        for k in range(m - 1, -1, -1):
+            if not self.slides[k]:
+                levers[:, k] = across * UP
+            behind = behind + (slid[:, k] if self.slides[k] else 0.0)
+            if k:
+                across = _across(self.axes[k - 1], self.offsets[k : k + 1]) + behind
+            behind = behind + _longest(self.offsets[k : k + 1])
+        return levers, behind * UP if m else behind
+
+    def error(self, size: Array, inexact: float) -> Array:
+        """Returns by how many metres a vertex' position, of sizes as :meth:`levers` returns them, is wrong at most.
+
+        Args:
+            inexact: by how much the joints' positions are wrong at most, in radians or metres.
+
+        Raises:
+            ProofError: it is too large for the bound to hold.
+        """
+        part = (len(self.joints) + 3) * (2.0**-44 + 2 * inexact)
+        if not part < 2.0**-10:
+            raise ProofError("proof_too_large", "the positions of the motion are too large for doubles to tell where the bodies are")
+        return size * part + int(self.slides.sum()) * inexact
+
+    def poses(self, q: Array, cosines: Array, sines: Array) -> tuple[Array, Array]:
+        """Returns the rotations and the positions of the body in the frame at N configurations, (N, 3, 3) and (N, 3).
+
+        Args:
+            q: (N, n) positions, of which those of prismatic joints matter.
+            cosines, sines: (N, n) of the positions of revolute joints.
+        """
+        R = np.broadcast_to(self.rotations[0], (len(q), 3, 3))
+        p = np.broadcast_to(self.offsets[0], (len(q), 3))
+        for k, j in enumerate(self.joints):
+            if self.slides[k]:
+                p = p + (R @ self.axes[k]) * q[:, j, None]
+            else:
+                R = R @ _rotations(self.axes[k], cosines[:, j], sines[:, j])
+            p = p + R @ self.offsets[k + 1]
+            R = R @ self.rotations[k + 1]
+        return R, p
+
+
+def _rounded(x: fmpq) -> float:
+    return float(int(x.p) / int(x.q))
+
+
+def _longest(points: Array) -> float:
+    """Returns the largest length of points, (V, 3), rounded upwards; what underflows is less than what is added."""
+    return float(np.sqrt((points**2).sum(axis=1)).max()) * UP + 1e-150
+
+
+def _across(axis: Array, points: Array) -> float:
+    """Returns the largest distance of points, (V, 3), from the line along an axis through 0, rounded upwards."""
+    return _longest(np.cross(axis, points)) + 2.0**-45 * _longest(points)
+
+
+def _rotations(axis: Array, cosines: Array, sines: Array) -> Array:
+    """Returns the rotations about an axis, (N, 3, 3), by Rodrigues' formula."""
+    x, y, z = axis
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + sines[:, None, None] * K + (1.0 - cosines)[:, None, None] * (K @ K)

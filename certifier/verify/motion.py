@@ -1,0 +1,294 @@
+"""The verifier checks here that a motion is free of collisions, and a tube about it (docs/algorithm.md, 11).
+
+In an interval of time from t0 to t1, of length h, a point p moves on a curve that stays within h^2/8 times the largest |p''| of the chord
+from p(t0) to p(t1). A plane is constant in the frame that the proof names. If it has all vertices of a on one side and all of b on the
+other at t0 and at t1, with room for these bulges, for the radii and paddings, for the tube and for what doubles are wrong by, it keeps the
+bodies apart in all of the interval. The bounds of |p''| and of the tube are computed here, from the scene and the waypoints alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from certifier.errors import ProofError
+from certifier.model import Array, Geometry, Scene
+from certifier.proof import limits
+from certifier.proof.motion import Motion, MotionProof, Space
+from certifier.verify.angles import cosines_and_sines
+from certifier.verify.chains import UP, Chain
+from certifier.verify.decimals import exactly, rounded_down
+from certifier.verify.kinematics import ExactKinematics
+from certifier.verify.scene import check_scene
+from certifier.verify.uncovered import not_covered
+
+BLOCK = 1 << 14
+"""At most this many intervals are looked at together."""
+PRODUCTS = 1 << 20
+"""At most this many vertices, each at one time, are looked at together, unless one body has more."""
+
+
+@dataclass(frozen=True)
+class MotionStatement:
+    """States what a valid proof proves.
+
+    Attributes:
+        rho: the tube, radians or metres; 0 where the motion itself is all that is proved.
+        gap: a lower bound in metres of the distance between the two padded bodies of every pair, all along the motion and in the tube.
+    """
+
+    scene: Scene
+    motion: Motion
+    rho: float
+    gap: float
+
+    def lines(self) -> list[str]:
+        """Returns the statement in plain words, without the scene."""
+        motion, scene = self.motion, self.scene
+        start, end = (", ".join(map(exactly, motion.waypoints[i])) for i in (0, -1))
+        names = ", ".join(f"'{joint.name}'" for joint in scene.moving)
+        digest = hashlib.sha256(np.ascontiguousarray(motion.waypoints).tobytes()).hexdigest()
+        tube = f"at every configuration whose joints are within {exactly(self.rho)} rad or m of the motion at a time, all one number"
+        return [
+            f"a motion through {len(motion.waypoints)} waypoints, straight in {motion.space.value} from each to the next:",
+            f"  joints {names}, all waypoints within their limits",
+            f"  from {motion.space.value} = {start}",
+            f"  to {motion.space.value} = {end}",
+            f"  SHA-256 of the waypoints as doubles: {digest}",
+            f"all along it the padded bodies of each of the scene's {len(scene.pairs)} pairs are at least {rounded_down(self.gap)} m apart",
+            *([f"and {tube}, beyond the limits as well"] if self.rho else []),
+            *not_covered(scene),
+        ]
+
+
+def verify_motion(proof: MotionProof) -> MotionStatement:
+    """Checks a proof about a motion and returns what it proves.
+
+    Raises:
+        ProofError: the proof does not hold.
+    """
+    scene = proof.scene
+    check_scene(scene)
+    proof.check_shapes()
+    _check_motion(proof)
+    _check_intervals(proof)
+    check = _Check(proof)
+    gap = min(check.gaps(), default=np.inf)
+    if not 0 < gap < np.inf:
+        raise ProofError("proof_motion", "the scene has no pair to keep apart")
+    return MotionStatement(scene, proof.motion, proof.rho, float(gap))
+
+
+def _check_motion(proof: MotionProof) -> None:
+    """Checks that the waypoints are within the joint limits, and that the tube is one."""
+    scene, waypoints = proof.scene, proof.motion.waypoints
+    if not (np.isfinite(waypoints).all() and np.abs(waypoints).max(initial=0.0) <= limits.MAGNITUDE):
+        raise ProofError("proof_motion", f"a waypoint has a number larger than {limits.MAGNITUDE:g}")
+    lower, upper = proof.motion.space.limits(scene)
+    if not ((lower <= waypoints) & (waypoints <= upper)).all():
+        raise ProofError("proof_motion", "a waypoint is not within the joint limits")
+    if not 0 <= proof.rho <= limits.MAGNITUDE:
+        raise ProofError("proof_motion", "the tube has no width")
+
+
+def _check_intervals(proof: MotionProof) -> None:
+    """Checks that the intervals are within limits and cover every piece, and that frames are bodies and normals unit vectors, nearly."""
+    scene, total = proof.scene, len(proof.ends)
+    if total > limits.INTERVALS:
+        raise ProofError("proof_too_large", f"the proof has {total} intervals; at most {limits.INTERVALS} are checked")
+    if proof.frames.size and not (proof.frames.min() >= 0 and proof.frames.max() < len(scene.bodies)):
+        raise ProofError("proof_motion", "a plane is in the frame of a body that is not there")
+    counts = proof.counts.reshape(-1)
+    last = np.cumsum(counts, dtype=np.int64) - 1
+    if not (_starts(proof) < proof.ends).all() or not (proof.ends[last] == 1.0).all():
+        raise ProofError("proof_motion", "the intervals do not cover the time of a piece from 0 to 1, one after the other")
+    lengths = np.linalg.norm(proof.normals, axis=1)
+    if not ((lengths > 0.5) & (lengths < 2.0)).all():
+        raise ProofError("proof_motion", "a plane's normal is no unit vector")
+
+
+def _starts(proof: MotionProof) -> Array:
+    """Returns when each interval begins, (I,)."""
+    starts = np.concatenate([[0.0], proof.ends[:-1]])
+    counts = proof.counts.reshape(-1)
+    starts[np.cumsum(counts, dtype=np.int64) - counts] = 0.0
+    return starts
+
+
+@dataclass(frozen=True)
+class _Poses:
+    """Holds where a body is in a frame at N times.
+
+    Attributes:
+        R, p: (N, 3, 3) and (N, 3).
+    """
+
+    R: Array
+    p: Array
+
+    def along(self, normals: Array, at: np.ndarray, vertices: Array) -> Array:
+        """Returns n'(R v + p), (I, V), for normals (I, 3) and the poses' numbers (I,)."""
+        rows = np.einsum("ijk,ij->ik", self.R[at], normals)
+        return rows @ vertices.T + np.einsum("ij,ij->i", self.p[at], normals)[:, None]
+
+
+class _Check:
+    """Checks the intervals of all pairs; those of the same two bodies in the same frame share the poses."""
+
+    def __init__(self, proof: MotionProof) -> None:
+        self._proof, self._scene, self._motion = proof, proof.scene, proof.motion
+        self._kinematics = ExactKinematics.by_joint(proof.scene)
+        self._starts = _starts(proof)
+        per_pair = proof.counts.sum(axis=1, dtype=np.int64)
+        self._first = np.cumsum(per_pair) - per_pair
+        self._count = per_pair
+        self._piece = (
+            np.concatenate([np.repeat(np.arange(proof.motion.pieces), row) for row in proof.counts]) if len(per_pair) else per_pair
+        )
+        self._turns = self._scene.revolute & (self._motion.space is Space.S)
+        self._base = self._scene.q_star if self._motion.space is Space.S else np.zeros(self._scene.n)
+        # Seven roundings and fewer lie between two waypoints and a position; a tangent's counts twice in its angle.
+        self._inexact = 2.0**-48 * float(np.abs(self._motion.waypoints).max() + np.abs(self._base).max(initial=0.0))
+        waypoints = np.abs(self._motion.waypoints + self._base)
+        self._slid = np.maximum(waypoints[:-1], waypoints[1:]) * UP + self._inexact + proof.rho
+
+    def gaps(self) -> Iterator[float]:
+        """Yields, for some intervals at a time, how far the padded bodies are apart in them at least, in metres.
+
+        Raises:
+            ProofError: one of the planes does not keep them apart, or it takes too long to see whether they do.
+        """
+        groups: dict[tuple[str, str, str], list[int]] = defaultdict(list)
+        for i, pair in enumerate(self._scene.pairs):
+            frame = self._scene.bodies[self._proof.frames[i]]
+            groups[frame, self._scene.geometry(pair.a).body, self._scene.geometry(pair.b).body].append(i)
+        self._check_cost(groups)
+        for (frame, *bodies), pairs in groups.items():
+            chains = [Chain.between(self._scene, self._kinematics, frame, body) for body in bodies]
+            yield from self._group(chains, pairs)
+
+    def _check_cost(self, groups: dict[tuple[str, str, str], list[int]]) -> None:
+        cost = 0
+        for (frame, *bodies), pairs in groups.items():
+            joints = sum(len(self._kinematics.path(frame, body)) for body in bodies)
+            for i in pairs:
+                vertices = sum(len(self._scene.geometry(name).vertices) for name in (self._scene.pairs[i].a, self._scene.pairs[i].b))
+                cost += int(self._count[i]) * (vertices + limits.JOINT_COST * joints)
+        if cost > limits.SWEPT:
+            raise ProofError("proof_too_large", "the intervals have more vertices, behind more joints, than are checked")
+
+    def _group(self, chains: list[Chain], pairs: list[int]) -> Iterator[float]:
+        """Yields the gaps of pairs of the same two bodies."""
+        levers: dict[str, tuple[Array, Array]] = {}
+        for parts in self._blocks(pairs):
+            rows = np.concatenate([np.arange(low, high) for _, low, high in parts])
+            keys = self._piece[rows] + 1j * np.concatenate([self._starts[rows], self._proof.ends[rows]]).reshape(2, -1)
+            times, at = np.unique(keys, return_inverse=True)
+            at, poses = at.reshape(2, -1), self._poses(chains, times.real.astype(np.int64), times.imag)
+            done = 0
+            for i, low, high in parts:
+                yield self._gap(i, chains, levers, slice(low, high), poses, at[:, done : done + high - low])
+                done += high - low
+
+    def _blocks(self, pairs: list[int]) -> Iterator[list[tuple[int, int, int]]]:
+        """Yields lists of parts of pairs' intervals: the pair's number, the first interval and the one behind the last."""
+        block: list[tuple[int, int, int]] = []
+        room = BLOCK
+        for i in pairs:
+            low, end = int(self._first[i]), int(self._first[i] + self._count[i])
+            most = max(
+                1, PRODUCTS // max(len(self._scene.geometry(name).vertices) for name in (self._scene.pairs[i].a, self._scene.pairs[i].b))
+            )
+            while low < end:
+                high = min(end, low + room, low + most)
+                block.append((i, low, high))
+                room -= high - low
+                low = high
+                if not room:
+                    yield block
+                    block, room = [], BLOCK
+        if block:
+            yield block
+
+    def _poses(self, chains: list[Chain], piece: np.ndarray, time: Array) -> list[_Poses]:
+        """Returns the poses of both bodies at times of pieces, (N,) each."""
+        start, end = self._motion.waypoints[piece], self._motion.waypoints[piece + 1]
+        x = start + time[:, None] * (end - start)
+        if self._motion.space is Space.Q:
+            cosines, sines = cosines_and_sines(np.where(self._scene.revolute, x, 0.0))
+        else:
+            c, s = cosines_and_sines(self._base)
+            square = x * x
+            cosine, sine = (1.0 - square) / (1.0 + square), 2.0 * x / (1.0 + square)
+            cosines, sines = c * cosine - s * sine, s * cosine + c * sine
+        return [_Poses(*chain.poses(x + self._base, cosines, sines)) for chain in chains]
+
+    def _gap(
+        self, i: int, chains: list[Chain], levers: dict[str, tuple[Array, Array]], rows: slice, poses: list[_Poses], at: np.ndarray
+    ) -> float:
+        """Returns how far the padded bodies of a pair are apart at least in some of its intervals.
+
+        Args:
+            levers: of geometries that were looked at before; those of this pair are added.
+            poses: of both bodies, at the times numbered by ``at``, (2, I), the beginnings and the ends of the intervals.
+        """
+        pair, proof = self._scene.pairs[i], self._proof
+        a, b = self._scene.geometry(pair.a), self._scene.geometry(pair.b)
+        normals, piece, t0, t1 = proof.normals[rows], self._piece[rows], self._starts[rows], proof.ends[rows]
+        low = np.minimum(*(poses[0].along(normals, at[k], a.vertices).min(axis=1) for k in (0, 1)))
+        high = np.maximum(*(poses[1].along(normals, at[k], b.vertices).max(axis=1) for k in (0, 1)))
+        rates, changes = self._rates(piece, t0, t1)
+        needed = np.full(len(t0), a.radius + b.radius + 2 * self._scene.padding)
+        for chain, geometry in zip(chains, (a, b), strict=True):
+            lever, size = self._levers(chain, geometry, levers)
+            row = piece if len(lever) > 1 else np.zeros_like(piece)
+            needed += (t1 - t0) ** 2 / 8 * _acceleration(chain, lever[row], rates, changes)
+            needed += proof.rho * lever[row].sum(axis=1) + chain.error(size, self._inexact)[row]
+        gaps = (low - high) / (np.linalg.norm(normals, axis=1) * UP) - needed * UP
+        worst = int(gaps.argmin())
+        if not gaps[worst] > 0:
+            problem = f"piece {piece[worst]}, time {t0[worst]:.6g} to {t1[worst]:.6g}: the plane does not keep {pair.a} and {pair.b} apart"
+            raise ProofError("proof_motion", problem)
+        return float(gaps[worst] / UP)
+
+    def _levers(self, chain: Chain, geometry: Geometry, known: dict[str, tuple[Array, Array]]) -> tuple[Array, Array]:
+        """Returns the geometry's levers and sizes, in one row where they are the same for all pieces."""
+        if geometry.name not in known:
+            slid = self._slid[:, chain.joints] if chain.slides.any() else self._slid[:1, chain.joints]
+            known[geometry.name] = chain.levers(geometry.vertices, slid)
+        return known[geometry.name]
+
+    def _rates(self, piece: np.ndarray, t0: Array, t1: Array) -> tuple[Array, Array]:
+        """Returns bounds of |dq/dt| and |d2q/dt2| in intervals of pieces, (I, n) each, rounded upwards.
+
+        For a tangent of half an angle, q = q* + 2 atan(x), these are 2 |x'|/(1 + x^2) and 4 |x'|^2 |x|/(1 + x^2)^2.
+        """
+        start, end = self._motion.waypoints[piece], self._motion.waypoints[piece + 1]
+        step = np.abs(end - start)
+        if self._motion.space is Space.Q:
+            return step * UP, np.zeros_like(step)
+        x0, x1 = (start + t[:, None] * (end - start) for t in (t0, t1))
+        least = np.where(x0 * x1 > 0, np.minimum(np.abs(x0), np.abs(x1)) - self._inexact, 0.0).clip(0.0)
+        most = np.maximum(np.abs(x0), np.abs(x1)) + self._inexact
+        norm = 1 + least**2
+        rates = np.where(self._turns, 2 * step / norm, step)
+        return rates * UP, np.where(self._turns, 4 * step**2 * most / norm**2, 0.0) * UP
+
+
+def _acceleration(chain: Chain, levers: Array, rates: Array, changes: Array) -> Array:
+    """Returns a bound of the acceleration of every vertex, (I,), from levers (I, m), rates and their changes (I, n), rounded upwards.
+
+    Joints i and then k on the path contribute twice the product of their rates times the lever of k, where i is revolute, and nothing where
+    it is prismatic; a revolute joint alone contributes its lever times the square of its rate and times its change.
+    """
+    total, turning = np.zeros(len(levers)), np.zeros(len(levers))
+    for k, j in enumerate(chain.joints):
+        total += 2 * turning * rates[:, j] * levers[:, k]
+        if not chain.slides[k]:
+            total += levers[:, k] * (rates[:, j] ** 2 + changes[:, j])
+            turning += rates[:, j]
+    return total * UP

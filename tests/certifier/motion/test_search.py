@@ -1,0 +1,134 @@
+"""The search for planes along a motion: what passes, what touches, and where."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from certifier.errors import RegionError
+from certifier.kinematics import Kinematics
+from certifier.model import JointKind
+from certifier.motion.given import given
+from certifier.motion.intervals import RESOLUTION
+from certifier.motion.search import Stop, search
+from certifier.outcome import Outcome
+from certifier.proof.motion import Motion, MotionProof, Space
+from certifier.verify.motion import verify_motion
+from tests.certifier.motions import POST, TIP, distances, least_distance, positions, swing
+from tests.certifier.scenes import planar_arm
+
+
+def motion(scene, *waypoints, space=Space.Q):
+    points = np.array(waypoints, dtype=float)
+    return given(scene, points if space is Space.Q else scene.to_s(points), space)
+
+
+@pytest.mark.parametrize("space", Space)
+@pytest.mark.parametrize("gap", [0.3, 1e-3, 1e-6])
+def test_a_motion_that_passes_is_proved_however_near(gap, space):
+    scene = swing(gap, padding=0.01)
+    proof = search(scene, motion(scene, [-1.5], [1.2], space=space))
+    assert isinstance(proof, MotionProof)
+    assert 0 < verify_motion(proof).gap <= gap * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("space", Space)
+@pytest.mark.parametrize("depth", [0.0, 1e-6, 1e-3, 0.05])
+def test_the_first_contact_is_found_where_geometry_says(depth, space):
+    scene = swing(-depth, padding=0.01)
+    found = search(scene, motion(scene, [-1.5], [-1.0], [1.0], space=space))
+    assert isinstance(found, Stop)
+    before, at = (positions(scene, motion(scene, [-1.0], [1.0], space=space), 0, [t])[0, 0] for t in (found.certified_to, found.time))
+    away, reach = 1.0 + TIP + POST + 0.02 - depth, TIP + POST + 0.02
+    near, contact = (-np.arccos(min(1.0, (1 + away**2 - r**2) / (2 * away))) for r in (reach + RESOLUTION, reach))
+    assert (found.outcome, found.piece, found.pair) == (Outcome.REFUTED, 1, scene.pairs[0])
+    assert near - 1e-9 <= at <= contact + 1e-6
+    assert before <= at <= before + 1e-6
+
+
+def test_a_millimetre_tells_two_motions_apart():
+    """The arm reaches for the obstacle and back. Of two such motions, a millimetre apart at the tip, one is proved and one touches."""
+    scene = planar_arm(2)
+    rest, reaching = np.array([-0.5, -1.0]), np.array([0.6, 0.0])
+    free, touching = 0.0, 1.0
+    while touching - free > 2e-4:
+        middle = (free + touching) / 2
+        proved = isinstance(search(scene, motion(scene, rest, rest + middle * (reaching - rest), rest)), MotionProof)
+        free, touching = (middle, touching) if proved else (free, middle)
+    passing, colliding = (motion(scene, rest, rest + share * (reaching - rest), rest) for share in (free, touching))
+    vias, tip = np.array([passing.waypoints[1], colliding.waypoints[1]]), np.array([[1.0, 0.0, 0.0]])
+    tips = Kinematics.of(scene).points("world", "arm/link2", tip, scene.to_s(vias))
+    assert np.linalg.norm(tips[0] - tips[1]) < 1e-3
+    assert verify_motion(search(scene, passing)).gap > 0
+    assert least_distance(scene, passing) > 0
+    assert search(scene, colliding).outcome is Outcome.REFUTED
+    assert least_distance(scene, colliding) < 1e-6
+
+
+def test_a_motion_that_begins_in_contact_or_stands_still():
+    scene = swing(-0.01)
+    found = search(scene, motion(scene, [0.0], [1.0]))
+    assert (found.outcome, found.piece, found.certified_to, found.time) == (Outcome.REFUTED, 0, 0.0, 0.0)
+    found = search(scene, motion(scene, [1.0], [1.0], [0.0]))
+    assert (found.outcome, found.piece) == (Outcome.REFUTED, 1)
+    assert verify_motion(search(scene, motion(scene, [1.0], [1.0]))).gap > 0.1
+
+
+def test_the_earliest_contact_of_all_pairs_is_reported():
+    """Link 2 meets the obstacle before link 1 does, whichever of the two pairs comes first."""
+    scene = planar_arm(2)
+    path = motion(scene, [0.0, -1.5], [1.4, 0.5])
+    found = search(scene, path)
+    times = np.linspace(0, 1, 4001)
+    first = times[np.argmax(distances(scene, positions(scene, path, 0, times)) < 1e-6)]
+    assert found.outcome is Outcome.REFUTED
+    assert first - 1 / 4000 <= found.time <= first
+    turned = search(replace(scene, pairs=scene.pairs[::-1]), path)
+    assert (turned.pair, turned.time) == (found.pair, found.time)
+
+
+@pytest.mark.parametrize("kind", [JointKind.REVOLUTE, JointKind.PRISMATIC])
+@pytest.mark.parametrize("space", Space)
+def test_a_tube_is_free_and_nearly_as_wide_as_the_bound_allows(kind, space):
+    scene = planar_arm(2, kind=kind)
+    path = motion(scene, [-1.2, -0.5], [-0.4, 0.3], [0.1, -0.6], space=space)
+    proof = search(scene, path, tube=True)
+    statement = verify_motion(MotionProof.from_bytes(proof.to_bytes(), scene))
+    assert statement.rho == proof.rho > 0.01
+    assert any("within" in line for line in statement.lines())
+    rng = np.random.default_rng(0)
+    for piece in range(path.pieces):
+        q = positions(scene, path, piece, rng.uniform(size=500))
+        assert distances(scene, q + statement.rho * rng.choice([-1.0, 1.0], q.shape)).min() > 0
+    # A tip that turns about one joint moves exactly by the bound.
+    swinging = swing(0.2)
+    tube = search(swinging, motion(swinging, [1.0], [0.0]), tube=True)
+    assert 0.9 * 0.2 < tube.rho < 0.2
+
+
+def test_motions_of_the_wrong_shape_or_beyond_limits_are_refused_with_their_place():
+    scene = planar_arm(2)
+    for waypoints, code, field in (
+        ([[0.0, 0.0]], "motion_shape", "waypoints"),
+        ([[0.0], [1.0]], "motion_shape", "waypoints"),
+        ([[0.0, 0.0], [0.0]], "motion_shape", "waypoints"),
+        ([[0.0, 0.0], [0.0, "x"]], "motion_shape", "waypoints"),
+        ([[0.0, 0.0], [0.0, np.nan]], "motion_not_finite", "waypoints[1][1]"),
+        ([[0.0, 0.0], [0.0, 0.0], [2.5, 0.0]], "outside_limits", "waypoints[2][0]"),
+    ):
+        with pytest.raises(RegionError) as refusal:
+            given(scene, waypoints, Space.Q)
+        assert (refusal.value.code, refusal.value.field) == (code, field)
+    limit = scene.to_s([2.0, 2.0])
+    assert isinstance(given(scene, [limit, -limit], Space.S), Motion)
+
+
+def test_a_joint_may_turn_beyond_its_window():
+    """The window of s ends 170 degrees from q*; a motion in q goes on."""
+    scene = swing(0.01)
+    scene = replace(scene, joints=(replace(scene.joints[0], lower=-2.9, upper=2.9, own_limits=(None, 7.0)),))
+    assert verify_motion(search(scene, motion(scene, [-8.0], [7.0]))).gap > 0
+    with pytest.raises(RegionError):
+        given(scene, [[0.0], [7.1]], Space.Q)
