@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import itertools
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from certifier.kinematics import Kinematics, rigid_inverse
 from certifier.model import Array, Geometry, JointKind
@@ -46,8 +48,9 @@ class Side(NamedTuple):
     size: float
 
 
+@lru_cache(maxsize=1 << 12)
 def chain(kinematics: Kinematics, frame: str, body: str) -> Chain:
-    """Returns the chain from a body's frame to a body."""
+    """Returns the chain from a body's frame to a body, which is made once and kept."""
     fixed, links, axes, moving = np.eye(4), [], [], []
     for here, there in itertools.pairwise(kinematics.bodies_between(frame, body)):
         joint = kinematics.scene.joint_above.get(here)
@@ -79,17 +82,35 @@ def side(chain: Chain, geometry: Geometry, reaches: Array) -> Side:
         reaches: (K - 1, n) for every piece, how far each joint's position is from 0 at most.
     """
     vertices = np.ascontiguousarray(geometry.vertices)
-    slid = np.where(chain.slides, reaches[:, chain.joints], 0.0)
-    levers, m = np.ones(slid.shape), len(chain.joints)
-    # Behind a joint come a fixed offset, of which only the part across the axis counts, and what is behind the next joint.
-    tails = vertices @ chain.rotations[m].T + chain.offsets[m]
-    across = float(np.linalg.norm(np.cross(chain.axes[m - 1], tails), axis=1).max()) if m else 0.0
-    behind = np.full(len(slid), float(np.linalg.norm(tails, axis=1).max()))
-    levers[:, m - 1 :] = across
-    for k in range(m - 2, -1, -1):
-        behind += slid[:, k + 1]
-        levers[:, k] = np.linalg.norm(np.cross(chain.axes[k], chain.offsets[k + 1])) + behind
-        behind += np.linalg.norm(chain.offsets[k + 1])
-    levers[:, chain.slides] = 1.0
-    size = float(np.linalg.norm(chain.offsets[0]) + (behind + slid[:, :1].sum(axis=1)).max())
-    return Side(chain, vertices, levers, size)
+    levers = np.ones((len(reaches), len(chain.joints)))
+    return Side(chain, vertices, levers, _measure(chain, vertices, reaches, levers))
+
+
+@njit(cache=True)
+def _measure(chain: Chain, vertices: Array, reaches: Array, levers: Array) -> float:
+    """Fills in the levers of revolute joints and returns the size of a side."""
+    m, longest, across = len(chain.joints), 0.0, 0.0
+    for v in range(len(vertices)):
+        tail = chain.rotations[m] @ vertices[v] + chain.offsets[m]
+        longest = max(longest, _length(tail))
+        if m:
+            across = max(across, _length(np.cross(chain.axes[m - 1], tail)))
+    size = longest
+    for piece in range(len(reaches)):
+        # Behind a joint come a fixed offset, of which only the part across the axis counts, and what is behind the next joint.
+        lever, behind = across, longest
+        for k in range(m - 1, -1, -1):
+            if chain.slides[k]:
+                behind += reaches[piece, chain.joints[k]]
+            else:
+                levers[piece, k] = lever
+            if k:
+                lever = _length(np.cross(chain.axes[k - 1], chain.offsets[k])) + behind
+            behind += _length(chain.offsets[k])
+        size = max(size, behind)
+    return size
+
+
+@njit(cache=True)
+def _length(p: Array) -> float:
+    return np.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])

@@ -132,7 +132,7 @@ def divide(
     reach: float,
     slack: float,
     rho: float,
-    until: float,
+    until: tuple[int, float],
     ends: Array,
     normals: Array,
     counts: Array,
@@ -145,7 +145,7 @@ def divide(
         reach: the radii and paddings of both bodies, metres.
         slack: metres that the planes have to leave for what the verifier rounds.
         rho: the tube, radians or metres; it becomes smaller where it has to, if it is above 0.
-        until: the number of the piece and the time in it, added up, after which the search ends.
+        until: the number of the piece and the time in it at which the search ends.
         ends, normals: (I,), (I, 3); they are filled in.
         counts: (K - 1,) is filled in.
 
@@ -191,7 +191,7 @@ def divide(
                 ends[found], normals[found] = t1, normal
                 found += 1
                 counts[piece] += 1
-                if piece + t1 > until:
+                if piece == until[0] and t1 >= until[1]:
                     return DONE, piece, t0, t1, 0.0, rho
                 A[:V] = A[V:]
                 B[:W] = B[W:]

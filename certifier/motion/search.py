@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Geometry, Pair, Scene
-from certifier.motion.chains import Chain, Side, chain, side
+from certifier.motion.chains import Side, chain, side
 from certifier.motion.intervals import CONTACT, DONE, MANY, acceleration, clearance, divide, positions
 from certifier.outcome import Outcome
 from certifier.proof import limits
@@ -19,37 +20,64 @@ FIRST = 1 << 10
 """There is room for so many intervals of a pair at first."""
 OUTCOMES = {CONTACT: Outcome.REFUTED, MANY: Outcome.INCONCLUSIVE}
 ROUNDED = 2.0**-41
-"""The planes leave this part of the bodies' size, for every joint and two more, for what the verifier rounds."""
+"""The planes leave this part of the bodies' sizes, for every joint and two more, for what the verifier rounds."""
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Says where a motion could not be certified any further.
+    """Says where a motion first could not be certified any further.
 
     Attributes:
         outcome: REFUTED for a contact, TOO_CLOSE, or INCONCLUSIVE for too many intervals.
-        piece: number of the piece of the motion.
-        certified_to: time of the piece up to which all pairs are apart; the planes up to there are not kept as a proof.
-        time: time of the piece of the contact; otherwise the same.
-        distance: of the padded bodies at that time, metres; 0 or less where they overlap, by an amount that it does not say.
+        piece, time: the piece of the motion and the time of it where the pair touches or comes too close.
+        distance: of the padded bodies there, metres; 0 or less where they overlap, by an amount that it does not say.
     """
 
     outcome: Outcome
     pair: Pair
     piece: int
-    certified_to: float
     time: float
     distance: float
 
 
-def search(scene: Scene, motion: Motion, tube: bool = False) -> MotionProof | Stop:
-    """Returns a proof of a motion, not yet verified, or where it first could not be certified.
+@dataclass(frozen=True)
+class Found:
+    """Holds what a search has come to.
+
+    Attributes:
+        proof: of the motion, not yet verified, or of its beginning where there is a stop; None where a pair touches at once.
+        stop: None where all of the motion is proved.
+    """
+
+    proof: MotionProof | None
+    stop: Stop | None
+
+
+def search(scene: Scene, motion: Motion, tube: bool = False) -> Found:
+    """Returns a proof of a motion, or where it first touches and a proof of the motion up to there.
 
     Args:
         motion: that certifier.motion.given has accepted.
-        tube: whether to look for the largest tube, to about 2 % of what the bound of the bodies' displacement allows.
+        tube: whether to look for the largest tube, to about 2 % of what the bound of the bodies' displacement allows. The beginning of a
+            motion that touches is proved without one.
     """
-    return _Search(scene, motion).run(tube)
+    searched = _Search(scene, motion)
+    found = searched.run(searched.widest() if tube else 0.0)
+    return searched.run(0.0) if tube and found.stop else found
+
+
+class _Part(NamedTuple):
+    """What a pair has come to: how :func:`divide` ends, and its ends, normals and counts of intervals."""
+
+    how: int
+    piece: int
+    t0: float
+    t1: float
+    distance: float
+    rho: float
+    ends: Array
+    normals: Array
+    counts: np.ndarray
 
 
 class _Search:
@@ -62,30 +90,46 @@ class _Search:
         self._q_star = scene.q_star if in_s else np.zeros(scene.n)
         self._positions = motion.waypoints + self._q_star  # of joints that slide, to whose positions alone it matters
         self._rates = np.abs(np.diff(motion.waypoints, axis=0)).max(axis=0) * np.where(self._turns, 2.0, 1.0)
-        self._chains: dict[tuple[str, str], Chain] = {}
         self._sides: dict[tuple[str, str], Side] = {}
         self._frames: dict[tuple[str, str], str] = {}
 
-    def run(self, tube: bool) -> MotionProof | Stop:
-        scene = self._scene
-        rho = self._widest() if tube else 0.0
+    def run(self, rho: float) -> Found:
+        """Returns what the search comes to with a tube of this width at first, in radians or metres."""
+        scene, parts, stop = self._scene, [], None
         self._sides.clear()
-        stop, until, parts = None, np.inf, []
-        number = {body: i for i, body in enumerate(scene.bodies)}
-        frames = np.empty(len(scene.pairs), dtype=np.int32)
-        for i, (pair, a, b, frame) in enumerate(self._pairs()):
+        until, certified = (self._motion.pieces - 1, 1.0), (self._motion.pieces - 1, 1.0)
+        left = limits.INTERVALS - self._motion.pieces * len(scene.pairs)
+        for pair, a, b, frame in self._pairs():
             sides = self._side(frame, a, rho), self._side(frame, b, rho)
-            how, piece, t0, t1, distance, rho, *part = self._divide(sides, a.radius + b.radius + 2 * scene.padding, rho, until)
-            frames[i] = number[frame]
-            if how == DONE:
-                parts.append(part)
-            elif piece + t1 < until:
-                until = piece + t1
-                stop = Stop(OUTCOMES.get(how, Outcome.TOO_CLOSE), pair, piece, t0, t1 if how == CONTACT else t0, distance)
-        if stop is not None:
-            return stop
-        ends, normals, counts = (np.concatenate([part[k] for part in parts]) for k in range(3))
-        return MotionProof(scene, self._motion, rho, frames, counts.reshape(len(parts), -1), ends, normals)
+            part = self._divide(sides, a.radius + b.radius + 2 * scene.padding, rho, until, left)
+            parts.append(part)
+            rho = part.rho
+            left -= max(0, len(part.ends) - self._motion.pieces)
+            if part.how != DONE:
+                time = part.t1 if part.how == CONTACT else part.t0
+                certified = min(certified, (part.piece, part.t0))
+                if stop is None or (part.piece, time) < (stop.piece, stop.time):
+                    until = part.piece, part.t1
+                    stop = Stop(OUTCOMES.get(part.how, Outcome.TOO_CLOSE), pair, part.piece, time, part.distance)
+        return Found(self._proof(parts, certified, rho), stop)
+
+    def _proof(self, parts: list[_Part], certified: tuple[int, float], rho: float) -> MotionProof | None:
+        """Returns the proof of the motion up to a piece and a time of it, to which all parts reach; None for no time at all."""
+        piece, end = certified if certified[1] > 0 else (certified[0] - 1, 1.0)
+        if piece < 0:
+            return None
+        number = {body: i for i, body in enumerate(self._scene.bodies)}
+        frames = np.array([number[frame] for *_, frame in self._pairs()], dtype=np.int32)
+        counts = np.array([part.counts[: piece + 1] for part in parts], dtype=np.int32)
+        kept = []
+        for part, row in zip(parts, counts, strict=True):
+            before = int(row[:piece].sum())
+            row[piece] = 1 + np.searchsorted(part.ends[before : before + row[piece]], end)
+            kept.append(before + int(row[piece]))
+        ends = np.concatenate([part.ends[:k] for part, k in zip(parts, kept, strict=True)])
+        normals = np.concatenate([part.normals[:k] for part, k in zip(parts, kept, strict=True)])
+        motion = Motion(self._motion.space, self._motion.waypoints[: piece + 2])
+        return MotionProof(self._scene, motion, end, rho, frames, counts, ends, normals)
 
     def _pairs(self) -> Iterator[tuple[Pair, Geometry, Geometry, str]]:
         """Yields every pair with its geometries and the body in whose frame its planes are constant."""
@@ -97,24 +141,20 @@ class _Search:
 
     def _frame(self, a: Geometry, b: Geometry) -> str:
         """Returns the body between two others from which their accelerations look least."""
+        farthest, still = self._reaches(0.0).max(axis=0, keepdims=True), np.zeros(self._scene.n)
         moving = dict.fromkeys(self._kinematics.rigid_root(body) for body in self._kinematics.bodies_between(a.body, b.body))
 
         def bent(frame: str) -> float:
-            sides = (side(self._chain(frame, geometry.body), geometry, self._reaches(0.0)) for geometry in (a, b))
-            return sum(acceleration(side, side.levers.max(axis=0), self._rates, np.zeros(self._scene.n)) for side in sides)
+            sides = (side(chain(self._kinematics, frame, geometry.body), geometry, farthest) for geometry in (a, b))
+            return sum(acceleration(side, side.levers[0], self._rates, still) for side in sides)
 
         return min(moving, key=bent)
-
-    def _chain(self, frame: str, body: str) -> Chain:
-        if (frame, body) not in self._chains:
-            self._chains[frame, body] = chain(self._kinematics, frame, body)
-        return self._chains[frame, body]
 
     def _side(self, frame: str, geometry: Geometry, rho: float) -> Side:
         """Returns a side whose levers hold in a tube of rho, or of a larger one that was asked about before."""
         key = frame, geometry.name
         if key not in self._sides:
-            self._sides[key] = side(self._chain(frame, geometry.body), geometry, self._reaches(rho))
+            self._sides[key] = side(chain(self._kinematics, frame, geometry.body), geometry, self._reaches(rho))
         return self._sides[key]
 
     def _reaches(self, rho: float) -> Array:
@@ -122,7 +162,7 @@ class _Search:
         size = np.abs(self._positions)
         return np.maximum(size[:-1], size[1:]) + rho
 
-    def _widest(self) -> float:
+    def widest(self) -> float:
         """Returns a tube beyond which the bodies' distances at the first waypoint do not let any be, radians or metres."""
         first, widest = self._motion.waypoints[0], np.inf
         q = np.empty(self._scene.n)
@@ -135,19 +175,20 @@ class _Search:
                 widest = min(widest, gap / levers)
         return float(np.clip(widest, 0.0, np.pi))
 
-    def _divide(
-        self, sides: tuple[Side, Side], reach: float, rho: float, until: float
-    ) -> tuple[int, int, float, float, float, float, Array, Array, np.ndarray]:
-        """Returns what :func:`divide` does, then the ends, the normals and the counts of the intervals."""
+    def _divide(self, sides: tuple[Side, Side], reach: float, rho: float, until: tuple[int, float], most: int) -> _Part:
+        """Divides the motion for a pair, as :func:`divide` does, with ``most`` more intervals than there are pieces at most."""
         a, b = sides
         joints = len(a.chain.joints) + len(b.chain.joints)
-        slack = ROUNDED * (joints + 2) * (a.size + b.size) * (1 + float(np.abs(self._motion.waypoints).max()))
-        room = FIRST
+        waypoints = np.ascontiguousarray(self._motion.waypoints)
+        slack = ROUNDED * (reach + (joints + 2) * (a.size + b.size) * (1 + float(np.abs(waypoints).max())))
+        most += self._motion.pieces
+        room = min(FIRST, most)
         while True:
             ends, normals, counts = np.empty(room), np.empty((room, 3)), np.zeros(self._motion.pieces, dtype=np.int32)
-            waypoints = np.ascontiguousarray(self._motion.waypoints)
-            found = divide(a, b, waypoints, self._turns, self._q_star, reach, slack, rho, until, ends, normals, counts)
-            if found[0] != MANY or room >= limits.INTERVALS:
+            how, piece, t0, t1, distance, left = divide(
+                a, b, waypoints, self._turns, self._q_star, reach, slack, rho, until, ends, normals, counts
+            )
+            if how != MANY or room == most:
                 total = counts.sum()
-                return (*found, ends[:total], normals[:total], counts)
-            room = min(room * 16, limits.INTERVALS)
+                return _Part(how, piece, t0, t1, distance, left, ends[:total], normals[:total], counts)
+            room = min(room * 16, most)

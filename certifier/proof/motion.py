@@ -51,12 +51,13 @@ class Motion:
 
 @dataclass(frozen=True)
 class MotionProof:
-    """Holds planes that keep every pair of the scene apart all along a motion (docs/proofs.md).
+    """Holds planes that keep every pair of the scene apart all along a motion, or along its beginning (docs/proofs.md).
 
     The arrays of intervals hold, one after the other, those of the first pair: of its first piece in the order of time, of its second
     piece, and so on; then those of the next pair.
 
     Attributes:
+        end: the time of the last piece up to which the motion is proved, above 0; 1 where all of it is.
         rho: the tube: joint positions that are off by this much, in radians or metres, are proved as well.
         frames: (P,) int32, for every pair of the scene the number of the body in whose frame its planes are constant.
         counts: (P, K - 1) int32, in how many intervals the time of each piece is divided for each pair.
@@ -66,6 +67,7 @@ class MotionProof:
 
     scene: Scene
     motion: Motion
+    end: float
     rho: float
     frames: np.ndarray
     counts: np.ndarray
@@ -74,7 +76,8 @@ class MotionProof:
 
     def to_bytes(self) -> bytes:
         """Returns the proof as a file."""
-        header = {"format": FORMAT, "kind": KIND, "scene_hash": self.scene.hash, "space": self.motion.space.value, "rho": self.rho}
+        said = {"space": self.motion.space.value, "end": self.end, "rho": self.rho}
+        header = {"format": FORMAT, "kind": KIND, "scene_hash": self.scene.hash, **said}
         arrays = {name: getattr(self, name) for name in ("frames", "counts", "ends", "normals")}
         return pack(header, {"waypoints": self.motion.waypoints, **arrays})
 
@@ -87,7 +90,7 @@ class MotionProof:
         """
         header, unpacked = unpack(data, KIND)
         with malformed():
-            fields, arrays = head(header, "space", "rho"), Arrays(unpacked)
+            fields, arrays = head(header, "space", "end", "rho"), Arrays(unpacked)
             same_scene(fields, scene)
             space = fields["space"].text()
             if space not in set(Space):
@@ -95,7 +98,8 @@ class MotionProof:
             frames, counts = arrays.take("frames", "int32"), arrays.take("counts", "int32")
             waypoints, ends, normals = (arrays.floats(name) for name in ("waypoints", "ends", "normals"))
             arrays.end()
-        proof = cls(scene, Motion(Space(space), waypoints), float(fields["rho"].number()), frames, counts, ends, normals)
+            end, rho = (float(fields[name].number()) for name in ("end", "rho"))
+        proof = cls(scene, Motion(Space(space), waypoints), end, rho, frames, counts, ends, normals)
         proof.check_shapes()
         return proof
 

@@ -20,8 +20,8 @@ from certifier.errors import ProofError
 from certifier.model import Array, JointKind, Scene
 from certifier.verify.kinematics import ExactKinematics
 
-UP = 1 + 2.0**-30
-"""Sums of fewer than 2^20 products of numbers that are not negative, times this, are not below what they stand for."""
+UP = 1 + 2.0**-40
+"""What fewer than 2^12 sums, products and quotients of numbers that are not negative give, times this, is not below what it stands for."""
 
 
 @dataclass(frozen=True)
@@ -127,11 +127,16 @@ def _longest(points: Array) -> float:
 
 def _across(axis: Array, points: Array) -> float:
     """Returns the largest distance of points, (V, 3), from the line along an axis through 0, rounded upwards."""
-    return _longest(np.cross(axis, points)) + 2.0**-45 * _longest(points)
+    return _longest(points @ _skew(axis).T) + 2.0**-45 * _longest(points)
 
 
 def _rotations(axis: Array, cosines: Array, sines: Array) -> Array:
     """Returns the rotations about an axis, (N, 3, 3), by Rodrigues' formula."""
-    x, y, z = axis
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    K = _skew(axis)
     return np.eye(3) + sines[:, None, None] * K + (1.0 - cosines)[:, None, None] * (K @ K)
+
+
+def _skew(axis: Array) -> Array:
+    """Returns the matrix K, (3, 3), with K p the vector product of the axis and p."""
+    x, y, z = axis
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -29,7 +29,7 @@ from certifier.verify.uncovered import not_covered
 BLOCK = 1 << 14
 """At most this many intervals are looked at together."""
 PRODUCTS = 1 << 20
-"""At most this many vertices, each at one time, are looked at together, unless one body has more."""
+"""At most this many vertices, each at one time, are looked at together."""
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,14 @@ class MotionStatement:
     """States what a valid proof proves.
 
     Attributes:
+        end: the time of the motion's last piece up to which it is proved; 1 for all of it.
         rho: the tube, radians or metres; 0 where the motion itself is all that is proved.
         gap: a lower bound in metres of the distance between the two padded bodies of every pair, all along the motion and in the tube.
     """
 
     scene: Scene
     motion: Motion
+    end: float
     rho: float
     gap: float
 
@@ -52,14 +54,15 @@ class MotionStatement:
         start, end = (", ".join(map(exactly, motion.waypoints[i])) for i in (0, -1))
         names = ", ".join(f"'{joint.name}'" for joint in scene.moving)
         digest = hashlib.sha256(np.ascontiguousarray(motion.waypoints).tobytes()).hexdigest()
-        tube = f"at every configuration whose joints are within {exactly(self.rho)} rad or m of the motion at a time, all one number"
+        part = "all along it" if self.end == 1.0 else f"from its beginning to the part {exactly(self.end)} of its last piece"
+        tube = f"at every configuration whose joints are within {exactly(self.rho)} rad or m of this at a time, all one number"
         return [
             f"a motion through {len(motion.waypoints)} waypoints, straight in {motion.space.value} from each to the next:",
             f"  joints {names}, all waypoints within their limits",
             f"  from {motion.space.value} = {start}",
             f"  to {motion.space.value} = {end}",
             f"  SHA-256 of the waypoints as doubles: {digest}",
-            f"all along it the padded bodies of each of the scene's {len(scene.pairs)} pairs are at least {rounded_down(self.gap)} m apart",
+            f"{part} the padded bodies of each of the scene's {len(scene.pairs)} pairs are at least {rounded_down(self.gap)} m apart",
             *([f"and {tube}, beyond the limits as well"] if self.rho else []),
             *not_covered(scene),
         ]
@@ -80,7 +83,7 @@ def verify_motion(proof: MotionProof) -> MotionStatement:
     gap = min(check.gaps(), default=np.inf)
     if not 0 < gap < np.inf:
         raise ProofError("proof_motion", "the scene has no pair to keep apart")
-    return MotionStatement(scene, proof.motion, proof.rho, float(gap))
+    return MotionStatement(scene, proof.motion, proof.end, proof.rho, float(gap))
 
 
 def _check_motion(proof: MotionProof) -> None:
@@ -96,15 +99,16 @@ def _check_motion(proof: MotionProof) -> None:
 
 
 def _check_intervals(proof: MotionProof) -> None:
-    """Checks that the intervals are within limits and cover every piece, and that frames are bodies and normals unit vectors, nearly."""
+    """Checks that intervals cover the motion up to its end, within limits, that frames are bodies, and normals nearly unit vectors."""
     scene, total = proof.scene, len(proof.ends)
     if total > limits.INTERVALS:
         raise ProofError("proof_too_large", f"the proof has {total} intervals; at most {limits.INTERVALS} are checked")
     if proof.frames.size and not (proof.frames.min() >= 0 and proof.frames.max() < len(scene.bodies)):
         raise ProofError("proof_motion", "a plane is in the frame of a body that is not there")
     counts = proof.counts.reshape(-1)
-    last = np.cumsum(counts, dtype=np.int64) - 1
-    if not (_starts(proof) < proof.ends).all() or not (proof.ends[last] == 1.0).all():
+    last = proof.ends[np.cumsum(counts, dtype=np.int64) - 1].reshape(proof.counts.shape)
+    covered = (last[:, :-1] == 1.0).all() and (last[:, -1] >= proof.end).all()
+    if not (covered and 0 < proof.end <= 1 and (_starts(proof) < proof.ends).all() and (proof.ends <= 1.0).all()):
         raise ProofError("proof_motion", "the intervals do not cover the time of a piece from 0 to 1, one after the other")
     lengths = np.linalg.norm(proof.normals, axis=1)
     if not ((lengths > 0.5) & (lengths < 2.0)).all():
@@ -134,6 +138,32 @@ class _Poses:
         """Returns n'(R v + p), (I, V), for normals (I, 3) and the poses' numbers (I,)."""
         rows = np.einsum("ijk,ij->ik", self.R[at], normals)
         return rows @ vertices.T + np.einsum("ij,ij->i", self.p[at], normals)[:, None]
+
+
+class _Side:
+    """Holds the geometries of one of two bodies, and what is known of them on every piece.
+
+    Attributes:
+        geometries: every one once.
+        number: (P,) which of them belongs to each pair of the group.
+    """
+
+    def __init__(self, chain: Chain, geometries: list[Geometry], slid: Array) -> None:
+        self.chain = chain
+        self.geometries = list({geometry.name: geometry for geometry in geometries}.values())
+        numbers = {geometry.name: i for i, geometry in enumerate(self.geometries)}
+        self.number = np.array([numbers[geometry.name] for geometry in geometries])
+        # Without a prismatic joint, one row of levers holds for every piece.
+        self._slid = slid[:, chain.joints] if chain.slides.any() else slid[:1, chain.joints]
+        self._known: dict[str, tuple[Array, Array]] = {}
+
+    def levers(self, geometry: Geometry, piece: np.ndarray) -> tuple[Array, Array]:
+        """Returns the levers and the sizes of a geometry on pieces, (I, m) and (I,)."""
+        if geometry.name not in self._known:
+            self._known[geometry.name] = self.chain.levers(geometry.vertices, self._slid)
+        row = piece if len(self._slid) > 1 else np.zeros_like(piece)
+        levers, sizes = self._known[geometry.name]
+        return levers[row], sizes[row]
 
 
 class _Check:
@@ -167,9 +197,12 @@ class _Check:
             frame = self._scene.bodies[self._proof.frames[i]]
             groups[frame, self._scene.geometry(pair.a).body, self._scene.geometry(pair.b).body].append(i)
         self._check_cost(groups)
+        chains: dict[tuple[str, str], Chain] = {}
         for (frame, *bodies), pairs in groups.items():
-            chains = [Chain.between(self._scene, self._kinematics, frame, body) for body in bodies]
-            yield from self._group(chains, pairs)
+            for body in bodies:
+                if (frame, body) not in chains:
+                    chains[frame, body] = Chain.between(self._scene, self._kinematics, frame, body)
+            yield from self._group([chains[frame, body] for body in bodies], pairs)
 
     def _check_cost(self, groups: dict[tuple[str, str, str], list[int]]) -> None:
         cost = 0
@@ -182,37 +215,43 @@ class _Check:
             raise ProofError("proof_too_large", "the intervals have more vertices, behind more joints, than are checked")
 
     def _group(self, chains: list[Chain], pairs: list[int]) -> Iterator[float]:
-        """Yields the gaps of pairs of the same two bodies."""
-        levers: dict[str, tuple[Array, Array]] = {}
-        for parts in self._blocks(pairs):
-            rows = np.concatenate([np.arange(low, high) for _, low, high in parts])
-            keys = self._piece[rows] + 1j * np.concatenate([self._starts[rows], self._proof.ends[rows]]).reshape(2, -1)
-            times, at = np.unique(keys, return_inverse=True)
-            at, poses = at.reshape(2, -1), self._poses(chains, times.real.astype(np.int64), times.imag)
-            done = 0
-            for i, low, high in parts:
-                yield self._gap(i, chains, levers, slice(low, high), poses, at[:, done : done + high - low])
-                done += high - low
+        """Yields the gaps of pairs of the same two bodies, some intervals at a time."""
+        both = [[self._scene.geometry(name) for name in (self._scene.pairs[i].a, self._scene.pairs[i].b)] for i in pairs]
+        most = max(1, min(BLOCK, PRODUCTS // max(len(geometry.vertices) for two in both for geometry in two)))
+        rows = np.concatenate([np.arange(self._first[i], self._first[i] + self._count[i]) for i in pairs])
+        owner = np.repeat(np.arange(len(pairs)), self._count[pairs])
+        sides = [_Side(chain, [two[k] for two in both], self._slid) for k, chain in enumerate(chains)]
+        for first in range(0, len(rows), most):
+            yield self._gap(sides, rows[first : first + most], owner[first : first + most])
 
-    def _blocks(self, pairs: list[int]) -> Iterator[list[tuple[int, int, int]]]:
-        """Yields lists of parts of pairs' intervals: the pair's number, the first interval and the one behind the last."""
-        block: list[tuple[int, int, int]] = []
-        room = BLOCK
-        for i in pairs:
-            low, end = int(self._first[i]), int(self._first[i] + self._count[i])
-            most = max(
-                1, PRODUCTS // max(len(self._scene.geometry(name).vertices) for name in (self._scene.pairs[i].a, self._scene.pairs[i].b))
-            )
-            while low < end:
-                high = min(end, low + room, low + most)
-                block.append((i, low, high))
-                room -= high - low
-                low = high
-                if not room:
-                    yield block
-                    block, room = [], BLOCK
-        if block:
-            yield block
+    def _gap(self, sides: list[_Side], rows: np.ndarray, owner: np.ndarray) -> float:
+        """Returns how far the padded bodies are apart at least in some intervals, whose pairs' numbers in the group are ``owner``."""
+        proof = self._proof
+        normals, piece, t0, t1 = proof.normals[rows], self._piece[rows], self._starts[rows], proof.ends[rows]
+        # A number with a piece as its real and a time as its imaginary part, as numbers of this kind are sorted and compared exactly.
+        times, at = np.unique(piece + 1j * np.array([t0, t1]), return_inverse=True)
+        poses = self._poses([side.chain for side in sides], times.real.astype(np.int64), times.imag)
+        rates, changes = self._rates(piece, t0, t1)
+        needed = np.full(len(rows), 2 * self._scene.padding)
+        ends = np.empty((2, len(rows)))
+        for k, (side, pose, sign) in enumerate(zip(sides, poses, (1.0, -1.0), strict=True)):
+            for number, geometry in enumerate(side.geometries):
+                own = np.flatnonzero(side.number[owner] == number)
+                if not own.size:
+                    continue
+                levers, size = side.levers(geometry, piece[own])
+                bent = _acceleration(side.chain, levers, rates[own], changes[own])
+                needed[own] += geometry.radius + (t1 - t0)[own] ** 2 / 8 * bent + proof.rho * levers.sum(axis=1)
+                needed[own] += side.chain.error(size, self._inexact)
+                reached = [pose.along(sign * normals[own], at.reshape(2, -1)[end, own], geometry.vertices).min(axis=1) for end in (0, 1)]
+                ends[k, own] = np.minimum(*reached)
+        gaps = ends.sum(axis=0) / (np.linalg.norm(normals, axis=1) * UP) - needed * UP
+        worst = int(gaps.argmin())
+        if not gaps[worst] > 0:
+            a, b = (side.geometries[side.number[owner[worst]]].name for side in sides)
+            problem = f"piece {piece[worst]}, time {t0[worst]:.6g} to {t1[worst]:.6g}: the plane does not keep {a} and {b} apart"
+            raise ProofError("proof_motion", problem)
+        return float(gaps[worst] / UP)
 
     def _poses(self, chains: list[Chain], piece: np.ndarray, time: Array) -> list[_Poses]:
         """Returns the poses of both bodies at times of pieces, (N,) each."""
@@ -226,41 +265,6 @@ class _Check:
             cosine, sine = (1.0 - square) / (1.0 + square), 2.0 * x / (1.0 + square)
             cosines, sines = c * cosine - s * sine, s * cosine + c * sine
         return [_Poses(*chain.poses(x + self._base, cosines, sines)) for chain in chains]
-
-    def _gap(
-        self, i: int, chains: list[Chain], levers: dict[str, tuple[Array, Array]], rows: slice, poses: list[_Poses], at: np.ndarray
-    ) -> float:
-        """Returns how far the padded bodies of a pair are apart at least in some of its intervals.
-
-        Args:
-            levers: of geometries that were looked at before; those of this pair are added.
-            poses: of both bodies, at the times numbered by ``at``, (2, I), the beginnings and the ends of the intervals.
-        """
-        pair, proof = self._scene.pairs[i], self._proof
-        a, b = self._scene.geometry(pair.a), self._scene.geometry(pair.b)
-        normals, piece, t0, t1 = proof.normals[rows], self._piece[rows], self._starts[rows], proof.ends[rows]
-        low = np.minimum(*(poses[0].along(normals, at[k], a.vertices).min(axis=1) for k in (0, 1)))
-        high = np.maximum(*(poses[1].along(normals, at[k], b.vertices).max(axis=1) for k in (0, 1)))
-        rates, changes = self._rates(piece, t0, t1)
-        needed = np.full(len(t0), a.radius + b.radius + 2 * self._scene.padding)
-        for chain, geometry in zip(chains, (a, b), strict=True):
-            lever, size = self._levers(chain, geometry, levers)
-            row = piece if len(lever) > 1 else np.zeros_like(piece)
-            needed += (t1 - t0) ** 2 / 8 * _acceleration(chain, lever[row], rates, changes)
-            needed += proof.rho * lever[row].sum(axis=1) + chain.error(size, self._inexact)[row]
-        gaps = (low - high) / (np.linalg.norm(normals, axis=1) * UP) - needed * UP
-        worst = int(gaps.argmin())
-        if not gaps[worst] > 0:
-            problem = f"piece {piece[worst]}, time {t0[worst]:.6g} to {t1[worst]:.6g}: the plane does not keep {pair.a} and {pair.b} apart"
-            raise ProofError("proof_motion", problem)
-        return float(gaps[worst] / UP)
-
-    def _levers(self, chain: Chain, geometry: Geometry, known: dict[str, tuple[Array, Array]]) -> tuple[Array, Array]:
-        """Returns the geometry's levers and sizes, in one row where they are the same for all pieces."""
-        if geometry.name not in known:
-            slid = self._slid[:, chain.joints] if chain.slides.any() else self._slid[:1, chain.joints]
-            known[geometry.name] = chain.levers(geometry.vertices, slid)
-        return known[geometry.name]
 
     def _rates(self, piece: np.ndarray, t0: Array, t1: Array) -> tuple[Array, Array]:
         """Returns bounds of |dq/dt| and |d2q/dt2| in intervals of pieces, (I, n) each, rounded upwards.

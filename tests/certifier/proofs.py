@@ -73,9 +73,9 @@ def motion() -> tuple[Scene, MotionProof]:
     """A two-link arm swings past its obstacle, through three waypoints and with a tube."""
     world = planar_arm(2, padding=0.01)
     path = given(world, [[-0.9, -0.4], [-0.2, 0.5], [0.1, -0.7]], Space.Q)
-    found = search(world, path, tube=True)
-    assert isinstance(found, MotionProof)
-    return world, found
+    proof = search(world, path, tube=True).proof
+    assert proof is not None
+    return world, proof
 
 
 def files() -> dict[str, bytes]:

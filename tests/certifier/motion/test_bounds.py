@@ -35,9 +35,16 @@ def positions(tree, motion, piece, times):
     return (x, tree.to_q(x)) if motion.space is Space.S else (tree.to_s(x), x)
 
 
+def without_pairs(tree, motion, rho):
+    counts = np.zeros((0, motion.pieces), np.int32)
+    return MotionProof(tree, motion, 1.0, rho, np.zeros(0, np.int32), counts, np.zeros(0), np.zeros((0, 3)))
+
+
 def bounds(tree, frame, body, shape, motion, rho=0.0):
     """Levers, and the bounds of the acceleration on each piece, as the verifier and as the search computes them."""
-    empty = MotionProof(tree, motion, rho, np.zeros(0, np.int32), np.zeros((0, motion.pieces), np.int32), np.zeros(0), np.zeros((0, 3)))
+    empty = MotionProof(
+        tree, motion, 1.0, rho, np.zeros(0, np.int32), np.zeros((0, motion.pieces), np.int32), np.zeros(0), np.zeros((0, 3))
+    )
     check, chain = _Check(empty), Chain.between(tree, ExactKinematics.by_joint(tree), frame, body)
     pieces = np.arange(motion.pieces)
     rates, changes = check._rates(pieces, np.zeros(len(pieces)), np.ones(len(pieces)))
@@ -95,7 +102,9 @@ def test_positions_are_as_exact_as_is_said(seed):
     """Against exact fractions, in s."""
     tree, frame, body, shape, motion = random_case(2 * seed + 1)
     points = motion.waypoints
-    proof = MotionProof(tree, motion, 0.0, np.zeros(0, np.int32), np.zeros((0, motion.pieces), np.int32), np.zeros(0), np.zeros((0, 3)))
+    proof = MotionProof(
+        tree, motion, 1.0, 0.0, np.zeros(0, np.int32), np.zeros((0, motion.pieces), np.int32), np.zeros(0), np.zeros((0, 3))
+    )
     check, chain = _Check(proof), Chain.between(tree, ExactKinematics.by_joint(tree), frame, body)
     _, size = chain.levers(shape.vertices, check._slid[:, chain.joints])
     (poses,) = check._poses([chain], np.array([0, 1]), np.array([0.0, 1.0]))

@@ -12,7 +12,7 @@ from certifier.kinematics import Kinematics
 from certifier.model import JointKind
 from certifier.motion.given import given
 from certifier.motion.intervals import RESOLUTION
-from certifier.motion.search import Stop, search
+from certifier.motion.search import search
 from certifier.outcome import Outcome
 from certifier.proof.motion import Motion, MotionProof, Space
 from certifier.verify.motion import verify_motion
@@ -29,23 +29,26 @@ def motion(scene, *waypoints, space=Space.Q):
 @pytest.mark.parametrize("gap", [0.3, 1e-3, 1e-6])
 def test_a_motion_that_passes_is_proved_however_near(gap, space):
     scene = swing(gap, padding=0.01)
-    proof = search(scene, motion(scene, [-1.5], [1.2], space=space))
-    assert isinstance(proof, MotionProof)
-    assert 0 < verify_motion(proof).gap <= gap * (1 + 1e-6)
+    found = search(scene, motion(scene, [-1.5], [1.2], space=space))
+    assert found.stop is None
+    assert 0 < verify_motion(found.proof).gap <= gap * (1 + 1e-6)
 
 
 @pytest.mark.parametrize("space", Space)
 @pytest.mark.parametrize("depth", [0.0, 1e-6, 1e-3, 0.05])
 def test_the_first_contact_is_found_where_geometry_says(depth, space):
     scene = swing(-depth, padding=0.01)
-    found = search(scene, motion(scene, [-1.5], [-1.0], [1.0], space=space))
-    assert isinstance(found, Stop)
-    before, at = (positions(scene, motion(scene, [-1.0], [1.0], space=space), 0, [t])[0, 0] for t in (found.certified_to, found.time))
+    path = motion(scene, [-1.5], [-1.0], [1.0], space=space)
+    found = search(scene, path)
+    stop, proved = found.stop, verify_motion(found.proof)
+    before, at = (positions(scene, path, 1, [t])[0, 0] for t in (proved.end, stop.time))
     away, reach = 1.0 + TIP + POST + 0.02 - depth, TIP + POST + 0.02
     near, contact = (-np.arccos(min(1.0, (1 + away**2 - r**2) / (2 * away))) for r in (reach + RESOLUTION, reach))
-    assert (found.outcome, found.piece, found.pair) == (Outcome.REFUTED, 1, scene.pairs[0])
+    assert (stop.outcome, stop.piece, stop.pair) == (Outcome.REFUTED, 1, scene.pairs[0])
     assert near - 1e-9 <= at <= contact + 1e-6
     assert before <= at <= before + 1e-6
+    assert proved.motion.pieces == 2
+    assert not any("all along" in line for line in proved.lines())
 
 
 def test_a_millimetre_tells_two_motions_apart():
@@ -55,38 +58,40 @@ def test_a_millimetre_tells_two_motions_apart():
     free, touching = 0.0, 1.0
     while touching - free > 2e-4:
         middle = (free + touching) / 2
-        proved = isinstance(search(scene, motion(scene, rest, rest + middle * (reaching - rest), rest)), MotionProof)
+        proved = search(scene, motion(scene, rest, rest + middle * (reaching - rest), rest)).stop is None
         free, touching = (middle, touching) if proved else (free, middle)
     passing, colliding = (motion(scene, rest, rest + share * (reaching - rest), rest) for share in (free, touching))
     vias, tip = np.array([passing.waypoints[1], colliding.waypoints[1]]), np.array([[1.0, 0.0, 0.0]])
     tips = Kinematics.of(scene).points("world", "arm/link2", tip, scene.to_s(vias))
     assert np.linalg.norm(tips[0] - tips[1]) < 1e-3
-    assert verify_motion(search(scene, passing)).gap > 0
+    assert verify_motion(search(scene, passing).proof).gap > 0
     assert least_distance(scene, passing) > 0
-    assert search(scene, colliding).outcome is Outcome.REFUTED
+    assert search(scene, colliding).stop.outcome is Outcome.REFUTED
     assert least_distance(scene, colliding) < 1e-6
 
 
 def test_a_motion_that_begins_in_contact_or_stands_still():
     scene = swing(-0.01)
     found = search(scene, motion(scene, [0.0], [1.0]))
-    assert (found.outcome, found.piece, found.certified_to, found.time) == (Outcome.REFUTED, 0, 0.0, 0.0)
+    assert found.proof is None
+    assert (found.stop.outcome, found.stop.piece, found.stop.time) == (Outcome.REFUTED, 0, 0.0)
     found = search(scene, motion(scene, [1.0], [1.0], [0.0]))
-    assert (found.outcome, found.piece) == (Outcome.REFUTED, 1)
-    assert verify_motion(search(scene, motion(scene, [1.0], [1.0]))).gap > 0.1
+    assert (found.stop.outcome, found.stop.piece) == (Outcome.REFUTED, 1)
+    assert verify_motion(search(scene, motion(scene, [1.0], [1.0])).proof).gap > 0.1
 
 
 def test_the_earliest_contact_of_all_pairs_is_reported():
     """Link 2 meets the obstacle before link 1 does, whichever of the two pairs comes first."""
     scene = planar_arm(2)
     path = motion(scene, [0.0, -1.5], [1.4, 0.5])
-    found = search(scene, path)
+    stop = search(scene, path).stop
     times = np.linspace(0, 1, 4001)
     first = times[np.argmax(distances(scene, positions(scene, path, 0, times)) < 1e-6)]
-    assert found.outcome is Outcome.REFUTED
-    assert first - 1 / 4000 <= found.time <= first
+    assert stop.outcome is Outcome.REFUTED
+    assert first - 1 / 4000 <= stop.time <= first
     turned = search(replace(scene, pairs=scene.pairs[::-1]), path)
-    assert (turned.pair, turned.time) == (found.pair, found.time)
+    assert (turned.stop.pair, turned.stop.time) == (stop.pair, stop.time)
+    assert 0 <= stop.time - verify_motion(turned.proof).end < 1e-6
 
 
 @pytest.mark.parametrize("kind", [JointKind.REVOLUTE, JointKind.PRISMATIC])
@@ -94,7 +99,7 @@ def test_the_earliest_contact_of_all_pairs_is_reported():
 def test_a_tube_is_free_and_nearly_as_wide_as_the_bound_allows(kind, space):
     scene = planar_arm(2, kind=kind)
     path = motion(scene, [-1.2, -0.5], [-0.4, 0.3], [0.1, -0.6], space=space)
-    proof = search(scene, path, tube=True)
+    proof = search(scene, path, tube=True).proof
     statement = verify_motion(MotionProof.from_bytes(proof.to_bytes(), scene))
     assert statement.rho == proof.rho > 0.01
     assert any("within" in line for line in statement.lines())
@@ -104,7 +109,7 @@ def test_a_tube_is_free_and_nearly_as_wide_as_the_bound_allows(kind, space):
         assert distances(scene, q + statement.rho * rng.choice([-1.0, 1.0], q.shape)).min() > 0
     # A tip that turns about one joint moves exactly by the bound.
     swinging = swing(0.2)
-    tube = search(swinging, motion(swinging, [1.0], [0.0]), tube=True)
+    tube = search(swinging, motion(swinging, [1.0], [0.0]), tube=True).proof
     assert 0.9 * 0.2 < tube.rho < 0.2
 
 
@@ -129,6 +134,6 @@ def test_a_joint_may_turn_beyond_its_window():
     """The window of s ends 170 degrees from q*; a motion in q goes on."""
     scene = swing(0.01)
     scene = replace(scene, joints=(replace(scene.joints[0], lower=-2.9, upper=2.9, own_limits=(None, 7.0)),))
-    assert verify_motion(search(scene, motion(scene, [-8.0], [7.0]))).gap > 0
+    assert verify_motion(search(scene, motion(scene, [-8.0], [7.0])).proof).gap > 0
     with pytest.raises(RegionError):
         given(scene, [[0.0], [7.1]], Space.Q)

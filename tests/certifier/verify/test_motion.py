@@ -49,10 +49,10 @@ def test_of_thousands_of_single_changes_none_is_accepted_that_is_not_true(space)
     """The motion passes at a millimetre. A changed plane or time says the same of it; a changed motion or scene is sampled."""
     scene = swing(1e-3)
     points = np.array([[-1.0], [0.3], [-0.2]])
-    found = search(scene, Motion(space, points if space is Space.Q else scene.to_s(points)))
+    found = search(scene, Motion(space, points if space is Space.Q else scene.to_s(points))).proof
     rng, accepted, untrue = np.random.default_rng(0), 0, 0
     for _ in range(2000):
-        kind = rng.choice(["normals", "ends", "counts", "waypoints", "padding", "radius", "rho", "dropped"])
+        kind = rng.choice(["normals", "ends", "counts", "waypoints", "padding", "radius", "rho", "end", "dropped"])
         proof = found
         if kind in ("normals", "ends", "counts"):
             proof = replace(found, **{kind: changed(getattr(found, kind), rng)})
@@ -63,6 +63,8 @@ def test_of_thousands_of_single_changes_none_is_accepted_that_is_not_true(space)
         elif kind == "radius":
             post = replace(scene.geometries[1], radius=scene.geometries[1].radius + rng.uniform(-2e-3, 2e-3))
             proof = replace(found, scene=replace(scene, geometries=(scene.geometries[0], post)))
+        elif kind == "end":
+            proof = replace(found, end=rng.uniform(0, 1))
         elif kind == "rho":
             proof = replace(found, rho=10.0 ** rng.integers(-9, 1))
         else:
@@ -98,6 +100,9 @@ def test_a_pair_is_not_left_out():
         {"rho": -1.0},
         {"rho": float("nan")},
         {"rho": 1e9},
+        {"end": 0.0},
+        {"end": 1.5},
+        {"end": float("nan")},
         {"space": "r"},
         {"waypoints": np.zeros((1, 2))},
         {"waypoints": np.zeros((3, 3))},
@@ -148,13 +153,13 @@ def test_the_statement_names_the_motion_and_what_is_not_covered():
     assert lines[2] == "  from q = -0.9, -0.4"
     assert any("'arm/link1' and 'arm/link2'" in line and "not covered" in line for line in lines)
     assert len(json.dumps(lines)) < 2000
-    plain = search(scene, proof.motion)
+    plain = search(scene, proof.motion).proof
     assert not any("and at every configuration" in line for line in verify_motion(plain).lines())
 
 
 def test_a_scene_without_pairs_proves_nothing():
     scene: Scene = replace(planar_arm(1), pairs=())
     empty = MotionProof(
-        scene, Motion(Space.Q, np.zeros((2, 1))), 0.0, np.zeros(0, np.int32), np.zeros((0, 1), np.int32), np.zeros(0), np.zeros((0, 3))
+        scene, Motion(Space.Q, np.zeros((2, 1))), 1.0, 0.0, np.zeros(0, np.int32), np.zeros((0, 1), np.int32), np.zeros(0), np.zeros((0, 3))
     )
     assert refused(empty)
