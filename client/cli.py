@@ -232,6 +232,16 @@ def _parser() -> argparse.ArgumentParser:
     certify.add_argument("--solver", metavar="NAME", help="solver that Drake uses: clarabel (default), scs, csdp or mosek")
     certify.set_defaults(run="client.commands:certify")
 
+    motion = verbs.add_parser("certify-path", parents=[json], help="certify a motion, straight from waypoint to waypoint")
+    motion.add_argument("scene", metavar="SCENE")
+    motion.add_argument("--q", metavar='"0,0.3,..."', action="append", help="a waypoint: joint positions; give it two times or more")
+    motion.add_argument("--path", metavar="FILE", help="the waypoints: npz, JSON, YAML or CSV with q or s (K x n), perhaps times t (K)")
+    motion.add_argument("--space", choices=["q", "s"], help="in which the motion is straight; default: in which the waypoints are given")
+    motion.add_argument("--tube", action="store_true", help="look for the largest certified tube about the motion")
+    motion.add_argument("--local", action="store_true", help="certify in this process, without a service")
+    motion.add_argument("--out", metavar="FILE", help="file for the proof; default: none")
+    motion.set_defaults(run="client.motion:certify_path")
+
     verify = verbs.add_parser("verify", parents=[json], help="check a proof file offline and say what was proved")
     verify.add_argument("proof", metavar="PROOF")
     verify.set_defaults(run="client.verify:verify")

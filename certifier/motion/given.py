@@ -7,30 +7,45 @@ from typing import Any
 import numpy as np
 
 from certifier.errors import RegionError
-from certifier.model import Scene
+from certifier.model import Array, Scene
 from certifier.proof import limits
 from certifier.proof.motion import Motion, Space
 
 
-def given(scene: Scene, waypoints: Any, space: Space, field: str = "waypoints") -> Motion:
+def given(scene: Scene, waypoints: Any, coordinates: Space, space: Space | None = None, field: str = "waypoints") -> Motion:
     """Returns a motion from what users give: nested lists or an array of numbers, (K, n).
 
-    Waypoints in q may go beyond a joint's window, up to its own limits; the motion goes the way that they say, and is not taken to other
-    turns of a joint.
+    A motion that is straight in q may go beyond a joint's window, up to the joint's own limits. It goes the way that the numbers say; no
+    waypoint is taken to another turn of a joint.
 
     Args:
+        coordinates: what the numbers are, q or s.
+        space: in which coordinates the motion is straight; None for those.
         field: where the user gave the waypoints, for errors.
 
     Raises:
         RegionError: ``motion_shape``, ``motion_not_finite``, ``motion_too_long``, or ``outside_limits`` with the waypoint and the joint.
     """
+    points = _numbers(scene, waypoints, field)
+    space = space or coordinates
+    if coordinates is Space.Q and space is Space.S:
+        _check_limits(scene, points, (scene.q_lower, scene.q_upper), field)
+        return Motion(space, np.clip(scene.to_s(points), *space.limits(scene)))
+    _check_limits(scene, points, coordinates.limits(scene), field)
+    return Motion(space, points if space is coordinates else np.clip(scene.to_q(points), *space.limits(scene)))
+
+
+def _numbers(scene: Scene, waypoints: Any, field: str) -> Array:
     try:
         points = np.array(waypoints, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise RegionError("motion_shape", f"waypoints must be lists of {scene.n} numbers each: {error}", field=field) from None
-    if points.ndim != 2 or points.shape[1] != scene.n or len(points) < 2:
+    except (TypeError, ValueError):
+        points = None
+    if points is None or points.ndim != 2 or points.shape[1] != scene.n or len(points) < 2:
         hint = f"give two or more waypoints with {scene.n} numbers each, one for every joint in the scene's order"
-        raise RegionError("motion_shape", f"the waypoints are of shape {points.shape}", field=field, hint=hint)
+        shape = "no lists of numbers of one length" if points is None else f"of shape {points.shape}"
+        raise RegionError("motion_shape", f"the waypoints are {shape}", field=field, hint=hint)
+    if not scene.pairs:
+        raise RegionError("motion_shape", "the scene has no pair of bodies to keep apart", field="scene")
     if len(points) * len(scene.pairs) > limits.INTERVALS:
         most = limits.INTERVALS // len(scene.pairs)
         problem = f"there are {len(points)} waypoints, and a proof about this scene holds at most {most}"
@@ -39,13 +54,13 @@ def given(scene: Scene, waypoints: Any, space: Space, field: str = "waypoints") 
     if len(wrong):
         i, j = wrong[0]
         raise RegionError("motion_not_finite", f"{points[i, j]} is no number of at most {limits.MAGNITUDE:g}", field=f"{field}[{i}][{j}]")
-    if not scene.pairs:
-        raise RegionError("motion_shape", "the scene has no pair of bodies to keep apart", field="scene")
-    lower, upper = space.limits(scene)
+    return points
+
+
+def _check_limits(scene: Scene, points: Array, bounds: tuple[Array, Array], field: str) -> None:
+    lower, upper = bounds
     outside = np.argwhere((points < lower) | (points > upper))
     if len(outside):
         i, j = outside[0]
-        problem = f"waypoint {i} is outside the limits of joint {scene.moving[j].name}: {points[i, j]:.6g} is not in"
-        hint = f"joints are counted from 0, {space.value} as in the scene's order"
-        raise RegionError("outside_limits", f"{problem} [{lower[j]:.6g}, {upper[j]:.6g}]", field=f"{field}[{i}][{j}]", hint=hint)
-    return Motion(space, points)
+        problem = f"waypoint {i} has joint {scene.moving[j].name} at {points[i, j]:.6g}, not within [{lower[j]:.6g}, {upper[j]:.6g}]"
+        raise RegionError("outside_limits", problem, field=f"{field}[{i}][{j}]", hint="waypoints and joints are counted from 0")

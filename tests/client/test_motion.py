@@ -1,0 +1,96 @@
+"""``ciris certify-path``: waypoints from the command line and from files, what is printed, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from certifier.errors import RegionError
+from certifier.proof.motion import Space
+from client.paths import path_file
+from tests.client.conftest import PLANAR, Ciris
+
+FREE, TOUCHING = ("0.2,-0.4", "-0.4,0.3"), ("0,0", "2,2")
+
+
+def test_a_motion_is_certified_and_its_proof_kept(ciris: Ciris, tmp_path: Path) -> None:
+    proof = tmp_path / "motion.proof"
+    done = ciris("certify-path", PLANAR, "--q", FREE[0], "--q", FREE[1], "--local", "--tube", "--out", proof)
+    assert done.status == 0, done.stderr
+    for word in ("certified, guarantee exact", "straight in q", "tube", "rad", f"ciris verify {proof}"):
+        assert word in done.stdout
+    checked = ciris("verify", proof)
+    assert checked.status == 0
+    assert "all along it the padded bodies" in checked.stdout
+
+
+def test_a_contact_is_a_negative_answer_with_the_time_of_the_file(ciris: Ciris, tmp_path: Path) -> None:
+    path = tmp_path / "path.json"
+    path.write_text(json.dumps({"q": [[0.0, 0.0], [2.0, 2.0]], "t": [10.0, 12.0]}))
+    done = ciris("certify-path", PLANAR, "--path", path, "--local", "--json")
+    found = json.loads(done.stdout)
+    assert (done.status, found["outcome"], found["proof"]) == (1, "refuted", None)
+    assert found["stop"]["t"] == pytest.approx(10 + 2 * found["stop"]["time"])
+    done = ciris("certify-path", PLANAR, "--path", path, "--local")
+    assert "touch" in done.stdout
+    assert "all pairs are certified up to" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--local"], "--path: give the waypoints"),
+        (["--q", "0,0", "--local"], "two or more waypoints"),
+        (["--q", "0,0", "--q", "0", "--local"], "different numbers of joints"),
+        (["--q", "0,0", "--q", "0,x", "--local"], "--q 1[1]: 'x' is not a finite number"),
+        (["--q", "0,0", "--q", "0,99", "--local"], "--q[1][1]: waypoint 1 has joint"),
+        (["--q", "0,0", "--q", "0,0.1"], "add --local"),
+        (["--path", "nothing.npz", "--local"], "there is no file nothing.npz"),
+    ],
+)
+def test_what_cannot_be_a_motion_is_said_in_one_line(ciris: Ciris, arguments: list[str], words: str) -> None:
+    done = ciris("certify-path", PLANAR, *arguments)
+    assert (done.status, done.stdout) == (2, "")
+    assert words in done.error
+
+
+def test_files_of_every_kind_say_the_same(tmp_path: Path) -> None:
+    s, t = np.array([[0.1, -0.2], [0.3, 0.4], [0.5, 0.25]]), np.array([0.0, 1.0, 2.5])
+    np.savez(tmp_path / "a.npz", s=s, t=t)
+    (tmp_path / "a.json").write_text(json.dumps({"s": s.tolist(), "t": t.tolist()}))
+    (tmp_path / "a.yaml").write_text(f"s: {s.tolist()}\nt: {t.tolist()}\n")
+    rows = "\n".join(f"{time},{x},{y}" for time, (x, y) in zip(t, s, strict=True))
+    (tmp_path / "a.csv").write_text(f"t,s1,s2\n{rows}\n\n")
+    for suffix in ("npz", "json", "yaml", "csv"):
+        found = path_file(str(tmp_path / f"a.{suffix}"))
+        assert (found.coordinates, found.waypoints.tolist(), found.times.tolist()) == (Space.S, s.tolist(), t.tolist())
+    (tmp_path / "b.csv").write_text("0.1,-0.2\n0.3,0.4\n")
+    found = path_file(str(tmp_path / "b.csv"))
+    assert (found.coordinates, found.waypoints.tolist(), found.times) == (Space.Q, s[:2].tolist(), None)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("a.txt", "0 0", "neither .npz"),
+        ("a.json", "[1]", "no JSON file"),
+        ("a.json", '{"x": [[1]]}', "neither q nor s"),
+        ("a.json", '{"q": [[1]], "s": [[1]]}', "both q and s"),
+        ("a.json", '{"q": [[1], [2]], "t": [1, 1]}', "ascending"),
+        ("a.json", '{"q": [[1], ["x"]]}', "no JSON file"),
+        ("a.npz", "x", "no npz file"),
+        ("a.yaml", "q: [", "no YAML file"),
+        ("a.csv", "0,0\n0,x\n", "waypoint 1: 'x' is no number"),
+        ("a.csv", "0,0\n0\n", "waypoint 1: 1 numbers, where 2 belong"),
+        ("a.csv", "", "no CSV file"),
+    ],
+)
+def test_a_bad_file_is_refused_with_what_is_wrong(tmp_path: Path, name: str, content: str, words: str) -> None:
+    (tmp_path / name).write_text(content)
+    with pytest.raises(RegionError) as refusal:
+        path_file(str(tmp_path / name))
+    assert words in str(refusal.value)
+    assert refusal.value.field == "--path"
