@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks import agreement, catalogue, compare, growth, report, scaling, service, store, survey
+from benchmarks import agreement, catalogue, compare, growth, path, report, scaling, service, store, survey
 from certifier.errors import CirisError
 from client.output import Screen, print_json
 
@@ -60,6 +60,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "pairs": _pairs,
     "scene": _scene,
     "growth": _growth,
+    "path": lambda args, screen: path.path(args.scenes, args.motions, screen.line),
     "agreement": lambda args, screen: agreement.campaign(agreement.questions(), screen.line),
     "scaling": lambda args, screen: scaling.curves(args.against is not None, screen.line),
     "service": lambda args, screen: service.beside_local(args.example, args.processes, args.turns, screen.line),
@@ -95,6 +96,9 @@ def _parser() -> ArgumentParser:
     grown.add_argument(
         "--into", type=Path, metavar="FILE", help="put the rows into this document, in place of the same examples' rows of the same ways"
     )
+    moved = kinds.add_parser("path", parents=[as_json], help="certify random motions, beside dense sampling of them")
+    moved.add_argument("scenes", nargs="*", metavar="SCENE", default=list(path.SCENES), help=f"default: all; {', '.join(path.SCENES)}")
+    moved.add_argument("--motions", type=_count, default=20, metavar="N", help="so many motions of each length; default 20")
     kinds.add_parser("agreement", parents=[as_json], help="compare verdicts on hundreds of pairs with Drake's")
     kinds.add_parser("scaling", parents=[against], help="measure how the cost grows with obstacles, joints and faces")
     surveyed = kinds.add_parser("survey", parents=[as_json], help="certify every pair of every scene on every region")

@@ -254,10 +254,27 @@ def _counts(counts: dict[str, int]) -> str:
     return ", ".join(f"{number} {_plain(name)}" for name, number in sorted(counts.items(), key=lambda item: -item[1]))
 
 
+def _path(document: Document) -> list[str]:
+    """Returns a table with one line for each scene, and a sentence about what sampling says otherwise."""
+    header = ["scene", "joints", "pairs", "certified", "contacts", "intervals", "s", "largest", "verify", "tube", "sampling", "told apart"]
+    rows = []
+    for row in document["rows"]:
+        times = [seconds(row[what]["median"]) if row[what] else "-" for what in ("verify_seconds", "tube_seconds", "sampling_seconds")]
+        intervals = f"{row['intervals']['median']:.0f}" if row["intervals"] else "-"
+        counts = [str(row[what]) for what in ("joints", "pairs")] + [f"{row['certified']} of {row['motions']}", str(row["contacts"])]
+        taken = [seconds(row["seconds"]["median"]), seconds(row["seconds"]["largest"])]
+        rows.append([row["scene"], *counts, intervals, *taken, *times, f"{row['told_apart']} of {row['millimetres']}"])
+    wrong = sum(row["certified_but_sampled_in_contact"] for row in document["rows"])
+    between = sum(row["contacts_between_samples"] for row in document["rows"])
+    said = f"Sampling finds a contact on {wrong} of the certified motions, and none on {between} of those with a contact."
+    return [_table(header, rows), said]
+
+
 _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "pairs": _compared,
     "scene": _compared,
     "growth": _growth,
+    "path": _path,
     "agreement": _agreement,
     "scaling": _scaling,
     "service": _service,

@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import agreement, catalogue, compare, growth, report, service, store, survey
+from benchmarks import agreement, catalogue, compare, growth, path, report, service, store, survey
 from benchmarks.compare import Verdict, verdict
 from certifier.errors import CirisError
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD
 from certifier.outcome import Outcome
 from certifier.pair.closest import closest
+from certifier.verify.scene import check_scene
 from tests.services import Postgres
 
 
@@ -190,3 +191,26 @@ def test_the_survey_decides_every_pair() -> None:
 def test_the_page_shows_the_figures_that_lie_beside_it() -> None:
     page = report.PAGE.read_text(encoding="utf-8")
     assert page == report.page(page)
+
+
+def test_motions_are_measured_beside_sampling() -> None:
+    document = bench("path", "planar_2dof", "--motions", "4")
+    (row,) = document["rows"]
+    assert (row["scene"], row["joints"], row["motions"]) == ("planar_2dof", 2, 8)
+    assert 0 < row["certified"] < 8
+    assert row["certified"] + row["contacts"] == 8
+    assert row["certified_but_sampled_in_contact"] == 0
+    assert row["told_apart"] == row["millimetres"] > 0
+    assert "planar_2dof" in report.text(document)
+
+
+def test_two_arms_of_seven_joints_make_one_of_fourteen() -> None:
+    single, both = catalogue.scene("iiwa_shelf"), path.scene(path.TWO_IIWAS)
+    check_scene(both)
+    assert (both.n, len(both.pairs)) == (14, 2 * len(single.pairs) + 8 * 8 - 1)
+    s = np.full((1, 14), 0.2)
+    of_one, of_two = Kinematics.of(single), Kinematics.of(both)
+    hand = of_one.points(WORLD, "iiwa/link_7", np.zeros((1, 3)), s[:, :7])
+    left, right = (of_two.points(WORLD, f"{arm}/link_7", np.zeros((1, 3)), s) for arm in ("left", "right"))
+    assert (left + right) / 2 == pytest.approx(hand)
+    assert (right - left)[0, 0] == pytest.approx([0, path.APART, 0])
