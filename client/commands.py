@@ -102,7 +102,7 @@ def grow(args: Namespace) -> int:
         if value is not None
     }
     if args.deadline is not None and not 0 < args.deadline < math.inf:
-        raise CirisError("option", f"{args.deadline:g} is no number of seconds above 0", field="--deadline")
+        raise CirisError("option", f"must be a number of seconds above 0, not {args.deadline:g}", field="--deadline")
     if len(seeds) > 1:
         return _grow_many(args, seeds, options, screen)
     check_writable(args.out)
@@ -135,7 +135,7 @@ def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, 
     """Has the service run one job a seed. The regions stay on the service."""
     if args.local or args.out is not None:
         raise CirisError(
-            "several_seeds", "several seeds need a service, which keeps their regions", field="--q", hint="leave --local and --out out"
+            "several_seeds", "several seeds need a service, which keeps their regions", field="--q", hint="leave out --local and --out"
         )
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
@@ -165,19 +165,22 @@ def file_name(name: str) -> str:
 
 
 def check_writable(out: str | None) -> None:
-    """Refuses, before a job takes minutes, a place that its proof cannot be written to.
+    """Refuses, before a job takes minutes, a file that cannot be written, or that would be overwritten.
 
     Raises:
-        CirisError: not_writable.
+        CirisError: not_writable, file_exists.
     """
     path = Path(out or ".")
     directory = path.parent if out else path
     if path.is_dir() and out:
         raise CirisError("not_writable", f"{out} is a directory", field="--out", hint="name a file")
-    if not directory.is_dir() or not os.access(directory, os.W_OK):
-        raise CirisError(
-            "not_writable", f"the proof cannot be written into {directory.absolute()}", field="--out", hint="name a file elsewhere"
-        )
+    if path.is_file():
+        raise CirisError("file_exists", f"{out} is there already", field="--out", hint="move it away, or name another file")
+    if not directory.is_dir():
+        raise CirisError("not_writable", f"there is no directory {directory.absolute()}", field="--out", hint="make it, or name another")
+    if not os.access(directory, os.W_OK):
+        message = f"nothing can be written into {directory.absolute()}"
+        raise CirisError("not_writable", message, field="--out", hint="name a file elsewhere")
 
 
 def save_proof(manifest: dict[str, Any], proof: bytes, out: str | None) -> Path:
@@ -278,6 +281,8 @@ def region_show(args: Namespace) -> int:
 
 
 def region_export(args: Namespace) -> int:
+    if args.out is not None:
+        check_writable(args.out)
     with service.connect(args.url) as client:
         data = client.proof(args.region) if args.format == "proof" else client.export(args.region, args.format)
     if args.out is not None:
