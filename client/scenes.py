@@ -27,7 +27,7 @@ def scene_init(args: Namespace) -> int:
     out = Path(args.out)
     seed_file = out.parent / SEED_FILE
     if out.suffix not in (".yaml", ".yml"):
-        raise CirisError("scene_file", f"a scene file ends in .yaml, not as {out.name}", field="--out")
+        raise CirisError("scene_file", f"the name of a scene file must end in .yaml, not as {out.name}", field="--out")
     for path in (out, seed_file):
         if path.exists():
             raise CirisError(
@@ -64,7 +64,7 @@ def scene_init(args: Namespace) -> int:
 def _package(text: str) -> tuple[str, Path]:
     name, _, directory = text.partition("=")
     if not name or not directory:
-        raise CirisError("bad_option", f"{text!r} is not NAME=DIRECTORY", field="--package")
+        raise CirisError("bad_option", f"must be NAME=DIRECTORY, not {text!r}", field="--package")
     return name, Path(directory)
 
 

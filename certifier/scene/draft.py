@@ -137,7 +137,8 @@ def _read(path: Path) -> _Model:
 
     joints: list[str] = []
     if not path.is_file():
-        raise SceneError("scene_model", f"there is no file {path}")
+        problem = f"{path} is a directory" if path.is_dir() else f"there is no file {path}"
+        raise SceneError("scene_model", problem, hint="name a model file: URDF, SDFormat or MJCF")
     parse_xml(path, path.name, "scene_model", install)
     model.name = model.name or path.stem
     return model

@@ -74,7 +74,11 @@ class ModelFile:
         raise NotImplementedError
 
     def _refuse(self, element: _Element, what: str) -> NoReturn:
-        raise SceneError("scene_model", f"{self.name}:{element.line}: {what}", field="directives")
+        raise SceneError("scene_model", f"{self.name}:{element.line}: {what}", field="directives", hint="mend the model there")
+
+    def _check_order(self, element: _Element, lower: float, upper: float) -> None:
+        if lower > upper:
+            self._refuse(element, f"the limits of a joint are {lower:g} and {upper:g}; the lower one must not be greater")
 
     def _numbers(self, element: _Element, what: str, text: str, counts: tuple[int, ...]) -> list[float]:
         words = text.split()
@@ -132,6 +136,8 @@ class Urdf(ModelFile):
         for key, counts in self._COUNTS.items():
             if key in element.attributes:
                 self._numbers(element, f"{key} of <{element.name}>", element.attributes[key], counts)
+        if element.name == "limit" and parent == "joint":
+            self._check_order(element, *(float(element.attributes.get(key, 0.0)) for key in ("lower", "upper")))
         self._check_geometry(element)
         if _COLLISION in element.around and element.name == "mesh" and "filename" in element.attributes:
             self.meshes.append(Reference(element.attributes["filename"], element.line))
@@ -161,6 +167,10 @@ class Sdf(ModelFile):
     )
     UNREAD = frozenset(["plugin", "sensor", "gui"])
 
+    def __init__(self, path: Path, name: str) -> None:
+        self._limits: dict[str, float] = {}
+        super().__init__(path, name)
+
     def _check(self, element: _Element, parent: str) -> None:
         dimensions = self._DIMENSIONS.get(parent, {}) if _COLLISION in element.around else {}
         if element.name in dimensions:
@@ -169,7 +179,11 @@ class Sdf(ModelFile):
         elif element.name == "pose":
             self._text(element, (0, 6, 7))
         elif (counts := self._COUNTS.get((parent, element.name))) is not None:
-            self._text(element, counts)
+            numbers = self._text(element, counts)
+            if parent == "limit":
+                self._limits[element.name] = numbers[0]
+        elif element.name == "limit":
+            self._check_order(element, self._limits.pop("lower", -math.inf), self._limits.pop("upper", math.inf))
         elif element.name == "uri" and parent == "include":
             self.includes.append(Reference(self._whole(element), element.line))
         elif element.name == "uri" and parent == "mesh" and _COLLISION in element.around:
@@ -212,7 +226,9 @@ class Mjcf(ModelFile):
         if element.name in self._NUMBERED:
             for key, counts in self._COUNTS.items():
                 if key in element.attributes:
-                    self._numbers(element, f"{key} of <{element.name}>", element.attributes[key], counts)
+                    numbers = self._numbers(element, f"{key} of <{element.name}>", element.attributes[key], counts)
+                    if (element.name, key) == ("joint", "range"):
+                        self._check_order(element, *numbers)
             for key in self._MOVED & element.attributes.keys():
                 self._refuse(element, f"{key} of <{element.name}> is not read by Drake")
             if float(element.attributes.get("ref", 0)) != 0:

@@ -8,22 +8,21 @@ from typing import Any
 from certifier.errors import CirisError, SceneError
 from certifier.isolation.child import run_in_child
 from certifier.model import Scene
+from certifier.scene.file import existing
 
 
 def load_scene(path: str | Path, *, timeout_s: float = 60, memory_bytes: int = 4 * 2**30) -> Scene:
     """Returns the scene that a scene file describes. A child process reads it, and may die without harm.
 
     Args:
-        path: the scene file (docs/architecture.md); relative paths in it start at its directory.
+        path: the scene file (docs/scenes.md); relative paths in it start at its directory.
         timeout_s: wall-clock limit of the child, seconds.
         memory_bytes: memory limit of the child, bytes.
 
     Raises:
         SceneError: what is wrong and where; ``scene_model_crash`` when reading the models ended the child.
     """
-    path = Path(path).absolute()
-    if not path.is_file():
-        raise SceneError("scene_not_found", f"there is no scene file {path}")
+    path = existing(path)
     # SDFormat looks for included files in the working directory.
     return read_in_child("certifier.scene.parse:parse", {"path": str(path)}, path.name, path.parent, timeout_s, memory_bytes)
 

@@ -53,6 +53,10 @@ _IGNORED_SHAPE = re.compile(
 """These are Drake's warnings about collision geometry that it leaves out."""
 
 
+_CPLUSPLUS = re.compile(r"std::|\.array\(\)|\.all\(\)")
+"""What Drake's assertions say to compilers only."""
+
+
 def parse(payload: dict[str, Any]) -> dict[str, Any]:
     """Returns the document of the Scene that the file ``payload["path"]`` describes.
 
@@ -139,20 +143,25 @@ class _DrakeLog(logging.Handler):
 
 
 def _model_error(scene_file: SceneFile, error: BaseException) -> SceneError:
-    """Returns what Drake raised as an error for people. For a failed assertion (SystemExit in pydrake) it names every model.
+    """Returns what Drake raised as an error for people. Where it does not say which model it is about, the error names every model.
 
-    The assertion does not say which model it comes from.
+    Of a failed assertion (SystemExit in pydrake) the condition is said, and not where it stands in Drake's source.
     """
     message = _one_line(scene_file, str(error))
-    if not isinstance(error, RuntimeError):
-        message = f"Drake cannot use a model ({', '.join(scene_file.models)}): {message}"
     where = re.search(r"directives\[\d+\]", message)
-    return SceneError("scene_model", message.split(" while accepting")[0], field=where[0] if where else "directives")
+    message = message.split(" while accepting")[0]
+    if assertion := re.search(r"condition '(.+)' failed", message):
+        message = f"a number of a model makes no sense: Drake needs {re.sub(_CPLUSPLUS, '', assertion[1])}"
+    said = where or any(Path(file).name in message for file in (scene_file.path.name, *scene_file.models))
+    models = "" if said else f"{', '.join(scene_file.models)}: "
+    return SceneError(
+        "scene_model", f"{models}{message}", field=where[0] if where else "directives", hint="mend the model or the directive"
+    )
 
 
 def _one_line(scene_file: SceneFile, message: str) -> str:
     """Returns a message of Drake's in one printable line, with paths relative to the scene file."""
-    message = message.replace("<string>", scene_file.path.name)
+    message = message.replace("<string>", scene_file.path.name).replace(": error: ", ": ")
     message = re.sub(rf"(file:)?/*{re.escape(str(scene_file.path.parent.resolve()))}/", "", message)
     return textwrap.shorten(escaped(" ".join(message.removeprefix("error: ").split())), MAX_SENTENCE, placeholder=" ...")
 
@@ -202,7 +211,7 @@ def _joint(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
             message = (
                 f"joint {name} is a {joint.type_name().removesuffix('_rpy')} joint; revolute, prismatic and fixed joints are supported"
             )
-            raise SceneError("unsupported_joint", message, field="directives")
+            raise SceneError("unsupported_joint", message, field="directives", hint="replace it by such joints, or weld its bodies")
     lower, upper = float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])
     return Joint(name, kind, parent, child, np.array(axis), X_PF, X_BM, joint.position_start(), lower, upper)
 
@@ -229,8 +238,8 @@ def _couplings(plant: MultibodyPlant) -> list[Coupling]:
             for row, constant in zip(matrix, constants, strict=True)
         ]
     if len(found) < plant.num_constraints():
-        message = "the models close a loop by a constraint; only independent joints are supported"
-        raise SceneError("unsupported_joint", message, field="directives")
+        message = "the models close a loop by a constraint"
+        raise SceneError("unsupported_joint", message, field="directives", hint="remove it; only independent joints are supported")
     return found
 
 
@@ -256,7 +265,8 @@ def _geometries(
     reach = tree.reach(list(found.values()), scene_file.padding)
     for i, name, body_name in half_spaces:
         if body_name not in tree.anchored:
-            raise SceneError("unsupported_shape", f"geometry {name} is a half-space on a body that moves", field="directives")
+            message = f"geometry {name} is a half-space on a body that moves"
+            raise SceneError("unsupported_shape", message, field="directives", hint="use a box")
         X_BG = inspector.GetPoseInFrame(i)
         center = (RigidTransform(tree.anchored[body_name]) @ X_BG).inverse().translation()
         found[i] = _placed(name, body_name, shapes.half_space(center, reach), X_BG)
@@ -290,7 +300,7 @@ def _convex(shape: Shape, name: str, scene_file: SceneFile, strict: StrictReader
             return shapes.polytope(said, _mesh_points(shape, strict), scene_file.max_vertices)
         case _:
             message = f"geometry {name} is a {type(shape).__name__}, which is not supported"
-            raise SceneError("unsupported_shape", message, field="directives")
+            raise SceneError("unsupported_shape", message, field="directives", hint="use a primitive or a mesh")
 
 
 def _mesh_points(shape: Convex | Mesh, strict: StrictReader) -> Array:
@@ -304,7 +314,7 @@ def _mesh_points(shape: Convex | Mesh, strict: StrictReader) -> Array:
     points = strict.points(shape.source().path()) * shape.scale3()
     if not np.isfinite(points).all():
         message = f"scaled by {shape.scale3().tolist()}, a point of {escaped(shape.source().path().name)} is not finite"
-        raise SceneError("scene_model", message, field="directives")
+        raise SceneError("scene_model", message, field="directives", hint="mend the file or the scale")
     hull = shape.GetConvexHull()
     rank = {tuple(hull.vertex(k)): k for k in range(hull.num_vertices())}
     return points[np.argsort([rank.get(tuple(point), len(rank)) for point in points.tolist()], kind="stable")]

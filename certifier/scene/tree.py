@@ -72,7 +72,8 @@ def _outward(joints: list[Joint], bodies: list[str]) -> list[Joint]:
             rest.remove(j)
             j = j if j.parent == body else _turned(j)
             if j.child in reached:
-                raise SceneError("loop", f"joint {j.name} closes a loop of joints; only trees are supported")
+                message = f"joint {j.name} closes a loop of joints"
+                raise SceneError("loop", message, field="directives", hint="remove a joint of the loop; only trees are supported")
             reached.add(j.child)
             open_ends.append(j.child)
             found.append(j)

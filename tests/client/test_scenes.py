@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +12,7 @@ import yaml
 
 from certifier.scene import load_scene
 from tests.certifier.scene.workshop import ARM, BOX, EXAMPLES, LIMIT, ROOM
-from tests.client.conftest import Ciris
+from tests.client.conftest import Ciris, command, surroundings
 
 GRIPPER = """<link name="left"><collision><geometry><box size="0.02 0.02 0.1"/></geometry></collision></link>
   <joint name="grip" type="prismatic"><parent link="hand"/><child link="left"/><origin xyz="0.4 0.03 0"/><axis xyz="0 1 0"/>
@@ -58,6 +61,18 @@ def test_a_draft_of_a_robot_as_people_ship_it_is_a_scene_with_a_free_seed(ciris:
         assert words is True or str(words) in checked.stdout
     grown = ciris("grow", out, "--local", "--out", tmp_path / "proof")
     assert grown.status == 0, grown.stderr
+
+
+def test_a_draft_that_is_ended_leaves_nothing_behind(tmp_path: Path) -> None:
+    asked = command("scene", "init", robot(tmp_path), "--world", tmp_path / "room.sdf")
+    drafting = subprocess.Popen(asked, cwd=tmp_path, env=surroundings(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    while not list(tmp_path.glob(".draft-*")):
+        assert drafting.poll() is None, "it drafts before it has ended"
+        time.sleep(0.01)
+    drafting.terminate()
+    _, said = drafting.communicate(timeout=20)
+    assert (drafting.returncode, said) == (128 + signal.SIGTERM, "")
+    assert not [*tmp_path.glob(".draft-*"), *tmp_path.glob("*.yaml")]
 
 
 def test_every_example_can_be_drafted_anew(ciris: Ciris, tmp_path: Path) -> None:
@@ -132,7 +147,7 @@ def test_what_cannot_be_drafted_is_named_and_leaves_nothing(ciris: Ciris, tmp_pa
         ((tmp_path / "alone" / "arm.urdf",), "--package tools=DIRECTORY"),
         ((tmp_path / "nothing.urdf",), "there is no file"),
         ((model, "--world", tmp_path / "ws" / "tools" / "meshes" / "finger.obj"), "finger.obj"),
-        ((model, "--package", "tools"), "'tools' is not NAME=DIRECTORY"),
+        ((model, "--package", "tools"), "must be NAME=DIRECTORY, not 'tools'"),
     ]
     for i, (arguments, words) in enumerate(cases):
         out = tmp_path / f"case{i}" / "scene.yaml"
