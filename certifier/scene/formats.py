@@ -124,7 +124,7 @@ class Urdf(ModelFile):
     UNREAD = frozenset(["gazebo"])
     _COUNTS: ClassVar[dict[str, tuple[int, ...]]] = {
         **dict.fromkeys(("xyz", "rpy", "size"), (3,)),
-        **dict.fromkeys(("radius", "length", "lower", "upper", "a", "b", "c"), (1,)),
+        **dict.fromkeys(("radius", "length", "lower", "upper", "a", "b", "c", "multiplier", "offset"), (1,)),
         "scale": (1, 3),
     }
 
@@ -153,6 +153,9 @@ class Sdf(ModelFile):
         ("limit", "upper"): (1,),
         ("plane", "normal"): (3,),
         ("mesh", "scale"): (3,),
+        ("mimic", "multiplier"): (1,),
+        ("mimic", "offset"): (1,),
+        ("mimic", "reference"): (1,),
     }
     ONCE = _SHAPES.union(
         ["pose", "geometry", "axis", "limit", "uri", "parent", "child"],
@@ -177,6 +180,10 @@ class Sdf(ModelFile):
         elif element.name in self._DIMENSIONS and parent == "geometry" and _COLLISION in element.around:
             for missing in self._DIMENSIONS[element.name].keys() - element.children:
                 self._refuse(element, f"<{element.name}> has no <{missing}>, and Drake would make one up")
+        elif element.name == "drake:mimic":
+            for key in ("multiplier", "offset"):
+                if key in element.attributes:
+                    self._numbers(element, f"{key} of <drake:mimic>", element.attributes[key], (1,))
         self._check_geometry(element)
 
     def _whole(self, element: _Element) -> str:

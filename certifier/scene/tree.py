@@ -85,7 +85,11 @@ def _outward(joints: list[Joint], bodies: list[str]) -> list[Joint]:
 def floating(body: str) -> SceneError:
     """Returns the error for a body that no joint connects to the world."""
     drake_name = body.replace("/", "::")
+    outer, *inside = drake_name.split("::")
     hint = f"weld it: add_weld: {{parent: world, child: {drake_name}}}"
+    if len(inside) > 1:
+        frame = f"add_frame: {{name: {outer}::stands, X_PF: {{base_frame: {drake_name}}}}}"
+        hint = f"weld a frame of it: {frame}, and add_weld: {{parent: world, child: {outer}::stands}}"
     return SceneError("floating_body", f"body {body} is not attached to anything", field="directives", hint=hint)
 
 

@@ -140,6 +140,9 @@ def test_remarks(tmp_path):
     assert any("filters hide arm/hand/palm and room/walls/wall" in w for w in parsed(write(tmp_path, extra=filtered)).warnings)
 
 
+NESTED = ROOM.replace("</link></model>", '</link><model name="shelf"><link name="board"/></model></model>')
+
+
 def floating(scene=SCENE):
     return scene.replace("  - add_weld: {parent: world, child: room::walls}\n", "")
 
@@ -155,6 +158,7 @@ def floating(scene=SCENE):
         ({"kind": "planar"}, "unsupported_joint", "directives", "arm/turn is a planar joint"),
         ({"kind": "floating"}, "floating_body", "directives", "arm/hand"),
         ({"scene": floating()}, "floating_body", "directives", "add_weld: {parent: world, child: room::walls}"),
+        ({"files": {"room.sdf": NESTED}}, "floating_body", "directives", "X_PF: {base_frame: room::shelf::board}}, and add_weld"),
         (
             {"more": FINGER.format(name="grip", kind="revolute", more='<mimic joint="turn"/>')},
             "unsupported_joint",
