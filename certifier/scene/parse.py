@@ -217,7 +217,8 @@ def joint_of(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
             message = (
                 f"joint {name} is a {joint.type_name().removesuffix('_rpy')} joint; revolute, prismatic and fixed joints are supported"
             )
-            raise SceneError("unsupported_joint", message, field="directives")
+            hint = "write two slides and a turn, as docs/scenes.md does for a mobile base" if joint.type_name() == "planar" else ""
+            raise SceneError("unsupported_joint", message, field="directives", hint=hint)
     lower, upper = float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])
     return Joint(name, kind, parent, child, np.array(axis), X_PF, X_BM, joint.position_start(), lower, upper)
 
