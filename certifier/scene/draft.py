@@ -77,21 +77,24 @@ def draft(robot: Path, worlds: Sequence[Path], out: Path, packages: Mapping[str,
     held = _inventory("\n".join([head, *add.values()]), models, directory)
     head = "\n".join([head, *_directives(add, held["roots"]), *_limits(held), *_fix(held)]) + "\n"
     scene = _loaded(head, directory)
-    rng = np.random.default_rng(0)
-    random = rng.uniform(scene.q_lower, scene.q_upper, (TRIED + SEEDS, scene.n))
+    random = np.random.default_rng(0).uniform(scene.q_lower, scene.q_upper, (TRIED + SEEDS, scene.n))
     middle = scene.q_star.clip(scene.q_lower, scene.q_upper)
     always = set(scene.pairs)
     for touches in touching(scene, [middle, *random[:TRIED]]):
         always &= touches
-    name = next(iter(models))
-    robot_alone = [p for p in always if all(geometry.startswith((f"{name}/", f"{name}::")) for geometry in (p.a, p.b))]
-    ignored = tuple(sorted(robot_alone, key=lambda p: (p.a, p.b)))
-    near = np.linalg.norm((random[TRIED:] - middle) / (scene.q_upper - scene.q_lower), axis=1)
-    candidates = [middle, *random[TRIED:][np.argsort(near)]]
-    seed = next((q for q, touches in zip(candidates, touching(scene, candidates), strict=True) if touches <= always), None)
+    own = tuple(f"{next(iter(models))}{mark}" for mark in ("/", "::"))
+    overlapping = sorted(always, key=lambda pair: (pair.a, pair.b))
+    ignored = tuple(pair for pair in overlapping if pair.a.startswith(own) and pair.b.startswith(own))
+    others = tuple(pair for pair in overlapping if pair not in ignored)
     text = head + _joints(scene) + _ignore(ignored, scene)
-    others = tuple(sorted(always - {*ignored}, key=lambda p: (p.a, p.b)))
-    return Draft(text, _loaded(text, directory), seed, ignored, others)
+    return Draft(text, _loaded(text, directory), _free(scene, middle, random[TRIED:], always), ignored, others)
+
+
+def _free(scene: Scene, middle: Array, random: Array, always: set[Pair]) -> Array | None:
+    """Returns the middle or else the nearest to it of the random configurations, at which nothing touches but what always does."""
+    near = np.linalg.norm((random - middle) / (scene.q_upper - scene.q_lower), axis=1)
+    candidates = [middle, *random[np.argsort(near)]]
+    return next((q for q, touches in zip(candidates, touching(scene, candidates), strict=True) if touches <= always), None)
 
 
 def _name_in(path: Path) -> str:
@@ -144,7 +147,7 @@ def _inventory(text: str, models: Mapping[str, Path], directory: Path) -> dict[s
     """Returns what the models of a scene file hold (:mod:`certifier.scene.inventory`)."""
     with _scene_file(text, directory) as path:
         payload = {"path": str(path), "models": {name: str(model.resolve()) for name, model in models.items()}}
-        return read_in_child("certifier.scene.inventory:inventory", payload, path.name, directory, TIMEOUT_S, MEMORY_BYTES)
+        return read_in_child("certifier.scene.inventory:inventory", payload, "the draft", directory, TIMEOUT_S, MEMORY_BYTES)
 
 
 def _directives(add: Mapping[str, str], roots: Sequence[Mapping[str, Any]]) -> list[str]:
