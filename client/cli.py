@@ -276,7 +276,7 @@ def _parser() -> argparse.ArgumentParser:
     contains.set_defaults(run="client.commands:contains")
 
     bench = verbs.add_parser("bench", help="measure ciris, and Drake beside it if asked; see ciris bench BENCHMARK --help")
-    kinds = ["pairs", "scene", "growth", "agreement", "scaling", "service", "store", "survey", "docs"]
+    kinds = ["pairs", "scene", "growth", "agreement", "scaling", "service", "store", "survey", "robots", "docs"]
     bench.add_argument("benchmark", choices=kinds)
     bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...")
     bench.set_defaults(run="client.bench:bench")
