@@ -170,12 +170,15 @@ def _parser() -> argparse.ArgumentParser:
     init.add_argument("--world", metavar="FILE", action="append", default=[], help="model of what stands around it; may be repeated")
     init.add_argument("--package", metavar="NAME=DIR", action="append", default=[], help="where a package is that a model names")
     init.add_argument(
-        "--out", metavar="FILE", default="scene.yaml", help="the scene file; default: scene.yaml here, with seed.yaml beside it"
+        "--out",
+        metavar="FILE",
+        default="scene.yaml",
+        help="the scene file; default: scene.yaml here. The seed goes beside it, into seed.yaml, or NAME.seed.yaml for NAME.yaml",
     )
     init.set_defaults(run="client.scenes:scene_init")
     check = scene.add_parser("check", parents=[json], help="say what a scene file makes of its models, without a service")
     check.add_argument("path", metavar="PATH.yaml")
-    check.add_argument("--q", metavar="Q", help="a configuration to look at; default: the seed.yaml beside the file, or else q*")
+    check.add_argument("--q", metavar="Q", help="a configuration to look at; default: the seed beside the file, or else q*")
     check.set_defaults(run="client.scenes:scene_check")
     add = scene.add_parser("add", parents=[remote, json], help="upload a scene file and all files it refers to")
     add.add_argument("path", metavar="PATH.yaml")
@@ -191,7 +194,7 @@ def _parser() -> argparse.ArgumentParser:
         "--q",
         metavar='"0,0.3,..."',
         action="append",
-        help="the seed: joint positions; default: q of the seed.yaml beside the scene file; "
+        help="the seed: joint positions; default: q of the seed.yaml beside scene.yaml, or NAME.seed.yaml beside NAME.yaml; "
         "if given several times, the service grows one region a seed, all at once",
     )
     grow.add_argument(
@@ -281,7 +284,7 @@ def _parser() -> argparse.ArgumentParser:
     contains.set_defaults(run="client.commands:contains")
 
     bench = verbs.add_parser("bench", help="measure ciris, and Drake beside it if asked; see ciris bench BENCHMARK --help")
-    kinds = ["pairs", "scene", "growth", "agreement", "scaling", "service", "store", "survey", "docs"]
+    kinds = ["pairs", "scene", "growth", "agreement", "scaling", "service", "store", "survey", "robots", "docs"]
     bench.add_argument("benchmark", choices=kinds)
     bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...")
     bench.set_defaults(run="client.bench:bench")

@@ -17,7 +17,6 @@ from certifier.errors import CirisError, RegionError
 from certifier.model import Array, Polytope
 from certifier.scene.file import existing
 
-SEED_FILE = "seed.yaml"
 SAME_CENTER = 1e-9
 """Two q* are the same where no joint differs by more than this, in radians or metres."""
 _FORMATS = "give C, d and perhaps center as lists of numbers, or a region that `ciris region export` wrote"
@@ -49,8 +48,14 @@ def is_scene_file(scene: str) -> bool:
     return scene.endswith((".yaml", ".yml")) or "/" in scene
 
 
+def seed_file(scene: str | Path) -> Path:
+    """Returns where the seed of a scene file is: seed.yaml beside scene.yaml, and NAME.seed.yaml beside NAME.yaml."""
+    path = Path(scene)
+    return path.with_name("seed.yaml" if path.stem == "scene" else f"{path.stem}.seed.yaml")
+
+
 def seed_of(scene: str, q: str | None) -> list[float]:
-    """Returns the seed configuration: ``q``, or the ``q`` of the seed.yaml beside the scene file.
+    """Returns the seed configuration: ``q``, or the ``q`` of the scene file's seed file.
 
     Raises:
         CirisError: scene_not_found for a scene file that is not there; seed_missing; seed_file.
@@ -60,11 +65,10 @@ def seed_of(scene: str, q: str | None) -> list[float]:
         return configuration(q)
     if is_scene_file(scene):
         existing(scene)
-    path = Path(scene).parent / SEED_FILE
+    path = seed_file(scene if is_scene_file(scene) else "scene.yaml")
     if not is_scene_file(scene) or not path.is_file():
-        raise CirisError(
-            "seed_missing", "no seed was given", field="--q", hint=f"give one, or put a {SEED_FILE} with q beside the scene file"
-        )
+        hint = f"give one, or put q into {path.name} beside the scene file"
+        raise CirisError("seed_missing", "no seed was given", field="--q", hint=hint)
     try:
         document = yaml.safe_load(path.read_text(encoding="utf-8"))
         return configuration(" ".join(str(float(value)) for value in document["q"]), field=f"{path}: q")

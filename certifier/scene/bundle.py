@@ -100,7 +100,7 @@ def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
         root.mkdir()
         payload = {"archive": str(archive), "root": str(root), "limits": asdict(limits)}
         try:
-            return read_in_child(_READER, payload, "the bundle", None, limits.timeout_s, limits.memory_bytes)
+            return Scene.from_document(read_in_child(_READER, payload, "the bundle", None, limits.timeout_s, limits.memory_bytes))
         except CirisError as error:
             error.message = error.message.replace(f"{root}/", "")
             raise

@@ -128,7 +128,7 @@ class Urdf(ModelFile):
     UNREAD = frozenset(["gazebo"])
     _COUNTS: ClassVar[dict[str, tuple[int, ...]]] = {
         **dict.fromkeys(("xyz", "rpy", "size"), (3,)),
-        **dict.fromkeys(("radius", "length", "lower", "upper", "a", "b", "c"), (1,)),
+        **dict.fromkeys(("radius", "length", "lower", "upper", "a", "b", "c", "multiplier", "offset"), (1,)),
         "scale": (1, 3),
     }
 
@@ -137,7 +137,8 @@ class Urdf(ModelFile):
             if key in element.attributes:
                 self._numbers(element, f"{key} of <{element.name}>", element.attributes[key], counts)
         if element.name == "limit" and parent == "joint":
-            self._check_order(element, *(float(element.attributes.get(key, 0.0)) for key in ("lower", "upper")))
+            limits = (float(element.attributes.get(key, limit)) for key, limit in (("lower", -math.inf), ("upper", math.inf)))
+            self._check_order(element, *limits)
         self._check_geometry(element)
         if _COLLISION in element.around and element.name == "mesh" and "filename" in element.attributes:
             self.meshes.append(Reference(element.attributes["filename"], element.line))
@@ -159,6 +160,9 @@ class Sdf(ModelFile):
         ("limit", "upper"): (1,),
         ("plane", "normal"): (3,),
         ("mesh", "scale"): (3,),
+        ("mimic", "multiplier"): (1,),
+        ("mimic", "offset"): (1,),
+        ("mimic", "reference"): (1,),
     }
     ONCE = _SHAPES.union(
         ["pose", "geometry", "axis", "limit", "uri", "parent", "child"],
@@ -191,6 +195,10 @@ class Sdf(ModelFile):
         elif element.name in self._DIMENSIONS and parent == "geometry" and _COLLISION in element.around:
             for missing in self._DIMENSIONS[element.name].keys() - element.children:
                 self._refuse(element, f"<{element.name}> has no <{missing}>, and Drake would make one up")
+        elif element.name == "drake:mimic":
+            for key in ("multiplier", "offset"):
+                if key in element.attributes:
+                    self._numbers(element, f"{key} of <drake:mimic>", element.attributes[key], (1,))
         self._check_geometry(element)
 
     def _whole(self, element: _Element) -> str:

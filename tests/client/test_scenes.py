@@ -139,6 +139,31 @@ def test_nothing_is_overwritten(ciris: Ciris, tmp_path: Path) -> None:
     assert (tmp_path / "seed.yaml").read_text() == "q: [1]\n"
 
 
+def test_a_second_scene_of_a_directory_has_a_seed_of_its_own(ciris: Ciris, tmp_path: Path) -> None:
+    model = robot(tmp_path)
+    assert ciris("scene", "init", model).status == 0
+    done = ciris("scene", "init", model, "--out", "other.yaml")
+    assert done.status == 0, done.stderr
+    assert yaml.safe_load((tmp_path / "other.seed.yaml").read_text())["q"] == [0.0]
+    assert "nothing touches at other.seed.yaml" in ciris("scene", "check", "other.yaml").stdout
+    (tmp_path / "other.seed.yaml").write_text("q: [0, 0]\n")
+    assert "other.seed.yaml" in ciris("scene", "check", "other.yaml").error
+    assert "nothing touches at seed.yaml" in ciris("scene", "check", "scene.yaml").stdout
+    (tmp_path / "other.seed.yaml").unlink()
+    assert "put q into other.seed.yaml" in ciris("grow", "other.yaml", "--local").error
+
+
+def test_an_ignored_pair_that_never_touches_is_remarked_on(ciris: Ciris, tmp_path: Path) -> None:
+    """The finger never comes to the foot; the cover is always in it, so it is right to ignore that."""
+    model, out = robot(tmp_path), tmp_path / "cell" / "scene.yaml"
+    assert ciris("scene", "init", model, "--out", out).status == 0
+    assert "are ignored, but touch at none" not in ciris("scene", "check", out).stdout
+    out.write_text(out.read_text() + "  - {pair: [arm/base, arm/left], reason: never mind}\n")
+    checked = ciris("scene", "check", out).stdout
+    assert "warning: arm/base and arm/left are ignored, but touch at none of 201 configurations tried" in checked
+    assert "arm/cover are ignored, but" not in checked
+
+
 def test_what_cannot_be_drafted_is_named_and_leaves_nothing(ciris: Ciris, tmp_path: Path) -> None:
     model = robot(tmp_path)
     (tmp_path / "alone").mkdir()

@@ -187,7 +187,7 @@ COMMANDS: list[Row] = [
             "seed_missing",
             "--q",
             "no seed was given",
-            "give one, or put a {SEED_FILE} with q beside the scene file",
+            "give one, or put q into {name} beside the scene file",
             lambda t: t.ciris("grow", t.write(alone__yaml="").name, "--local"),
         ),
         (
@@ -246,7 +246,7 @@ COMMANDS: list[Row] = [
             "file_exists",
             "--out",
             "{path} is there already",
-            "move it away, or name another file in a new directory",
+            "move it away, or name another file",
             lambda t: t.ciris("scene", "init", "arm.urdf", "--out", t.write(scene__yaml="").name),
         ),
         (

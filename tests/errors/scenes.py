@@ -27,6 +27,17 @@ MIMIC += '<limit lower="-1" upper="2" effort="1" velocity="1"/></joint><link nam
 FREE = SCENE.replace("  - add_weld: {parent: world, child: room::walls}\n", "")
 SDF_SHAPE = """<sdf version="1.7"><model name="room"><link name="walls"><collision name="wall"><geometry>{}</geometry></collision></link>
 </model></sdf>"""
+FAR = (
+    """<robot name="r"><link name="base"/><link name="hand"/>
+<joint name="turn" type="revolute"><parent link="base"/><child link="hand"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>"""
+    + MIMIC.replace("<mimic ", '<mimic offset="9" ')
+    + "</robot>"
+)
+BALL_JOINT = """<drake:joint name="b" type="ball"><parent link="hand"/><child link="ball"/></drake:joint><link name="ball"/>"""
+ONE_MODEL = "a file is one model: name a file for each, or put them all into one <model>, in place of <world>, "
+ONE_MODEL += "without its physics, lights and gui"
+NESTED = '<sdf version="1.9"><model name="room"><model name="shelf"><link name="board"/></model></model></sdf>'
 MUJOCO = "directives: [{add_model: {name: m, file: m.xml}}]\n"
 
 
@@ -417,6 +428,13 @@ MODELS = [
             lambda t: t.scene(shape='<sphere radius="-1"/>'),
         ),
         (
+            "scene_model",
+            "directives",
+            "{models}{message}",
+            ONE_MODEL,
+            lambda t: t.scene(files={"room.sdf": '<sdf version="1.9"><world name="w"/></sdf>'}),
+        ),
+        (
             "scene_name",
             "directives",
             "the {what} {...} has a name that is not accepted",
@@ -428,6 +446,13 @@ MODELS = [
             "directives",
             "joint {name} is a {...} joint; revolute, prismatic and fixed joints are supported",
             "replace it by such joints, or weld its bodies",
+            lambda t: t.scene(more=BALL_JOINT),
+        ),
+        (
+            "unsupported_joint",
+            "directives",
+            "joint {name} is a {...} joint; revolute, prismatic and fixed joints are supported",
+            "write two slides and a turn, as docs/scenes.md does for a mobile base",
             lambda t: t.scene(kind="planar"),
         ),
         (
@@ -498,6 +523,17 @@ MODELS = [
         ),
     ),
     *rows(
+        "certifier/scene/mimics.py",
+        (
+            "scene_model",
+            "directives",
+            "joint {joint} follows {leader}, as {factor} times its position plus {offset}; no position of {leader} has it and all other "
+            "joints that follow within their limits, for {joint} {...} to {...}",
+            "mend the limits, the multiplier or the offset in the model",
+            lambda t: drafted(t, t.write(robot__urdf=FAR)),
+        ),
+    ),
+    *rows(
         "certifier/scene/tree.py",
         (
             "loop",
@@ -512,6 +548,13 @@ MODELS = [
             "body {body} is not attached to anything",
             "weld it: add_weld: {parent: world, child: {drake_name}}",
             lambda t: t.scene(FREE),
+        ),
+        (
+            "floating_body",
+            "directives",
+            "body {body} is not attached to anything",
+            "weld a frame of it: {frame}, and add_weld: {parent: world, child: {outer}::stands}",
+            lambda t: t.scene(FREE, files={"room.sdf": NESTED}),
         ),
     ),
     *rows(
