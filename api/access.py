@@ -123,7 +123,7 @@ class _Needs(HTTPBearer):
         caller: Caller = request.state.caller
         if not caller.scope.includes(self._scope):
             problem = f"this needs a key of the scope {self._scope}; the key {caller.name!r} has {caller.scope}"
-            raise CirisError("scope_missing", problem, field="Authorization")
+            raise CirisError("scope_missing", problem, field="Authorization", hint=f"`ciris key add NAME --scope {self._scope}` makes one")
         return caller
 
 

@@ -43,7 +43,9 @@ def polytope(scene: Scene, body: PolytopeBody) -> None:
     for i, row in enumerate(body.C):
         _length(scene, row, f"polytope.C[{i}]", "polytope_shape")
     if len(body.C) != len(body.d):
-        raise RegionError("polytope_shape", f"C has {len(body.C)} rows and d has {len(body.d)} numbers", field="polytope.d")
+        raise RegionError(
+            "polytope_shape", f"C has {len(body.C)} rows and d has {len(body.d)} numbers", field="polytope.d", hint="give one number a row"
+        )
     if body.center is not None:
         _length(scene, body.center, "polytope.center", "polytope_shape")
         if not scene.polytope(body.C, body.d).contains(body.center):
@@ -67,13 +69,16 @@ def webhook(body: WebhookRequest) -> None:
     except ValueError:
         usable = False
     if not usable or not body.url.isascii() or not body.url.isprintable() or " " in body.url:
-        raise CirisError("webhook_url", f"{body.url!r} cannot be called", field="webhook.url", hint="https://host/path, no credentials")
+        raise CirisError(
+            "webhook_url", f"{body.url!r} cannot be called", field="webhook.url", hint="write https://host/path, without credentials"
+        )
     try:
         private = not is_public(url.hostname or "")
     except ValueError:
         return  # the host is a name: the worker that calls it resolves it
     if private and not settings().webhook_private:
-        raise CirisError("webhook_address", f"{url.hostname} is not a public address", field="webhook.url")
+        hint = "CIRIS_WEBHOOK_PRIVATE=1 allows it"
+        raise CirisError("webhook_address", f"{url.hostname} is not a public address", field="webhook.url", hint=hint)
 
 
 def points(scene: Scene, rows: Sequence[Sequence[float]], field: str) -> Array:

@@ -85,7 +85,8 @@ class Guard:
             raise CirisError("unknown_host", f"this service is not {host!r}", field="Host", hint="call it by 127.0.0.1 or localhost")
         origin = headers.get("origin")
         if method not in ("GET", "HEAD", "OPTIONS") and origin is not None and origin.partition("://")[2] != host:
-            raise CirisError("cross_site", f"requests from {origin} are not accepted", field="Origin")
+            hint = "send them from the service's own pages, or from a program"
+            raise CirisError("cross_site", f"requests from {origin} are not accepted", field="Origin", hint=hint)
 
     async def _check_caller(self, scope: Scope, headers: Headers) -> None:
         """Finds out who asks (``request.state.caller``), except on public paths, and counts the request.
@@ -129,7 +130,7 @@ def _name(host: str) -> str:
 def _check_url(scope: Scope) -> None:
     """Refuses a zero byte in the path or the query: no database can look it up."""
     if "\0" in scope["path"] or b"%00" in scope["query_string"]:
-        raise CirisError("invalid_request", "the address holds a zero byte")
+        raise CirisError("invalid_request", "the address holds a zero byte", field="url", hint="leave it out")
 
 
 def _too_large(limit: int) -> str:
@@ -139,7 +140,7 @@ def _too_large(limit: int) -> str:
 def _check_length(headers: Headers, limit: int) -> None:
     length = headers.get("content-length", "")
     if length.isdigit() and int(length) > limit:
-        raise CirisError("too_large", _too_large(limit))
+        raise CirisError("too_large", _too_large(limit), field="body", hint="send less")
 
 
 def _counted(receive: Receive, limit: int) -> Receive:

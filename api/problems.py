@@ -39,6 +39,10 @@ _STATUS_OF_CODE = {
 
 RETRY_SECONDS = 5
 
+_DESCRIBED = "/openapi.json describes every request"
+_PLACES = {HTTPStatus.NOT_FOUND: "url", HTTPStatus.METHOD_NOT_ALLOWED: "method", HTTPStatus.REQUEST_ENTITY_TOO_LARGE: "body"}
+"""Where the errors of the framework are."""
+
 
 class FieldProblem(BaseModel):
     """Names one field of the request that is wrong, and says why."""
@@ -60,7 +64,7 @@ class Problem(BaseModel):
                     "detail": "joint arm/elbow is at 9, not between its limits -2 and 2",
                     "code": "seed_outside_limits",
                     "field": "seed.q[1]",
-                    "hint": "",
+                    "hint": "move it between them",
                     "errors": [],
                 }
             ]
@@ -120,14 +124,16 @@ def _validation(error: RequestValidationError) -> Problem:
     found = error.errors()
     problems = [FieldProblem(field=_field(e["loc"]), message=_sentence(e)) for e in found]
     if any(e["type"] == "json_invalid" for e in found):
-        return problem_of(CirisError("malformed_json", "the body is not JSON"), HTTPStatus.BAD_REQUEST)
-    return problem_of(CirisError("invalid_request", problems[0].message, field=problems[0].field or None), errors=problems)
+        return problem_of(CirisError("malformed_json", "the body is not JSON", field="body", hint=_DESCRIBED), HTTPStatus.BAD_REQUEST)
+    return problem_of(
+        CirisError("invalid_request", problems[0].message, field=problems[0].field or "body", hint=_DESCRIBED), errors=problems
+    )
 
 
 def _http(error: HTTPException) -> Problem:
     status = HTTPStatus(error.status_code)
     code = "too_large" if status == HTTPStatus.REQUEST_ENTITY_TOO_LARGE else status.name.lower()
-    return problem_of(CirisError(code, error.detail), status)
+    return problem_of(CirisError(code, error.detail, field=_PLACES.get(status), hint=_DESCRIBED), status)
 
 
 def _unavailable(_error: Exception) -> Problem:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks import agreement, catalogue, compare, growth, path, report, scaling, service, store, survey
+from benchmarks import agreement, catalogue, compare, growth, models, path, report, robots, scaling, service, store, survey
 from certifier.errors import CirisError
 from client.output import Screen, print_json
 
@@ -65,6 +65,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "scaling": lambda args, screen: scaling.curves(args.against is not None, screen.line),
     "service": lambda args, screen: service.beside_local(args.example, args.processes, args.turns, screen.line),
     "store": lambda args, screen: store.store(args.postgresql, store.COUNTS, screen.line),
+    "robots": lambda args, screen: robots.robots(args.robots, args.deadline, screen.line),
     "survey": lambda args, screen: survey.survey(args.scenes, args.most, screen.line, args.cells),
 }
 
@@ -111,6 +112,13 @@ def _parser() -> ArgumentParser:
     served.add_argument("--turns", type=_count, default=5, metavar="N", help="how often each is run; default 5")
     stored = kinds.add_parser("store", parents=[as_json], help="measure what the database takes for a pair in jobs of 1000 and of 100000")
     stored.add_argument("--postgresql", metavar="URL", help="measure this empty PostgreSQL database too, besides SQLite")
+    shipped = kinds.add_parser("robots", parents=[as_json], help="take robots as people ship them from model files to a verified region")
+    shipped.add_argument(
+        "robots", nargs="*", metavar="ROBOT", default=list(models.ROBOTS), help=f"default: all; {', '.join(models.ROBOTS)}"
+    )
+    shipped.add_argument(
+        "--deadline", type=float, default=robots.DEADLINE, metavar="SECONDS", help=f"for each region; default {robots.DEADLINE:g}"
+    )
     kinds.add_parser("docs", help="write the tables of docs/benchmarks.md from docs/benchmarks/*.json")
     return parser
 

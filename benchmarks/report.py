@@ -231,6 +231,18 @@ def _store(document: Document) -> list[str]:
     return [f"Milliseconds for one pair by the clock, medians of {document['repeat']}.", _table(header, rows)]
 
 
+def _robots(document: Document) -> list[str]:
+    columns = {"scene init": "init, s", "scene check": "check, s", "grow": "grow, s", "verify": "verify, s"}
+    rows = []
+    for row in document["rows"]:
+        counts = [str(row.get(key, "")) for key in ("joints", "pairs", "ignored")]
+        times = [f"{row['seconds'][verb]:.1f}" if verb in row["seconds"] else "" for verb in columns]
+        share, megabytes = (f"{row['share']:.2f}", f"{row['proof_bytes'] / 1e6:.1f}") if "share" in row else ("", "")
+        rows.append([row["robot"], *counts, *times, share, megabytes, row["ended"]])
+    header = ["robot", "joints", "pairs", "ignored", *columns.values(), "share", "proof, MB", "ended"]
+    return [f"{document['deadline']:g} s for each region, on all cores.", _table(header, rows)]
+
+
 def _survey(document: Document) -> list[str]:
     rows = [
         [row["scene"], row["region"], _counts(row["outcomes"]), str(row["left_out"]), seconds(row["seconds"])] for row in document["counts"]
@@ -277,6 +289,7 @@ _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "path": _path,
     "agreement": _agreement,
     "scaling": _scaling,
+    "robots": _robots,
     "service": _service,
     "store": _store,
     "survey": _survey,

@@ -71,7 +71,9 @@ def _more(rows: list[dict[str, Any]], what: str) -> dict[str, Any]:
 
 def _grown(name: str, way: str, service: _Service, directory: Path, processes: int) -> dict[str, Any]:
     """Runs one command. Returns its seconds, those besides seeding and pairs, and the processor time of the command and the service."""
-    command = [*CIRIS, "grow", str(catalogue.ROOT / "examples" / name / "scene.yaml"), "--json", "--out", str(directory / "proof")]
+    proof = directory / "proof"
+    proof.unlink(missing_ok=True)
+    command = [*CIRIS, "grow", str(catalogue.ROOT / "examples" / name / "scene.yaml"), "--json", "--out", str(proof)]
     command += [LOCAL] if way == LOCAL else ["--url", service.url]
     before, start, busy = _stolen(), time.perf_counter(), _processor_seconds(service.pid)
     # ``--local`` uses all cores it may, so it may use as many as the service.

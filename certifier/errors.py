@@ -42,6 +42,19 @@ class ProofError(CirisError):
     """The proof does not hold, or the file is not a proof."""
 
 
+def unreadable(error: OSError) -> str:
+    """Returns why a file cannot be read or written, for people."""
+    match error:
+        case FileNotFoundError():
+            return "there is no such file or directory"
+        case IsADirectoryError():
+            return "it is a directory"
+        case PermissionError():
+            return "you may not read or write it"
+        case _:
+            return (error.strerror or str(error)).lower()
+
+
 def close_matches(name: str, known: list[str]) -> str:
     """Returns a hint with the known names that are most like ``name``; the hint is empty when none is like it."""
     tails = {k.rsplit("/", 1)[-1]: k for k in known}

@@ -27,6 +27,7 @@ from certifier.errors import CirisError, RegionError, SceneError
 Array = NDArray[Any]
 
 SCHEMA_VERSION = 1
+_STORED = "the document was changed or is of another version; load the scene from its file again"
 WORLD = "world"
 MAX_NAME, MAX_SENTENCE = 200, 500
 """A name has at most MAX_NAME characters, and a sentence of free text has at most MAX_SENTENCE."""
@@ -261,7 +262,7 @@ class Scene:
         try:
             return self._geometry[name]
         except KeyError:
-            raise SceneError("unknown_geometry", f"no geometry is called {name!r}", hint="names are model/body/geometry") from None
+            raise SceneError("unknown_geometry", f"no geometry is called {name!r}", hint="write model/body/geometry") from None
 
     @cached_property
     def _pairs_of(self) -> dict[str, list[tuple[int, Pair]]]:
@@ -342,9 +343,9 @@ class Scene:
         except SceneError:
             raise
         except CirisError as error:
-            raise SceneError("scene_document", error.message, field=error.field) from None
+            raise SceneError("scene_document", error.message, field=error.field, hint=_STORED) from None
         if document.get("hash", scene.hash) != scene.hash:
-            raise SceneError("scene_hash", "the scene's stored hash does not match its content")
+            raise SceneError("scene_hash", "the scene's stored hash does not match its content", field="hash", hint=_STORED)
         return scene
 
 
@@ -370,6 +371,10 @@ def _not_less(q: float, base: float, revolute: bool) -> float:
         ctx.prec = precision
 
 
+def _size(array: Array) -> str:
+    return " x ".join(map(str, array.shape)) or "a number"
+
+
 def _read(document: Any) -> Scene:
     """Returns the scene of a document; the document's hash is not looked at.
 
@@ -378,7 +383,8 @@ def _read(document: Any) -> Scene:
     """
     version = document.get("schema_version") if isinstance(document, dict) else SCHEMA_VERSION
     if version != SCHEMA_VERSION or type(version) is not int:
-        raise SceneError("scene_schema", f"the scene's schema version is not {SCHEMA_VERSION}", field="schema_version")
+        message = f"the scene's schema version is not {SCHEMA_VERSION}"
+        raise SceneError("scene_schema", message, field="schema_version", hint=_STORED)
     content = ("schema_version", "name", "joints", "bodies", "geometries", "pairs", "ignored", "q_star", "padding")
     scene = Node(document).fields(*content, optional=("hash", "warnings", "provenance"))
     return Scene(
@@ -466,13 +472,14 @@ class Polytope:
         """
         try:
             rows, offsets = np.array(C, dtype=float), np.array(d, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise RegionError("polytope_shape", f"C and d must be arrays of numbers: {error}", field=field) from None
+        except (TypeError, ValueError):
+            raise RegionError("polytope_shape", "C and d must be lists of numbers, and the rows of C equally long", field=field) from None
         if rows.size == 0 and n is not None:
             rows = rows.reshape(0, n)
         if rows.ndim != 2 or offsets.shape != (len(rows),) or (n is not None and rows.shape[1] != n):
-            hint = f"C is m x {n or 'n'}, one column a joint in the scene's order, and d has m numbers"
-            raise RegionError("polytope_shape", f"C is {rows.shape} and d is {offsets.shape}", field=field, hint=hint)
+            hint = f"C must be m x {n or 'n'}, one column a joint in the scene's order, and d must have m numbers"
+            message = f"C is {_size(rows)} and d is {_size(offsets)}"
+            raise RegionError("polytope_shape", message, field=field, hint=hint)
         if not (np.isfinite(rows).all() and np.isfinite(offsets).all()):
             raise RegionError("polytope_not_finite", "C and d must be finite numbers", field=field)
         return cls(rows, offsets)

@@ -7,11 +7,13 @@ import importlib
 import io
 import os
 import re
+import signal
 import sys
 from collections.abc import Callable, Sequence
+from types import FrameType
 from typing import Any, NoReturn
 
-from certifier.errors import CirisError
+from certifier.errors import CirisError, unreadable
 from certifier.model import escaped
 from client.output import NEGATIVE
 
@@ -45,6 +47,7 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command and returns the exit status."""
     _prepare_streams()
+    signal.signal(signal.SIGTERM, _terminated)  # so that files that a command made for itself are removed
     parsed = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
         status = _command(parsed.run)(parsed)
@@ -56,9 +59,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        return _fail(f"{error.filename or ''}: {error.strerror or error}".removeprefix(": "), 2)
+        return _fail(f"{error.filename or ''}: {unreadable(error)}".removeprefix(": "), 2)
     except KeyboardInterrupt:
         return _fail("interrupted", INTERRUPTED)
+
+
+def _terminated(number: int, _frame: FrameType | None) -> NoReturn:
+    raise SystemExit(128 + number)
 
 
 def _prepare_streams() -> None:
@@ -163,12 +170,15 @@ def _parser() -> argparse.ArgumentParser:
     init.add_argument("--world", metavar="FILE", action="append", default=[], help="model of what stands around it; may be repeated")
     init.add_argument("--package", metavar="NAME=DIR", action="append", default=[], help="where a package is that a model names")
     init.add_argument(
-        "--out", metavar="FILE", default="scene.yaml", help="the scene file; default: scene.yaml here, with seed.yaml beside it"
+        "--out",
+        metavar="FILE",
+        default="scene.yaml",
+        help="the scene file; default: scene.yaml here. The seed goes beside it, into seed.yaml, or NAME.seed.yaml for NAME.yaml",
     )
     init.set_defaults(run="client.scenes:scene_init")
     check = scene.add_parser("check", parents=[json], help="say what a scene file makes of its models, without a service")
     check.add_argument("path", metavar="PATH.yaml")
-    check.add_argument("--q", metavar="Q", help="a configuration to look at; default: the seed.yaml beside the file, or else q*")
+    check.add_argument("--q", metavar="Q", help="a configuration to look at; default: the seed beside the file, or else q*")
     check.set_defaults(run="client.scenes:scene_check")
     add = scene.add_parser("add", parents=[remote, json], help="upload a scene file and all files it refers to")
     add.add_argument("path", metavar="PATH.yaml")
@@ -184,7 +194,7 @@ def _parser() -> argparse.ArgumentParser:
         "--q",
         metavar='"0,0.3,..."',
         action="append",
-        help="the seed: joint positions; default: q of the seed.yaml beside the scene file; "
+        help="the seed: joint positions; default: q of the seed.yaml beside scene.yaml, or NAME.seed.yaml beside NAME.yaml; "
         "if given several times, the service grows one region a seed, all at once",
     )
     grow.add_argument(
@@ -206,7 +216,7 @@ def _parser() -> argparse.ArgumentParser:
     grow.add_argument("--pushes", type=int, help="how often the faces are pushed out again; default: more often for smaller arms")
     grow.add_argument("--rounds", type=int, help="rounds of the polytope step; default: a few for small arms, none for large ones")
     grow.add_argument("--random-seed", type=int, help="seed of every random choice; default 0")
-    grow.add_argument("--out", metavar="FILE", help="file for the proof; default: a file in this directory, named after scene and proof")
+    grow.add_argument("--out", metavar="FILE", help="new file for the proof; default: one in this directory, named after scene and proof")
     grow.add_argument("--watch", action="store_true", help="print a line for every pair as it is settled")
     grow.add_argument("--local", action="store_true", help="grow in this process, without a service")
     grow.set_defaults(run="client.commands:grow")
@@ -227,7 +237,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     certify.add_argument("--watch", action="store_true", help="print a line for every pair as it is settled")
     certify.add_argument("--local", action="store_true", help="certify in this process, without a service")
-    certify.add_argument("--out", metavar="FILE", help="file for the proof, where the polytope is certified; default: none")
+    certify.add_argument("--out", metavar="FILE", help="new file for the proof, where the polytope is certified; default: none")
     certify.add_argument("--backend", choices=["ciris", "drake"], default="ciris", help="drake asks Drake's own program, as a cross-check")
     certify.add_argument("--solver", metavar="NAME", help="solver that Drake uses: clarabel (default), scs, csdp or mosek")
     certify.set_defaults(run="client.commands:certify")
@@ -239,7 +249,7 @@ def _parser() -> argparse.ArgumentParser:
     motion.add_argument("--space", choices=["q", "s"], help="in which the motion is straight; default: in which the waypoints are given")
     motion.add_argument("--tube", action="store_true", help="look for the largest certified tube about the motion")
     motion.add_argument("--local", action="store_true", help="certify in this process, without a service")
-    motion.add_argument("--out", metavar="FILE", help="file for the proof; default: none")
+    motion.add_argument("--out", metavar="FILE", help="new file for the proof; default: none")
     motion.set_defaults(run="client.motion:certify_path")
 
     verify = verbs.add_parser("verify", parents=[json], help="check a proof file offline and say what was proved")
@@ -275,7 +285,7 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("region", metavar="ID")
     export.add_argument("--format", choices=["json", "npz", "drake-yaml", "proof"], default="json")
     export.add_argument("--name", help="what the region is called in the file; default: its id")
-    export.add_argument("--out", metavar="FILE", help="file to write; default: standard output")
+    export.add_argument("--out", metavar="FILE", help="new file to write; default: standard output")
     export.set_defaults(run="client.commands:region_export")
 
     contains = verbs.add_parser("contains", parents=[remote, json], help="say which certified regions contain a configuration")
@@ -284,7 +294,7 @@ def _parser() -> argparse.ArgumentParser:
     contains.set_defaults(run="client.commands:contains")
 
     bench = verbs.add_parser("bench", help="measure ciris, and Drake beside it if asked; see ciris bench BENCHMARK --help")
-    kinds = ["pairs", "scene", "growth", "path", "agreement", "scaling", "service", "store", "survey", "docs"]
+    kinds = ["pairs", "scene", "growth", "path", "agreement", "scaling", "service", "store", "survey", "robots", "docs"]
     bench.add_argument("benchmark", choices=kinds)
     bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...")
     bench.set_defaults(run="client.bench:bench")

@@ -13,9 +13,9 @@ from certifier.errors import CirisError
 from certifier.outcome import Outcome
 from certifier.verify.decimals import at_most_mm, exactly
 from client import output, service
+from client.files import ProofFile, check_writable
 from client.inputs import configuration, polytope_file, seed_of
 from client.output import Screen, print_json
-from client.proof_file import ProofFile
 
 OK, NO = 0, 1
 
@@ -101,9 +101,10 @@ def grow(args: Namespace) -> int:
         if value is not None
     }
     if args.deadline is not None and not 0 < args.deadline < math.inf:
-        raise CirisError("option", f"{args.deadline:g} is no number of seconds above 0", field="--deadline")
+        raise CirisError("option", f"must be a number of seconds above 0, not {args.deadline:g}", field="--deadline")
     if len(seeds) > 1:
         return _grow_many(args, seeds, options, screen)
+    check_writable(args.out)
     proof, seed = ProofFile(args.out), seeds[0]
     if args.local:
         from client import local
@@ -138,7 +139,7 @@ def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, 
     """Has the service run one job a seed. The regions stay on the service."""
     if args.local or args.out is not None:
         raise CirisError(
-            "several_seeds", "several seeds need a service, which keeps their regions", field="--q", hint="leave --local and --out out"
+            "several_seeds", "several seeds need a service, which keeps their regions", field="--q", hint="leave out --local and --out"
         )
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
@@ -167,7 +168,10 @@ def certify(args: Namespace) -> int:
     polytope = polytope_file(args.polytope)
     drake, cells = _drake(args), 1 if args.cells is None else args.cells
     proof: bytes | None
-    kept = None if args.out is None else ProofFile(args.out)
+    kept = None
+    if args.out is not None:
+        check_writable(args.out)
+        kept = ProofFile(args.out)
     if args.local:
         from client import local
 
@@ -254,6 +258,8 @@ def region_show(args: Namespace) -> int:
 
 
 def region_export(args: Namespace) -> int:
+    if args.out is not None:
+        check_writable(args.out)
     with service.connect(args.url) as client:
         data = client.proof(args.region) if args.format == "proof" else client.export(args.region, args.format, args.name)
     if args.out is not None:

@@ -19,11 +19,11 @@ from typing import Any
 import certifier
 from certifier.errors import CirisError
 from client import output, service
+from client.files import ProofFile, file_name
 from client.find import api_key, data_dir, running_stack
 from client.http import Client
 from client.inputs import seed_of
 from client.output import Screen
-from client.proof_file import ProofFile, file_name
 
 SCENE = Path(__file__).resolve().parent.parent / "examples" / "iiwa_shelf" / "scene.yaml"
 DEADLINE_SECONDS = 120

@@ -6,6 +6,7 @@ It raises the API's problems as :class:`certifier.errors.CirisError`.
 from __future__ import annotations
 
 import json
+import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -209,7 +210,9 @@ class Client:
         return response
 
     def _unreachable(self, error: Exception) -> CirisError:
-        return CirisError("unreachable", f"the service at {self.url} does not answer: {error}", hint="is `ciris up` running?")
+        reason = re.sub(r"^\[.*?\] ", "", str(error))  # an errno, which helps nobody
+        message = f"the service at {self.url} does not answer: {reason}"
+        return CirisError("unreachable", message, hint="is `ciris up` running there?")
 
 
 def _segment(name: str) -> str:
@@ -219,7 +222,7 @@ def _segment(name: str) -> str:
         CirisError: not_found for what no name can be.
     """
     if not name.strip("."):
-        raise CirisError("not_found", f"{name!r} is no name and no id")
+        raise CirisError("not_found", f"{name!r} is no name and no id", hint="`scene ls`, `job ls` and `region ls` of ciris list them")
     return quote(name, safe="")
 
 
@@ -227,4 +230,4 @@ def _problem(response: httpx2.Response) -> CirisError:
     if response.headers.get("content-type", "").startswith("application/problem+json"):
         problem = response.json()
         return CirisError(problem["code"], problem["detail"], field=problem["field"], hint=problem["hint"])
-    return CirisError("not_ciris", f"{response.url} answered {response.status_code}; is that the address of a ciris service?")
+    return CirisError("not_ciris", f"{response.url} answered {response.status_code}", hint="is that the address of a ciris service?")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
+from certifier.errors import CirisError
 from client import output
 from client.follow import follow
 from client.http import Document
@@ -64,8 +65,12 @@ def job_follow(args: Namespace) -> int:
 
 
 def job_cancel(args: Namespace) -> int:
+    """Asks a job to end. Of one that had ended before, it says so."""
     with connect(args.url) as client:
-        job = client.cancel(args.job)
+        before = client.job(args.job)
+        job = client.cancel(before["id"])
+    if before["ended"]:
+        Screen().line(f"the job had ended before, {before['state']}; nothing was cancelled")
     return _say(job, args)
 
 
@@ -93,7 +98,7 @@ def _print(job: dict[str, Any]) -> None:
         ("created", job["created_at"][:19]),
         ("outcome", output.plain(job["outcome"])),
         *([("reason", job["reason"])] if job["reason"] else []),
-        *([("error", error["message"])] if error else []),
+        *([("error", str(CirisError.from_document(error)))] if error else []),
         *([("region", job["region"])] if job["region"] else []),
     ]
     output.print_facts(facts)

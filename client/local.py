@@ -80,6 +80,7 @@ def certify(
         cells: as in :class:`certifier.growth.options.GrowthOptions`, for our certifier.
     """
     loaded = load(scene)
+    given.check_space([joint.name for joint in loaded.moving], loaded.q_star.tolist())
     tell = _teller(loaded, screen, watch)
     if drake is None:
         from certifier.jobs import local

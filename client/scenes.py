@@ -17,7 +17,7 @@ from certifier.scene.draft import draft
 from certifier.scene.load import load_scene
 from certifier.seeding.limits import check_limits
 from client import output
-from client.inputs import SEED_FILE, configuration, seed_of
+from client.inputs import configuration, seed_file, seed_of
 
 COSTLIEST = 5
 
@@ -25,14 +25,12 @@ COSTLIEST = 5
 def scene_init(args: Namespace) -> int:
     """Writes a scene file, and a seed beside it."""
     out = Path(args.out)
-    seed_file = out.parent / SEED_FILE
     if out.suffix not in (".yaml", ".yml"):
-        raise CirisError("scene_file", f"a scene file ends in .yaml, not as {out.name}", field="--out")
-    for path in (out, seed_file):
+        raise CirisError("scene_file", f"the name of a scene file must end in .yaml, not as {out.name}", field="--out")
+    seed = seed_file(out)
+    for path in (out, seed):
         if path.exists():
-            raise CirisError(
-                "file_exists", f"{path} is there already", field="--out", hint="move it away, or name another file in a new directory"
-            )
+            raise CirisError("file_exists", f"{path} is there already", field="--out", hint="move it away, or name another file")
     packages = dict(_package(text) for text in args.package)
     made = not out.parent.exists()
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -55,8 +53,8 @@ def scene_init(args: Namespace) -> int:
     text = (
         f"q: {[round(float(x), 6) for x in drafted.seed]}\nabout: The free configuration nearest to q_star that ciris scene init found.\n"
     )
-    seed_file.write_text(text, encoding="utf-8")
-    print(f"{seed_file}: a configuration that is free of collision")
+    seed.write_text(text, encoding="utf-8")
+    print(f"{seed}: a configuration that is free of collision")
     print(f"next: ciris scene check {out}, then ciris grow {out} --local")
     return 0
 
@@ -64,7 +62,7 @@ def scene_init(args: Namespace) -> int:
 def _package(text: str) -> tuple[str, Path]:
     name, _, directory = text.partition("=")
     if not name or not directory:
-        raise CirisError("bad_option", f"{text!r} is not NAME=DIRECTORY", field="--package")
+        raise CirisError("bad_option", f"must be NAME=DIRECTORY, not {text!r}", field="--package")
     return name, Path(directory)
 
 
@@ -100,15 +98,16 @@ def scene_check(args: Namespace) -> int:
 
 
 def _configuration(scene: Scene, args: Namespace) -> tuple[np.ndarray, str]:
-    if args.q is None and not (Path(args.path).parent / SEED_FILE).is_file():
+    seed = seed_file(args.path)
+    if args.q is None and not seed.is_file():
         inside = 1e-3 * (scene.q_upper - scene.q_lower)
         return scene.q_star.clip(scene.q_lower + inside, scene.q_upper - inside), "q*"
     q = configuration(args.q) if args.q is not None else seed_of(args.path, None)
     if len(q) != scene.n:
         names = ", ".join(joint.name for joint in scene.moving)
-        field = SEED_FILE if args.q is None else "--q"
+        field = seed.name if args.q is None else "--q"
         raise CirisError("seed_wrong_length", f"{len(q)} numbers for {scene.n} joints", field=field, hint=f"in order: {names}")
-    return np.array(q), "--q" if args.q is not None else SEED_FILE
+    return np.array(q), "--q" if args.q is not None else seed.name
 
 
 def _joints(scene: Scene, q: np.ndarray) -> list[tuple[str, ...]]:

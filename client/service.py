@@ -84,6 +84,7 @@ def certify(client: Client, scene: Document, given: PolytopeFile, screen: Screen
     Raises:
         CirisError: the polytope was refused, or the job was cancelled.
     """
+    given.check_space([joint["name"] for joint in scene["positions"]], [joint["q_star"] for joint in scene["positions"]])
     body: dict[str, Any] = {"C": given.polytope.C.tolist(), "d": given.polytope.d.tolist()}
     if given.center is not None:
         body["center"] = given.center.tolist()
@@ -118,7 +119,8 @@ def _error(job: Document) -> CirisError:
     """Returns the error that says why an ended job has no result."""
     if job["error"]:
         return CirisError.from_document(job["error"])
-    return CirisError(f"job_{job['state']}", job["reason"] or f"the job is {job['state']}")
+    reason = job["reason"] or f"the job is {job['state']}"
+    return CirisError(f"job_{job['state']}", reason, hint=f"`ciris job show {job['id'][:8]}` tells more")
 
 
 def _seconds(job: Document) -> float:

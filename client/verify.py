@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from certifier.errors import CirisError
+from certifier.errors import CirisError, unreadable
 from certifier.isolation.child import run_in_child
 from certifier.model import escaped
 from certifier.proof.limits import FILE_BYTES
@@ -23,6 +23,9 @@ from client.cores import cores
 from client.output import Screen, print_json
 
 HOLDS, DOES_NOT = 0, 1
+REFUSED = "get the file again from whom you have it, or grow the region again; believe nothing that this file says"
+UNCHECKED = "it may hold all the same; the verifier takes no files of this size, for they may come from strangers"
+"""These say what to do about every proof that does not hold, and about one that is too large."""
 MEMORY_BYTES = 4 << 30
 """This is the limit of each process, of which there is one for each core."""
 TIMEOUT_S = 3600.0
@@ -67,8 +70,8 @@ def _readable(path: Path) -> Iterator[Path]:
     except (OSError, CirisError) as error:
         if isinstance(error, CirisError) and error.code != "no_file":
             raise
-        what = error.message if isinstance(error, CirisError) else error.strerror or str(error)
-        raise CirisError("no_file", what, field=escaped(str(path))) from None
+        what = error.message if isinstance(error, CirisError) else unreadable(error)
+        raise CirisError("no_file", what, field=escaped(str(path)), hint="name a proof file") from None
 
 
 def _answer(path: Path) -> dict[str, Any]:
@@ -81,8 +84,10 @@ def _answer(path: Path) -> dict[str, Any]:
             )
     except CirisError as error:
         if error.code == "no_file":
-            raise CirisError(error.code, error.message) from None
-        return {"holds": False, "error": {**error.to_document(), "message": escaped(error.message)}}
+            raise CirisError("no_file", error.message, hint="name a proof file") from None
+        found = {"holds": False, "error": {**error.to_document(), "message": escaped(error.message)}}
+    if not found["holds"]:
+        found["error"]["hint"] = found["error"]["hint"] or (UNCHECKED if found["error"]["code"] == "proof_too_large" else REFUSED)
     return found
 
 

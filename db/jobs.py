@@ -98,7 +98,8 @@ def retry(session: Session, job_id: str, key_id: str | None = None) -> JobRow:
     """
     job = lock(session, get(session, job_id).id)
     if job.state not in (JobState.FAILED, JobState.CANCELLED):
-        raise CirisError("job_not_retryable", f"the job is {job.state}; only a failed or cancelled one can be retried", field="job")
+        message = f"the job is {job.state}; only a failed or cancelled one can be retried"
+        raise CirisError("job_not_retryable", message, field="job", hint="create a new one")
     again, made = create(
         session,
         kind=job.kind,

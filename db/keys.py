@@ -55,7 +55,7 @@ def add(session: Session, name: str, scope: Scope) -> str:
         CirisError: key_name, for a name that cannot be used or is in use.
     """
     if not _NAME.fullmatch(name):
-        raise CirisError("key_name", f"{name!r} is no name for a key", field="name", hint="up to 64 letters, digits and . _ - @")
+        raise CirisError("key_name", f"{name!r} is no name for a key", field="name", hint="choose up to 64 letters, digits and . _ - @")
     if _active(session, name):
         raise CirisError("key_name", f"there is a key {name!r} already", field="name", hint="revoke it, or choose another name")
     key_id = secrets.token_hex(6)
@@ -137,9 +137,9 @@ def check_bind(settings: Settings) -> None:
     try:
         with database.read() as session:
             guarded = exist(session)
-    except SQLAlchemyError as error:
+    except SQLAlchemyError:
         hint = "is it there, and migrated (`python -m db.migrate`)?"
-        raise CirisError("no_database", f"the database cannot be used: {type(error).__name__}", hint=hint) from None
+        raise CirisError("no_database", "the database cannot be used", field="CIRIS_DATABASE_URL", hint=hint) from None
     finally:
         database.close()
     if not guarded:

@@ -52,5 +52,7 @@ def _place(cursor: str) -> tuple[datetime, str]:
         if place.tzinfo is None or not row_id.isprintable():
             raise ValueError
     except ValueError:
-        raise CirisError("cursor", "this is not the `next` of a page", field="after") from None
+        raise CirisError(
+            "cursor", "this is not the `next` of a page", field="after", hint="leave it out to begin with the first page"
+        ) from None
     return place, row_id

@@ -27,5 +27,6 @@ def get(session: Session, digest: str) -> bytes:
     """
     row = session.get(ProofRow, digest)
     if row is None:
-        raise CirisError("proof_not_found", f"there is no proof {digest}")
+        hint = "the database has lost it: restore a backup, or grow the region again"
+        raise CirisError("proof_not_found", f"there is no proof {digest}", field="proof", hint=hint)
     return row.data

@@ -46,7 +46,7 @@ def of_job(session: Session, job_id: str) -> WebhookRow:
     """
     row = session.scalar(select(WebhookRow).where(WebhookRow.job_id == job_id))
     if row is None:
-        raise CirisError("webhook_not_found", f"job {job_id!r} has no webhook", field="job")
+        raise CirisError("webhook_not_found", f"job {job_id!r} has no webhook", field="job", hint="give one when you create a job")
     return row
 
 

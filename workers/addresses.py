@@ -29,8 +29,11 @@ def resolve(host: str, port: int, *, private: bool) -> str:
     """
     try:
         found = [str(entry[4][0]) for entry in socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)]
-    except (OSError, UnicodeError) as error:
-        raise CirisError("webhook_address", f"{host} cannot be resolved: {error}") from None
+    except (OSError, UnicodeError):
+        hint = "is it spelt so, and does the service's machine know it?"
+        raise CirisError("webhook_address", f"no address of {host} was found", field="webhook.url", hint=hint) from None
     if not private and not all(map(is_public, found)):
-        raise CirisError("webhook_address", f"{host} is not a public address", hint="CIRIS_WEBHOOK_PRIVATE=1 allows it")
+        raise CirisError(
+            "webhook_address", f"{host} is not a public address", field="webhook.url", hint="CIRIS_WEBHOOK_PRIVATE=1 allows it"
+        )
     return found[0]

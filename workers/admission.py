@@ -36,5 +36,6 @@ def _too_much(cost: PairCost, needs: str, limit: str) -> CirisError:
     return CirisError(
         "does_not_fit",
         f"certifying {cost.a} and {cost.b} ({chain} joints between them, {vertices} vertices) needs about {needs}; {limit}",
+        field="scene",
         hint="give the bodies fewer vertices, ignore the pair with a reason, or raise the limit",
     )

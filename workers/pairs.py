@@ -20,12 +20,12 @@ from db.session import database
 from db.settings import settings
 from db.states import JobState
 from workers.actions import certify_action
+from workers.failures import IN_LOG, LOST, ON_LOSS
 from workers.scenes import load_scene
 from workers.transaction import persistently
 
 log = logging.getLogger(__name__)
 
-LOST = "its process died {deaths} times (killed, crashed, out of memory or over the time limit) in {attempts} attempts at"
 SAVE_SECONDS = 0.5
 """Results are saved together once this much time has passed since the last saving."""
 
@@ -57,14 +57,14 @@ def _certify(claim: pairs.Claim, pair: pairs.Claimed) -> PairResult:
     start = time.perf_counter()
     if leases.is_poison(pair.deaths, pair.attempt, settings().max_attempts):
         problem = f"{LOST.format(deaths=pair.deaths, attempts=pair.attempt - 1)} this pair"
-        return _error(CirisError("worker_lost", problem), start)
+        return _error(CirisError("worker_lost", problem, hint=ON_LOSS), start)
     try:
         return _certification(claim.scene_id, claim.job_id, claim.iteration)(pair.index, pair.part)
     except CirisError as error:
         return _error(error, start)
-    except Exception as error:
+    except Exception:
         log.exception("the pair failed")
-        return _error(CirisError("internal_error", f"{type(error).__name__}: {error}"), start)
+        return _error(CirisError("internal_error", "certifying the pair went wrong in the service", hint=IN_LOG), start)
 
 
 def _error(error: CirisError, start: float) -> PairResult:

@@ -131,8 +131,10 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
     data = settings.data_dir.expanduser().absolute()
     try:
         (data / "logs").mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CirisError("data_directory", f"{data} cannot be made: {error.strerror}", field="--data") from None
+    except OSError:
+        raise CirisError(
+            "data_directory", f"{data} cannot be made", field="--data", hint="name a directory that you may write to"
+        ) from None
     with _only_one(data), _stop_signals() as stopping, _socket_directory(data) as sockets, _reserved_port(settings, port) as bound:
         host = f"[{settings.host}]" if settings.family == socket.AF_INET6 else settings.host
         url = f"http://{host}:{bound}"
@@ -210,9 +212,9 @@ def _wait_until_healthy(url: str, stopping: Callable[[], bool], data: Path) -> b
         try:
             with urllib.request.urlopen(f"{url}/healthz", timeout=2):
                 return True
-        except (urllib.error.URLError, ConnectionError, TimeoutError) as error:
+        except (urllib.error.URLError, ConnectionError, TimeoutError):
             if time.monotonic() > until:
-                raise CirisError("stack_failed", f"the API does not answer: {error}", hint=f"see {data / 'logs'}") from None
+                raise CirisError("stack_failed", f"the API at {url} does not answer", hint=f"see {data / 'logs'}") from None
         time.sleep(POLL_SECONDS)
     return False
 
@@ -232,7 +234,7 @@ def _reserved_port(settings: Settings, asked: int | None) -> Iterator[int]:
         else:
             host = settings.host
             problem = f"no port of {host} can be bound" if asked is None else f"port {asked} of {host} cannot be bound"
-            raise CirisError("port_taken", problem, field="port", hint="choose another, or none; CIRIS_HOST is where it is looked for")
+            raise CirisError("port_taken", problem, field="--port", hint="choose another, or none; CIRIS_HOST is where it is looked for")
         holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 0)
         holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
         yield int(holder.getsockname()[1])
@@ -256,7 +258,10 @@ def _only_one(data: Path) -> Iterator[None]:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise CirisError(
-                "stack_running", f"a stack with the data directory {data} is running already", hint="see its stack.json"
+                "stack_running",
+                f"a stack with the data directory {data} is running already",
+                field="--data",
+                hint="use that one, or name another directory",
             ) from None
         yield
 

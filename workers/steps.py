@@ -30,7 +30,7 @@ from db.settings import settings
 from db.states import JobState, StepKind, StepState
 from db.types import utcnow
 from workers.app import send_work
-from workers.pairs import LOST
+from workers.failures import IN_LOG, LOST, ON_LOSS
 from workers.scenes import load_scene
 from workers.transaction import persistently
 
@@ -57,9 +57,9 @@ def carry_out(claim: steps.Claim) -> bool:
             state, done = StepState.DONE, _do(claim)
         except CirisError as error:
             state, done = StepState.FAILED, Done(error.to_document())
-        except Exception as error:
+        except Exception:
             log.exception("the step failed")
-            problem = CirisError("internal_error", f"{claim.kind}: {type(error).__name__}: {error}")
+            problem = CirisError("internal_error", f"the step {claim.kind} went wrong in the service", hint=IN_LOG)
             state, done = StepState.FAILED, Done(problem.to_document())
         saved = persistently(lambda: _save(claim, state, done, time.perf_counter() - start))
     if saved and claim.kind == StepKind.ACCEPT and state == StepState.FAILED:
@@ -81,7 +81,7 @@ def _save(claim: steps.Claim, state: StepState, done: Done, seconds: float) -> b
 def _do(claim: steps.Claim) -> Done:
     if leases.is_poison(claim.deaths, claim.attempt, settings().max_attempts):
         problem = f"{LOST.format(deaths=claim.deaths, attempts=claim.attempt - 1)} the step {claim.kind}"
-        raise CirisError("worker_lost", problem)
+        raise CirisError("worker_lost", problem, hint=ON_LOSS)
     scene = load_scene(claim.scene_id)
     match claim.kind:
         case StepKind.PROPOSE:

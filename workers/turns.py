@@ -31,6 +31,7 @@ from workers import admission
 from workers.actions import certify_action
 from workers.app import send_work
 from workers.coordinator import ending, next_transition, step_report
+from workers.failures import IN_LOG
 from workers.scenes import load_scene
 from workers.transaction import Afterwards, persistently, writing
 
@@ -61,9 +62,9 @@ def coordinate(job_id: str) -> None:
             transition = _decide(turn)
         except CirisError as error:
             decision = partial(_give_up, turn, error)
-        except Exception as error:
+        except Exception:
             log.exception("the next step could not be decided")
-            problem = CirisError("internal_error", f"the next step could not be decided: {type(error).__name__}: {error}")
+            problem = CirisError("internal_error", "deciding what is next went wrong in the service", hint=IN_LOG)
             decision = partial(_give_up, turn, problem)
         else:
             decision = partial(_save, turn, transition)
@@ -96,7 +97,8 @@ def _begin(job_id: str) -> Turn | None:
             outcome = Outcome.CERTIFIED if steps.accepted(session, job_id) else Outcome.INCONCLUSIVE
             _finish_growth(session, job, Finish(outcome, "the deadline was reached"))
         if job.coordinator_attempts >= settings().max_attempts:
-            job.error = CirisError("coordination_failed", "the coordinator died or hung each time it decided about this job").to_document()
+            problem = "the coordinator died or hung each time it decided about this job"
+            job.error = CirisError("coordination_failed", problem, hint=IN_LOG).to_document()
             _finish_growth(session, job, Finish(Outcome.ERROR, "the coordinator failed"))
         if job.action is not None and job.action["kind"] == "finish":
             _finish(session, job, afterwards)

@@ -186,7 +186,8 @@ def download_pair_proof(job_id: str, pair: int, iteration: Annotated[int, Query(
         rows = [row for row in pairs.of_iteration(session, job.id, iteration) if row.pair_index == pair]
         digest = _cell(scenes.load(db, job.scene_id), rows).proof if rows else None
         if digest is None:
-            raise CirisError("proof_not_found", f"there is no proof of pair {pair} in iteration {iteration}", field="pair")
+            message = f"there is no proof of pair {pair} in iteration {iteration}"
+            raise CirisError("proof_not_found", message, field="pair", hint="only pairs that are certified or refuted have one")
         data = proofs.get(session, digest)
     headers = {"Content-Disposition": f'attachment; filename="{job.id}-{iteration}-{pair}.proof"'}
     return Response(with_scene(data, scenes.load(db, job.scene_id)), media_type="application/octet-stream", headers=headers)

@@ -41,7 +41,7 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
     if options.kind == "grow":
         return Transition(state, Propose(options.seed))
     if "C" not in options.seed or "d" not in options.seed:
-        raise RegionError("polytope_missing", "a polytope needs C and d", field="polytope")
+        raise RegionError("polytope_missing", "a polytope needs C and d", field="polytope", hint="give both")
     given, center = Polytope.given(options.seed["C"], options.seed["d"], scene.n), options.seed.get("center")
     limited = scene.polytope(given.C, given.d)
     center = None if center is None else np.array(center)

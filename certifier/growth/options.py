@@ -100,9 +100,9 @@ class GrowthOptions:
                 )
         options = cls(**document)
         if options.kind not in ("grow", "certify"):
-            raise RegionError("option_value", "kind is 'grow' or 'certify'", field="options.kind")
+            raise RegionError("option_value", "kind must be 'grow' or 'certify'", field="options.kind")
         if options.contraction not in ("whole", "targeted", "uniform", None):
-            raise RegionError("option_value", "contraction is 'whole', 'targeted' or 'uniform'", field="options.contraction")
+            raise RegionError("option_value", "contraction must be 'whole', 'targeted' or 'uniform'", field="options.contraction")
         for name, (least, greatest) in WHOLE_NUMBERS.items():
             value = getattr(options, name)
             if name in ("cells", *EFFORT[0][1]) and value is None:
@@ -110,7 +110,8 @@ class GrowthOptions:
             if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= greatest:
                 raise RegionError("option_value", f"{name} must be an integer from {least} to {greatest}", field=f"options.{name}")
         if options.contraction == "uniform" and options.seed.get("contain"):
-            raise RegionError("option_value", "uniform contraction does not keep points inside", field="options.contraction")
+            message = "uniform contraction does not keep points inside"
+            raise RegionError("option_value", message, field="options.contraction", hint="leave out the points, or contract otherwise")
         if not (isinstance(options.tolerance, (int, float)) and 0 < options.tolerance < LARGEST_TOLERANCE):
             raise RegionError("option_value", f"tolerance must be a number between 0 and {LARGEST_TOLERANCE:g}", field="options.tolerance")
         return options

@@ -194,8 +194,8 @@ class GrowthState:
             }
             return cls(options, **{**document, **parts, "suspects": tuple(document["suspects"])})
         except (KeyError, TypeError) as error:
-            message = f"this job was begun by another version of ciris and cannot go on: {type(error).__name__}: {error}"
-            raise CirisError("other_version", message, hint="retry it") from error
+            message = "this job was begun by another version of ciris and cannot go on"
+            raise CirisError("other_version", message, field="job", hint="retry it") from error
 
 
 def _whole(document: dict[str, Any] | None) -> Whole | None:

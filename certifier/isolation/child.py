@@ -54,7 +54,8 @@ def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes:
     try:
         status, answer = nursery.ask(request, timeout_s)
     except TimeoutError:
-        raise CirisError("child_timeout", f"it took more than {timeout_s:g} s and was stopped{nursery.tail()}") from None
+        message = f"it took more than {timeout_s:g} s and was stopped{nursery.tail()}"
+        raise CirisError("child_timeout", message, hint="ask for less, or try again when the machine has less to do") from None
     except (EOFError, ConnectionError):
         raise _death(nursery.process.returncode, nursery.tail(), memory_bytes) from None
     tail = nursery.tail()
@@ -140,9 +141,10 @@ def _result(answer: dict[str, Any]) -> Any:
 
 def _death(status: int, tail: str, memory_bytes: int) -> CirisError:
     if "MemoryError" in tail or "bad_alloc" in tail:
-        return CirisError("child_memory", f"it needed more than {memory_bytes / 2**30:.3g} GiB of memory{tail}")
+        message = f"it needed more than {memory_bytes / 2**30:.3g} GiB of memory{tail}"
+        return CirisError("child_memory", message, hint="ask for less: fewer bodies, or fewer vertices")
     how = f"signal {signal.Signals(-status).name}" if status < 0 else f"exit status {status}"
-    return CirisError("child_died", f"the process died ({how}){tail}")
+    return CirisError("child_died", f"the process died ({how}){tail}", hint="try again; report it with these words if it dies again")
 
 
 def encode(value: Any) -> bytes:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from certifier.errors import RegionError
 from certifier.model import Array, Polytope
-from certifier.polytopes.polytope import bounds, chebyshev_center
+from certifier.polytopes.polytope import SCALED, bounds, chebyshev_center
 from certifier.polytopes.sampling import CHAINS, hit_and_run
 
 _GAP = 1e-9
@@ -53,7 +53,7 @@ def inscribed_ellipsoid(polytope: Polytope) -> Ellipsoid:
     try:
         x, square = _largest(C / (d - C @ start)[:, None])
     except np.linalg.LinAlgError as error:
-        raise RegionError("ellipsoid_failed", f"no inscribed ellipsoid was found: {error}", field="polytope") from error
+        raise RegionError("ellipsoid_failed", "no inscribed ellipsoid was found", field="polytope", hint=SCALED) from error
     center = start + x
     eigenvalues, axes = np.linalg.eigh(square)
     shape = (axes * np.sqrt(eigenvalues)) @ axes.T

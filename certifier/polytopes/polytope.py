@@ -115,7 +115,8 @@ def chebyshev_center(polytope: Polytope, names: tuple[str, ...] | None = None) -
     if radius < 0:
         raise _empty()
     if radius <= _FLAT:
-        raise RegionError("polytope_empty", f"the polytope is flat: no ball of radius {_FLAT:g} fits inside", field="polytope")
+        message = f"the polytope is flat: no ball of radius {_FLAT:g} fits inside"
+        raise RegionError("polytope_empty", message, field="polytope", hint="move its faces apart")
     return center, radius
 
 
@@ -133,7 +134,7 @@ def _check_cone(C: Array) -> None:
 
 
 def _empty() -> RegionError:
-    return RegionError("polytope_empty", "no point satisfies C s <= d", field="polytope")
+    return RegionError("polytope_empty", "no point satisfies C s <= d", field="polytope", hint="look at the signs and at the joint limits")
 
 
 def _unbounded(direction: Array) -> RegionError:
@@ -141,6 +142,8 @@ def _unbounded(direction: Array) -> RegionError:
     return RegionError("polytope_unbounded", f"the polytope is unbounded along {v}", field="polytope", hint="add the joint limits as rows")
 
 
+SCALED = "scale the rows of C to length 1, and leave out rows that nearly repeat others"
+"""This is what to do where the numbers of a polytope are too hard."""
 _CLEARLY = 1e-9
 """A row must be redundant by this relative distance to be dropped, so that whoever proves it again succeeds as well."""
 
@@ -233,7 +236,7 @@ def _maximise(polytope: Polytope, directions: Array, start: Array) -> tuple[Arra
     try:
         return simplex.maximise(polytope.C, polytope.d, directions, start)
     except np.linalg.LinAlgError as error:
-        raise RegionError("polytope_numerics", f"a linear program over the polytope failed: {error}", field="polytope") from error
+        raise RegionError("polytope_numerics", "a linear program over the polytope failed", field="polytope", hint=SCALED) from error
 
 
 def _boxed(polytope: Polytope, lo: Array, hi: Array) -> Polytope:

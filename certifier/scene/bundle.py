@@ -16,12 +16,14 @@ from pathlib import Path
 from certifier.errors import CirisError, SceneError
 from certifier.isolation.child import prepare
 from certifier.model import Scene
-from certifier.scene.file import read_scene_file
+from certifier.scene.file import existing, read_scene_file, with_relative_packages
 from certifier.scene.load import read_in_child
 from certifier.scene.references import references, resolve
 
 INDEX = "bundle.json"
 """In this file the bundle says which file is the scene file."""
+SMALLER = "use smaller meshes, or fewer of them"
+"""This is what to do about a bundle that is too large."""
 _READER = "certifier.scene.unpack:parse_bundle"
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
@@ -48,12 +50,14 @@ class BundleLimits:
 def pack_bundle(path: str | Path) -> bytes:
     """Returns a zip of the scene file and every file that it refers to, directly or through others; equal files give equal bytes.
 
+    Where the scene file gives a package's absolute path, the bundle has the relative one: the package lies elsewhere there.
+
     A file that is referred to but does not exist is left out. Whoever loads the bundle gets Drake's message about it.
 
     Raises:
         SceneError: the scene file is wrong, or a reference cannot travel (``bundle_uri``).
     """
-    scene_file = read_scene_file(Path(path).resolve())
+    scene_file = read_scene_file(existing(path).resolve())
     files = {scene_file.path}
     waiting = [resolve(model, scene_file.path.parent, scene_file.packages) for model in scene_file.models]
     while waiting:
@@ -69,7 +73,8 @@ def pack_bundle(path: str | Path) -> bytes:
         for directory in sorted(set(scene_file.packages.values()) - {root}):
             _write(archive, f"{directory.relative_to(root).as_posix()}/", b"")
         for file in sorted(files):
-            _write(archive, file.relative_to(root).as_posix(), file.read_bytes())
+            content = with_relative_packages(file).encode() if file == scene_file.path else file.read_bytes()
+            _write(archive, file.relative_to(root).as_posix(), content)
     return data.getvalue()
 
 
@@ -87,14 +92,15 @@ def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
     """
     limits = limits or BundleLimits()
     if len(data) > limits.bytes:
-        raise SceneError("bundle_too_large", f"the bundle has {len(data)} bytes; at most {limits.bytes} are accepted")
+        message = f"the bundle has {len(data)} bytes; at most {limits.bytes} are accepted"
+        raise SceneError("bundle_too_large", message, field="bundle", hint=SMALLER)
     with tempfile.TemporaryDirectory(prefix="ciris-") as directory:
         archive, root = Path(directory).resolve() / "bundle.zip", Path(directory).resolve() / "files"
         archive.write_bytes(data)
         root.mkdir()
         payload = {"archive": str(archive), "root": str(root), "limits": asdict(limits)}
         try:
-            return read_in_child(_READER, payload, "the bundle", None, limits.timeout_s, limits.memory_bytes)
+            return Scene.from_document(read_in_child(_READER, payload, "the bundle", None, limits.timeout_s, limits.memory_bytes))
         except CirisError as error:
             error.message = error.message.replace(f"{root}/", "")
             raise

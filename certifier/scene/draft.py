@@ -9,18 +9,21 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from xml.parsers import expat
 
 import numpy as np
 import yaml
 
 from certifier.errors import SceneError
-from certifier.model import WORLD, Array, JointKind, Pair, Scene
+from certifier.model import Array, JointKind, Pair, Scene
 from certifier.scene.contacts import touching
-from certifier.scene.load import load_scene
+from certifier.scene.load import MEMORY_BYTES, TIMEOUT_S, load_scene, read_in_child
+from certifier.scene.mimics import Mimic, at_rest
 from certifier.scene.references import references
 from certifier.scene.xml import parse_xml
 
@@ -28,7 +31,11 @@ TRIED = 200
 """So many random configurations tell which pairs always overlap."""
 SEEDS = 2000
 """A free configuration is looked for among so many."""
-_PACKAGE = "package://"
+SLIDE = 1.0
+"""A slide without limits is drafted to go so far from its limit, in metres, or to either side of 0 if it has neither."""
+_PACKAGES = ("package://", "model://")
+_NAMED = {"robot": "name", "model": "name", "mujoco": "model"}
+"""The elements that are models, and the attribute that is the model's name."""
 
 
 @dataclass(frozen=True)
@@ -49,23 +56,6 @@ class Draft:
     overlapping: tuple[Pair, ...]
 
 
-@dataclass
-class _Model:
-    """What a model file says of itself: its name, its links that hang on no joint, and its mimic joints."""
-
-    path: Path
-    name: str = ""
-    links: list[str] = field(default_factory=list)
-    children: set[str] = field(default_factory=set)
-    mimics: dict[str, str] = field(default_factory=dict)
-    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
-    static: bool = False
-
-    @property
-    def roots(self) -> list[str]:
-        return [] if self.static else [link for link in self.links if link not in self.children and link != WORLD]
-
-
 def draft(robot: Path, worlds: Sequence[Path], out: Path, packages: Mapping[str, Path]) -> Draft:
     """Returns a scene file for a robot and what stands around it, which was loaded once.
 
@@ -77,80 +67,55 @@ def draft(robot: Path, worlds: Sequence[Path], out: Path, packages: Mapping[str,
     Raises:
         SceneError: a file cannot be used; ``scene_package`` for a package that was not found.
     """
-    models = [_read(path) for path in (robot, *worlds)]
-    for model in models:
-        model.name = _unused(model.name, [other.name for other in models[: models.index(model)]])
+    models: dict[str, Path] = {}
+    for path in (robot, *worlds):
+        models[_unused(_name_in(path), models)] = path
     directory = out.resolve().parent
-    found = {name: root for model in models for name, root in _packages(model.path, packages).items()}
-    held = {f"{model.name}/{joint}": _at_rest(model, joint) for model in models for joint in _coupled(model)}
-    head = _head(out, models, found, held, directory)
+    found = {name: root for path in models.values() for name, root in _packages(path, packages).items()}
+    head = _head(out, robot, found, directory)
+    add = {name: f"  - add_model: {{name: {_quoted(name)}, file: {_quoted(_relative(path, directory))}}}" for name, path in models.items()}
+    held = _inventory("\n".join([head, *add.values()]), models, directory)
+    head = "\n".join([head, *_directives(add, held["roots"]), *_limits(held), *_fix(held)]) + "\n"
     scene = _loaded(head, directory)
-    rng = np.random.default_rng(0)
-    random = rng.uniform(scene.q_lower, scene.q_upper, (TRIED + SEEDS, scene.n))
+    random = np.random.default_rng(0).uniform(scene.q_lower, scene.q_upper, (TRIED + SEEDS, scene.n))
     middle = scene.q_star.clip(scene.q_lower, scene.q_upper)
     always = set(scene.pairs)
     for touches in touching(scene, [middle, *random[:TRIED]]):
         always &= touches
-    robot_alone = [p for p in always if all(name.startswith(f"{models[0].name}/") for name in (p.a, p.b))]
-    ignored = tuple(sorted(robot_alone, key=lambda p: (p.a, p.b)))
-    near = np.linalg.norm((random[TRIED:] - middle) / (scene.q_upper - scene.q_lower), axis=1)
-    candidates = [middle, *random[TRIED:][np.argsort(near)]]
-    seed = next((q for q, touches in zip(candidates, touching(scene, candidates), strict=True) if touches <= always), None)
+    own = tuple(f"{next(iter(models))}{mark}" for mark in ("/", "::"))
+    overlapping = sorted(always, key=lambda pair: (pair.a, pair.b))
+    ignored = tuple(pair for pair in overlapping if pair.a.startswith(own) and pair.b.startswith(own))
+    others = tuple(pair for pair in overlapping if pair not in ignored)
     text = head + _joints(scene) + _ignore(ignored, scene)
-    others = tuple(sorted(always - {*ignored}, key=lambda p: (p.a, p.b)))
-    return Draft(text, _loaded(text, directory), seed, ignored, others)
+    return Draft(text, _loaded(text, directory), _free(scene, middle, random[TRIED:], always), ignored, others)
 
 
-def _read(path: Path) -> _Model:
-    model, inside = _Model(path), [""]
-    text: list[str] = []
+def _free(scene: Scene, middle: Array, random: Array, always: set[Pair]) -> Array | None:
+    """Returns the middle or else the nearest to it of the random configurations, at which nothing touches but what always does."""
+    near = np.linalg.norm((random - middle) / (scene.q_upper - scene.q_lower), axis=1)
+    candidates = [middle, *random[np.argsort(near)]]
+    return next((q for q, touches in zip(candidates, touching(scene, candidates), strict=True) if touches <= always), None)
 
-    def start(name: str, attributes: dict[str, str]) -> None:
-        text.clear()
-        parent = inside[-1]
-        if name in ("robot", "model") and not model.name:
-            model.name = attributes.get("name", "")
-        if name == "mujoco":
-            model.name = attributes.get("model", "")
-        if name == "link" and parent in ("robot", "model"):
-            model.links.append(attributes.get("name", ""))
-        if name == "joint":
-            joints.append(attributes.get("name", ""))
-        if name == "child" and parent == "joint" and "link" in attributes:
-            model.children.add(attributes["link"])
-        if name == "mimic" and parent in ("joint", "axis") and "joint" in attributes:
-            model.mimics[joints[-1]] = attributes["joint"]
-        if name == "limit" and parent == "joint":
-            model.limits[joints[-1]] = _number(attributes.get("lower")), _number(attributes.get("upper"))
-        inside.append(name)
 
-    def end(name: str) -> None:
-        inside.pop()
-        said = "".join(text).strip()
-        if name == "child" and inside[-1] == "joint" and said:
-            model.children.add(said)
-        if name == "static" and inside[-1] == "model":
-            model.static = said in ("1", "true")
+def _name_in(path: Path) -> str:
+    """Returns the name that a model file gives its first model, or else the file's."""
+    found: list[str] = []
+
+    def start(element: str, attributes: dict[str, str]) -> None:
+        if element in _NAMED:
+            found.append(attributes.get(_NAMED[element], ""))
 
     def install(parser: expat.XMLParserType) -> None:
-        parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, text.append
+        parser.StartElementHandler = start
 
-    joints: list[str] = []
     if not path.is_file():
-        raise SceneError("scene_model", f"there is no file {path}")
+        problem = f"{path} is a directory" if path.is_dir() else f"there is no file {path}"
+        raise SceneError("scene_model", problem, hint="name a model file: URDF, SDFormat or MJCF")
     parse_xml(path, path.name, "scene_model", install)
-    model.name = model.name or path.stem
-    return model
+    return next(filter(None, found[:1]), path.stem)
 
 
-def _number(text: str | None) -> float:
-    try:
-        return float(text or 0.0)
-    except ValueError:
-        return 0.0
-
-
-def _unused(name: str, taken: Sequence[str]) -> str:
+def _unused(name: str, taken: Collection[str]) -> str:
     return name if name not in taken else next(f"{name}_{i}" for i in range(2, 1000) if f"{name}_{i}" not in taken)
 
 
@@ -158,9 +123,9 @@ def _packages(path: Path, given: Mapping[str, Path]) -> dict[str, Path]:
     """Returns where the packages are that a model names."""
     found: dict[str, Path] = {}
     for reference in references(path):
-        if not reference.startswith(_PACKAGE):
+        if not reference.startswith(_PACKAGES):
             continue
-        name = reference.removeprefix(_PACKAGE).partition("/")[0]
+        name = reference.partition("://")[2].partition("/")[0]
         above = [place / name for place in path.absolute().parents] + [place for place in path.absolute().parents if place.name == name]
         places = [given[name]] if name in given else [place for place in above if place.is_dir()]
         if not places or not places[0].is_dir():
@@ -170,41 +135,96 @@ def _packages(path: Path, given: Mapping[str, Path]) -> dict[str, Path]:
     return found
 
 
-def _coupled(model: _Model) -> list[str]:
-    """Returns the joints to hold: those that others mimic, and in SDFormat, where Drake does not read this, the others as well."""
-    followers = [] if model.path.suffix.lower() == ".urdf" else list(model.mimics)
-    return list(dict.fromkeys([*model.mimics.values(), *followers]))
-
-
-def _at_rest(model: _Model, joint: str) -> float:
-    lower, upper = model.limits.get(joint, (0.0, 0.0))
-    return float(np.clip(0.0, lower, upper))
-
-
-def _head(out: Path, models: Sequence[_Model], packages: Mapping[str, Path], held: Mapping[str, float], directory: Path) -> str:
+def _head(out: Path, robot: Path, packages: Mapping[str, Path], directory: Path) -> str:
     name = out.stem if out.stem != "scene" else directory.name
-    lines = [f"# Drafted by ciris scene init for {models[0].path.name}; docs/scenes.md explains every key.", f"name: {_quoted(name)}"]
+    lines = [f"# Drafted by ciris scene init for {robot.name}; docs/scenes.md explains every key.", f"name: {_quoted(name)}"]
     if packages:
-        lines += ["# Where the packages are that models name as package://", "packages:"]
-        lines += [f"  {_quoted(package)}: {_quoted(os.path.relpath(root, directory))}" for package, root in packages.items()]
-    lines.append("directives:")
-    for model in models:
-        lines.append(f"  - add_model: {{name: {_quoted(model.name)}, file: {_quoted(os.path.relpath(model.path.resolve(), directory))}}}")
-        lines += [f"  - add_weld: {{parent: world, child: {_quoted(f'{model.name}::{root}')}}}" for root in model.roots]
-    if any(model.roots for model in models[1:]):
-        lines.append("# The welds say where things stand, not the poses of links in their files. A weld may have a pose:")
+        lines += ["# Where the packages are that models name as package:// or model://", "packages:"]
+        lines += [f"  {_quoted(package)}: {_quoted(_relative(root, directory))}" for package, root in packages.items()]
+    return "\n".join([*lines, "directives:"])
+
+
+def _inventory(text: str, models: Mapping[str, Path], directory: Path) -> dict[str, Any]:
+    """Returns what the models of a scene file hold (:mod:`certifier.scene.inventory`)."""
+    with _scene_file(text, directory) as path:
+        payload = {"path": str(path), "models": {name: str(model.resolve()) for name, model in models.items()}}
+        return read_in_child("certifier.scene.inventory:inventory", payload, "the draft", directory, TIMEOUT_S, MEMORY_BYTES)
+
+
+def _directives(add: Mapping[str, str], roots: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Returns the directives that add each model, given by its name, and weld its roots to the world where its file has them."""
+    lines = []
+    for name, line in add.items():
+        lines.append(line)
+        for root in roots:
+            if root["body"].startswith(f"{name}::"):
+                lines += _weld(root)
+    if len(add) > 1:
+        lines.append("# The X_PC of a weld says where its child stands, in metres and degrees. Without one, that is the world's origin.")
         lines.append("#   X_PC: {translation: [0.5, 0, 0], rotation: !Rpy {deg: [0, 0, 90]}}")
-    if held:
-        lines += ["# Other joints mimic these, so they are held, and the others with them. Choose where.", "fix:"]
-        lines += [f"  {_quoted(joint)}: {value:g}" for joint, value in held.items()]
-    return "\n".join(lines) + "\n"
+    return lines
 
 
-def _loaded(text: str, directory: Path) -> Scene:
+def _weld(root: Mapping[str, Any]) -> list[str]:
+    """Returns the directives that hold a body where its file has it. Of a model in a model, Drake welds only a frame of the outer one."""
+    translation, rpy = ([round(x, 9) + 0.0 for x in root[key]] for key in ("translation", "rpy"))
+    parts = [f"translation: {translation}"] if any(translation) else []
+    parts += [f"rotation: !Rpy {{deg: {rpy}}}"] if any(rpy) else []
+    pose = f", X_PC: {{{', '.join(parts)}}}" if parts else ""
+    model, *inside = root["body"].split("::")
+    child, lines = root["body"], []
+    if len(inside) > 1:
+        child = f"{model}::{'_'.join(inside)}_stands"
+        lines.append(f"  - add_frame: {{name: {_quoted(child)}, X_PF: {{base_frame: {_quoted(root['body'])}}}}}")
+    return [*lines, f"  - add_weld: {{parent: world, child: {_quoted(child)}{pose}}}"]
+
+
+def _limits(held: Mapping[str, Any]) -> list[str]:
+    """Returns limits for the slides that have none in the model."""
+    coupled = {mimic[role] for mimic in held["mimics"] for role in ("follower", "leader")}
+    slides = {
+        joint["name"]: (joint["lower"], joint["upper"])
+        for joint in held["joints"]
+        if joint["kind"] == JointKind.PRISMATIC and joint["name"] not in coupled
+    }
+    guessed = {joint: _guess(*limits) for joint, limits in slides.items() if np.isinf(limits).any()}
+    if not guessed:
+        return []
+    lines = [f"  {_quoted(joint)}: [{lower:.12g}, {upper:.12g}]" for joint, (lower, upper) in guessed.items()]
+    return ["# The model does not say how far these slide, so this is a guess. Write how far, in metres:", "limits:", *lines]
+
+
+def _guess(lower: float, upper: float) -> tuple[float, float]:
+    if np.isfinite(lower):
+        return lower, lower + SLIDE
+    return (upper - SLIDE, upper) if np.isfinite(upper) else (-SLIDE, SLIDE)
+
+
+def _fix(held: Mapping[str, Any]) -> list[str]:
+    """Returns where joints are held that others mimic, and where those that Drake does not have follow."""
+    mimics = [Mimic(**mimic) for mimic in held["mimics"]]
+    followers = {mimic.follower for mimic in mimics} - {*held["unread"]}
+    rest = at_rest(mimics, {joint["name"]: (joint["lower"], joint["upper"]) for joint in held["joints"]})
+    lines = [f"  {_quoted(joint)}: {position:.12g}" for joint, position in rest.items() if joint not in followers]
+    return ["# Other joints mimic these, so they are held, and the others with them. Choose where.", "fix:", *lines] if lines else []
+
+
+@contextmanager
+def _scene_file(text: str, directory: Path) -> Iterator[Path]:
+    """Yields a scene file with this text, which is there for so long."""
     with tempfile.NamedTemporaryFile("w", suffix=".yaml", prefix=".draft-", dir=directory, encoding="utf-8") as file:
         file.write(text)
         file.flush()
-        return load_scene(file.name)
+        yield Path(file.name)
+
+
+def _loaded(text: str, directory: Path) -> Scene:
+    with _scene_file(text, directory) as path:
+        return load_scene(path)
+
+
+def _relative(path: Path, directory: Path) -> str:
+    return os.path.relpath(path.resolve(), directory)
 
 
 def _joints(scene: Scene) -> str:

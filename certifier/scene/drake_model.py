@@ -37,7 +37,8 @@ def build_diagram(scene: Scene) -> RobotDiagram:
     plant.Finalize()
     for joint in scene.moving:
         if plant.GetJointByName(joint.name).position_start() != joint.index:
-            raise SceneError("joint_order", f"joint {joint.name} is not number {joint.index} in a depth-first walk of the tree")
+            message = f"joint {joint.name} is not number {joint.index} in a depth-first walk of the tree"
+            raise SceneError("joint_order", message, hint="Drake numbers joints so; load the scene from its file again")
     only = CollisionFilterDeclaration().ExcludeWithin(GeometrySet(list(ids.values())))
     for pair in scene.pairs:
         only.AllowBetween(GeometrySet(ids[pair.a]), GeometrySet(ids[pair.b]))
@@ -77,7 +78,8 @@ def _shape(geometry: Geometry) -> tuple[RigidTransform, Shape]:
         along = vertices[1] - vertices[0]
         length = float(np.linalg.norm(along))
         return RigidTransform(RotationMatrix.MakeFromOneVector(along / length, 2), vertices.mean(axis=0)), Capsule(radius, length)
-    raise SceneError("unsupported_shape", f"geometry {geometry.name} has a radius and {len(vertices)} vertices; at most two can be rounded")
+    message = f"geometry {geometry.name} has a radius and {len(vertices)} vertices; Drake can round at most two"
+    raise SceneError("unsupported_shape", message)
 
 
 def _transform(X: Array) -> RigidTransform:

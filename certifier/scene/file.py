@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +24,7 @@ KEYS = ("name", "packages", "directives", "q_star", "limits", "fix", "padding", 
 MAX_BYTES = 2**20
 MAX_DEPTH = 50
 MIN_HULL_VERTICES = 8
+_MEND = "mend the YAML there; docs/scenes.md shows a scene file"
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def read_scene_file(path: Path) -> SceneFile:
     """
     text = _text(path)
     root = compose(text, path.name)
-    nodes = _mapping(root, "", KEYS)
+    nodes = _mapping(root, path.name)
     if "directives" not in nodes:
         raise _wrong("directives", "is missing", hint="a list of Drake Model Directives that adds the robot and its surroundings")
     values = {key: _construct(node, key) for key, node in nodes.items() if key != "directives"}
@@ -111,6 +113,20 @@ def read_scene_file(path: Path) -> SceneFile:
     )
 
 
+def existing(path: str | Path) -> Path:
+    """Returns the absolute path of a scene file that is there.
+
+    Raises:
+        SceneError: ``scene_not_found``.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise SceneError("scene_not_found", f"{path} is a directory", hint="name the scene file in it, which ends in .yaml")
+    if not path.is_file():
+        raise SceneError("scene_not_found", f"there is no scene file {path}", hint="`ciris scene init` drafts one for a robot's model")
+    return path.absolute()
+
+
 def compose(text: str, name: str) -> yaml.Node | None:
     """Returns the YAML nodes of a stranger's text, which may have no aliases and may be no deeper than a scene needs.
 
@@ -122,15 +138,15 @@ def compose(text: str, name: str) -> yaml.Node | None:
         for event in yaml.parse(text, Loader=_Loader):
             depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
             if isinstance(event, yaml.AliasEvent):
-                raise SceneError("scene_yaml", f"{name} uses the alias *{event.anchor}; aliases are not supported")
+                raise SceneError("scene_yaml", f"{name} uses the alias *{event.anchor}", hint="write out what it stands for")
             if depth > MAX_DEPTH:
-                raise SceneError("scene_yaml", f"{name} is nested more than {MAX_DEPTH} levels deep")
+                raise SceneError("scene_yaml", f"{name} may be nested at most {MAX_DEPTH} levels deep")
         return yaml.compose(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise SceneError("scene_yaml", f"{name}{line}: {error.problem}") from None
+        raise SceneError("scene_yaml", f"{name}{line}: {error.problem}", hint=_MEND) from None
     except yaml.YAMLError as error:
-        raise SceneError("scene_yaml", f"{name} is not YAML: {str(error).splitlines()[0]}") from None
+        raise SceneError("scene_yaml", f"{name} is not YAML: {str(error).splitlines()[0]}", hint=_MEND) from None
 
 
 def directive_files(text: str, name: str) -> list[tuple[str, str]]:
@@ -150,39 +166,61 @@ def directive_files(text: str, name: str) -> list[tuple[str, str]]:
 def _text(path: Path) -> str:
     try:
         data = path.read_bytes()
-    except OSError as error:
-        raise SceneError("scene_not_found", f"the scene file {path} cannot be read: {error.strerror}") from None
+    except OSError:
+        raise SceneError("scene_not_found", f"the scene file {path} cannot be read", hint="is it there, and may you read it?") from None
     if len(data) > MAX_BYTES:
-        raise SceneError("scene_yaml", f"{path.name} has {len(data)} bytes; a scene file may have {MAX_BYTES}")
+        raise SceneError("scene_yaml", f"{path.name} has {len(data)} bytes; a scene file may have at most {MAX_BYTES}")
     try:
         return data.decode()
     except UnicodeDecodeError as error:
-        raise SceneError("scene_yaml", f"{path.name} is not UTF-8 text: {error.reason} at byte {error.start}") from None
+        raise SceneError("scene_yaml", f"{path.name}: byte {error.start} is not UTF-8 text", hint="save the file as UTF-8") from None
 
 
 def _construct(node: yaml.Node, where: str) -> Any:
+    _check_unique(node, where)
     try:
         return yaml.constructor.SafeConstructor().construct_document(node)
     except (yaml.YAMLError, ValueError) as error:
         problem = error.problem if isinstance(error, yaml.MarkedYAMLError) else str(error)
-        raise _wrong(where, f"line {node.start_mark.line + 1}: {problem}") from None
+        raise _wrong(where, f"line {node.start_mark.line + 1}: {problem}", hint=_MEND) from None
+
+
+def _check_unique(node: yaml.Node, where: str) -> None:
+    """Refuses a key that a mapping has twice: YAML's reader would take the last one without a word."""
+    if isinstance(node, yaml.MappingNode):
+        seen = set()
+        for key, value in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise _wrong(where, f"line {key.start_mark.line + 1}: a key must be text")
+            place = f"{where}.{key.value}"
+            if key.value in seen:
+                raise _twice(place, key)
+            seen.add(key.value)
+            _check_unique(value, place)
+    elif isinstance(node, yaml.SequenceNode):
+        for i, value in enumerate(node.value):
+            _check_unique(value, f"{where}[{i}]")
+
+
+def _twice(where: str, key: yaml.Node) -> SceneError:
+    return _wrong(where, f"is given twice, again in line {key.start_mark.line + 1}", hint="leave one of them out")
 
 
 def _wrong(where: str, message: str, hint: str = "") -> SceneError:
     return SceneError("scene_field", message, field=where or None, hint=hint)
 
 
-def _mapping(node: yaml.Node | None, where: str, known: tuple[str, ...]) -> dict[str, yaml.Node]:
+def _mapping(node: yaml.Node | None, name: str) -> dict[str, yaml.Node]:
     if not isinstance(node, yaml.MappingNode):
-        raise _wrong(where, "a scene file is a mapping of name, directives and so on")
+        raise _wrong("", f"{name} must be a mapping of name, directives and so on")
     found: dict[str, yaml.Node] = {}
     for key, value in node.value:
         if not isinstance(key, yaml.ScalarNode):
-            raise _wrong(where, f"line {key.start_mark.line + 1}: a key must be text")
+            raise _wrong("", f"{name}, line {key.start_mark.line + 1}: a key must be text")
         if key.value in found:
-            raise _wrong(str(key.value), f"is given twice, again in line {key.start_mark.line + 1}")
+            raise _twice(str(key.value), key)
         found[key.value] = value
-    _known(found, where, known)
+    _known(found, "", KEYS)
     return found
 
 
@@ -234,12 +272,13 @@ def _integer(value: Any, where: str, minimum: int) -> int:
 
 def _packages(value: Any, directory: Path) -> dict[str, Path]:
     if not isinstance(value, dict):
-        raise _wrong("packages", "must map package names to directories")
+        raise _wrong("packages", "must map names of packages to directories")
     roots = {}
     for name, root in value.items():
         path = (directory / _string(root, f"packages.{name}")).resolve()
         if not path.is_dir():
-            raise _wrong(f"packages.{name}", f"there is no directory {root}")
+            hint = "a path that does not begin with / starts at the directory of the scene file"
+            raise _wrong(f"packages.{name}", f"there is no directory {path}", hint=hint)
         roots[_name(name, "packages")] = path
     return roots
 
@@ -292,9 +331,14 @@ def _ignore(value: Any) -> tuple[IgnoreEntry, ...]:
 def _check_directives(node: yaml.Node) -> None:
     if not isinstance(node, yaml.SequenceNode) or not node.value:
         raise _wrong("directives", "must be a list of Drake Model Directives with at least one entry")
+    _check_unique(node, "directives")
     for i, entry in enumerate(node.value):
         if not isinstance(entry, yaml.MappingNode) or len(entry.value) != 1:
             raise _wrong(f"directives[{i}]", "must be a mapping with one key, the kind of directive, such as add_model")
+    for _, file in _file_nodes(node):
+        if file.value.startswith(("/", "~", "file:")):
+            hint = "name a directory above it under packages, and write package://NAME/FILE"
+            raise _wrong("directives", f"line {file.start_mark.line + 1}: {file.value!a} is not a relative path", hint=hint)
 
 
 def _file_nodes(directives: yaml.Node) -> list[tuple[str, yaml.ScalarNode]]:
@@ -309,15 +353,33 @@ def _file_nodes(directives: yaml.Node) -> list[tuple[str, yaml.ScalarNode]]:
     ]
 
 
+def with_relative_packages(path: Path) -> str:
+    """Returns the text of a scene file that has passed the schema, with absolute paths of packages made relative to its directory."""
+    text = _text(path)
+    root = compose(text, path.name)
+    assert isinstance(root, yaml.MappingNode), "it has passed the schema"
+    roots = [node for key, packages in root.value if key.value == "packages" for _, node in packages.value]
+    directory = path.parent.resolve()
+    absolute = [node for node in roots if node.value.startswith("/")]
+    relative = [json.dumps(os.path.relpath(Path(node.value).resolve(), directory), ensure_ascii=False) for node in absolute]
+    return _replaced(text, 0, len(text), list(zip(absolute, relative, strict=True)))
+
+
+def _replaced(text: str, start: int, end: int, changed: list[tuple[yaml.ScalarNode, str]]) -> str:
+    """Returns a part of the text with other texts in the place of some of its nodes, which are in order."""
+    pieces, last = [], start
+    for node, instead in changed:
+        pieces += [text[last : node.start_mark.index], instead]
+        last = node.end_mark.index
+    return "".join([*pieces, text[last:end]])
+
+
 def _resolved(text: str, directives: yaml.Node, directory: Path) -> str:
     start, end = directives.start_mark.index, directives.end_mark.index
-    pieces, last = [], start
-    for _, node in _file_nodes(directives):
-        if "://" not in node.value:
-            pieces += [text[last : node.start_mark.index], json.dumps(f"file://{(directory / node.value).resolve()}", ensure_ascii=False)]
-            last = node.end_mark.index
-    pieces.append(text[last:end])
+    relative = [node for _, node in _file_nodes(directives) if "://" not in node.value]
+    absolute = [json.dumps(f"file://{(directory / node.value).resolve()}", ensure_ascii=False) for node in relative]
+    resolved = _replaced(text, start, end, list(zip(relative, absolute, strict=True)))
     line, column = directives.start_mark.line, directives.start_mark.column
     if line == 0:
-        return "directives: " + "".join(pieces)
-    return "\n" * (line - 1) + "directives:\n" + " " * column + "".join(pieces)
+        return f"directives: {resolved}"
+    return "\n" * (line - 1) + "directives:\n" + " " * column + resolved

@@ -74,7 +74,11 @@ class ModelFile:
         raise NotImplementedError
 
     def _refuse(self, element: _Element, what: str) -> NoReturn:
-        raise SceneError("scene_model", f"{self.name}:{element.line}: {what}", field="directives")
+        raise SceneError("scene_model", f"{self.name}:{element.line}: {what}", field="directives", hint="mend the model there")
+
+    def _check_order(self, element: _Element, lower: float, upper: float) -> None:
+        if lower > upper:
+            self._refuse(element, f"the limits of a joint are {lower:g} and {upper:g}; the lower one must not be greater")
 
     def _numbers(self, element: _Element, what: str, text: str, counts: tuple[int, ...]) -> list[float]:
         words = text.split()
@@ -124,7 +128,7 @@ class Urdf(ModelFile):
     UNREAD = frozenset(["gazebo"])
     _COUNTS: ClassVar[dict[str, tuple[int, ...]]] = {
         **dict.fromkeys(("xyz", "rpy", "size"), (3,)),
-        **dict.fromkeys(("radius", "length", "lower", "upper", "a", "b", "c"), (1,)),
+        **dict.fromkeys(("radius", "length", "lower", "upper", "a", "b", "c", "multiplier", "offset"), (1,)),
         "scale": (1, 3),
     }
 
@@ -132,6 +136,9 @@ class Urdf(ModelFile):
         for key, counts in self._COUNTS.items():
             if key in element.attributes:
                 self._numbers(element, f"{key} of <{element.name}>", element.attributes[key], counts)
+        if element.name == "limit" and parent == "joint":
+            limits = (float(element.attributes.get(key, limit)) for key, limit in (("lower", -math.inf), ("upper", math.inf)))
+            self._check_order(element, *limits)
         self._check_geometry(element)
         if _COLLISION in element.around and element.name == "mesh" and "filename" in element.attributes:
             self.meshes.append(Reference(element.attributes["filename"], element.line))
@@ -153,6 +160,9 @@ class Sdf(ModelFile):
         ("limit", "upper"): (1,),
         ("plane", "normal"): (3,),
         ("mesh", "scale"): (3,),
+        ("mimic", "multiplier"): (1,),
+        ("mimic", "offset"): (1,),
+        ("mimic", "reference"): (1,),
     }
     ONCE = _SHAPES.union(
         ["pose", "geometry", "axis", "limit", "uri", "parent", "child"],
@@ -160,6 +170,10 @@ class Sdf(ModelFile):
         [name for shape in _DIMENSIONS.values() for name in shape],
     )
     UNREAD = frozenset(["plugin", "sensor", "gui"])
+
+    def __init__(self, path: Path, name: str) -> None:
+        self._limits: dict[str, float] = {}
+        super().__init__(path, name)
 
     def _check(self, element: _Element, parent: str) -> None:
         dimensions = self._DIMENSIONS.get(parent, {}) if _COLLISION in element.around else {}
@@ -169,7 +183,11 @@ class Sdf(ModelFile):
         elif element.name == "pose":
             self._text(element, (0, 6, 7))
         elif (counts := self._COUNTS.get((parent, element.name))) is not None:
-            self._text(element, counts)
+            numbers = self._text(element, counts)
+            if parent == "limit":
+                self._limits[element.name] = numbers[0]
+        elif element.name == "limit":
+            self._check_order(element, self._limits.pop("lower", -math.inf), self._limits.pop("upper", math.inf))
         elif element.name == "uri" and parent == "include":
             self.includes.append(Reference(self._whole(element), element.line))
         elif element.name == "uri" and parent == "mesh" and _COLLISION in element.around:
@@ -177,6 +195,10 @@ class Sdf(ModelFile):
         elif element.name in self._DIMENSIONS and parent == "geometry" and _COLLISION in element.around:
             for missing in self._DIMENSIONS[element.name].keys() - element.children:
                 self._refuse(element, f"<{element.name}> has no <{missing}>, and Drake would make one up")
+        elif element.name == "drake:mimic":
+            for key in ("multiplier", "offset"):
+                if key in element.attributes:
+                    self._numbers(element, f"{key} of <drake:mimic>", element.attributes[key], (1,))
         self._check_geometry(element)
 
     def _whole(self, element: _Element) -> str:
@@ -212,7 +234,9 @@ class Mjcf(ModelFile):
         if element.name in self._NUMBERED:
             for key, counts in self._COUNTS.items():
                 if key in element.attributes:
-                    self._numbers(element, f"{key} of <{element.name}>", element.attributes[key], counts)
+                    numbers = self._numbers(element, f"{key} of <{element.name}>", element.attributes[key], counts)
+                    if (element.name, key) == ("joint", "range"):
+                        self._check_order(element, *numbers)
             for key in self._MOVED & element.attributes.keys():
                 self._refuse(element, f"{key} of <{element.name}> is not read by Drake")
             if float(element.attributes.get("ref", 0)) != 0:

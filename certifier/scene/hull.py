@@ -67,7 +67,8 @@ def outer(points: Array, max_vertices: int) -> tuple[Array, float, int]:
             distance = max(_nearest(v, extreme - center)[1] for v in vertices)
             inflation = max(distance * (1 + _SAFETY), distance + _ROUNDING * float(np.abs(points).max()))
             return vertices + center, inflation, len(extreme)
-    raise SceneError("hull", f"no polytope of {max_vertices} vertices was found around a mesh of {len(points)} points")
+    message = f"no polytope of {max_vertices} vertices was found around a mesh of {len(points)} points"
+    raise SceneError("hull", message, field="mesh.max_vertices", hint="raise it, or simplify the mesh")
 
 
 def contains(vertices: Array, points: Array, tolerance: float = 0.0) -> bool:

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from certifier.errors import SceneError, close_matches
 from certifier.model import Array, Joint, JointKind
+
+T = TypeVar("T")
 
 WINDOW = np.radians(170.0)
 """A window reaches at most so far to either side of q*. Nearer to half a turn, s changes so fast that certificates become hard."""
@@ -41,7 +44,7 @@ def held(joints: Sequence[Joint], positions: Mapping[str, float], couplings: Seq
         SceneError: ``unknown_name``; ``scene_field`` where a joint cannot be there; ``unsupported_joint`` where coupled joints are free.
     """
     by_name = {j.name: j for j in joints if j.index is not None}
-    at = {_known(name, by_name, "fix"): value for name, value in positions.items()}
+    at = _by_full_name(positions, by_name, "fix")
     for name, value in at.items():
         _check_within(by_name[name], value)
     _follow(at, by_name, couplings)
@@ -57,12 +60,12 @@ def narrowed(joints: Sequence[Joint], limits: Mapping[str, tuple[float, float]])
         SceneError: ``unknown_name``; ``scene_field`` for limits outside of the joint's own.
     """
     by_name = {j.name: j for j in joints if j.index is not None}
-    given = {_known(name, by_name, "limits"): pair for name, pair in limits.items()}
+    given = _by_full_name(limits, by_name, "limits")
     for name, (lower, upper) in given.items():
         own_lower, own_upper = _range(by_name[name])
         if lower < own_lower - EXACT or upper > own_upper + EXACT:
             message = f"{lower:g} to {upper:g} is not within the joint's own limits, {own_lower:g} to {own_upper:g}"
-            raise SceneError("scene_field", message, field=f"limits.{name}")
+            raise SceneError("scene_field", message, field=f"limits.{name}", hint="scene files can only make limits narrower")
     return [replace(j, lower=given[j.name][0], upper=given[j.name][1]) if j.name in given else j for j in joints]
 
 
@@ -77,10 +80,12 @@ def centered(joints: Sequence[Joint], q_star: Sequence[float] | None) -> tuple[l
     """
     moving = sorted((j for j in joints if j.index is not None), key=lambda j: j.index or 0)
     if not moving:
-        raise SceneError("no_joints", "no joint of the scene can move, so there is no configuration space", field="directives")
+        message = "no joint of the scene can move, so there is no configuration space"
+        raise SceneError("no_joints", message, field="directives", hint="add a model with joints, or hold fewer of them by fix")
     if q_star is not None and len(q_star) != len(moving):
         names = ", ".join(j.name for j in moving)
-        raise SceneError("scene_field", f"has {len(q_star)} numbers for {len(moving)} joints: {names}", field="q_star")
+        message = f"has {len(q_star)} numbers for {len(moving)} joints"
+        raise SceneError("scene_field", message, field="q_star", hint=f"in order: {names}")
     centers = [_middle(j) for j in moving] if q_star is None else list(q_star)
     found = {j.name: _windowed(j, center) for j, center in zip(moving, centers, strict=True)}
     return [found.get(j.name, j) for j in joints], np.array(centers)
@@ -104,13 +109,11 @@ def _windowed(joint: Joint, center: float) -> Joint:
     lower, upper = _range(joint)
     if lower >= upper:
         message = f"joint {joint.name} cannot move: its limits are {lower:g} and {upper:g}"
-        raise SceneError("joint_range", message, field="directives", hint=f"hold it, with fix: {{{joint.name}: {lower:g}}}")
+        raise SceneError("joint_range", message, field="directives", hint=f"hold it by fix: {{{joint.name}: {lower:g}}}")
     if joint.kind is not JointKind.REVOLUTE:
         if not (np.isfinite(lower) and np.isfinite(upper)):
             message = f"joint {joint.name} has no finite limits"
-            raise SceneError(
-                "joint_range", message, field="directives", hint=f"give it some, with limits: {{{joint.name}: [LOWER, UPPER]}}"
-            )
+            raise SceneError("joint_range", message, field="directives", hint=f"give it some by limits: {{{joint.name}: [LOWER, UPPER]}}")
         return joint
     if center - np.pi < lower and upper < center + np.pi:
         return joint
@@ -120,6 +123,17 @@ def _windowed(joint: Joint, center: float) -> Joint:
         raise SceneError("joint_range", message, field="q_star", hint="move q_star into the joint's limits")
     own = tuple(limit if np.isfinite(limit) else None for limit in (lower, upper))
     return replace(joint, lower=window[0], upper=window[1], own_limits=(own[0], own[1]))
+
+
+def _by_full_name(said: Mapping[str, T], joints: Mapping[str, Joint], field: str) -> dict[str, T]:
+    """Returns what a scene file says of joints by their full names."""
+    found: dict[str, T] = {}
+    for name, value in said.items():
+        full = _known(name, joints, field)
+        if full in found:
+            raise SceneError("scene_field", f"joint {full} is named twice", field=f"{field}.{name}", hint="leave one of them out")
+        found[full] = value
+    return found
 
 
 def _known(name: str, joints: Mapping[str, Joint], field: str) -> str:
@@ -136,7 +150,7 @@ def _check_within(joint: Joint, value: float) -> None:
     lower, upper = _range(joint)
     if not lower - EXACT <= value <= upper + EXACT:
         message = f"{value:g} is not within the joint's limits, {lower:g} to {upper:g}"
-        raise SceneError("scene_field", message, field=f"fix.{joint.name}")
+        raise SceneError("scene_field", message, field=f"fix.{joint.name}", hint="hold it within them")
 
 
 def _follow(at: dict[str, float], by_name: Mapping[str, Joint], couplings: Sequence[Coupling]) -> None:
@@ -156,7 +170,8 @@ def _follow(at: dict[str, float], by_name: Mapping[str, Joint], couplings: Seque
             _check_within(by_name[follower], at[follower])
         elif abs(rest) > EXACT:
             names = " and ".join(known.factors)
-            raise SceneError("scene_field", f"joints {names} are coupled (mimic), and cannot be held at these positions", field="fix")
+            message = f"joints {names} are coupled (mimic), and cannot be held at these positions"
+            raise SceneError("scene_field", message, field="fix", hint="hold one of them; the other follows")
 
 
 def _welded(joint: Joint, value: float) -> Joint:

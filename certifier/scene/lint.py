@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from certifier.model import Geometry, Scene
+from certifier.model import Array, Geometry, Pair, Scene
 from certifier.scene.contacts import touching
 from certifier.scene.tree import Tree
 from certifier.verify.decimals import at_most_mm
 
 _SAMPLES = 40
+_IGNORED_SAMPLES = 200
 _STEEP = 50.0
 _HUGE = 10.0
 
@@ -22,19 +25,31 @@ def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn:
         drawn: bodies that have a visual geometry.
     """
     return [
-        *(_substituted(g) for g in scene.geometries if g.substitution),
+        *_substituted(scene),
         *_windows(scene),
         *_filtered(scene, tree, candidates),
         *_unguarded(scene, tree, drawn),
         *_steep(scene),
         *_huge(scene),
         *_always_touching(scene),
+        *(_never_touching(scene) if scene.ignored else []),
         *([] if scene.pairs else ["no pair of geometries can collide: there is nothing to certify"]),
     ]
 
 
-def _substituted(g: Geometry) -> str:
-    return f"{g.name}: {g.substitution}" + (f", reaching at most {at_most_mm(g.inflation)} outside" if g.inflation else "")
+def _substituted(scene: Scene) -> list[str]:
+    """Returns a finding about every kind of replacement, such as a hull of so many vertices, and the geometries that it was made for."""
+    groups: dict[str, list[Geometry]] = {}
+    for g in scene.geometries:
+        if g.substitution:
+            groups.setdefault(g.substitution, []).append(g)
+    findings = []
+    for substitution, group in groups.items():
+        others = f" and {len(group) - 1} more" if len(group) > 1 else ""
+        inflation = max(g.inflation for g in group)
+        reach = f", reaching at most {at_most_mm(inflation)} outside" if inflation else ""
+        findings.append(f"{group[0].name}{others}: {substitution}{reach}")
+    return findings
 
 
 def _windows(scene: Scene) -> list[str]:
@@ -87,14 +102,9 @@ def _huge(scene: Scene) -> list[str]:
 
 
 def _always_touching(scene: Scene) -> list[str]:
-    """Returns findings about pairs that overlap at every configuration tried: no region can be certified for them.
-
-    The configurations are q*, moved into the joint limits, and a few random ones.
-    """
-    rng = np.random.default_rng(0)
-    tried = [scene.q_star.clip(scene.q_lower, scene.q_upper), *rng.uniform(scene.q_lower, scene.q_upper, (_SAMPLES, scene.n))]
+    """Returns findings about pairs that overlap at every configuration tried: no region can be certified for them."""
     always = set(scene.pairs)
-    for found in touching(scene, tried):
+    for found in touching(scene, _tried(scene, _SAMPLES)):
         always &= found
         if not always:
             break
@@ -102,3 +112,27 @@ def _always_touching(scene: Scene) -> list[str]:
         f"{p.a} and {p.b} overlap in every configuration tried: mend the geometry, or ignore the pair with a reason"
         for p in sorted(always, key=lambda p: (p.a, p.b))
     ]
+
+
+def _never_touching(scene: Scene) -> list[str]:
+    """Returns findings about bodies with ignored pairs of which none touches at any configuration tried."""
+
+    def bodies(pair: Pair) -> tuple[str, ...]:
+        return tuple(sorted(scene.geometry(name).body for name in (pair.a, pair.b)))
+
+    ignored = tuple(Pair(pair.a, pair.b) for pair in scene.ignored)
+    apart = {bodies(pair) for pair in ignored}
+    for found in touching(replace(scene, pairs=ignored), _tried(scene, _IGNORED_SAMPLES)):
+        apart -= {bodies(pair) for pair in found}
+        if not apart:
+            break
+    return [
+        f"{a} and {b} are ignored, but touch at none of {_IGNORED_SAMPLES + 1} configurations tried: without the entry, they are certified"
+        for a, b in sorted(apart)
+    ]
+
+
+def _tried(scene: Scene, samples: int) -> list[Array]:
+    """Returns q*, moved into the joint limits, and so many random configurations."""
+    rng = np.random.default_rng(0)
+    return [scene.q_star.clip(scene.q_lower, scene.q_upper), *rng.uniform(scene.q_lower, scene.q_upper, (samples, scene.n))]

@@ -8,28 +8,32 @@ from typing import Any
 from certifier.errors import CirisError, SceneError
 from certifier.isolation.child import run_in_child
 from certifier.model import Scene
+from certifier.scene.file import existing
+
+TIMEOUT_S, MEMORY_BYTES = 60.0, 4 * 2**30
 
 
-def load_scene(path: str | Path, *, timeout_s: float = 60, memory_bytes: int = 4 * 2**30) -> Scene:
+def load_scene(path: str | Path, *, timeout_s: float = TIMEOUT_S, memory_bytes: int = MEMORY_BYTES) -> Scene:
     """Returns the scene that a scene file describes. A child process reads it, and may die without harm.
 
     Args:
-        path: the scene file (docs/architecture.md); relative paths in it start at its directory.
+        path: the scene file (docs/scenes.md); relative paths in it start at its directory.
         timeout_s: wall-clock limit of the child, seconds.
         memory_bytes: memory limit of the child, bytes.
 
     Raises:
         SceneError: what is wrong and where; ``scene_model_crash`` when reading the models ended the child.
     """
-    path = Path(path).absolute()
-    if not path.is_file():
-        raise SceneError("scene_not_found", f"there is no scene file {path}")
+    path = existing(path)
     # SDFormat looks for included files in the working directory.
-    return read_in_child("certifier.scene.parse:parse", {"path": str(path)}, path.name, path.parent, timeout_s, memory_bytes)
+    document = read_in_child("certifier.scene.parse:parse", {"path": str(path)}, path.name, path.parent, timeout_s, memory_bytes)
+    return Scene.from_document(document)
 
 
-def read_in_child(function: str, payload: dict[str, Any], name: str, directory: Path | None, timeout_s: float, memory_bytes: int) -> Scene:
-    """Returns the scene whose document ``function(payload)`` returns in a child process.
+def read_in_child(
+    function: str, payload: dict[str, Any], name: str, directory: Path | None, timeout_s: float, memory_bytes: int
+) -> dict[str, Any]:
+    """Returns the document that ``function(payload)`` returns in a child process.
 
     Args:
         name: name of what is read, for people.
@@ -39,11 +43,11 @@ def read_in_child(function: str, payload: dict[str, Any], name: str, directory: 
         SceneError: whatever the function raises, or ``scene_model_crash``.
     """
     try:
-        document = run_in_child(function, payload, timeout_s=timeout_s, memory_bytes=memory_bytes, directory=directory)
+        document: dict[str, Any] = run_in_child(function, payload, timeout_s=timeout_s, memory_bytes=memory_bytes, directory=directory)
     except SceneError:
         raise
     except CirisError as death:
         message = f"reading the models of {name} failed: {death.message}"
         hint = "look for files that include themselves, broken shapes or meshes"
         raise SceneError("scene_model_crash", message, field="directives", hint=hint) from None
-    return Scene.from_document(document)
+    return document

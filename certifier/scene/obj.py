@@ -43,7 +43,7 @@ def read_points(path: Path, name: str) -> Array:
     coordinates = array("d")
     farthest, farthest_line = 0, 0
 
-    def refuse(line: int, what: str, hint: str = "") -> NoReturn:
+    def refuse(line: int, what: str, hint: str = "export the mesh again") -> NoReturn:
         raise SceneError("scene_model", f"{name}:{line}: {what}", field="directives", hint=hint)
 
     if b"\0" in data:

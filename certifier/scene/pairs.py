@@ -26,8 +26,8 @@ def pairs(
     for entry in ignore:
         for k, name in enumerate((entry.a, entry.b)):
             if name != WORLD and name not in known:
-                message = f"{name!r} is neither a body nor a geometry of the scene"
-                raise SceneError("unknown_name", message, field=f"{entry.field}[{k}]", hint=close_matches(name, known))
+                message, hint = f"{name!r} is neither a body nor a geometry of the scene", "`ciris scene show` and `scene check` list them"
+                raise SceneError("unknown_name", message, field=f"{entry.field}[{k}]", hint=close_matches(name, known) or hint)
     wanted: list[Pair] = []
     ignored: list[Ignored] = []
     used: set[IgnoreEntry] = set()

@@ -51,6 +51,15 @@ _IGNORED_SHAPE = re.compile(
     r"Ignoring unsupported SDFormat element in geometry|geom \S+ specified unknown mesh|The geom type|The fromto tag"
 )
 """These are Drake's warnings about collision geometry that it leaves out."""
+_SEVERAL_MODELS = re.compile(r"must have a single <model>|can only contain one model")
+"""So Drake says that a file holds no model or several."""
+_ONE_MODEL = (
+    "a file is one model: name a file for each, or put them all into one <model>, in place of <world>, without its physics, lights and gui"
+)
+
+
+_CPLUSPLUS = re.compile(r"std::|\.array\(\)|\.all\(\)")
+"""What Drake's assertions say to compilers only."""
 
 
 def parse(payload: dict[str, Any]) -> dict[str, Any]:
@@ -65,9 +74,9 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
     strict = StrictReader(scene_file)
     strict.check(scene_file.resolved_directives, path.name)
-    warnings = _read_models(scene_file, plant)
+    warnings = read_models(scene_file, plant)
     inspector = scene_graph.model_inspector()
-    joints, q_star = centered(narrowed(held(_joints(plant), scene_file.fix, _couplings(plant)), scene_file.limits), scene_file.q_star)
+    joints, q_star = centered(narrowed(held(_joints(plant), scene_file.fix, couplings(plant)), scene_file.limits), scene_file.q_star)
     tree = Tree(joints, _bodies(plant))
     by_id = _geometries(scene_file, strict, plant, inspector, tree)
     candidates = [(by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()]
@@ -94,7 +103,7 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     return document
 
 
-def _read_models(scene_file: SceneFile, plant: MultibodyPlant) -> list[str]:
+def read_models(scene_file: SceneFile, plant: MultibodyPlant) -> list[str]:
     """Adds the directives' models to the plant, finalises it and returns Drake's warnings.
 
     It prints the models' names first, because only what is printed remains if Drake ends the process.
@@ -139,20 +148,24 @@ class _DrakeLog(logging.Handler):
 
 
 def _model_error(scene_file: SceneFile, error: BaseException) -> SceneError:
-    """Returns what Drake raised as an error for people. For a failed assertion (SystemExit in pydrake) it names every model.
+    """Returns what Drake raised as an error for people. Where it does not say which model it is about, the error names every model.
 
-    The assertion does not say which model it comes from.
+    Of a failed assertion (SystemExit in pydrake) the condition is said, and not where it stands in Drake's source.
     """
     message = _one_line(scene_file, str(error))
-    if not isinstance(error, RuntimeError):
-        message = f"Drake cannot use a model ({', '.join(scene_file.models)}): {message}"
     where = re.search(r"directives\[\d+\]", message)
-    return SceneError("scene_model", message.split(" while accepting")[0], field=where[0] if where else "directives")
+    message = message.split(" while accepting")[0]
+    if assertion := re.search(r"condition '(.+)' failed", message):
+        message = f"a number of a model makes no sense: Drake needs {re.sub(_CPLUSPLUS, '', assertion[1])}"
+    said = where or any(Path(file).name in message for file in (scene_file.path.name, *scene_file.models))
+    models = "" if said else f"{', '.join(scene_file.models)}: "
+    hint = _ONE_MODEL if _SEVERAL_MODELS.search(message) else "mend the model or the directive"
+    return SceneError("scene_model", f"{models}{message}", field=where[0] if where else "directives", hint=hint)
 
 
 def _one_line(scene_file: SceneFile, message: str) -> str:
     """Returns a message of Drake's in one printable line, with paths relative to the scene file."""
-    message = message.replace("<string>", scene_file.path.name)
+    message = message.replace("<string>", scene_file.path.name).replace(": error: ", ": ")
     message = re.sub(rf"(file:)?/*{re.escape(str(scene_file.path.parent.resolve()))}/", "", message)
     return textwrap.shorten(escaped(" ".join(message.removeprefix("error: ").split())), MAX_SENTENCE, placeholder=" ...")
 
@@ -176,16 +189,25 @@ def _body_name(plant: MultibodyPlant, body: RigidBody) -> str:
 
 
 def _joints(plant: MultibodyPlant) -> list[Joint]:
-    return [_joint(plant, plant.get_joint(index)) for index in plant.GetJointIndices()]
+    return [joint_of(plant, plant.get_joint(index)) for index in plant.GetJointIndices()]
 
 
 def _bodies(plant: MultibodyPlant) -> list[str]:
     return [_body_name(plant, plant.get_body(BodyIndex(i))) for i in range(plant.num_bodies())]
 
 
-def _joint(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
+def _joint_name(plant: MultibodyPlant, joint: DrakeJoint) -> str:
+    return _named(f"{plant.GetModelInstanceName(joint.model_instance())}/{joint.name()}", "joint")
+
+
+def joint_of(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
+    """Returns a joint of the plant.
+
+    Raises:
+        SceneError: ``unsupported_joint``, ``floating_body`` or ``scene_name``.
+    """
     parent, child = _body_name(plant, joint.parent_body()), _body_name(plant, joint.child_body())
-    name = _named(f"{plant.GetModelInstanceName(joint.model_instance())}/{joint.name()}", "joint")
+    name = _joint_name(plant, joint)
     X_PF = joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4()
     X_BM = joint.frame_on_child().GetFixedPoseInBodyFrame().GetAsMatrix4()
     match joint:
@@ -202,12 +224,14 @@ def _joint(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
             message = (
                 f"joint {name} is a {joint.type_name().removesuffix('_rpy')} joint; revolute, prismatic and fixed joints are supported"
             )
-            raise SceneError("unsupported_joint", message, field="directives")
+            planar = "write two slides and a turn, as docs/scenes.md does for a mobile base"
+            hint = planar if joint.type_name() == "planar" else "replace it by such joints, or weld its bodies"
+            raise SceneError("unsupported_joint", message, field="directives", hint=hint)
     lower, upper = float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])
     return Joint(name, kind, parent, child, np.array(axis), X_PF, X_BM, joint.position_start(), lower, upper)
 
 
-def _couplings(plant: MultibodyPlant) -> list[Coupling]:
+def couplings(plant: MultibodyPlant) -> list[Coupling]:
     """Returns what mimic joints keep to.
 
     Raises:
@@ -219,7 +243,7 @@ def _couplings(plant: MultibodyPlant) -> list[Coupling]:
     q = program.NewContinuousVariables(plant.num_positions(), "q")
     AddMultibodyPlantConstraints(plant=plant, q=q, prog=program, plant_context=plant.CreateDefaultContext())
     names = {joint.position_start(): joint for joint in map(plant.get_joint, plant.GetJointIndices()) if joint.num_positions()}
-    position = {v.get_id(): _joint(plant, names[i]).name for i, v in enumerate(q) if i in names}
+    position = {v.get_id(): _joint_name(plant, names[i]) for i, v in enumerate(q) if i in names}
     found = []
     for binding in program.linear_equality_constraints():
         matrix, constants = binding.evaluator().GetDenseA(), binding.evaluator().lower_bound()
@@ -229,8 +253,8 @@ def _couplings(plant: MultibodyPlant) -> list[Coupling]:
             for row, constant in zip(matrix, constants, strict=True)
         ]
     if len(found) < plant.num_constraints():
-        message = "the models close a loop by a constraint; only independent joints are supported"
-        raise SceneError("unsupported_joint", message, field="directives")
+        message = "the models close a loop by a constraint"
+        raise SceneError("unsupported_joint", message, field="directives", hint="remove it; only independent joints are supported")
     return found
 
 
@@ -256,7 +280,8 @@ def _geometries(
     reach = tree.reach(list(found.values()), scene_file.padding)
     for i, name, body_name in half_spaces:
         if body_name not in tree.anchored:
-            raise SceneError("unsupported_shape", f"geometry {name} is a half-space on a body that moves", field="directives")
+            message = f"geometry {name} is a half-space on a body that moves"
+            raise SceneError("unsupported_shape", message, field="directives", hint="use a box")
         X_BG = inspector.GetPoseInFrame(i)
         center = (RigidTransform(tree.anchored[body_name]) @ X_BG).inverse().translation()
         found[i] = _placed(name, body_name, shapes.half_space(center, reach), X_BG)
@@ -290,7 +315,7 @@ def _convex(shape: Shape, name: str, scene_file: SceneFile, strict: StrictReader
             return shapes.polytope(said, _mesh_points(shape, strict), scene_file.max_vertices)
         case _:
             message = f"geometry {name} is a {type(shape).__name__}, which is not supported"
-            raise SceneError("unsupported_shape", message, field="directives")
+            raise SceneError("unsupported_shape", message, field="directives", hint="use a primitive or a mesh")
 
 
 def _mesh_points(shape: Convex | Mesh, strict: StrictReader) -> Array:
@@ -304,7 +329,7 @@ def _mesh_points(shape: Convex | Mesh, strict: StrictReader) -> Array:
     points = strict.points(shape.source().path()) * shape.scale3()
     if not np.isfinite(points).all():
         message = f"scaled by {shape.scale3().tolist()}, a point of {escaped(shape.source().path().name)} is not finite"
-        raise SceneError("scene_model", message, field="directives")
+        raise SceneError("scene_model", message, field="directives", hint="mend the file or the scale")
     hull = shape.GetConvexHull()
     rank = {tuple(hull.vertex(k)): k for k in range(hull.num_vertices())}
     return points[np.argsort([rank.get(tuple(point), len(rank)) for point in points.tolist()], kind="stable")]

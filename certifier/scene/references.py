@@ -22,6 +22,7 @@ from certifier.scene.xml import parse_xml
 _ATTRIBUTES = {"file", "filename", "uri", "url"}
 _PLUGIN = "plugin"
 _DIRECTORIES = {"meshdir", "texturedir", "assetdir"}
+_EXPORT = "export the mesh again"
 _SCHEME = re.compile(r"^([a-zA-Z][\w+.-]*):(//)?")
 
 
@@ -39,9 +40,10 @@ def references(path: Path) -> list[str]:
         raise SceneError("bundle_file", f"{path.name}: files of this kind are not part of a scene", hint=f"known kinds: {kinds}") from None
     try:
         return read(path)
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        reason = str(error).splitlines()[0]
-        raise SceneError("bundle_text", f"{path.name} cannot be read: {reason}") from None
+    except UnicodeDecodeError as error:
+        raise SceneError("bundle_text", f"{path.name}: byte {error.start} is not UTF-8 text", hint="save the file as UTF-8") from None
+    except (json.JSONDecodeError, RecursionError):
+        raise SceneError("bundle_text", f"{path.name} is not JSON", hint=_EXPORT) from None
 
 
 def resolve(reference: str, directory: Path, packages: dict[str, Path]) -> Path:
@@ -53,13 +55,14 @@ def resolve(reference: str, directory: Path, packages: dict[str, Path]) -> Path:
     scheme = _SCHEME.match(reference)
     if scheme is None:
         if reference.startswith(("/", "~")) or "\\" in reference or "\0" in reference:
-            raise SceneError("bundle_uri", f"{reference!r} is not a relative path", hint="keep every file below one directory")
+            hint = "name a directory above it under packages, and write package://NAME/FILE"
+            raise SceneError("bundle_uri", f"{reference!r} is not a relative path", hint=hint)
         return (directory / reference).resolve()
     if scheme[1] not in ("package", "model") or not scheme[2]:
-        raise SceneError("bundle_uri", f"{reference!r}: only relative paths and package:// URIs are accepted")
+        raise SceneError("bundle_uri", f"{reference!r} is no file of the scene", hint="use a relative path or package://NAME/FILE")
     name, _, rest = reference[scheme.end() :].partition("/")
     if name not in packages:
-        hint = f"known packages: {', '.join(packages)}" if packages else "name its root under packages"
+        hint = f"known packages: {', '.join(packages)}" if packages else "name its directory under packages in the scene file"
         raise SceneError("bundle_uri", f"{reference!r} names the unknown package {name!r}", hint=hint)
     return (packages[name] / rest).resolve()
 
@@ -73,7 +76,7 @@ def _xml(path: Path) -> list[str]:
     def start(name: str, attributes: dict[str, str]) -> None:
         stack.append(name)
         if len(stack) > MAX_DEPTH:
-            raise SceneError("bundle_xml", f"{path.name} is nested more than {MAX_DEPTH} levels deep")
+            raise SceneError("bundle_xml", f"{path.name} may be nested at most {MAX_DEPTH} levels deep")
         text.clear()
         directories.extend(value for key, value in attributes.items() if key in _DIRECTORIES)
         if name != _PLUGIN:
@@ -90,7 +93,8 @@ def _xml(path: Path) -> list[str]:
 
     parse_xml(path, path.name, "bundle_xml", install)
     if any(".." in Path(value).parts for value in directories):
-        raise SceneError("bundle_uri", f"{path.name}: .. is not accepted in {', '.join(sorted(_DIRECTORIES))}")
+        message = f"{path.name}: .. is not accepted in {', '.join(sorted(_DIRECTORIES))}"
+        raise SceneError("bundle_uri", message, hint="keep the files below the directory of the model")
     return [value for value in found if value] + [f"{d}/{value}" for d in directories for value in found if value]
 
 
@@ -119,7 +123,7 @@ def _gltf(path: Path) -> list[str]:
         written = [uri for uri in uris if not uri.startswith("data:")]
         return list(dict.fromkeys([*written, *map(unquote, written)]))
     except (AttributeError, TypeError):
-        raise SceneError("bundle_text", f"{path.name} is not glTF") from None
+        raise SceneError("bundle_text", f"{path.name} is not glTF", hint=_EXPORT) from None
 
 
 def _nothing(_: Path) -> list[str]:

@@ -56,6 +56,10 @@ class StrictReader:
                 path, suffix = self._located(reference, [self._root]), _suffix(reference)
                 if path is None or path in read:
                     continue
+                if path.is_dir():
+                    raise SceneError(
+                        "scene_model", f"{self._name(path)} is a directory", field="directives", hint="name a model file in it"
+                    )
                 if kind == "add_directives":
                     read.add(path)
                     documents.append((_text(path, self._name(path)), self._name(path)))
@@ -121,5 +125,5 @@ def _not_read(what: str) -> SceneError:
 def _text(path: Path, name: str) -> str:
     try:
         return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise SceneError("scene_yaml", f"{name} cannot be read: {error}", field="directives") from None
+    except (OSError, UnicodeDecodeError):
+        raise SceneError("scene_yaml", f"{name} cannot be read as UTF-8 text", field="directives", hint="is it a YAML file?") from None

@@ -72,7 +72,8 @@ def _outward(joints: list[Joint], bodies: list[str]) -> list[Joint]:
             rest.remove(j)
             j = j if j.parent == body else _turned(j)
             if j.child in reached:
-                raise SceneError("loop", f"joint {j.name} closes a loop of joints; only trees are supported")
+                message = f"joint {j.name} closes a loop of joints"
+                raise SceneError("loop", message, field="directives", hint="remove a joint of the loop; only trees are supported")
             reached.add(j.child)
             open_ends.append(j.child)
             found.append(j)
@@ -85,7 +86,11 @@ def _outward(joints: list[Joint], bodies: list[str]) -> list[Joint]:
 def floating(body: str) -> SceneError:
     """Returns the error for a body that no joint connects to the world."""
     drake_name = body.replace("/", "::")
-    hint = f"weld it: add_weld: {{parent: world, child: {drake_name}}}"
+    outer, *inside = drake_name.split("::")
+    itself = f"weld it: add_weld: {{parent: world, child: {drake_name}}}"
+    frame = f"add_frame: {{name: {outer}::stands, X_PF: {{base_frame: {drake_name}}}}}"
+    framed = f"weld a frame of it: {frame}, and add_weld: {{parent: world, child: {outer}::stands}}"
+    hint = framed if len(inside) > 1 else itself
     return SceneError("floating_body", f"body {body} is not attached to anything", field="directives", hint=hint)
 
 

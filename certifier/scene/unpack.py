@@ -9,12 +9,14 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from certifier.errors import SceneError
-from certifier.scene.bundle import INDEX, BundleLimits, starts
+from certifier.scene.bundle import INDEX, SMALLER, BundleLimits, starts
 from certifier.scene.file import read_scene_file
 from certifier.scene.parse import parse
 from certifier.scene.references import references, resolve
 
 _DEPTH = 32
+_BELOW = "keep the file below the directory of the model"
+_PACK = "make bundles with `ciris scene add`"
 _CHUNK = 2**20
 
 
@@ -44,14 +46,14 @@ def check_bundle(root: Path, scene: Path) -> None:
         where = file.relative_to(root).as_posix()
         for reference in references(file):
             if file.suffix.lower() in (".mjcf", ".xml") and ".." in PurePosixPath(reference).parts:
-                raise SceneError("bundle_uri", f"{where}: {reference!r}: .. is not accepted here")
+                raise SceneError("bundle_uri", f"{where}: {reference!r}: .. is not accepted here", hint=_BELOW)
             for start in starts(file, scene):
                 _inside(resolve(reference, start, packages), root, f"{where}: {reference!r}")
 
 
 def _inside(path: Path, root: Path, what: str) -> None:
     if not path.is_relative_to(root):
-        raise SceneError("bundle_uri", f"{what} leads out of the bundle")
+        raise SceneError("bundle_uri", f"{what} leads out of the bundle", hint="`ciris scene add` packs every file that is needed")
 
 
 def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
@@ -64,16 +66,17 @@ def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
         with zipfile.ZipFile(bundle) as archive:
             entries = archive.infolist()
             if len(entries) > limits.files:
-                raise SceneError("bundle_too_large", f"the bundle has {len(entries)} files; at most {limits.files} are accepted")
+                message = f"the bundle has {len(entries)} files; at most {limits.files} are accepted"
+                raise SceneError("bundle_too_large", message, field="bundle", hint=SMALLER)
             left = limits.unpacked_bytes
             for entry in entries:
                 left -= _extract(archive, entry, root, left)
         scene = str(json.loads((root / INDEX).read_text(encoding="utf-8"))["scene"])
     except SceneError:
         raise
-    except Exception as error:  # zipfile and the decompressors raise many kinds of error
-        hint = "make bundles with pack_bundle or `ciris scene add`"
-        raise SceneError("bundle_zip", f"this is not a scene bundle: {type(error).__name__}: {error}", hint=hint) from None
+    except Exception:  # zipfile and the decompressors raise many kinds of error
+        message = f"this is no zip with a scene file that {INDEX} names, or it cannot be unpacked"
+        raise SceneError("bundle_zip", message, field="bundle", hint=_PACK) from None
     _checked_name(scene)
     return scene
 
@@ -88,14 +91,15 @@ def _extract(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, root: Path, left:
         target.mkdir(parents=True, exist_ok=True)
         return 0
     if (entry.external_attr >> 16) & 0o170000 not in (0, 0o100000):
-        raise SceneError("bundle_path", f"{entry.filename!r} is not a plain file")
+        raise SceneError("bundle_path", f"{entry.filename!r} is not a plain file", field="bundle", hint=_PACK)
     target.parent.mkdir(parents=True, exist_ok=True)
     written = 0
     with archive.open(entry) as source, target.open("xb") as sink:
         while chunk := source.read(_CHUNK):
             written += len(chunk)
             if written > left:
-                raise SceneError("bundle_too_large", f"the bundle unpacks to more than is accepted; {entry.filename!r} goes beyond it")
+                message = f"the bundle unpacks to more than is accepted; {entry.filename!r} goes beyond it"
+                raise SceneError("bundle_too_large", message, field="bundle", hint=SMALLER)
             sink.write(chunk)
     return written
 
@@ -103,7 +107,8 @@ def _extract(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, root: Path, left:
 def _checked_name(name: str) -> str:
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts or "\\" in name or "\0" in name or not path.parts:
-        raise SceneError("bundle_path", f"{name!r} is not a path inside the bundle")
+        raise SceneError("bundle_path", f"{name!r} is not a path inside the bundle", field="bundle", hint=_PACK)
     if len(path.parts) > _DEPTH:
-        raise SceneError("bundle_path", f"{name[:80]!r}... is nested more than {_DEPTH} directories deep")
+        message = f"{name[:80]!r}... may be nested at most {_DEPTH} directories deep"
+        raise SceneError("bundle_path", message, field="bundle", hint=_PACK)
     return name

@@ -23,12 +23,13 @@ def parse_xml(path: Path, name: str, code: str, install: Callable[[expat.XMLPars
     parser = expat.ParserCreate()
 
     def refuse(*_: object) -> None:
-        message = f"{name}:{parser.CurrentLineNumber}: the file declares a document type or entity, which is not accepted"
-        raise SceneError(code, message, field="directives")
+        message = f"{name}:{parser.CurrentLineNumber}: the file declares a document type or entity"
+        raise SceneError(code, message, field="directives", hint="remove it, and write out what the entities stand for")
 
     install(parser)
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
     try:
         parser.Parse(path.read_bytes(), True)
     except expat.ExpatError as error:
-        raise SceneError(code, f"{name}:{error.lineno}: this is not XML: {expat.ErrorString(error.code)}", field="directives") from None
+        message = f"{name}:{error.lineno}: this is not XML: {expat.ErrorString(error.code)}"
+        raise SceneError(code, message, field="directives", hint="mend the file there") from None

@@ -121,7 +121,9 @@ class _Iris:
 
     def __init__(self, scene: Scene, options: SeedOptions) -> None:
         self._function, self._options = (IrisNp2, IrisNp2Options()) if options.method is Method.IRIS_NP2 else (IrisZo, IrisZoOptions())
-        self._scene, self._checker = scene, _checker(scene)
+        self._scene = scene
+        with _listening():  # Drake tells how many contexts it allocates, which is nothing to people who grow a region
+            self._checker = _checker(scene)
         self._kinematics = RationalForwardKinematics(self._checker.plant())  # Drake's parameterization does not keep it alive
         self._options.parameterization = IrisParameterizationFunction(self._kinematics, scene.q_star)
         sampled = self._options.sampled_iris_options

@@ -6,22 +6,38 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from certifier.errors import RegionError
-from certifier.model import Scene
+from certifier.model import Array, Scene
+
+ON = 1e-9
+"""A position so near to a limit, in radians or metres, is on it: nobody types such a distance."""
+HAIR = 1e-4
+"""A position on a limit is moved inside by so much, in radians or metres."""
 
 
 def check_limits(scene: Scene, q: ArrayLike, field: str = "seed") -> None:
     """Refuses a configuration with a joint outside of its limits, or of the window that the scene covers of its turn.
 
     Raises:
-        RegionError: ``seed_outside_limits`` (the limits themselves are outside) or ``seed_outside_window``; the error names the joint.
+        RegionError: ``seed_outside_limits`` (limits themselves are not outside) or ``seed_outside_window``; the error names the joint.
     """
     values, shifted = np.asarray(q, dtype=float), scene.in_windows(q)
     for i, (joint, value, own_lower, own_upper) in enumerate(zip(scene.moving, values, *scene.own_limits, strict=True)):
-        if not own_lower < value < own_upper:
-            message = f"joint {joint.name} is at {value:g}, not between its limits {own_lower:g} and {own_upper:g}"
-            raise RegionError("seed_outside_limits", message, field=f"{field}[{i}]")
-        if not scene.q_lower[i] < shifted[i] < scene.q_upper[i]:
+        if not own_lower - ON <= value <= own_upper + ON:
+            message = f"joint {joint.name} is at {value:.9g}, not between its limits {own_lower:.9g} and {own_upper:.9g}"
+            raise RegionError("seed_outside_limits", message, field=f"{field}[{i}]", hint="move it between them")
+        if not scene.q_lower[i] - ON <= shifted[i] <= scene.q_upper[i] + ON:
             message = (
                 f"joint {joint.name} is at {value:g}, outside of the window from {joint.lower:g} to {joint.upper:g} that the scene covers"
             )
             raise RegionError("seed_outside_window", message, field=f"{field}[{i}]", hint=f"set q_star of this joint to about {value:.3g}")
+
+
+def off_limits(scene: Scene, q: ArrayLike) -> Array:
+    """Returns configurations, (..., n), that have passed :func:`check_limits`, with positions on a limit moved inside by a hair.
+
+    A region has an interior around its seed, and a limit has nothing of the region on its other side.
+    """
+    values, shifted = np.asarray(q, dtype=float), scene.in_windows(q)
+    hair = np.minimum(HAIR, (scene.q_upper - scene.q_lower) / 4)
+    low, high = shifted <= scene.q_lower + ON, shifted >= scene.q_upper - ON
+    return np.where(low, scene.q_lower + hair, np.where(high, scene.q_upper - hair, values))

@@ -82,14 +82,14 @@ class SeedOptions:
         try:
             method = Method(given.pop("method")) if "method" in given else None
         except ValueError:
-            raise _refuse("method", f"method is one of {', '.join(Method)}") from None
+            raise _refuse("method", f"method must be one of {', '.join(Method)}") from None
         needed, idle = (("C", "d"), ("q",)) if method is Method.POLYTOPE else (("q",), ("C", "d", "center"))
         for name in needed:
             if name not in given:
-                raise _refuse(name, f"the method {method or Method.IRIS_NP2} needs {name}", "missing_option")
+                raise _refuse(name, f"the method {method or Method.IRIS_NP2} needs {name}", "missing_option", "give it")
         for name in idle:
             if name in given:
-                raise _refuse(name, f"the method {method or Method.IRIS_NP2} has no use for {name}")
+                raise _refuse(name, f"the method {method or Method.IRIS_NP2} has no use for {name}", hint="leave it out")
         for name in ("q", "d", "center"):
             if name in given:
                 given[name] = _numbers(name, given[name])

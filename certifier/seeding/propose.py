@@ -15,7 +15,7 @@ from certifier.outcome import Guarantee
 from certifier.polytopes.polytope import chebyshev_center, drop_redundant
 from certifier.seeding.free import check_free
 from certifier.seeding.iris import iris
-from certifier.seeding.limits import check_limits
+from certifier.seeding.limits import check_limits, off_limits
 from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.proposal import Proposal
 
@@ -35,13 +35,16 @@ def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> None:
         )
     for joint, value in zip(scene.moving, q, strict=True):
         if not np.isfinite(value):
-            raise RegionError("seed_not_finite", f"joint {joint.name} is at {value}", field=f"{field}[{joint.index}]")
+            message = f"joint {joint.name} is at {value}"
+            raise RegionError("seed_not_finite", message, field=f"{field}[{joint.index}]", hint="give a finite number")
     check_limits(scene, q, field)
     check_free(scene, q, field)
 
 
 def propose(scene: Scene, options: SeedOptions) -> Proposal:
     """Returns a polytope around the seed, by the options' method; it is deterministic for ``random_seed``.
+
+    What is on a joint limit is moved inside by a hair (:func:`certifier.seeding.limits.off_limits`).
 
     IRIS may take minutes, and it runs native code, so call it in a process that may die.
 
@@ -53,14 +56,14 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
     method = options.method or Method.IRIS_NP2
     for i, q in enumerate(options.contain):
         check_seed(scene, q, f"seed.contain[{i}]")
-    contain = scene.to_s(np.array(options.contain)) if options.contain else np.zeros((0, scene.n))
+    contain = scene.to_s(off_limits(scene, options.contain)) if options.contain else np.zeros((0, scene.n))
     if method is Method.POLYTOPE:
         C, d, center = _given(scene, options)
         said: dict[str, Any] = {}
     else:
         assert options.q is not None, "every method but polytope has a seed"
         check_seed(scene, options.q)
-        center = scene.to_s(options.q)
+        center = scene.to_s(off_limits(scene, options.q))
         if method is Method.LIMITS:
             C, d = np.zeros((0, scene.n)), np.zeros(0)
             said = {}
@@ -97,7 +100,10 @@ def _given(scene: Scene, options: SeedOptions) -> tuple[Array, Array, Array]:
     center = np.array(options.center)
     if center.shape != (scene.n,) or not np.all(limited.C @ center < limited.d):
         raise RegionError(
-            "center_outside", "the centre does not lie strictly inside the polytope and the joint limits", field="seed.center"
+            "center_outside",
+            "the centre does not lie strictly inside the polytope and the joint limits",
+            field="seed.center",
+            hint="leave it out to have one found",
         )
     return given.C, given.d, center
 

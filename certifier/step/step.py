@@ -93,23 +93,25 @@ def step(
     """
     points = np.zeros((0, scene.n)) if contain is None else contain
     if not polytope.contains(points).all():
-        raise RegionError("point_outside", "a point to contain is not in the polytope", field="contain")
+        raise RegionError("point_outside", "a point to contain must be in the polytope", field="contain")
     before = inscribed_ellipsoid(polytope)
-    failure: Exception | None = None
     for scale in RETREATS:
         smaller = polytope if scale == 1.0 else _about(before.center, polytope, scale, fixed=2 * scene.n)
         if not smaller.contains(points).all():
             break
         try:
             found = _step(scene, smaller, proofs, points, progress)
-        except np.linalg.LinAlgError as error:
-            failure = error
+        except np.linalg.LinAlgError:
             continue
         growth = found.info["volume_after"] / before.volume - 1
         if scale < 1.0 and growth <= 0:
-            raise RegionError("step_failed", f"nothing larger was found from {scale} of the polytope")
+            message = f"nothing larger was found from {scale} of the polytope"
+            raise RegionError("step_failed", message, field="polytope", hint=_PUSH)
         return replace(found, growth=growth, info=found.info | {"volume_before": before.volume, "from": scale})
-    raise RegionError("step_failed", f"the proofs are not strictly feasible on the trust box: {failure}")
+    raise RegionError("step_failed", "no proof holds with room to spare on the step's trust box", field="polytope", hint=_PUSH)
+
+
+_PUSH = "push the faces out instead of stepping (pushes)"
 
 
 def _about(center: Array, polytope: Polytope, scale: float, fixed: int) -> Polytope:
@@ -204,7 +206,7 @@ def _check_size(scene: Scene, index: int, proof: PairProof) -> None:
     if terms > MOST_TERMS:
         pair, most = scene.pairs[index], f"more than {MOST_TERMS}"
         problem = f"with all {scene.n} joints in play the polynomials of {pair.a} and {pair.b} have {terms} terms, {most}"
-        raise RegionError("step_too_large", problem, hint="push the faces out instead of stepping (pushes)")
+        raise RegionError("step_too_large", problem, field="max_rounds", hint=_PUSH)
 
 
 def _within(box: Box, C: Array, d: Array) -> Polytope:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from certifier.errors import CirisError, ProofError
+from certifier.errors import CirisError, ProofError, unreadable
 from certifier.model import Scene, escaped
 from certifier.outcome import Guarantee
 from certifier.proof import limits
@@ -125,7 +125,7 @@ def answer_about_file(payload: dict[str, Any]) -> dict[str, Any]:
         with open(payload["path"], "rb") as file:
             data = file.read(limits.FILE_BYTES + 1)
     except OSError as error:
-        raise CirisError("no_file", error.strerror or str(error)) from None
+        raise CirisError("no_file", unreadable(error)) from None
     return answer(data, payload.get("processes", 1), _teller(payload["progress"]) if "progress" in payload else None)
 
 

@@ -101,15 +101,19 @@ class CellCheck:
         self._pieces = Pieces(proof, len(self._play))
         self._multipliers = Multipliers(proof, ground)
 
+        # Volumes that no cell chooses cost nothing here, however many vertices a stranger gives them.
+        used = {choice: proof.chosen[choice] for choice in np.unique(proof.choices).tolist()}
+        wanted = {id(volume) for volumes in used.values() for volume in volumes}
         positive, negative = (
             {
                 id(volume): Side(kinematics, proof.frame, volume, _not_less(volume.radius, scene.padding), sign, self._play)
                 for volume in (own, *coarse)
+                if id(volume) in wanted
             }
             for own, coarse, sign in zip(proof.volumes, proof.coarse, (1.0, -1.0), strict=True)
         )
-        self._sides = [(positive[id(first)], negative[id(second)]) for first, second in proof.chosen]
-        self._rounded = [scene.padding > 0 or first.radius > 0 or second.radius > 0 for first, second in proof.chosen]
+        self._sides = {choice: (positive[id(first)], negative[id(second)]) for choice, (first, second) in used.items()}
+        self._rounded = {choice: scene.padding > 0 or first.radius > 0 or second.radius > 0 for choice, (first, second) in used.items()}
 
     def cells(self, most: int) -> Iterator[Cells]:
         """Yields all cells, at most ``most`` at a time, which :meth:`gap` checks.
@@ -129,7 +133,7 @@ class CellCheck:
         least, with_plane = np.inf, np.flatnonzero(~cells.empty)
         choices = self._proof.choices[cells.plane[with_plane]]
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
-            for choice, sides in enumerate(self._sides):
+            for choice, sides in self._sides.items():
                 same = with_plane[choices == choice]
                 together = max(1, TOGETHER // max(*(side.vertices * side.entries for side in sides), 2 ** len(self._play)))
                 for first in range(0, len(same), together):

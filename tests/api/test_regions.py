@@ -176,7 +176,7 @@ def test_contains_without_any_region_is_no(client: TestClient, scene) -> None:
 
 @pytest.mark.parametrize(
     ("body", "field"),
-    [({"q": [[0.1, 0.2]]}, "q[0]"), ({"q": [[0.1]], "s": [[0.1]]}, None), ({}, None), ({"q": [["x"]]}, "q[0][0]"), ({"q": []}, "q")],
+    [({"q": [[0.1, 0.2]]}, "q[0]"), ({"q": [[0.1]], "s": [[0.1]]}, "body"), ({}, "body"), ({"q": [["x"]]}, "q[0][0]"), ({"q": []}, "q")],
 )
 def test_contains_refuses_what_makes_no_sense(client: TestClient, scene, body: dict[str, object], field: str | None) -> None:
     answer = client.post("/v1/planning/contains", json={"scene": "slider"} | body)

@@ -23,8 +23,8 @@ from certifier.pair.result import PairResult
 from certifier.verify.region import verify_region
 from client import output
 from client.cli import INTERRUPTED, _joined
+from client.files import ProofFile
 from client.find import data_dir
-from client.proof_file import ProofFile
 from db.settings import Settings
 from tests.client.conftest import PLANAR, ROOT, Ciris, command, surroundings
 
@@ -89,10 +89,10 @@ def files(tmp_path: Path) -> Path:
         (("certify", PLANAR, "--polytope", "missing.npz"), "there is no file missing.npz"),
         (("certify", PLANAR, "--polytope", "text.npz"), "is no npz file of numbers"),
         (("certify", PLANAR, "--polytope", "pickled.npz"), "is no npz file of numbers"),
-        (("certify", PLANAR, "--polytope", "nothing.npz"), "no array C and no array d"),
-        (("certify", PLANAR, "--polytope", "ragged.npz"), "C is (4, 2) and d is (2,)"),
+        (("certify", PLANAR, "--polytope", "nothing.npz"), "has no C and no d"),
+        (("certify", PLANAR, "--polytope", "ragged.npz"), "C is 4 x 2 and d is 2"),
         (("certify", PLANAR, "--polytope", "nan.npz"), "must be finite numbers"),
-        (("certify", PLANAR, "--polytope", "narrow.npz"), "C is (4, 1)"),
+        (("certify", PLANAR, "--polytope", "narrow.npz"), "C is 4 x 1"),
         (("certify", PLANAR, "--polytope", "empty.npz"), "no point satisfies"),
         (("certify", "planar-2dof", "--polytope", "small.npz"), "is not a scene file"),
         (("grow", "nowhere.yaml", "--q", "0,0"), "nowhere.yaml"),
@@ -104,9 +104,9 @@ def files(tmp_path: Path) -> Path:
         (("grow", PLANAR, "--q", "0,9"), "seed.q[1]: joint arm/elbow is at 9"),
         (("grow", PLANAR, "--q", "-1.2,1.0"), "arm/lower/bar and obstacles/body/post overlap"),
         (("grow", PLANAR, "--method", "magic"), "--method"),
-        (("grow", PLANAR, "--deadline", "0"), "--deadline: 0 is no number of seconds above 0"),
-        (("grow", PLANAR, "--deadline", "nan"), "--deadline: nan is no number"),
-        (("grow", PLANAR, "--out", "nowhere/region.proof"), "the proof cannot be written into"),
+        (("grow", PLANAR, "--deadline", "0"), "--deadline: must be a number of seconds above 0, not 0"),
+        (("grow", PLANAR, "--deadline", "nan"), "--deadline: must be a number of seconds above 0, not nan"),
+        (("grow", PLANAR, "--out", "nowhere/region.proof"), "--out: there is no directory"),
         (("grow", PLANAR, "--out", "."), ". is a directory"),
     ],
 )
@@ -198,7 +198,7 @@ def test_growing_here_says_what_happens(ciris: Ciris) -> None:
     assert any(line.startswith("seeding: done after") for line in said)
     assert any(line.startswith("certified region of iteration") and "% of the proposal" in line for line in said)
     assert not any(line.startswith("  1/") for line in said)
-    watched = ciris("grow", PLANAR, "--local", "--watch", "--out", "a.proof").stderr
+    watched = ciris("grow", PLANAR, "--local", "--watch", "--out", "b.proof").stderr
     assert "  1/" in watched
 
 
@@ -292,7 +292,7 @@ def test_a_proof_that_does_not_hold_is_a_negative_answer(ciris: Ciris, certified
     assert (done.status, done.json["holds"]) == (1, False)
     assert "does not hold" in done.error
     missing = ciris("verify", "missing.proof")
-    assert (missing.status, missing.error) == (2, "missing.proof: No such file or directory")
+    assert (missing.status, missing.error) == (2, "missing.proof: there is no such file or directory (name a proof file)")
 
 
 def test_scenes_are_added_listed_and_shown(ciris: Ciris, url: str) -> None:
@@ -321,6 +321,31 @@ def test_regions_are_listed_shown_and_exported(ciris: Ciris, url: str, region: s
     with np.load(io.BytesIO(ciris("region", "export", region, "--format", "npz", CIRIS_URL=url).raw)) as arrays:
         assert arrays["C"].tolist() == certified.manifest["halfspace_normals"]
     assert verify_region(ciris("region", "export", region, "--format", "proof", CIRIS_URL=url).raw).faces == 4
+
+
+def test_an_export_overwrites_nothing(ciris: Ciris, url: str, region: str, tmp_path: Path) -> None:
+    assert ciris("region", "export", region, "--out", "a.json", CIRIS_URL=url).status == 0
+    written = (tmp_path / "a.json").read_bytes()
+    again = ciris("region", "export", region, "--format", "npz", "--out", "a.json", CIRIS_URL=url)
+    assert (again.status, again.error) == (2, "--out: a.json is there already (move it away, or name another file)")
+    assert (tmp_path / "a.json").read_bytes() == written
+    nowhere = ciris("region", "export", region, "--out", "no/a.json", CIRIS_URL=url)
+    assert (nowhere.status, "there is no directory" in nowhere.error) == (2, True)
+
+
+def test_the_region_of_another_robot_is_not_certified_here(ciris: Ciris, url: str, region: str, certified: Region, tmp_path: Path) -> None:
+    for format in ("json", "npz"):
+        file = f"region.{format}"
+        assert ciris("region", "export", region, "--format", format, "--out", file, CIRIS_URL=url).status == 0
+        here = ciris("certify", PLANAR, "--polytope", file, "--local")
+        assert (here.status, "has the joints model/slide, and the scene arm/shoulder, arm/elbow" in here.error) == (2, True)
+        there = ciris("certify", PLANAR, "--polytope", file, CIRIS_URL=url)
+        assert (there.status, there.error) == (2, here.error)
+    moved = {**certified.manifest, "space": {**certified.manifest["space"], "q_star": [0.5]}}
+    (tmp_path / "moved.json").write_text(json.dumps(moved))
+    other = ciris("certify", "slider", "--polytope", "moved.json", CIRIS_URL=url)
+    assert (other.status, "is about q* = 0.5, and the scene about 0" in other.error) == (2, True)
+    assert httpx2.get(f"{url}/v1/jobs?kind=certify").json()["jobs"] == []
 
 
 def test_a_region_that_was_stored_before_there_were_shares_is_shown(certified: Region, capsys: pytest.CaptureFixture[str]) -> None:

@@ -41,7 +41,9 @@ def test_jobs_are_listed_shown_and_followed_by_the_first_characters_of_their_ids
 def test_a_job_is_cancelled_and_retried(ciris: Ciris, url: str, database: Database, scene: Scene) -> None:
     waiting = queued(database, scene)
     done = ciris("job", "cancel", waiting[:8], CIRIS_URL=url)
-    assert (done.status, "cancelled before it started" in done.stdout) == (0, True)
+    assert (done.status, "cancelled before it started" in done.stdout, done.stderr) == (0, True, "")
+    late = ciris("job", "cancel", waiting[:8])
+    assert (late.status, late.stderr) == (0, "the job had ended before, cancelled; nothing was cancelled\n")
     again = ciris("job", "retry", waiting[:8], "--json").json
     assert (again["state"], again["id"] == waiting) == ("queued", False)
     refused = ciris("job", "retry", again["id"][:8])

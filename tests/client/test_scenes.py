@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +12,7 @@ import yaml
 
 from certifier.scene import load_scene
 from tests.certifier.scene.workshop import ARM, BOX, EXAMPLES, LIMIT, ROOM
-from tests.client.conftest import Ciris
+from tests.client.conftest import Ciris, command, surroundings
 
 GRIPPER = """<link name="left"><collision><geometry><box size="0.02 0.02 0.1"/></geometry></collision></link>
   <joint name="grip" type="prismatic"><parent link="hand"/><child link="left"/><origin xyz="0.4 0.03 0"/><axis xyz="0 1 0"/>
@@ -58,6 +61,18 @@ def test_a_draft_of_a_robot_as_people_ship_it_is_a_scene_with_a_free_seed(ciris:
         assert words is True or str(words) in checked.stdout
     grown = ciris("grow", out, "--local", "--out", tmp_path / "proof")
     assert grown.status == 0, grown.stderr
+
+
+def test_a_draft_that_is_ended_leaves_nothing_behind(tmp_path: Path) -> None:
+    asked = command("scene", "init", robot(tmp_path), "--world", tmp_path / "room.sdf")
+    drafting = subprocess.Popen(asked, cwd=tmp_path, env=surroundings(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    while not list(tmp_path.glob(".draft-*")):
+        assert drafting.poll() is None, "it drafts before it has ended"
+        time.sleep(0.01)
+    drafting.terminate()
+    _, said = drafting.communicate(timeout=20)
+    assert (drafting.returncode, said) == (128 + signal.SIGTERM, "")
+    assert not [*tmp_path.glob(".draft-*"), *tmp_path.glob("*.yaml")]
 
 
 def test_every_example_can_be_drafted_anew(ciris: Ciris, tmp_path: Path) -> None:
@@ -124,6 +139,31 @@ def test_nothing_is_overwritten(ciris: Ciris, tmp_path: Path) -> None:
     assert (tmp_path / "seed.yaml").read_text() == "q: [1]\n"
 
 
+def test_a_second_scene_of_a_directory_has_a_seed_of_its_own(ciris: Ciris, tmp_path: Path) -> None:
+    model = robot(tmp_path)
+    assert ciris("scene", "init", model).status == 0
+    done = ciris("scene", "init", model, "--out", "other.yaml")
+    assert done.status == 0, done.stderr
+    assert yaml.safe_load((tmp_path / "other.seed.yaml").read_text())["q"] == [0.0]
+    assert "nothing touches at other.seed.yaml" in ciris("scene", "check", "other.yaml").stdout
+    (tmp_path / "other.seed.yaml").write_text("q: [0, 0]\n")
+    assert "other.seed.yaml" in ciris("scene", "check", "other.yaml").error
+    assert "nothing touches at seed.yaml" in ciris("scene", "check", "scene.yaml").stdout
+    (tmp_path / "other.seed.yaml").unlink()
+    assert "put q into other.seed.yaml" in ciris("grow", "other.yaml", "--local").error
+
+
+def test_an_ignored_pair_that_never_touches_is_remarked_on(ciris: Ciris, tmp_path: Path) -> None:
+    """The finger never comes to the foot; the cover is always in it, so it is right to ignore that."""
+    model, out = robot(tmp_path), tmp_path / "cell" / "scene.yaml"
+    assert ciris("scene", "init", model, "--out", out).status == 0
+    assert "are ignored, but touch at none" not in ciris("scene", "check", out).stdout
+    out.write_text(out.read_text() + "  - {pair: [arm/base, arm/left], reason: never mind}\n")
+    checked = ciris("scene", "check", out).stdout
+    assert "warning: arm/base and arm/left are ignored, but touch at none of 201 configurations tried" in checked
+    assert "arm/cover are ignored, but" not in checked
+
+
 def test_what_cannot_be_drafted_is_named_and_leaves_nothing(ciris: Ciris, tmp_path: Path) -> None:
     model = robot(tmp_path)
     (tmp_path / "alone").mkdir()
@@ -132,7 +172,7 @@ def test_what_cannot_be_drafted_is_named_and_leaves_nothing(ciris: Ciris, tmp_pa
         ((tmp_path / "alone" / "arm.urdf",), "--package tools=DIRECTORY"),
         ((tmp_path / "nothing.urdf",), "there is no file"),
         ((model, "--world", tmp_path / "ws" / "tools" / "meshes" / "finger.obj"), "finger.obj"),
-        ((model, "--package", "tools"), "'tools' is not NAME=DIRECTORY"),
+        ((model, "--package", "tools"), "must be NAME=DIRECTORY, not 'tools'"),
     ]
     for i, (arguments, words) in enumerate(cases):
         out = tmp_path / f"case{i}" / "scene.yaml"

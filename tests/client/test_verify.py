@@ -24,7 +24,12 @@ from tests.client.conftest import Ciris, command, surroundings
 
 def test_what_cannot_be_read_is_bad_input(ciris: Ciris, tmp_path: Path) -> None:
     (tmp_path / "directory").mkdir()
-    for name, words in (("missing", "No such file"), ("directory", "Is a directory"), ("missing/more", "No such file"), ("a\nb", "a\\nb")):
+    for name, words in (
+        ("missing", "no such file"),
+        ("directory", "it is a directory"),
+        ("missing/more", "no such file"),
+        ("a\nb", "a\\nb"),
+    ):
         done = ciris("verify", name)
         assert (done.status, done.raw) == (2, b"")
         assert words in done.error

@@ -72,7 +72,7 @@ def gone(pids: dict[str, int]) -> bool:
 def test_what_dies_is_started_again_and_a_stop_leaves_nothing(stack: Stack) -> None:
     second = subprocess.run([*COMMAND, "--data", str(stack.data)], cwd=ROOT, capture_output=True, text=True, check=False)
     assert second.returncode == 2
-    assert second.stderr.splitlines()[-1].startswith("error: a stack with the data directory")
+    assert second.stderr.splitlines()[-1].startswith("error: --data: a stack with the data directory")
 
     before = stack.description["pids"]
     assert set(before) == {"queue", "control", "solve", "api", "api-2"}
@@ -136,7 +136,7 @@ def test_a_port_that_was_asked_for_and_is_taken_is_told(tmp_path: Path) -> None:
         port = str(taken.getsockname()[1])
         failed = subprocess.run([*COMMAND, "--data", str(tmp_path), "--port", port], cwd=ROOT, capture_output=True, text=True, check=False)
     assert failed.returncode == 2
-    assert failed.stderr.startswith(f"error: port: port {port} of 127.0.0.1 cannot be bound")
+    assert failed.stderr.startswith(f"error: --port: port {port} of 127.0.0.1 cannot be bound")
 
 
 @pytest.mark.parametrize(

@@ -63,6 +63,23 @@ def test_packages_and_meshes_travel_and_strangers_do_not(tmp_path):
     assert scene.hash == parsed(path).hash
 
 
+def test_a_package_with_an_absolute_path_travels(tmp_path):
+    models = tmp_path / "a b" / "models"
+    models.mkdir(parents=True)
+    (models / "t.obj").write_text(TETRAHEDRON)
+    (tmp_path / "scenes").mkdir()
+    path = write(
+        tmp_path / "scenes",
+        f"packages:\n  here: .\n  mine: {models}  # not beside it\n" + SCENE,
+        shape='<mesh filename="package://mine/t.obj"/>',
+    )
+    bundle = pack_bundle(path)
+    assert {"a b/models/t.obj", "scenes/scene.yaml"} < {*names(bundle)}
+    text = zipfile.ZipFile(io.BytesIO(bundle)).read("scenes/scene.yaml").decode()
+    assert text == path.read_text().replace(str(models), '"../a b/models"')
+    assert load_bundle(bundle).hash == parsed(path).hash
+
+
 @pytest.mark.parametrize(
     "reference",
     ["/etc/passwd", "file:///etc/passwd", "http://example.org/a.urdf", "https://example.org/a", "package://other/a", "a\\b", "C:\\a"],

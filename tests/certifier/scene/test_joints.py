@@ -79,7 +79,8 @@ def test_configurations_a_turn_away_are_taken_to_the_window_where_the_joint_goes
     narrow = parsed(write(tmp_path))
     assert np.isnan(to_s(narrow, np.array([[1.0 - 2 * np.pi]]))).all()
     check_limits(scene, [1.0 - 2 * np.pi])
-    for value, code in ((7.0, "seed_outside_limits"), (3.1, "seed_outside_window"), (2 * np.pi, "seed_outside_limits")):
+    check_limits(scene, [2 * np.pi])
+    for value, code in ((7.0, "seed_outside_limits"), (3.1, "seed_outside_window"), (2 * np.pi + 1e-6, "seed_outside_limits")):
         with pytest.raises(RegionError) as caught:
             check_limits(scene, [value])
         assert caught.value.code == code

@@ -140,6 +140,20 @@ def test_remarks(tmp_path):
     assert any("filters hide arm/hand/palm and room/walls/wall" in w for w in parsed(write(tmp_path, extra=filtered)).warnings)
 
 
+def test_replacements_of_one_kind_are_one_remark(tmp_path):
+    """A robot may have a hundred meshes."""
+    rods = "".join(
+        f'<collision name="rod{i}"><geometry><cylinder radius="{radius}" length="1"/></geometry></collision>'
+        for i, radius in enumerate((0.01, 0.02))
+    )
+    more = f'<link name="rack">{rods}</link><joint name="on" type="fixed"><parent link="base"/><child link="rack"/></joint>'
+    (said,) = [w for w in parsed(write(tmp_path, more=more)).warnings if "cylinder" in w]
+    assert said == "arm/rack/rod0 and 1 more: cylinder -> circumscribed prism with 12 sides, reaching at most 0.706 mm outside"
+
+
+NESTED = ROOM.replace("</link></model>", '</link><model name="shelf"><link name="board"/></model></model>')
+
+
 def floating(scene=SCENE):
     return scene.replace("  - add_weld: {parent: world, child: room::walls}\n", "")
 
@@ -150,11 +164,13 @@ def floating(scene=SCENE):
         ({"extra": "q_star: [6]\n"}, "joint_range", "q_star", "arm/turn turns from -1 to 2 rad"),
         ({"kind": "prismatic", "limit": '<limit effort="1" velocity="1"/>'}, "joint_range", "directives", "arm/turn"),
         ({"limit": LIMIT.replace('"2"', '"-1"')}, "joint_range", "directives", "arm/turn cannot move"),
-        ({"extra": "q_star: [0, 0]\n"}, "scene_field", "q_star", "2 numbers for 1 joints: arm/turn"),
+        ({"extra": "q_star: [0, 0]\n"}, "scene_field", "q_star", "2 numbers for 1 joints (in order: arm/turn)"),
         ({"kind": "fixed", "limit": ""}, "no_joints", "directives", "no joint"),
         ({"kind": "planar"}, "unsupported_joint", "directives", "arm/turn is a planar joint"),
+        ({"kind": "planar"}, "unsupported_joint", "directives", "two slides and a turn"),
         ({"kind": "floating"}, "floating_body", "directives", "arm/hand"),
         ({"scene": floating()}, "floating_body", "directives", "add_weld: {parent: world, child: room::walls}"),
+        ({"files": {"room.sdf": NESTED}}, "floating_body", "directives", "X_PF: {base_frame: room::shelf::board}}, and add_weld"),
         (
             {"more": FINGER.format(name="grip", kind="revolute", more='<mimic joint="turn"/>')},
             "unsupported_joint",

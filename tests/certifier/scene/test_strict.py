@@ -17,6 +17,8 @@ SDF = """<sdf version="1.7"><model name="room"><link name="walls">
 </link>{more}</model></sdf>
 """
 BOX = "<box><size>0.1 1 1</size></box>"
+TURN = """<link name="door"/><joint name="turn" type="revolute"><parent>walls</parent><child>door</child><axis><xyz>0 0 1</xyz><limit>
+  {}</limit></axis></joint>"""
 POSE = "0.6 0 0.3 0 0 0"
 MJCF = """<mujoco model="arm">{top}
   <worldbody><body name="base"><geom name="foot" size="0.1"/>
@@ -48,6 +50,9 @@ REFUSED = [
     *(({"shape": f'<sphere radius="{x}"/>'}, "arm.urdf:7", "radius of <sphere>") for x in HALF),
     *(({"shape": f'<box size="1 1 {x}"/>'}, "arm.urdf:7", "size of <box>") for x in HALF),
     *((limits(x), "arm.urdf:5", "lower of <limit>") for x in HALF),
+    (limits("3"), "arm.urdf:5", "limits of a joint are 3 and 2"),
+    (sdf(more=TURN.format("<lower>2</lower><upper>1</upper>")), "room.sdf:5", "limits of a joint are 2 and 1"),
+    (mjcf(top='<default><joint range="1 -1"/></default>'), "arm.xml:1", "limits of a joint are 1 and -1"),
     ({"shape": '<box size="1 nan 1"/>'}, "arm.urdf:7", "size of <box>"),
     ({"shape": '<sphere radius="0.1"/><box size="9 9 9"/>'}, "arm.urdf:7", "more than one shape"),
     ({"shape": '<box size="1 1 1"/><box size="9 9 9"/>'}, "arm.urdf:7", "second <box>"),

@@ -59,7 +59,7 @@ def uniform(polytope, count=20_000):
         ([0.0, math.nan], "seed_not_finite", "crane/turn"),
         ([math.inf, 0.0], "seed_not_finite", "crane/slide"),
         ([0.0, 2.6], "seed_outside_limits", "crane/turn is at 2.6"),
-        ([-2.0, 0.0], "seed_outside_limits", "crane/slide"),
+        ([-2.0 - 1e-6, 0.0], "seed_outside_limits", "crane/slide is at -2.000001, not between"),
         ([1.5, math.pi / 2], "seed_in_collision", "crane/arm/hook and world/ahead overlap by 0.2 m"),
     ],
 )
@@ -69,6 +69,19 @@ def test_seeds_that_are_refused(q, code, words):
     assert error.value.code == code
     assert words in error.value.message
     assert error.value.field.startswith("seed.q")
+
+
+@pytest.mark.parametrize("method", [Method.IRIS_NP2, Method.BOX, Method.LIMITS])
+@pytest.mark.parametrize("q", [(2.0, 0.2), (-2.0, 2.5), (2.0 + 5e-10, -2.5 - 5e-10)])
+def test_a_seed_on_a_limit_is_moved_inside_by_a_hair(method, q):
+    scene = crane()
+    proposal = propose(scene, SeedOptions(method, q=q, contain=((1.9, -2.5),), max_iterations=1))
+    points = scene.polytope(proposal.C, proposal.d)
+    for point, asked in zip((proposal.center, proposal.contain[0]), (q, (1.9, -2.5)), strict=True):
+        assert (points.C @ point < points.d).all()
+        np.testing.assert_allclose(scene.to_q(point), asked, atol=2e-4)
+    untouched = propose(scene, SeedOptions(method, q=(1.9999, 0.2), max_iterations=1))
+    assert np.array_equal(untouched.center, scene.to_s((1.9999, 0.2)))
 
 
 @pytest.mark.parametrize("padding", [0.0, 0.03])

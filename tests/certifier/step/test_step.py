@@ -113,7 +113,9 @@ def test_proofs_that_hold_on_the_trust_box_hold_on_the_moved_polytope():
 @pytest.mark.parametrize(
     ("constant", "value", "code", "words"),
     [
-        pytest.param("MARGIN_SHARE", 50.0, "step_failed", "not strictly feasible", id="no certificate is feasible on the trust box"),
+        pytest.param(
+            "MARGIN_SHARE", 50.0, "step_failed", "no proof holds with room to spare", id="no certificate is feasible on the trust box"
+        ),
         pytest.param("MOST_TERMS", 4, "step_too_large", "arm/link2/bar and world/obstacle", id="a pair is too large, and named"),
     ],
 )

@@ -23,6 +23,7 @@ from certifier.proof.container import pack, unpack, with_scene
 from certifier.proof.pair import PairProof
 from certifier.proof.partition import EMPTY, PLANE, STREAMS, PartitionProof
 from certifier.proof.region import RegionProof
+from certifier.verify import control_points, partition
 from certifier.verify.file import answer, verify_file
 from certifier.verify.region import verify_region
 from certifier.verify.separations import statements, verify_separation
@@ -491,3 +492,17 @@ def test_a_region_may_hold_proofs_of_both_forms(processes):
     smaller = replace(parts, proofs=(parts.proofs[0], replace(other, interior=parts.interior)))
     with pytest.raises(ProofError, match="does not contain the region"):
         verify_region(smaller.to_bytes(), processes)
+
+
+def test_volumes_that_no_cell_chooses_cost_nothing(monkeypatch):
+    """A stranger may add as many as a file holds."""
+    scene = planar_arm(2)
+    proof = Producer(scene, scene.pairs[1], WORLD, [-0.2, -0.1], [0.3, 0.3]).proof(least=3)
+    name = next(name for name in proof.volumes[0].geometries + proof.volumes[1].geometries if name.startswith("arm/"))
+    which = 0 if name in proof.volumes[0].geometries else 1
+    large = Volume((name,), "arm/link1", np.zeros((1, 3)), 50.0)
+    coarse = ((large,), ()) if which == 0 else ((), (large,))
+    prepared = []
+    monkeypatch.setattr(partition, "Side", lambda *arguments: prepared.append(arguments[2]) or control_points.Side(*arguments))
+    assert verify_separation(replace(proof, coarse=coarse)).gap > 0
+    assert prepared == list(proof.volumes)

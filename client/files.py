@@ -1,4 +1,4 @@
-"""The proof of a region is kept in a file on this machine."""
+"""Files that commands write on this machine."""
 
 from __future__ import annotations
 
@@ -18,22 +18,11 @@ class ProofFile:
 
     Attributes:
         path: where the proof is; None before there is one.
-
-    Raises:
-        CirisError: not_writable, before a job takes minutes.
     """
 
     def __init__(self, out: str | None) -> None:
         self._out = out
         self.path: Path | None = None
-        path = Path(out or ".")
-        directory = path.parent if out else path
-        if path.is_dir() and out:
-            raise CirisError("not_writable", f"{out} is a directory", field="--out", hint="name a file")
-        if not directory.is_dir() or not os.access(directory, os.W_OK):
-            raise CirisError(
-                "not_writable", f"the proof cannot be written into {directory.absolute()}", field="--out", hint="name a file elsewhere"
-            )
 
     def write(self, scene: str, proof: bytes) -> Path:
         """Puts the proof of a region of the scene with this name in the place of the one before, if any, and returns its path.
@@ -54,6 +43,25 @@ class ProofFile:
             self.path.unlink(missing_ok=True)
         self.path = path
         return path
+
+
+def check_writable(out: str | None) -> None:
+    """Refuses, before a job takes minutes, a file that cannot be written, or that would be overwritten.
+
+    Raises:
+        CirisError: not_writable, file_exists.
+    """
+    path = Path(out or ".")
+    directory = path.parent if out else path
+    if path.is_dir() and out:
+        raise CirisError("not_writable", f"{out} is a directory", field="--out", hint="name a file")
+    if path.is_file():
+        raise CirisError("file_exists", f"{out} is there already", field="--out", hint="move it away, or name another file")
+    if not directory.is_dir():
+        raise CirisError("not_writable", f"there is no directory {directory.absolute()}", field="--out", hint="make it, or name another")
+    if not os.access(directory, os.W_OK):
+        message = f"nothing can be written into {directory.absolute()}"
+        raise CirisError("not_writable", message, field="--out", hint="name a file elsewhere")
 
 
 def file_name(name: str) -> str:

@@ -1,0 +1,84 @@
+"""This module is the child's side of drafting: it says what models hold before anything in them is welded to the world."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+import numpy as np
+from pydrake.math import RollPitchYaw
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+
+from certifier.model import Joint
+from certifier.scene.file import read_scene_file
+from certifier.scene.mimics import Mimic, mimic_of
+from certifier.scene.parse import couplings, joint_of, read_models
+from certifier.scene.strict import StrictReader
+from certifier.scene.xml import parse_xml
+
+
+def inventory(payload: dict[str, Any]) -> dict[str, Any]:
+    """Returns what the models of the scene file ``payload["path"]`` hold, JSON-able.
+
+    ``roots`` lists the bodies that nothing holds, each with Drake's name of the ``body`` and its pose in the world as the file has it:
+    ``translation`` in metres and ``rpy`` in degrees. ``joints`` lists those that move: ``name``, ``kind``, ``lower`` and ``upper``.
+    ``mimics`` lists the fields of each :class:`Mimic`. ``unread`` names the followers of which Drake does not read that they follow.
+
+    Args:
+        payload: ``path``, and ``models``, the model files by the names of their models.
+
+    Raises:
+        SceneError: whatever is wrong with the file or the models that it names.
+    """
+    path = Path(payload["path"])
+    scene_file = read_scene_file(path)
+    plant, _ = AddMultibodyPlantSceneGraph(DiagramBuilder(), time_step=0.0)
+    StrictReader(scene_file).check(scene_file.resolved_directives, path.name)
+    read_models(scene_file, plant)
+    free = plant.GetFloatingBaseBodies()
+    every = [plant.get_joint(index) for index in plant.GetJointIndices()]
+    joints = [joint_of(plant, joint) for joint in every if joint.child_body().index() not in free]
+    read = [mimic for mimic in map(mimic_of, couplings(plant)) if mimic is not None]
+    unread = [mimic for name, file in payload["models"].items() for mimic in _unread(Path(file), name, joints)]
+    return {
+        "roots": _roots(plant),
+        "joints": [{"name": j.name, "kind": j.kind.value, "lower": j.lower, "upper": j.upper} for j in joints if j.index is not None],
+        "mimics": [vars(mimic) for mimic in (*read, *unread)],
+        "unread": [mimic.follower for mimic in unread],
+    }
+
+
+def _roots(plant: MultibodyPlant) -> list[dict[str, Any]]:
+    context, found = plant.CreateDefaultContext(), []
+    for index in sorted(plant.GetFloatingBaseBodies(), key=int):
+        body = plant.get_body(index)
+        X_WB = plant.EvalBodyPoseInWorld(context, body)
+        rpy = np.degrees(RollPitchYaw(X_WB.rotation()).vector())
+        found.append({"body": body.scoped_name().get_full(), "translation": X_WB.translation().tolist(), "rpy": rpy.tolist()})
+    return found
+
+
+def _unread(file: Path, model: str, joints: list[Joint]) -> list[Mimic]:
+    """Returns what SDFormat's own <mimic> says, which Drake does not read."""
+    if file.suffix.lower() != ".sdf":
+        return []
+    tree = ElementTree.TreeBuilder()
+
+    def install(parser: expat.XMLParserType) -> None:
+        parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = tree.start, tree.end, tree.data
+
+    parse_xml(file, file.name, "scene_model", install)
+    full = {j.name.rsplit("/", 1)[-1]: j.name for j in joints if j.name.startswith((f"{model}/", f"{model}::"))}
+    found = []
+    for joint in tree.close().iter("joint"):
+        for mimic in joint.iterfind("axis/mimic"):
+            follower, leader = full.get(joint.get("name", "")), full.get(mimic.get("joint", ""))
+            if follower is not None and leader is not None:
+                factor, offset, reference = (
+                    float(mimic.findtext(key, default)) for key, default in (("multiplier", "1"), ("offset", "0"), ("reference", "0"))
+                )
+                found.append(Mimic(follower, leader, factor, offset - factor * reference))
+    return found

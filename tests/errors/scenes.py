@@ -1,0 +1,693 @@
+"""Errors of scene files, of models, and of bundles that carry them."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+from certifier.model import ALPHABET
+from certifier.scene import BundleLimits, load_bundle, load_scene
+from certifier.scene.draft import draft
+from tests.certifier.scene.workshop import SCENE
+from tests.errors.rows import Row, Trial, rows
+
+D = "directives: [{add_model: {name: a, file: a.urdf}}]\n"
+YAML = "mend the YAML there; docs/scenes.md shows a scene file"
+NAMES = f"names have {ALPHABET}"
+BELOW = "name a directory above it under packages, and write package://NAME/FILE"
+PACK = "make bundles with `ciris scene add`"
+SMALLER = "use smaller meshes, or fewer of them"
+MODEL = "name a model file: URDF, SDFormat or MJCF"
+MESH = "export the mesh again"
+MEND = "mend the model there"
+NOT_YAML = "line {...}: a key must be text"
+
+MIMIC = '<joint name="follow" type="revolute"><parent link="hand"/><child link="tip"/><axis xyz="0 0 1"/><mimic joint="turn"/>'
+MIMIC += '<limit lower="-1" upper="2" effort="1" velocity="1"/></joint><link name="tip"/>'
+FREE = SCENE.replace("  - add_weld: {parent: world, child: room::walls}\n", "")
+SDF_SHAPE = """<sdf version="1.7"><model name="room"><link name="walls"><collision name="wall"><geometry>{}</geometry></collision></link>
+</model></sdf>"""
+FAR = (
+    """<robot name="r"><link name="base"/><link name="hand"/>
+<joint name="turn" type="revolute"><parent link="base"/><child link="hand"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>"""
+    + MIMIC.replace("<mimic ", '<mimic offset="9" ')
+    + "</robot>"
+)
+BALL_JOINT = """<drake:joint name="b" type="ball"><parent link="hand"/><child link="ball"/></drake:joint><link name="ball"/>"""
+ONE_MODEL = "a file is one model: name a file for each, or put them all into one <model>, in place of <world>, "
+ONE_MODEL += "without its physics, lights and gui"
+NESTED = '<sdf version="1.9"><model name="room"><model name="shelf"><link name="board"/></model></model></sdf>'
+MUJOCO = "directives: [{add_model: {name: m, file: m.xml}}]\n"
+
+
+def room(shape: str) -> dict[str, dict[str, str]]:
+    return {"files": {"room.sdf": SDF_SHAPE.format(shape)}}
+
+
+def mjcf(body: str) -> dict[str, object]:
+    return {"scene": MUJOCO, "files": {"m.xml": f"<mujoco model='m'><worldbody><body name='b'>{body}</body></worldbody></mujoco>"}}
+
+
+def mesh(text: str | bytes) -> dict[str, object]:
+    return {"shape": '<mesh filename="m.obj"/>', "files": {"m.obj": text}}
+
+
+def drafted(t: Trial, robot: Path) -> None:
+    draft(robot, [], t.directory / "scene.yaml", {})
+
+
+FILES = rows(
+    "certifier/scene/file.py",
+    ("scene_not_found", "", "{path} is a directory", "name the scene file in it, which ends in .yaml", lambda t: load_scene(t.directory)),
+    (
+        "scene_not_found",
+        "",
+        "there is no scene file {path}",
+        "`ciris scene init` drafts one for a robot's model",
+        lambda t: load_scene(t.directory / "nothing.yaml"),
+    ),
+    ("scene_not_found", "", "the scene file {path} cannot be read", "is it there, and may you read it?", "a file of another user"),
+    ("scene_yaml", "", "{name} uses the alias *{anchor}", "write out what it stands for", lambda t: t.load("a: &x [1]\nb: *x\n")),
+    ("scene_yaml", "", "{name} may be nested at most {MAX_DEPTH} levels deep", "", lambda t: t.load("[" * 60 + "]" * 60)),
+    ("scene_yaml", "", "{name}{line}: {problem}", YAML, lambda t: t.load("name: [unclosed\n" + D)),
+    ("scene_yaml", "", "{name} is not YAML: {...}", YAML, lambda t: t.load("name: \x07\n")),
+    (
+        "scene_yaml",
+        "",
+        "{name} has {...} bytes; a scene file may have at most {MAX_BYTES}",
+        "",
+        lambda t: t.load("#" * (2**20 + 1)),
+    ),
+    ("scene_yaml", "", "{name}: byte {start} is not UTF-8 text", "save the file as UTF-8", lambda t: t.load(b"\xff\xfename")),
+    ("scene_field", "name", "line {...}: {problem}", YAML, lambda t: t.load(D + "name: !thing x\n")),
+    ("scene_field", "limits", NOT_YAML, "", lambda t: t.load(D + "limits: {[a]: [0, 1]}\n")),
+    (
+        "scene_field",
+        "directives",
+        "is missing",
+        "a list of Drake Model Directives that adds the robot and its surroundings",
+        lambda t: t.load("name: x\n"),
+    ),
+    ("scene_field", "mesh.mode", "must be hull, not {...}", "", lambda t: t.load(D + "mesh: {mode: raw}\n")),
+    (
+        "scene_field",
+        "fix.grip",
+        "is given twice, again in line {...}",
+        "leave one of them out",
+        lambda t: t.load(D + "fix: {grip: 0, grip: 1}\n"),
+    ),
+    ("scene_field", "", "{name} must be a mapping of name, directives and so on", "", lambda t: t.load("- a\n")),
+    ("scene_field", "", "{name}, line {...}: a key must be text", "", lambda t: t.load(D + "? [a, b]\n: c\n")),
+    ("scene_field", "ignored", "is not a key of a scene file", "did you mean {...}?", lambda t: t.load(D + "ignored: []\n")),
+    ("scene_field", "zzz", "is not a key of a scene file", "known keys: {...}", lambda t: t.load(D + "zzz: []\n")),
+    ("scene_field", "mesh", "must be a mapping with the keys {...}", "", lambda t: t.load(D + "mesh: 3\n")),
+    ("scene_field", "ignore[0][1]", "must be printable text, not {value}", "", lambda t: t.load(D + "ignore: [[a, 3]]\n")),
+    ("scene_field", "name", "must be text, not {value}", NAMES, lambda t: t.load(D + "name: 3\n")),
+    (
+        "scene_field",
+        "ignore[0].reason",
+        "must be one line of at most {MAX_SENTENCE} printable characters, not {value}",
+        "",
+        lambda t: t.load(D + "ignore: [{pair: [a, b], reason: 3}]\n"),
+    ),
+    ("scene_field", "padding", "must be a finite number, not {value}", "", lambda t: t.load(D + "padding: .nan\n")),
+    ("scene_field", "padding", "must be at least {minimum}, not {value}", "", lambda t: t.load(D + "padding: -1\n")),
+    ("scene_field", "cylinder_sides", "must be a whole number, not {value}", "", lambda t: t.load(D + "cylinder_sides: 3.5\n")),
+    ("scene_field", "packages", "must map names of packages to directories", "", lambda t: t.load(D + "packages: [m]\n")),
+    (
+        "scene_field",
+        "packages.m",
+        "there is no directory {path}",
+        "a path that does not begin with / starts at the directory of the scene file",
+        lambda t: t.load(D + "packages: {m: nowhere}\n"),
+    ),
+    ("scene_field", "q_star", "must be a list of numbers, one per joint", "", lambda t: t.load(D + "q_star: 3\n")),
+    ("scene_field", "fix", "must map names of joints to numbers", "", lambda t: t.load(D + "fix: 3\n")),
+    (
+        "scene_field",
+        "limits.a",
+        "must be two numbers, [lower, upper], in radians or metres",
+        "",
+        lambda t: t.load(D + "limits: {a: 3}\n"),
+    ),
+    (
+        "scene_field",
+        "limits.a",
+        "must have an interior: {lower} is not less than {upper}",
+        "hold a joint by fix",
+        lambda t: t.load(D + "limits: {a: [1, 1]}\n"),
+    ),
+    ("scene_field", "ignore", "must be a list of pairs of names", "", lambda t: t.load(D + "ignore: 3\n")),
+    ("scene_field", "ignore[0]", "must be two names, [a, b] or {pair: [a, b], reason: ...}", "", lambda t: t.load(D + "ignore: [[a]]\n")),
+    (
+        "scene_field",
+        "directives",
+        "must be a list of Drake Model Directives with at least one entry",
+        "",
+        lambda t: t.load("directives: []\n"),
+    ),
+    (
+        "scene_field",
+        "directives[0]",
+        "must be a mapping with one key, the kind of directive, such as add_model",
+        "",
+        lambda t: t.load("directives: [add_model]\n"),
+    ),
+    ("scene_field", "directives", "line {...}: {value} is not a relative path", BELOW, lambda t: t.load(D.replace("a.urdf", "/a.urdf"))),
+)
+
+MODELS = [
+    *rows(
+        "certifier/scene/draft.py",
+        ("scene_model", "", "{path} is a directory", MODEL, lambda t: drafted(t, t.directory)),
+        ("scene_model", "", "there is no file {path}", MODEL, lambda t: drafted(t, t.directory / "no.urdf")),
+        (
+            "scene_package",
+            "",
+            "{name} names the package {name}, which is not above it",
+            "say where it is: --package {name}=DIRECTORY",
+            lambda t: drafted(t, t.write(a__urdf="<robot name='a'><link name='l'><mesh filename='package://no/m.obj'/></link></robot>")),
+        ),
+    ),
+    *rows(
+        "certifier/scene/drake_model.py",
+        (
+            "joint_order",
+            "",
+            "joint {name} is not number {index} in a depth-first walk of the tree",
+            "Drake numbers joints so; load the scene from its file again",
+            "a scene document that was made by hand",
+        ),
+        (
+            "unsupported_shape",
+            "",
+            "geometry {name} has a radius and {...} vertices; Drake can round at most two",
+            "",
+            "a scene document that was made by hand",
+        ),
+    ),
+    *rows(
+        "certifier/scene/formats.py",
+        (
+            "scene_model",
+            "directives",
+            "the limits of a joint are {lower} and {upper}; the lower one must not be greater",
+            MEND,
+            lambda t: t.scene(limit='<limit lower="2" upper="-1" effort="1" velocity="1"/>'),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{what} is {...} instead of {wanted}",
+            MEND,
+            lambda t: t.scene(shape='<sphere radius="1,5"/>'),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "<geometry> has more than one shape, and Drake would read one",
+            MEND,
+            lambda t: t.scene(shape='<sphere radius="0.1"/><box size="9 9 9"/>'),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "<{name}> has a second <{name}>, and Drake would read the first",
+            MEND,
+            lambda t: t.scene(shape='<box size="1 1 1"/><box size="9 9 9"/>'),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "<{name}> must be positive, and Drake would read another number",
+            MEND,
+            lambda t: t.scene(**room("<sphere><radius>0</radius></sphere>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "<{name}> has no <{missing}>, and Drake would make one up",
+            MEND,
+            lambda t: t.scene(**room("<sphere></sphere>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "<{name}> holds more than text, and Drake would read a part of it",
+            MEND,
+            lambda t: t.scene(**room("<sphere><radius>1<!-- --> 5</radius></sphere>")),
+        ),
+        ("scene_model", "directives", "<{name}> in a body is not read by Drake", MEND, lambda t: t.scene(**mjcf("<frame/>"))),
+        ("scene_model", "directives", "{key} of <{name}> is not read by Drake", MEND, lambda t: t.scene(**mjcf("<joint refpos='1'/>"))),
+        (
+            "scene_model",
+            "directives",
+            "ref of <{name}> is not read by Drake: measure the joint's positions from 0",
+            MEND,
+            lambda t: t.scene(**mjcf("<joint ref='1'/>")),
+        ),
+    ),
+    *rows(
+        "certifier/scene/hull.py",
+        (
+            "hull",
+            "mesh.max_vertices",
+            "no polytope of {max_vertices} vertices was found around a mesh of {...} points",
+            "raise it, or simplify the mesh",
+            "no mesh is known for which none is found",
+        ),
+    ),
+    *rows(
+        "certifier/scene/joints.py",
+        (
+            "scene_field",
+            "limits.{name}",
+            "{lower} to {upper} is not within the joint's own limits, {own_lower} to {own_upper}",
+            "scene files can only make limits narrower",
+            lambda t: t.scene(extra="limits: {turn: [-2, 1]}"),
+        ),
+        (
+            "no_joints",
+            "directives",
+            "no joint of the scene can move, so there is no configuration space",
+            "add a model with joints, or hold fewer of them by fix",
+            lambda t: t.scene(extra="fix: {turn: 0}"),
+        ),
+        (
+            "scene_field",
+            "q_star",
+            "has {...} numbers for {...} joints",
+            "in order: {names}",
+            lambda t: t.scene(extra="q_star: [0, 0]"),
+        ),
+        (
+            "joint_range",
+            "directives",
+            "joint {name} cannot move: its limits are {lower} and {upper}",
+            "hold it by fix: {{name}: {lower}}",
+            lambda t: t.scene(limit='<limit lower="1" upper="1" effort="1" velocity="1"/>'),
+        ),
+        (
+            "joint_range",
+            "directives",
+            "joint {name} has no finite limits",
+            "give it some by limits: {{name}: [LOWER, UPPER]}",
+            lambda t: t.scene(**mjcf("<joint name='j' type='slide'/><geom size='0.1'/>")),
+        ),
+        (
+            "joint_range",
+            "q_star",
+            "joint {name} turns from {lower} to {upper} rad, and q* = {center} is more than 170 degrees away",
+            "move q_star into the joint's limits",
+            lambda t: t.scene(extra="q_star: [9]"),
+        ),
+        (
+            "scene_field",
+            "fix.{name}",
+            "joint {full} is named twice",
+            "leave one of them out",
+            lambda t: t.scene(extra="fix: {turn: 0, arm/turn: 0}"),
+        ),
+        (
+            "unknown_name",
+            "fix.{name}",
+            "{name} {what}",
+            "write model/joint",
+            lambda t: t.scene(
+                SCENE + "  - add_model: {name: two, file: arm.urdf}\n  - add_weld: {parent: world, child: two::base}\n",
+                extra="fix: {turn: 0}",
+            ),
+        ),
+        ("unknown_name", "fix.{name}", "{name} {what}", "did you mean {...}?", lambda t: t.scene(extra="fix: {turm: 0}")),
+        ("unknown_name", "fix.{name}", "{name} {what}", "joints: {...}", lambda t: t.scene(extra="fix: {zzz: 0}")),
+        (
+            "scene_field",
+            "fix.{name}",
+            "{value} is not within the joint's limits, {lower} to {upper}",
+            "hold it within them",
+            lambda t: t.scene(extra="fix: {turn: 9}"),
+        ),
+        (
+            "unsupported_joint",
+            "directives",
+            "joints {names} are coupled (mimic), and none is held",
+            "hold one of them, as in fix: {{...}: 0}; the other follows",
+            lambda t: t.scene(more=MIMIC),
+        ),
+        (
+            "scene_field",
+            "fix",
+            "joints {names} are coupled (mimic), and cannot be held at these positions",
+            "hold one of them; the other follows",
+            lambda t: t.scene(more=MIMIC, extra="fix: {turn: 0, follow: 1}"),
+        ),
+    ),
+    *rows(
+        "certifier/scene/load.py",
+        (
+            "scene_model_crash",
+            "directives",
+            "reading the models of {name} failed: {message}",
+            "look for files that include themselves, broken shapes or meshes",
+            lambda t: load_scene(t.write(scene__yaml=D, a__urdf="<robot name='a'/>"), timeout_s=1e-6),
+        ),
+    ),
+    *rows(
+        "certifier/scene/obj.py",
+        (
+            "scene_model",
+            "directives",
+            "the line holds a zero byte; OBJ files are text",
+            MESH,
+            lambda t: t.stranger(m__obj=b"v 0\0 0 0", **OBJ),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "the line goes on behind a backslash, which readers take differently",
+            "put it on one line",
+            lambda t: t.scene(**mesh("v 0 0 \\\n0\n")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{...} is not a vertex",
+            "write v and three finite decimal numbers",
+            lambda t: t.scene(**mesh("v 0 nan 0\n")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{...} is not a face",
+            "write f and the numbers of three or more vertices",
+            lambda t: t.scene(**mesh("v 0 0 0\nf 1\n")),
+        ),
+        ("scene_model", "directives", "{...} names a vertex that does not exist", MESH, lambda t: t.scene(**mesh("v 0 0 0\nf 1 1 0\n"))),
+        (
+            "scene_model",
+            "directives",
+            "{...} is not a statement of a polygon mesh",
+            "export the mesh as polygons",
+            lambda t: t.scene(**mesh("curv 0 1\n")),
+        ),
+        ("scene_model", "directives", "the face names vertex {farthest} of {...}", MESH, lambda t: t.scene(**mesh("v 0 0 0\nf 1 1 9\n"))),
+        ("scene_model", "directives", "the file has no vertices", MESH, lambda t: t.scene(**mesh("# nothing\n"))),
+    ),
+    *rows(
+        "certifier/scene/pairs.py",
+        (
+            "unknown_name",
+            "{field}[{k}]",
+            "{name} is neither a body nor a geometry of the scene",
+            "did you mean {...}?",
+            lambda t: t.scene(extra="ignore: [[arm/hamd, room/walls]]"),
+        ),
+        (
+            "unknown_name",
+            "{field}[{k}]",
+            "{name} is neither a body nor a geometry of the scene",
+            "`ciris scene show` and `scene check` list them",
+            lambda t: t.scene(extra="ignore: [[zzzzzzz, room/walls]]"),
+        ),
+    ),
+    *rows(
+        "certifier/scene/parse.py",
+        (
+            "unsupported_shape",
+            "directives",
+            "{...}",
+            "use a primitive or a mesh",
+            lambda t: t.scene(**room("<heightmap><uri>h.png</uri></heightmap>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{models}{message}",
+            "mend the model or the directive",
+            lambda t: t.scene(shape='<sphere radius="-1"/>'),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{models}{message}",
+            ONE_MODEL,
+            lambda t: t.scene(files={"room.sdf": '<sdf version="1.9"><world name="w"/></sdf>'}),
+        ),
+        (
+            "scene_name",
+            "directives",
+            "the {what} {...} has a name that is not accepted",
+            NAMES,
+            lambda t: t.scene(more='<link name="a&#9;b"/><joint name="f" type="fixed"><parent link="hand"/><child link="a&#9;b"/></joint>'),
+        ),
+        (
+            "unsupported_joint",
+            "directives",
+            "joint {name} is a {...} joint; revolute, prismatic and fixed joints are supported",
+            "replace it by such joints, or weld its bodies",
+            lambda t: t.scene(more=BALL_JOINT),
+        ),
+        (
+            "unsupported_joint",
+            "directives",
+            "joint {name} is a {...} joint; revolute, prismatic and fixed joints are supported",
+            "write two slides and a turn, as docs/scenes.md does for a mobile base",
+            lambda t: t.scene(kind="planar"),
+        ),
+        (
+            "unsupported_joint",
+            "directives",
+            "the models close a loop by a constraint",
+            "remove it; only independent joints are supported",
+            "a model with a ball constraint",
+        ),
+        (
+            "unsupported_shape",
+            "directives",
+            "geometry {name} is a half-space on a body that moves",
+            "use a box",
+            lambda t: t.scene(**mjcf("<joint name='j' range='-60 60'/><geom size='0.1'/><geom type='plane' size='1 1 1'/>")),
+        ),
+        (
+            "unsupported_shape",
+            "directives",
+            "geometry {name} is a {__name__}, which is not supported",
+            "use a primitive or a mesh",
+            "a shape that Drake is yet to have",
+        ),
+        (
+            "scene_model",
+            "directives",
+            "scaled by {...}, a point of {...} is not finite",
+            "mend the file or the scale",
+            "a mesh whose scale overflows, and whose hull Drake finds all the same",
+        ),
+    ),
+    *rows(
+        "certifier/scene/strict.py",
+        (
+            "scene_model",
+            "directives",
+            "{...} is a directory",
+            "name a model file in it",
+            lambda t: t.load(D.replace("a.urdf", ".")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "is no file that was found",
+            "name the model's file; Drake searches where a check cannot",
+            lambda t: t.scene(files={"room.sdf": INCLUDE.format("no.sdf")}),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "would be left out by Drake",
+            "models that can be included end in {...}",
+            lambda t: t.scene(files={"room.sdf": INCLUDE.format("room.txt"), "room.txt": ""}),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{what} is collision geometry, and of that only OBJ meshes are read",
+            "convert it to OBJ; meshes that are only drawn may be of another kind",
+            lambda t: t.scene(shape='<mesh filename="m.stl"/>'),
+        ),
+        (
+            "scene_yaml",
+            "directives",
+            "{name} cannot be read as UTF-8 text",
+            "is it a YAML file?",
+            lambda t: t.load("directives: [{add_directives: {file: more.yaml}}]\n" if t.write(more__yaml=b"\xff") else ""),
+        ),
+    ),
+    *rows(
+        "certifier/scene/mimics.py",
+        (
+            "scene_model",
+            "directives",
+            "joint {joint} follows {leader}, as {factor} times its position plus {offset}; no position of {leader} has it and all other "
+            "joints that follow within their limits, for {joint} {...} to {...}",
+            "mend the limits, the multiplier or the offset in the model",
+            lambda t: drafted(t, t.write(robot__urdf=FAR)),
+        ),
+    ),
+    *rows(
+        "certifier/scene/tree.py",
+        (
+            "loop",
+            "directives",
+            "joint {name} closes a loop of joints",
+            "remove a joint of the loop; only trees are supported",
+            "a loop that Drake takes",
+        ),
+        (
+            "floating_body",
+            "directives",
+            "body {body} is not attached to anything",
+            "weld it: add_weld: {parent: world, child: {drake_name}}",
+            lambda t: t.scene(FREE),
+        ),
+        (
+            "floating_body",
+            "directives",
+            "body {body} is not attached to anything",
+            "weld a frame of it: {frame}, and add_weld: {parent: world, child: {outer}::stands}",
+            lambda t: t.scene(FREE, files={"room.sdf": NESTED}),
+        ),
+    ),
+    *rows(
+        "certifier/scene/xml.py",
+        (
+            "scene_model",
+            "directives",
+            "{name}:{CurrentLineNumber}: the file declares a document type or entity",
+            "remove it, and write out what the entities stand for",
+            lambda t: t.scene(arm="<!DOCTYPE r [<!ENTITY a 'aaa'>]><robot name='r'/>"),
+        ),
+        ("scene_model", "directives", "{name}:{lineno}: this is not XML: {...}", "mend the file there", lambda t: t.scene(arm="<robot")),
+    ),
+]
+INCLUDE = '<sdf version="1.7"><model name="room"><include><uri>{}</uri></include></model></sdf>'
+OBJ = {
+    "arm__urdf": "<robot name='arm'><link name='base'><collision><geometry><mesh filename='m.obj'/></geometry></collision></link></robot>"
+}
+
+
+def link() -> tuple[zipfile.ZipInfo, str]:
+    entry = zipfile.ZipInfo("link.obj")
+    entry.external_attr = 0o120777 << 16
+    return entry, "/etc/passwd"
+
+
+BUNDLES = [
+    *rows(
+        "certifier/scene/bundle.py",
+        (
+            "bundle_too_large",
+            "bundle",
+            "the bundle has {...} bytes; at most {bytes} are accepted",
+            SMALLER,
+            lambda t: load_bundle(bytes(9), BundleLimits(bytes=8)),
+        ),
+    ),
+    *rows(
+        "certifier/scene/references.py",
+        (
+            "bundle_file",
+            "",
+            "{name}: files of this kind are not part of a scene",
+            "known kinds: {kinds}",
+            lambda t: t.stranger(run__sh="true"),
+        ),
+        ("bundle_text", "", "{name}: byte {start} is not UTF-8 text", "save the file as UTF-8", lambda t: t.stranger(m__obj=b"\xff\xfe")),
+        ("bundle_text", "", "{name} is not JSON", MESH, lambda t: t.stranger(m__gltf="{")),
+        ("bundle_text", "", "{name} is not glTF", MESH, lambda t: t.stranger(m__gltf="[]")),
+        ("bundle_uri", "", "{reference} is not a relative path", BELOW, lambda t: t.pack(shape='<mesh filename="/m.obj"/>')),
+        (
+            "bundle_uri",
+            "",
+            "{reference} is no file of the scene",
+            "use a relative path or package://NAME/FILE",
+            lambda t: t.pack(shape='<mesh filename="https://example.org/m.obj"/>'),
+        ),
+        (
+            "bundle_uri",
+            "",
+            "{reference} names the unknown package {name}",
+            "known packages: {...}",
+            lambda t: t.pack(shape='<mesh filename="package://no/m.obj"/>', extra="packages: {here: .}\n"),
+        ),
+        (
+            "bundle_uri",
+            "",
+            "{reference} names the unknown package {name}",
+            "name its directory under packages in the scene file",
+            lambda t: t.pack(shape='<mesh filename="package://no/m.obj"/>'),
+        ),
+        (
+            "bundle_xml",
+            "",
+            "{name} may be nested at most {MAX_DEPTH} levels deep",
+            "",
+            lambda t: t.stranger(arm__urdf="<a>" * 60 + "</a>" * 60),
+        ),
+        (
+            "bundle_uri",
+            "",
+            "{name}: .. is not accepted in {...}",
+            "keep the files below the directory of the model",
+            lambda t: t.stranger(m__xml="<mujoco><compiler meshdir='..'/></mujoco>"),
+        ),
+    ),
+    *rows(
+        "certifier/scene/unpack.py",
+        (
+            "bundle_uri",
+            "",
+            "{where}: {reference}: .. is not accepted here",
+            "keep the file below the directory of the model",
+            lambda t: t.stranger(m__xml="<mujoco><mesh file='a/../m.obj'/></mujoco>"),
+        ),
+        (
+            "bundle_uri",
+            "",
+            "{what} leads out of the bundle",
+            "`ciris scene add` packs every file that is needed",
+            lambda t: t.stranger(arm__urdf="<robot><mesh filename='../m.obj'/></robot>"),
+        ),
+        (
+            "bundle_too_large",
+            "bundle",
+            "the bundle has {...} files; at most {files} are accepted",
+            SMALLER,
+            lambda t: t.unpack(*((f"{i}.obj", "") for i in range(1001))),
+        ),
+        (
+            "bundle_zip",
+            "bundle",
+            "this is no zip with a scene file that {INDEX} names, or it cannot be unpacked",
+            PACK,
+            lambda t: load_bundle(b"not a zip"),
+        ),
+        ("bundle_path", "bundle", "{filename} is not a plain file", PACK, lambda t: t.unpack(link())),
+        (
+            "bundle_too_large",
+            "bundle",
+            "the bundle unpacks to more than is accepted; {filename} goes beyond it",
+            SMALLER,
+            lambda t: load_bundle(t.pack(), BundleLimits(unpacked_bytes=100)),
+        ),
+        ("bundle_path", "bundle", "{name} is not a path inside the bundle", PACK, lambda t: t.unpack(("../evil", ""))),
+        (
+            "bundle_path",
+            "bundle",
+            "{...}... may be nested at most {_DEPTH} directories deep",
+            PACK,
+            lambda t: t.unpack(("a/" * 40 + "b", "")),
+        ),
+    ),
+]
+
+SCENES: list[Row] = [*FILES, *MODELS, *BUNDLES]
