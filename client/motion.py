@@ -12,11 +12,11 @@ from certifier.errors import CirisError, RegionError
 from certifier.proof.motion import Space
 from certifier.verify.decimals import at_least_mm, rounded_down
 from client import output
+from client.files import ProofFile, check_writable
 from client.inputs import configuration
 from client.local import load
 from client.output import print_json
 from client.paths import PathFile, path_file
-from client.proof_file import ProofFile
 
 OK, NO = 0, 1
 
@@ -29,8 +29,11 @@ def certify_path(args: Namespace) -> int:
     """
     path, field = _path(args), "--path" if args.path else "--q"
     if not args.local:
-        raise CirisError("option", "the service certifies no motions", field="--local", hint="add --local")
-    kept = None if args.out is None else ProofFile(args.out)
+        raise CirisError("option", "the command asks no service about motions", field="--local", hint="add --local")
+    kept = None
+    if args.out is not None:
+        check_writable(args.out)
+        kept = ProofFile(args.out)
     scene = load(args.scene)
     from certifier.jobs.motion import certify
     from certifier.motion.given import given
@@ -49,12 +52,15 @@ def certify_path(args: Namespace) -> int:
 def _path(args: Namespace) -> PathFile:
     """Returns the waypoints of the arguments."""
     if bool(args.q) == bool(args.path):
-        raise CirisError("option", "give the waypoints either with --q, once for each, or as a file with --path", field="--path")
+        hint = "give them with --q, once for each, or as a file with --path"
+        raise CirisError("option", "a motion needs its waypoints, from one place", field="--path", hint=hint)
     if args.path:
         return path_file(args.path)
     waypoints = [configuration(text, f"--q {i}") for i, text in enumerate(args.q)]
     if len({len(waypoint) for waypoint in waypoints}) > 1:
-        raise RegionError("motion_shape", "the waypoints have different numbers of joints", field="--q")
+        raise RegionError(
+            "motion_shape", "the waypoints have different numbers of joints", field="--q", hint="give one number for each joint"
+        )
     return PathFile(Space.Q, np.array(waypoints), None)
 
 

@@ -18,7 +18,7 @@ from certifier.proof.motion import Space
 
 FIELD = "--path"
 KINDS = (".npz", ".json", ".yaml", ".yml", ".csv")
-_HINT = "np.savez(FILE, q=q) writes one: q is K x n, one row for each waypoint"
+_HINT = "give q or s, one row of numbers for each waypoint, and perhaps t"
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def path_file(path: str) -> PathFile:
     try:
         content = {".npz": _arrays, ".csv": _table}.get(suffix, _document)(path)
     except FileNotFoundError:
-        raise RegionError("path_file", f"there is no file {path}", field=FIELD) from None
+        raise RegionError("path_file", f"there is no file {path}", field=FIELD, hint=_HINT) from None
     except CirisError:
         raise
     except (OSError, ValueError, TypeError, BadZipFile, EOFError, yaml.YAMLError, RecursionError):
@@ -59,12 +59,11 @@ def path_file(path: str) -> PathFile:
         raise RegionError("path_file", f"{path} is no {kind} file of numbers", field=FIELD, hint=_HINT) from None
     spaces = [space for space in Space if space.value in content]
     if len(spaces) != 1:
-        what = "both q and s" if spaces else "neither q nor s"
-        raise RegionError("path_file", f"{path} has {what}", field=FIELD, hint="give the waypoints in one of them")
+        raise RegionError("path_file", f"{path} must have either q or s", field=FIELD, hint=_HINT)
     waypoints, times = content[spaces[0].value], content.get("t")
     if times is not None and not (times.shape == waypoints.shape[:1] and (np.diff(times) > 0).all()):
-        problem = f"t of {path} has to be {len(waypoints)} ascending numbers, one for each waypoint"
-        raise RegionError("path_file", problem, field=FIELD)
+        problem = f"t of {path} must be ascending numbers, one for each waypoint"
+        raise RegionError("path_file", problem, field=FIELD, hint="t may be left out")
     return PathFile(spaces[0], waypoints, times)
 
 
@@ -87,11 +86,13 @@ def _table(path: str) -> dict[str, Array]:
     if not rows:
         raise ValueError("no rows")
     names = [] if _is_number(rows[0][0]) else [name.strip() for name in rows.pop(0)]
+    columns = len(names or rows[0])
     for i, row in enumerate(rows):
-        wrong = next((j for j, text in enumerate(row) if not _is_number(text)), None)
-        if wrong is not None or len(row) != len(names or rows[0]):
-            what = f"{row[wrong]!r} is no number" if wrong is not None else f"{len(row)} numbers, where {len(names or rows[0])} belong"
-            raise RegionError("path_file", f"{path}, waypoint {i}: {what}", field=FIELD)
+        wrong = next((text for text in row if not _is_number(text)), None)
+        if wrong is not None:
+            raise RegionError("path_file", f"{path}, waypoint {i}: {wrong!r} is no number", field=FIELD, hint=_HINT)
+        if len(row) != columns:
+            raise RegionError("path_file", f"{path}, waypoint {i}: it must have {columns} numbers, as the first row", field=FIELD)
     numbers = np.array([[float(text) for text in row] for row in rows])
     timed = np.array([name == "t" for name in names], dtype=bool) if names else np.zeros(numbers.shape[1:], dtype=bool)
     in_s = bool(names) and all(name.startswith("s") for name in names if name != "t")

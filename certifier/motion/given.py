@@ -41,11 +41,12 @@ def _numbers(scene: Scene, waypoints: Any, field: str) -> Array:
     except (TypeError, ValueError):
         points = None
     if points is None or points.ndim != 2 or points.shape[1] != scene.n or len(points) < 2:
-        hint = f"give two or more waypoints with {scene.n} numbers each, one for every joint in the scene's order"
+        hint = f"give two or more, with {scene.n} numbers each, in the scene's order of joints"
         shape = "no lists of numbers of one length" if points is None else f"of shape {points.shape}"
         raise RegionError("motion_shape", f"the waypoints are {shape}", field=field, hint=hint)
     if not scene.pairs:
-        raise RegionError("motion_shape", "the scene has no pair of bodies to keep apart", field="scene")
+        hint = "add what moves against something else"
+        raise RegionError("motion_shape", "the scene has no pair of bodies to keep apart", field="scene", hint=hint)
     if len(points) * len(scene.pairs) > limits.INTERVALS:
         most = limits.INTERVALS // len(scene.pairs)
         problem = f"there are {len(points)} waypoints, and a proof about this scene holds at most {most}"
@@ -62,5 +63,6 @@ def _check_limits(scene: Scene, points: Array, bounds: tuple[Array, Array], fiel
     outside = np.argwhere((points < lower) | (points > upper))
     if len(outside):
         i, j = outside[0]
-        problem = f"waypoint {i} has joint {scene.moving[j].name} at {points[i, j]:.6g}, not within [{lower[j]:.6g}, {upper[j]:.6g}]"
-        raise RegionError("outside_limits", problem, field=f"{field}[{i}][{j}]", hint="waypoints and joints are counted from 0")
+        name = scene.moving[j].name
+        problem = f"joint {name} is at {points[i, j]:.6g} in waypoint {i}, not between {lower[j]:.6g} and {upper[j]:.6g}"
+        raise RegionError("outside_limits", problem, field=f"{field}[{i}][{j}]", hint="move it between them; waypoints count from 0")

@@ -44,6 +44,14 @@ PROOFS: list[Row] = [
         ("proof_too_large", "the header has {file_size} bytes, more than {HEADER_BYTES}"),
     ),
     *proofs(
+        "certifier/proof/motion.py",
+        ("document", "{...} is no space of a motion"),
+        ("proof_malformed", "the waypoints are {shape}, where (2 or more, {n}) belong"),
+        ("proof_malformed", "frames are {shape} and counts {shape}, for {pairs} pairs on {pieces} pieces"),
+        ("proof_motion", "a pair has no interval on a piece of the motion"),
+        ("proof_malformed", "ends are {shape} and normals {shape}, for {total} intervals"),
+    ),
+    *proofs(
         "certifier/proof/negative.py",
         ("document", "it is {shape}, not (K, 3)"),
     ),
@@ -151,6 +159,27 @@ PROOFS: list[Row] = [
         ("proof_too_large", "more than {MAX_CHAIN} joints between {frame} and {body}"),
         ("proof_malformed", "the Gram factors of {...} do not fit"),
         ("proof_malformed", "a Gram factor is out of range"),
+    ),
+    *proofs(
+        "certifier/verify/angles.py",
+        ("proof_too_large", "an angle of the proof is larger than {LARGEST}"),
+    ),
+    *proofs(
+        "certifier/verify/chains.py",
+        ("proof_too_large", "the positions of the motion are too large for doubles to tell where the bodies are"),
+    ),
+    *proofs(
+        "certifier/verify/motion.py",
+        ("proof_motion", "the scene has no pair to keep apart"),
+        ("proof_motion", "a waypoint has a number larger than {MAGNITUDE}"),
+        ("proof_motion", "a waypoint is not within the joint limits"),
+        ("proof_motion", "the tube has no width"),
+        ("proof_too_large", "the proof has {total} intervals; at most {INTERVALS} are checked"),
+        ("proof_motion", "a plane is in the frame of a body that is not there"),
+        ("proof_motion", "the intervals do not cover the time of a piece from 0 to 1, one after the other"),
+        ("proof_motion", "a plane's normal is no unit vector"),
+        ("proof_too_large", "the intervals have more vertices, behind more joints, than are checked"),
+        ("proof_motion", "piece {...}, time {...} to {...}: the plane does not keep {a} and {b} apart"),
     ),
     *proofs(
         "certifier/verify/scene.py",

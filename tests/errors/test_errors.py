@@ -10,6 +10,7 @@ import pytest
 from certifier.errors import CirisError
 from client.verify import REFUSED
 from tests.errors.commands import COMMANDS
+from tests.errors.motions import MOTIONS
 from tests.errors.proofs import PROOFS
 from tests.errors.regions import REGIONS
 from tests.errors.rows import Row, Trial, pattern
@@ -17,7 +18,7 @@ from tests.errors.scenes import SCENES
 from tests.errors.service import SERVICE
 from tests.errors.sites import Site, sites
 
-TABLE = [*SCENES, *REGIONS, *SERVICE, *COMMANDS, *PROOFS]
+TABLE = [*SCENES, *REGIONS, *MOTIONS, *SERVICE, *COMMANDS, *PROOFS]
 
 DEMANDS = re.compile(r"\bmust\b|\bat most\b|\bonly\b")
 """Words of a message that says by itself what has to be."""
