@@ -1,12 +1,16 @@
-"""This module measures how motions are certified, beside dense sampling of the same motions by the collision checker."""
+"""This module measures how motions are certified, beside dense sampling of the same motions by the collision checker.
+
+Seconds are processor time of this process.
+"""
 
 from __future__ import annotations
 
 import itertools
 import statistics
 import time
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -18,7 +22,10 @@ from certifier.model import WORLD, Array, Geometry, Pair, Scene
 from certifier.motion.given import given
 from certifier.outcome import Outcome
 from certifier.pair.collisions import in_collision
-from certifier.proof.motion import Motion, Space
+from certifier.proof.motion import Motion, MotionProof, Space
+from certifier.verify.motion import verify_motion
+
+T = TypeVar("T")
 
 TWO_IIWAS = "two_iiwas"
 SCENES = (*catalogue.EXAMPLES, TWO_IIWAS)
@@ -90,16 +97,20 @@ def path(names: list[str], count: int, progress: Progress) -> dict[str, Any]:
 def _row(name: str, count: int, progress: Progress) -> dict[str, Any]:
     found = scene(name)
     rng = np.random.default_rng(0)
-    verdicts, sampled = [], []
+    verdicts, taken, sampled = [], [], []
     certify(found, _motion(found, rng.uniform(found.q_lower, found.q_upper, (2, found.n))))  # compiles
     for length in LENGTHS:
         for _ in range(count):
             start, end = _free(found, rng), _free(found, rng)
             motion = _motion(found, np.array([start, start + length * (end - start)]))
-            verdicts.append(certify(found, motion))
-            sampled.append(_sampled(found, motion))
-            progress(f"{name}: {verdicts[-1].outcome.value}, {verdicts[-1].seconds:.3f} s; sampling {sampled[-1]['seconds']:.3f} s")
+            verdict, seconds = _timed(certify, found, motion)
+            contact, sampling = _timed(_samples_touch, found, motion)
+            verdicts.append(verdict)
+            taken.append(seconds)
+            sampled.append((contact, sampling))
+            progress(f"{name}: {verdict.outcome.value}, {seconds:.3f} s; sampling {sampling:.3f} s")
     certified = [verdict for verdict in verdicts if verdict.stop is None]
+    proofs = [verdict.proof for verdict in verdicts if verdict.proof is not None]
     touching = [verdict for verdict in verdicts if verdict.outcome is Outcome.REFUTED]
     told = [result for verdict in touching if (result := _told_apart(found, verdict)) is not None]
     return {
@@ -109,14 +120,14 @@ def _row(name: str, count: int, progress: Progress) -> dict[str, Any]:
         "motions": len(verdicts),
         "certified": len(certified),
         "contacts": len(touching),
-        "sampling_finds": sum(sample["contact"] for sample in sampled),
-        "certified_but_sampled_in_contact": sum(v.stop is None and s["contact"] for v, s in zip(verdicts, sampled, strict=True)),
-        "contacts_between_samples": sum(v.outcome is Outcome.REFUTED and not s["contact"] for v, s in zip(verdicts, sampled, strict=True)),
-        "seconds": _spread([verdict.seconds for verdict in verdicts]),
-        "verify_seconds": _spread([verdict.verify_seconds for verdict in verdicts]),
-        "tube_seconds": _spread([certify(found, verdict.motion, tube=True).seconds for verdict in certified]),
+        "sampling_finds": sum(contact for contact, _ in sampled),
+        "certified_but_sampled_in_contact": sum(v.stop is None and c for v, (c, _) in zip(verdicts, sampled, strict=True)),
+        "contacts_between_samples": sum(v.outcome is Outcome.REFUTED and not c for v, (c, _) in zip(verdicts, sampled, strict=True)),
+        "seconds": _spread(taken),
+        "verify_seconds": _spread([_timed(_verify, found, proof)[1] for proof in proofs]),
+        "tube_seconds": _spread([_timed(certify, found, verdict.motion, True)[1] for verdict in certified]),
         "intervals": _spread([float(verdict.intervals) for verdict in certified]),
-        "sampling_seconds": _spread([sample["seconds"] for sample in sampled]),
+        "sampling_seconds": _spread([seconds for _, seconds in sampled]),
         "told_apart": sum(told),
         "millimetres": len(told),
     }
@@ -134,12 +145,20 @@ def _free(found: Scene, rng: np.random.Generator) -> Array:
             return q
 
 
-def _sampled(found: Scene, motion: Motion) -> dict[str, Any]:
-    """Returns whether a sample of the motion is in contact, and how long all samples took."""
-    start = time.perf_counter()
+def _timed(function: Callable[..., T], *arguments: Any) -> tuple[T, float]:
+    """Returns what a function returns, and the seconds that it takes."""
+    start = time.process_time()
+    return function(*arguments), time.process_time() - start
+
+
+def _verify(found: Scene, proof: bytes) -> None:
+    verify_motion(MotionProof.from_bytes(proof, found))
+
+
+def _samples_touch(found: Scene, motion: Motion) -> bool:
+    """Returns whether a sample of a motion of one piece is in contact."""
     times = np.linspace(0, 1, SAMPLES)[:, None]
-    contact = in_collision(found, found.to_s((1 - times) * motion.waypoints[0] + times * motion.waypoints[1])).any()
-    return {"contact": bool(contact), "seconds": time.perf_counter() - start}
+    return bool(in_collision(found, found.to_s((1 - times) * motion.waypoints[0] + times * motion.waypoints[1])).any())
 
 
 def _told_apart(found: Scene, verdict: MotionVerdict) -> bool | None:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import base64
 import time
 from dataclasses import dataclass
 from typing import Any
 
-from certifier.model import Scene
+import numpy as np
+
+from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
+from certifier.motion.given import given
 from certifier.motion.search import Stop, search
 from certifier.outcome import Guarantee, Outcome
 from certifier.proof.container import with_scene
-from certifier.proof.motion import Motion, MotionProof
+from certifier.proof.motion import Motion, MotionProof, Space
 from certifier.verify.motion import MotionStatement, verify_motion
 
 
@@ -62,7 +66,7 @@ class MotionVerdict:
     def _place(self, piece: int, time: float) -> dict[str, Any]:
         """Returns a place on the motion, with the joint positions there."""
         point = self.motion.at(piece, time)
-        q = self.scene.to_q(point) if self.motion.space == "s" else point
+        q = self.scene.to_q(point) if self.motion.space is Space.S else point
         return {"piece": piece, "time": time, "q": q.tolist()}
 
 
@@ -86,3 +90,31 @@ def certify(scene: Scene, motion: Motion, tube: bool = False) -> MotionVerdict:
     verified = time.perf_counter()
     proof, intervals = with_scene(data, scene), len(found.proof.ends)
     return MotionVerdict(scene, motion, statement, proof, found.stop, intervals, verified - start, verified - searched)
+
+
+def certify_in_child(payload: dict[str, Any]) -> dict[str, Any]:
+    """Returns the document of a verdict, with the ``proof`` in base 64 or None. A child process runs this function.
+
+    Args:
+        payload: the ``scene``'s document; the waypoints, as ``q`` or as ``s``; ``space`` or None; ``tube``; and ``prove``, whether to give
+            the proof.
+
+    Raises:
+        RegionError: as certifier.motion.given; the field names the place in the payload.
+    """
+    scene = Scene.from_document(payload["scene"])
+    coordinates = Space.S if payload["q"] is None else Space.Q
+    space = Space(payload["space"]) if payload["space"] else None
+    motion = given(scene, payload[coordinates.value], coordinates, space, coordinates.value)
+    verdict = certify(scene, motion, payload["tube"])
+    proof = base64.b64encode(verdict.proof).decode() if verdict.proof and payload["prove"] else None
+    return {**verdict.document(), "proof": proof}
+
+
+def warm_up() -> None:
+    """Loads the compiled functions that a motion needs, by certifying one of a ball that swings about a post."""
+    joint = Joint("arm/turn", JointKind.REVOLUTE, WORLD, "arm/link", np.array([0.0, 0.0, 1.0]), np.eye(4), np.eye(4), 0, -1.0, 1.0)
+    balls = [Geometry(f"{body}/ball", body, np.array([[x, 0.0, 0.0]]), 0.1, {}) for body, x in (("arm/link", 1.0), (WORLD, 0.0))]
+    pair = Pair(balls[0].name, balls[1].name)
+    scene = Scene("swing", (joint,), (WORLD, "arm/link"), tuple(balls), (pair,), (), np.zeros(1))
+    certify(scene, Motion(Space.Q, np.array([[0.0], [0.5]])), tube=True)

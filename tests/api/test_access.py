@@ -77,6 +77,7 @@ SCOPES = [
     ("GET", "/metrics", Scope.READ),
     ("GET", "/", Scope.READ),
     ("POST", "/v1/planning/contains", Scope.READ),
+    ("POST", "/v1/planning/certify-path", Scope.SUBMIT),
     ("POST", "/v1/scenes", Scope.SUBMIT),
     ("POST", "/v1/jobs", Scope.SUBMIT),
     ("POST", "/v1/jobs/x/cancel", Scope.SUBMIT),

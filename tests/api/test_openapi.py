@@ -41,6 +41,7 @@ OPERATIONS = {
     "export_region": "GET /v1/regions/{region_id}/export",
     "delete_region": "DELETE /v1/regions/{region_id}",
     "contains": "POST /v1/planning/contains",
+    "certify_path": "POST /v1/planning/certify-path",
     "get_health": "GET /healthz",
     "get_readiness": "GET /readyz",
     "get_metrics": "GET /metrics",
@@ -93,6 +94,7 @@ def test_the_examples_work_on_the_scenes_that_they_name(client: TestClient, data
         ("GrowRequest", "/v1/jobs", 201),
         ("CertifyRequest", "/v1/jobs", 201),
         ("ContainsRequest", "/v1/planning/contains", 200),
+        ("MotionRequest", "/v1/planning/certify-path", 200),
     ):
         for example in schemas[name]["examples"]:
             answer = client.post(path, json=example)

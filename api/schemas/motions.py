@@ -1,0 +1,77 @@
+"""This module holds the bodies of requests about motions and of the answers."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from api.schemas.common import Request, SceneName, Vector
+from certifier.outcome import Guarantee, Outcome
+from certifier.proof.motion import Space
+
+Waypoints = Annotated[list[Vector], Field(min_length=2, max_length=2000)]
+
+
+class MotionRequest(Request):
+    """Asks for a proof of a motion. The request gives the waypoints either as joint positions `q` or as coordinates `s`."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"scene": "iiwa-shelf", "q": [[0, 0.3, 0, -1.8, 0, 0.9, 0], [0.4, 0.5, 0, -1.5, 0, 0.9, 0]], "tube": True}]
+        }
+    )
+
+    scene: SceneName
+    q: Waypoints | None = Field(None, description="(k, n), joint positions in radians or metres, one row for each waypoint.")
+    s: Waypoints | None = Field(None, description="(k, n), tangent-space coordinates s, one row for each waypoint.")
+    space: Space | None = Field(None, description="In which coordinates the motion is straight; without it, in those given.")
+    tube: bool = Field(False, description="Whether to look for the largest certified tube about the motion.")
+    prove: bool = Field(False, description="Whether to answer with the proof file as well.")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        if (self.q is None) == (self.s is None):
+            raise ValueError("give either q or s")
+        return self
+
+
+class SceneReference(BaseModel):
+    """Names a scene, and its content by its hash."""
+
+    name: str
+    hash: str
+
+
+class Place(BaseModel):
+    """Names a place on a motion."""
+
+    piece: int = Field(description="The piece from waypoint `piece` to the next one; they count from 0.")
+    time: float = Field(description="Which part of the piece is behind, from 0 to 1.")
+    q: list[float] = Field(description="Joint positions there, in radians or metres.")
+
+
+class Contact(Place):
+    """Says where a motion first could not be certified, and for which pair of bodies."""
+
+    a: str
+    b: str
+    distance: float = Field(description="How far the padded bodies are apart there, in metres; 0 where they overlap.")
+
+
+class MotionResponse(BaseModel):
+    """Says what has become of a motion. The proof has passed the verifier."""
+
+    scene: SceneReference
+    space: Space
+    waypoints: int
+    outcome: Outcome
+    guarantee: Guarantee
+    certified_to: Place | None = Field(description="Up to where every pair is proved to be apart; null where nothing is proved.")
+    margin: float | None = Field(description="A lower bound of all padded distances up to there, and in the tube, in metres.")
+    tube: float | None = Field(description="Joint positions that are off by this much, in radians or metres, are proved as well.")
+    stop: Contact | None = Field(description="The first contact, or where bodies come too close; null for a motion that is certified.")
+    intervals: int = Field(description="How many planes the proof has.")
+    seconds: float
+    verify_seconds: float
+    proof: str | None = Field(description="The proof file in base 64, of the motion or of its beginning; null where it was not asked for.")

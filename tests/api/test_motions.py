@@ -1,0 +1,66 @@
+"""Motions over HTTP: certified by a child process, with a proof that holds, or with the first contact."""
+
+from __future__ import annotations
+
+import base64
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.schemas.motions import MotionResponse
+from certifier.jobs.motion import certify
+from certifier.model import Scene
+from certifier.motion.given import given
+from certifier.proof.motion import Space
+from certifier.verify.file import verify_file
+from db import scenes
+from db.session import Database
+from tests.certifier.motions import swing
+
+ROUTE = "/v1/planning/certify-path"
+
+
+def test_a_motion_is_certified_with_its_proof(client: TestClient, scene: Scene) -> None:
+    found = client.post(ROUTE, json={"scene": "slider", "q": [[0.1], [-0.3], [0.0]], "tube": True, "prove": True}).json()
+    assert (found["outcome"], found["guarantee"], found["waypoints"], found["stop"]) == ("certified", "exact", 3, None)
+    assert found["scene"] == {"name": "slider", "hash": scene.hash}
+    assert found["tube"] > 0
+    statement = verify_file(base64.b64decode(found["proof"]))
+    assert (statement.kind, statement.scene.hash) == ("motion", scene.hash)
+
+
+def test_the_answer_is_that_of_a_plain_call(client: TestClient, database: Database) -> None:
+    """About a motion that touches, straight in q between waypoints in s."""
+    scene, waypoints = swing(-0.01), [[-0.5], [0.6]]
+    with database.write() as session:
+        scenes.add(session, scene)
+    found = client.post(ROUTE, json={"scene": scene.name, "s": waypoints, "space": "q"}).json()
+    expected = certify(scene, given(scene, waypoints, Space.S, Space.Q)).document() | {"proof": None}
+    assert set(MotionResponse.model_fields) == set(expected)
+    for name in set(expected) - {"seconds", "verify_seconds"}:
+        assert found[name] == expected[name], name
+    assert (found["outcome"], found["space"], found["proof"]) == ("refuted", "q", None)
+
+
+@pytest.mark.parametrize(
+    ("body", "code", "field"),
+    [
+        ({"q": [[0.1], [0.1, 0.2]]}, "motion_shape", "q"),
+        ({"q": [[0.1], [99]]}, "outside_limits", "q[1][0]"),
+        ({"q": [[0.1]]}, "invalid_request", "q"),
+        ({"q": [[0.1], [0.2]], "s": [[0.1], [0.2]]}, "invalid_request", "body"),
+        ({}, "invalid_request", "body"),
+        ({"q": [[0.1], [0.2]], "space": "x"}, "invalid_request", "space"),
+        ({"q": [[0.1], [0.2]], "speed": 1}, "invalid_request", "speed"),
+    ],
+)
+def test_what_is_no_motion_is_refused_with_its_place(
+    client: TestClient, scene: Scene, body: dict[str, object], code: str, field: str
+) -> None:
+    answer = client.post(ROUTE, json={"scene": "slider"} | body)
+    assert (answer.status_code, answer.json()["code"], answer.json()["field"]) == (422, code, field)
+
+
+def test_an_unknown_scene_is_named(client: TestClient, scene: Scene) -> None:
+    answer = client.post(ROUTE, json={"scene": "glider", "q": [[0.1], [0.2]]})
+    assert (answer.status_code, answer.json()["code"]) == (404, "scene_not_found")
