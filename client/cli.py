@@ -242,7 +242,7 @@ def _parser() -> argparse.ArgumentParser:
     certify.add_argument("--solver", metavar="NAME", help="solver that Drake uses: clarabel (default), scs, csdp or mosek")
     certify.set_defaults(run="client.commands:certify")
 
-    motion = verbs.add_parser("certify-path", parents=[json], help="certify a motion, straight from waypoint to waypoint")
+    motion = verbs.add_parser("certify-path", parents=[remote, json], help="certify a motion, straight from waypoint to waypoint")
     motion.add_argument("scene", metavar="SCENE")
     motion.add_argument("--q", metavar='"0,0.3,..."', action="append", help="a waypoint: joint positions; give it two times or more")
     motion.add_argument("--path", metavar="FILE", help="the waypoints: npz, JSON, YAML or CSV with q or s (K x n), perhaps times t (K)")

@@ -186,6 +186,10 @@ class Client:
         """Returns which regions of a scene contain each of these configurations."""
         return self._json("POST", "/v1/planning/contains", json={"scene": scene, "q": q})
 
+    def certify_path(self, request: Document) -> Document:
+        """Returns what becomes of a motion, and the proof in base 64 if the request asks for it."""
+        return self._json("POST", "/v1/planning/certify-path", json=request)
+
     def _all(self, name: str, **filters: str | None) -> list[Document]:
         """Returns the entries of all pages of a list."""
         params = {key: value for key, value in filters.items() if value is not None}

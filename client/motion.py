@@ -1,8 +1,10 @@
-"""``ciris certify-path`` certifies a motion in this process and prints what has become of it."""
+"""``ciris certify-path`` certifies a motion, in this process or by the service, and prints what has become of it."""
 
 from __future__ import annotations
 
+import base64
 import math
+import re
 from argparse import Namespace
 from typing import Any
 
@@ -11,7 +13,7 @@ import numpy as np
 from certifier.errors import CirisError, RegionError
 from certifier.proof.motion import Space
 from certifier.verify.decimals import at_least_mm, rounded_down
-from client import output
+from client import output, service
 from client.files import ProofFile, check_writable
 from client.inputs import configuration
 from client.local import load
@@ -22,31 +24,48 @@ OK, NO = 0, 1
 
 
 def certify_path(args: Namespace) -> int:
-    """Certifies the motion that the arguments give, and returns the command's exit status.
+    """Certifies the motion that the arguments give, in this process or by the service, and returns the command's exit status.
 
     Raises:
-        CirisError: the motion, its file or the scene cannot be used.
+        CirisError: the motion, its file or the scene cannot be used, or there is no service.
     """
     path, field = _path(args), "--path" if args.path else "--q"
-    if not args.local:
-        raise CirisError("option", "the command asks no service about motions", field="--local", hint="add --local")
     kept = None
     if args.out is not None:
         check_writable(args.out)
         kept = ProofFile(args.out)
+    document, proof = (_here if args.local else _by_service)(args, path, field)
+    written = None if kept is None or proof is None else str(kept.write(document["scene"]["name"], proof))
+    document = _timed({**document, "proof": written}, path)
+    if args.json:
+        print_json(document)
+    else:
+        _print(document)
+    return OK if document["outcome"] == "certified" else NO
+
+
+def _here(args: Namespace, path: PathFile, field: str) -> tuple[dict[str, Any], bytes | None]:
+    """Returns the document of the verdict of this process, and the proof where there is one."""
     scene = load(args.scene)
     from certifier.jobs.motion import certify
     from certifier.motion.given import given
 
     motion = given(scene, path.waypoints, path.coordinates, Space(args.space) if args.space else None, field)
     verdict = certify(scene, motion, args.tube)
-    written = None if kept is None or verdict.proof is None else str(kept.write(scene.name, verdict.proof))
-    document = _timed({**verdict.document(), "proof": written}, path)
-    if args.json:
-        print_json(document)
-    else:
-        _print(document, verdict.proof is not None and not written)
-    return OK if document["outcome"] == "certified" else NO
+    return verdict.document(), verdict.proof
+
+
+def _by_service(args: Namespace, path: PathFile, field: str) -> tuple[dict[str, Any], bytes | None]:
+    """Returns the document of the service's verdict, and the proof where it was asked for and there is one."""
+    with service.connect(args.url) as client:
+        scene = service.known_scene(client, args.scene)["id"]
+        asked = {"space": args.space, "tube": args.tube, "prove": args.out is not None}
+        try:
+            document = client.certify_path({"scene": scene, path.coordinates.value: path.waypoints.tolist(), **asked})
+        except CirisError as error:
+            error.field = re.sub(r"^[qs](?=\[|$)", field, error.field) if error.field else None
+            raise
+    return document, None if document["proof"] is None else base64.b64decode(document["proof"])
 
 
 def _path(args: Namespace) -> PathFile:
@@ -73,7 +92,7 @@ def _timed(document: dict[str, Any], path: PathFile) -> dict[str, Any]:
     return {**document, **places}
 
 
-def _print(document: dict[str, Any], unwritten: bool) -> None:
+def _print(document: dict[str, Any]) -> None:
     stop, certified, tube = document["stop"], document["certified_to"], document["tube"]
     if stop:
         how = "touch" if document["outcome"] == "refuted" else f"are {at_least_mm(stop['distance'])} apart, too close to go on,"
@@ -91,7 +110,7 @@ def _print(document: dict[str, Any], unwritten: bool) -> None:
     facts.append(("time", f"{output.seconds(document['seconds'])}, {document['intervals']} intervals"))
     if document["proof"]:
         facts.append(("proof", f"{document['proof']} (check it: ciris verify {document['proof']})"))
-    elif unwritten:
+    elif certified:
         facts.append(("proof", "verified and not kept; --out FILE keeps it"))
     output.print_facts(facts)
 

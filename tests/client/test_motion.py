@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from certifier.errors import RegionError
+from certifier.model import Scene
 from certifier.proof.motion import Space
 from client.paths import path_file
 from tests.client.conftest import PLANAR, Ciris
@@ -39,6 +40,16 @@ def test_a_contact_is_a_negative_answer_with_the_time_of_the_file(ciris: Ciris, 
     assert "all pairs are certified up to" in done.stdout
 
 
+def test_the_service_answers_as_well(ciris: Ciris, url: str, scene: Scene, tmp_path: Path) -> None:
+    proof = tmp_path / "motion.proof"
+    done = ciris("certify-path", "slider", "--q", "0.1", "--q", "-0.3", "--url", url, "--out", proof)
+    assert (done.status, done.stderr) == (0, "")
+    assert "certified, guarantee exact" in done.stdout
+    assert ciris("verify", proof).status == 0
+    refused = ciris("certify-path", "slider", "--q", "0.1", "--q", "99", "--url", url)
+    assert refused.error.startswith("--q[1][0]: joint ")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -47,7 +58,7 @@ def test_a_contact_is_a_negative_answer_with_the_time_of_the_file(ciris: Ciris, 
         (["--q", "0,0", "--q", "0", "--local"], "different numbers of joints"),
         (["--q", "0,0", "--q", "0,x", "--local"], "--q 1[1]: 'x' is not a finite number"),
         (["--q", "0,0", "--q", "0,99", "--local"], "--q[1][1]: joint "),
-        (["--q", "0,0", "--q", "0,0.1"], "add --local"),
+        (["--q", "0,0", "--q", "0,0.1"], "ciris up"),
         (["--path", "nothing.npz", "--local"], "there is no file nothing.npz"),
     ],
 )

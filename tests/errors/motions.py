@@ -61,13 +61,6 @@ MOTIONS: list[Row] = [
         "client/motion.py",
         (
             "option",
-            "--local",
-            "the command asks no service about motions",
-            "add --local",
-            lambda t: planned(t, "--q", "0,0", "--q", "0,0.1"),
-        ),
-        (
-            "option",
             "--path",
             "a motion needs its waypoints, from one place",
             "give them with --q, once for each, or as a file with --path",
