@@ -22,7 +22,7 @@ from tests.certifier import proofs
 Draw = Callable[[st.SearchStrategy], Any]
 Members = list[tuple[str, bytes]]
 
-KINDS = ("region", "pair", "dual", "witness")
+KINDS = ("region", "pair", "motion", "dual", "witness")
 DEEP, RAW = "@deep@", "@raw@"
 WORDS = [
     "",

@@ -29,14 +29,17 @@ from certifier.outcome import Outcome
 from certifier.pair.certification import Certification
 from certifier.proof.container import unpack
 from certifier.proof.ground import Ground
+from certifier.proof.motion import MotionProof
 from certifier.proof.negative import DualProof, WitnessProof
 from certifier.proof.pair import PairProof
 from certifier.proof.region import RegionProof
 from certifier.scene.bundle import load_bundle, pack_bundle
+from certifier.verify.motion import verify_motion
 from certifier.verify.pair import verify_pair
 from certifier.verify.region import verify_region
 from certifier.verify.scene import check_scene
 from certifier.verify.witness import TOLERANCE
+from tests.certifier.motions import positions
 from tests.certifier.truth import distances, distances_at
 from tests.certifier.verify.hostile import FAMILIES, HOSTILE, KINDS, bytes_changed, members, mutants, text_of, valid, zip_changed, zipped
 
@@ -155,10 +158,22 @@ def witness_is_true(data: bytes, scene: Scene) -> None:
     assert np.linalg.norm(p - q) <= sum(body.radius + scene.padding for body in bodies) + TOLERANCE + 1e-9
 
 
+def motion_is_true(data: bytes, scene: Scene) -> None:
+    """At 40 times of each piece, up to the end, and at as many corners of the tube."""
+    proof = MotionProof.from_bytes(data, scene)
+    statement, motion, rng = verify_motion(proof), proof.motion, np.random.default_rng(0)
+    for piece in range(motion.pieces):
+        times = np.linspace(0, proof.end if piece == motion.pieces - 1 else 1, 40)
+        q = positions(scene, motion, piece, times)
+        for near in (q, q + proof.rho * rng.choice([-1.0, 1.0], q.shape)):
+            assert all(statement.gap <= least + 1e-9 for least in distances_at(scene, scene.to_s(near)).values())
+
+
 JUSTIFIED: dict[str, Callable[[bytes, Scene], None]] = {
     "region": region_is_true,
     "pair": pair_is_true,
     "dual": dual_is_true,
+    "motion": motion_is_true,
     "witness": witness_is_true,
 }
 

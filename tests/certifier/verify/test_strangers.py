@@ -28,7 +28,7 @@ from tests.certifier.proofs import files, region
 from tests.certifier.scenes import planar_arm
 from tests.certifier.verify.hostile import fitting, members, saved, text_of, zipped
 
-KINDS = ("region", "pair", "dual", "witness")
+KINDS = ("region", "pair", "motion", "dual", "witness")
 
 
 @cache
@@ -102,6 +102,7 @@ PRINTED: list[tuple[str, tuple]] = [
     ("region", ("proofs", 0, "frame")),
     ("region", ("volumes", 0, "geometries", 0)),
     ("region", ("scene", "joints", 0, "kind")),
+    ("motion", ("space",)),
     ("witness", ("pair", 0)),
     ("witness", ("scene", "geometries", 0, "body")),
 ]

@@ -20,8 +20,10 @@ from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene, Volu
 from certifier.proof import limits
 from certifier.proof.container import pack, unpack, with_scene
 from certifier.proof.ground import Ground
+from certifier.proof.motion import Motion, MotionProof, Space
 from certifier.proof.negative import DualProof
 from certifier.proof.pair import PairProof, Side
+from certifier.verify.kinematics import ExactKinematics
 from certifier.verify.moments import monomials
 from tests.certifier.proofs import region
 from tests.certifier.scenes import ball, pose
@@ -194,6 +196,22 @@ def dual() -> bytes:
     return with_scene(DualProof(scene, scene.pairs[0], WORLD, ground, np.zeros(n), moments, (), entries, normal).to_bytes(), scene)
 
 
+def motion() -> bytes:
+    """As many intervals of bodies with as many vertices, behind as many joints, as there may be."""
+    scene, rng = chain(32, 1, 1.0), np.random.default_rng(0)
+    first, other = scene.geometries
+    many = 512
+    bodies = [Geometry(g.name, g.body, rng.normal(size=(many, 3)), 0.0, {}) for g in (first, other)]
+    far = replace(bodies[1], vertices=bodies[1].vertices + np.array([0.0, 0.0, 1e4]))
+    scene = replace(scene, geometries=(bodies[0], far), pairs=(Pair(first.name, other.name),))
+    joints = sum(len(ExactKinematics.by_joint(scene).path(WORLD, body.body)) for body in scene.geometries)
+    count = min(limits.INTERVALS, limits.SWEPT // (2 * many + limits.JOINT_COST * joints))
+    ends, normals = np.arange(1, count + 1) / count, np.tile([0.0, 0.0, -1.0], (count, 1))
+    frames, counts = np.zeros(1, np.int32), np.array([[count]], np.int32)
+    still = Motion(Space.Q, np.zeros((2, scene.n)))
+    return with_scene(MotionProof(scene, still, 1.0, 0.0, frames, counts, ends, normals).to_bytes(), scene)
+
+
 FILES: tuple[Callable[[], bytes], ...] = (
     header_of_nothing,
     header_of_numbers,
@@ -205,6 +223,7 @@ FILES: tuple[Callable[[], bytes], ...] = (
     gram_matrices,
     polytope,
     dual,
+    motion,
 )
 
 
