@@ -95,7 +95,8 @@ def _timed(document: dict[str, Any], path: PathFile) -> dict[str, Any]:
 def _print(document: dict[str, Any]) -> None:
     stop, certified, tube = document["stop"], document["certified_to"], document["tube"]
     if stop:
-        how = "touch" if document["outcome"] == "refuted" else f"are {at_least_mm(stop['distance'])} apart, too close to go on,"
+        apart = f"are {at_least_mm(stop['distance'])} apart"
+        how = {"refuted": "touch", "too_close": f"{apart}, too close to tell,"}.get(document["outcome"], f"{apart} where the search ended,")
         print(f"{stop['a']} and {stop['b']} {how} {_place(stop)}")
         print(f"q = {', '.join(f'{value:.6g}' for value in stop['q'])}")
         print(f"all pairs are certified up to {_place(certified)}" if certified else "nothing is certified before that")

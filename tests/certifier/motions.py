@@ -15,10 +15,10 @@ from tests.certifier.scenes import ball, planar_arm
 TIP, POST = 0.05, 0.1
 
 
-def swing(gap, padding=0.0):
-    """One link with a ball at its tip, 1 m from the joint, and a post that the ball misses by ``gap`` metres where the joint is at 0."""
-    post = ball("world/post", WORLD, POST, (1.0 + TIP + POST + 2 * padding + gap, 0.0, 0.0))
-    tip = ball("arm/link1/tip", "arm/link1", TIP, (1.0, 0.0, 0.0))
+def swing(gap, padding=0.0, length=1.0):
+    """A link with a ball at its tip, ``length`` metres from the joint, and a post that the ball misses by ``gap`` at 0."""
+    post = ball("world/post", WORLD, POST, (length + TIP + POST + 2 * padding + gap, 0.0, 0.0))
+    tip = ball("arm/link1/tip", "arm/link1", TIP, (length, 0.0, 0.0))
     return replace(planar_arm(1, post, padding=padding), geometries=(tip, post), pairs=(Pair(tip.name, post.name),))
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.arms import random_arm
 from certifier.errors import RegionError
 from certifier.kinematics import Kinematics
 from certifier.model import JointKind
@@ -14,6 +15,7 @@ from certifier.motion.given import given
 from certifier.motion.intervals import RESOLUTION
 from certifier.motion.search import search
 from certifier.outcome import Outcome
+from certifier.proof import limits
 from certifier.proof.motion import Motion, MotionProof, Space
 from certifier.verify.motion import verify_motion
 from tests.certifier.motions import POST, TIP, distances, least_distance, positions, swing
@@ -113,6 +115,23 @@ def test_a_tube_is_free_and_nearly_as_wide_as_the_bound_allows(kind, space):
     assert 0.9 * 0.2 < tube.rho < 0.2
 
 
+def test_bodies_nearer_than_doubles_can_tell_are_too_close():
+    """The link is a hundred kilometres long, so that its tip is not known to a micrometre."""
+    scene = swing(3e-7, length=1e5)
+    found = search(scene, motion(scene, [-0.1], [0.1]))
+    assert found.stop.outcome is Outcome.TOO_CLOSE
+    assert RESOLUTION < found.stop.distance < 1e-6
+    assert 0.4 < verify_motion(found.proof).end <= found.stop.time < 0.51
+
+
+def test_a_search_that_needs_too_many_intervals_says_so(monkeypatch):
+    scene = swing(1e-6)
+    monkeypatch.setattr(limits, "INTERVALS", 5)
+    found = search(scene, motion(scene, [-1.0], [1.0]))
+    assert found.stop.outcome is Outcome.INCONCLUSIVE
+    assert 0 < verify_motion(found.proof).end <= found.stop.time < 0.5
+
+
 def test_motions_of_the_wrong_shape_or_beyond_limits_are_refused_with_their_place():
     scene = planar_arm(2)
     for waypoints, code, field in (
@@ -137,3 +156,23 @@ def test_a_joint_may_turn_beyond_its_window():
     assert verify_motion(search(scene, motion(scene, [-8.0], [7.0])).proof).gap > 0
     with pytest.raises(RegionError):
         given(scene, [[0.0], [7.1]], Space.Q)
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_what_is_said_of_random_arms_is_true(seed):
+    """Of arms of revolute and prismatic joints, and of boxes, capsules and balls: by sampling the motion, the tube and the contact."""
+    rng = np.random.default_rng(seed)
+    scene = random_arm(rng, 4, rounded=seed % 2 == 1)
+    start = rng.uniform(-1, 1, (20, 4))
+    start = start[np.argmax([distances(scene, q[None])[0] for q in start])]
+    end = np.clip(start + rng.normal(size=4), -2, 2)
+    way = given(scene, [start, end, start], Space.Q, [*Space][seed // 2 % 2])
+    found = search(scene, way, tube=True)
+    if found.stop:
+        at = positions(scene, way, found.stop.piece, [found.stop.time])
+        assert abs(distances(scene, at)[0]) < 1e-6
+    if found.proof:
+        statement, proof = verify_motion(found.proof), found.proof
+        for piece in range(proof.motion.pieces):
+            q = positions(scene, proof.motion, piece, rng.uniform(0, proof.end, 40))
+            assert distances(scene, q + proof.rho * rng.choice([-1.0, 1.0], q.shape)).min() >= statement.gap - 1e-7
