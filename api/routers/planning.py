@@ -21,7 +21,7 @@ def contains(body: ContainsRequest, db: Db) -> ContainsResponse:
     """Returns, for each point, the certified regions of the scene that contain it, and how deep inside it is."""
     with db.read() as session:
         scene_id = scenes.find(session, body.scene)
-        stored = regions.polytopes(session, scene_id)
+        stored = regions.polytopes(session, regions.roll(session, scene_id)[1])
     scene = scenes.load(db, scene_id)
     points = to_s(scene, checks.points(scene, body.q, "q")) if body.q is not None else checks.points(scene, body.s or [], "s")
     found = MembershipIndex([Polytope(r.C, r.d) for r in stored], scene.n).locate(points)
