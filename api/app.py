@@ -15,6 +15,7 @@ from api.access import Keyring
 from api.access_log import AccessLog
 from api.announce import Announcer
 from api.children import AT_ONCE, ChildLimiter
+from api.libraries import Libraries
 from api.metrics import Requests
 from api.reading import READERS
 from api.routers import events, jobs, motions, planning, regions, scenes, service
@@ -48,6 +49,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.database = db or database()
     app.state.requests = Requests(settings().requests_file)
     app.state.children = ChildLimiter()
+    app.state.libraries = Libraries()
     app.state.announcer = Announcer()
     app.add_middleware(
         guard.Guard,

@@ -13,6 +13,7 @@ from certifier.model import Array, Scene
 from certifier.seeding.limits import check_limits
 from certifier.seeding.options import SeedOptions
 from db.settings import settings
+from planner.membership import to_s
 from workers.addresses import is_public
 
 
@@ -90,6 +91,19 @@ def points(scene: Scene, rows: Sequence[Sequence[float]], field: str) -> Array:
     for i, row in enumerate(rows):
         _length(scene, row, f"{field}[{i}]", "wrong_length")
     return np.array(rows, dtype=float)
+
+
+def in_s(scene: Scene, q: Array, field: str) -> Array:
+    """Returns waypoints q, (k, n), in s.
+
+    Raises:
+        RegionError: waypoint_outside_limits.
+    """
+    s = to_s(scene, q)
+    for i in np.flatnonzero(~np.isfinite(s).all(axis=1)).tolist():
+        message = "a joint of this waypoint is outside of its limits, or of the window that the scene covers, and has no s"
+        raise RegionError("waypoint_outside_limits", message, field=f"{field}[{i}]", hint="`ciris scene show` lists the limits")
+    return s
 
 
 def _length(scene: Scene, values: Sequence[float], field: str, code: str) -> None:

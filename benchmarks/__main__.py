@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks import agreement, catalogue, compare, growth, models, path, report, robots, scaling, service, store, survey
+from benchmarks import agreement, catalogue, compare, growth, models, path, query, report, robots, scaling, service, store, survey
 from certifier.errors import CirisError
 from client.output import Screen, print_json
 
@@ -66,6 +66,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "service": lambda args, screen: service.beside_local(args.example, args.processes, args.turns, screen.line),
     "store": lambda args, screen: store.store(args.postgresql, store.COUNTS, screen.line),
     "robots": lambda args, screen: robots.robots(args.robots, args.deadline, screen.line),
+    "query": lambda args, screen: query.query(args.regions, screen.line),
     "survey": lambda args, screen: survey.survey(args.scenes, args.most, screen.line, args.cells),
 }
 
@@ -119,6 +120,8 @@ def _parser() -> ArgumentParser:
     shipped.add_argument(
         "--deadline", type=float, default=robots.DEADLINE, metavar="SECONDS", help=f"for each region; default {robots.DEADLINE:g}"
     )
+    asked = kinds.add_parser("query", parents=[as_json], help="measure questions of planners about many regions, beside a plain product")
+    asked.add_argument("--regions", type=_count, default=query.REGIONS, metavar="N", help=f"default {query.REGIONS}")
     kinds.add_parser("docs", help="write the tables of docs/benchmarks.md from docs/benchmarks/*.json")
     return parser
 

@@ -144,20 +144,11 @@ def _spheres(_: Path) -> str:
 
 def _shells(directory: Path) -> str:
     """Returns an arm of seven joints whose links are tubes of convex meshes, 105 in all."""
-    return _tubes(directory, lambda parts: parts)
-
-
-def _hulls(directory: Path) -> str:
-    """Returns the same arm with one mesh for each link, for which the hull of its tube stands."""
-    return _tubes(directory, lambda parts: [np.concatenate(parts)])
-
-
-def _tubes(directory: Path, meshes: Callable[[list[Array]], list[Array]]) -> str:
     links, joints = [_link("link_0", _cylinder(0.09, 0.12, (0, 0, 0.06)))], []
     for i in range(7):
         radius, length = 0.085 - 0.006 * i, 0.2 - 0.01 * i
         geometries = []
-        for k, vertices in enumerate(meshes([_tube_part(radius, length, part) for part in range(_SECTORS * _RINGS)])):
+        for k, vertices in enumerate(_tube_part(radius, length, part) for part in range(_SECTORS * _RINGS)):
             (directory / f"link_{i + 1}_{k}.obj").write_text(_obj(vertices), encoding="utf-8")
             geometries.append(f'<geometry><mesh filename="link_{i + 1}_{k}.obj"/></geometry>')
         links.append(_link(f"link_{i + 1}", *geometries))
@@ -229,6 +220,5 @@ ROBOTS: dict[str, Callable[[Path], str]] = {
     "grasp": _grasp,
     "spheres": _spheres,
     "shells": _shells,
-    "hulls": _hulls,
 }
 """Writes the links and joints of a robot, and the files that they name into a directory."""

@@ -262,6 +262,17 @@ def _survey(document: Document) -> list[str]:
     return parts
 
 
+def _query(document: Document) -> list[str]:
+    header = ["regions", "faces", "MB", "regions at a point", "1000 points", "plain product, 1 point", "nearest", "straight in s", "in q"]
+    header += ["overlap of two", "add a region"]
+    rows = []
+    for row in document["rows"]:
+        named = ("contains_ms", "plain_point_ms", "nearest_ms", "segment_s_ms", "segment_q_ms", "overlap_ms", "add_ms")
+        sizes = [str(row["regions"]), str(row["faces"]), f"{row['megabytes']:.0f}", f"{row['hits']:.1f}"]
+        rows.append([*sizes, *(f"{row[name]:.1f}" for name in named)])
+    return ["Milliseconds of processor time, of one question where nothing else is said.", _table(header, rows)]
+
+
 def _counts(counts: dict[str, int]) -> str:
     return ", ".join(f"{number} {_plain(name)}" for name, number in sorted(counts.items(), key=lambda item: -item[1]))
 
@@ -293,4 +304,5 @@ _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "service": _service,
     "store": _store,
     "survey": _survey,
+    "query": _query,
 }

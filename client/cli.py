@@ -293,8 +293,23 @@ def _parser() -> argparse.ArgumentParser:
     contains.add_argument("--q", metavar='"0,0.3,..."', required=True, action="append", help="joint positions; may be given several times")
     contains.set_defaults(run="client.commands:contains")
 
+    near = verbs.add_parser("nearest", parents=[remote, json], help="say which certified region is nearest to a configuration, and how far")
+    near.add_argument("scene", metavar="SCENE")
+    near.add_argument("--q", metavar='"0,0.3,..."', required=True, action="append", help="joint positions; may be given several times")
+    near.set_defaults(run="client.planning:nearest")
+
+    path = verbs.add_parser("path", parents=[remote, json], help="say whether every point of a path is in certified regions")
+    path.add_argument("scene", metavar="SCENE")
+    path.add_argument("--q", metavar='"0,0.3,..."', required=True, action="append", help="a waypoint, joint positions; give two or more")
+    path.add_argument("--space", choices=["q", "s"], default="q", help="straight in joint positions q (default) or in tangent space s")
+    path.set_defaults(run="client.planning:path")
+
+    graph = verbs.add_parser("graph", parents=[remote, json], help="say which regions of a scene overlap, and where gaps are")
+    graph.add_argument("scene", metavar="SCENE")
+    graph.set_defaults(run="client.planning:graph")
+
     bench = verbs.add_parser("bench", help="measure ciris, and Drake beside it if asked; see ciris bench BENCHMARK --help")
-    kinds = ["pairs", "scene", "growth", "path", "agreement", "scaling", "service", "store", "survey", "robots", "docs"]
+    kinds = ["pairs", "scene", "growth", "path", "agreement", "scaling", "service", "store", "survey", "robots", "query", "docs"]
     bench.add_argument("benchmark", choices=kinds)
     bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...")
     bench.set_defaults(run="client.bench:bench")

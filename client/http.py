@@ -190,6 +190,23 @@ class Client:
         """Returns what becomes of a motion, and the proof in base 64 if the request asks for it."""
         return self._json("POST", "/v1/planning/certify-path", json=request)
 
+    def nearest(self, scene: str, q: list[list[float]]) -> Document:
+        """Returns the region of a scene that is nearest to each of these configurations, with its nearest point and distance."""
+        return self._json("POST", "/v1/planning/nearest", json={"scene": scene, "q": q})
+
+    def segments(self, scene: str, q: list[list[list[float]]], space: str = "q") -> Document:
+        """Returns for each pair of configurations whether the motion between them, straight in ``q`` or ``s``, is in certified regions."""
+        return self._json("POST", "/v1/planning/segment", json={"scene": scene, "q": q, "space": space})
+
+    def path(self, scene: str, q: list[list[float]], space: str = "q", times: list[float] | None = None) -> Document:
+        """Returns whether a path through these configurations, straight in ``q`` or ``s`` between them, is in certified regions."""
+        body = {"scene": scene, "q": q, "space": space, **({} if times is None else {"times": times})}
+        return self._json("POST", "/v1/planning/path", json=body)
+
+    def graph(self, scene: str) -> Document:
+        """Returns which regions of a scene overlap, as far as the service has compared them."""
+        return self._json("GET", "/v1/planning/graph", params={"scene": scene})
+
     def _all(self, name: str, **filters: str | None) -> list[Document]:
         """Returns the entries of all pages of a list."""
         params = {key: value for key, value in filters.items() if value is not None}

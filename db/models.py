@@ -286,12 +286,18 @@ class RegionRow(Base):
     id: Mapped[str] = mapped_column(String(36), primary_key=True)
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id"))
     scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), index=True)
+    number: Mapped[int]
+    """The version of the scene's library when the region was added. Who sees a region also sees those with lower numbers."""
+    linked: Mapped[int] = mapped_column(default=0)
+    """Its overlaps with the regions of lower numbers are known up to this number."""
     iteration: Mapped[int]
     guarantee: Mapped[str] = mapped_column(String(16))
     """A value of certifier.outcome.Guarantee."""
     manifest: Mapped[Document]
     arrays: Mapped[Arrays]
     """C (m, n), d (m,) with the joint limits, in s."""
+    box: Mapped[Arrays]
+    """``lower`` and ``upper``, (n,), of a box in s that contains the region."""
     faces: Mapped[int]
     """Number of faces, m."""
     proof_digest: Mapped[str] = mapped_column(ForeignKey("proofs.digest"))
@@ -302,6 +308,30 @@ class RegionRow(Base):
     share: Mapped[Document | None]
     """How much of the proposal the region keeps, as its manifest says it; None for a given polytope."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow, index=True)
+
+
+class LibraryRow(Base):
+    """This row counts the changes of a scene's regions. A scene's own row never changes, and is long. Without regions there is no row."""
+
+    __tablename__ = "libraries"
+
+    scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), primary_key=True)
+    version: Mapped[int] = mapped_column(default=0)
+    """How often a region of the scene was added or deleted."""
+
+
+class OverlapRow(Base):
+    """Two regions of a scene overlap: a ball fits into both."""
+
+    __tablename__ = "overlaps"
+
+    later: Mapped[str] = mapped_column(String(36), ForeignKey("regions.id", ondelete="CASCADE"), primary_key=True)
+    """Id of the region with the higher number."""
+    earlier: Mapped[str] = mapped_column(String(36), ForeignKey("regions.id", ondelete="CASCADE"), primary_key=True, index=True)
+    depth: Mapped[float]
+    """Radius of the largest ball, in s."""
+    witness: Mapped[list[float]] = mapped_column(JSON(none_as_null=True))
+    """(n,) its centre, in s."""
 
 
 class EventRow(Base):

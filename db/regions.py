@@ -8,17 +8,18 @@ from typing import Any
 from uuid import uuid4
 
 import numpy as np
-from sqlalchemy import Select, select
+from sqlalchemy import Select, select, update
 from sqlalchemy.orm import Session, defer
 
 from certifier.errors import CirisError
 from certifier.model import Array
 from db import events, jobs, pages, proofs
 from db.ids import expanded
-from db.models import IterationRow, JobRow, ProofRow, RegionRow
+from db.models import IterationRow, JobRow, LibraryRow, ProofRow, RegionRow
 from db.pages import Page
+from db.session import insert_new
 
-_UNREAD = defer(RegionRow.manifest, raiseload=True), defer(RegionRow.arrays, raiseload=True)
+_UNREAD = [defer(column, raiseload=True) for column in (RegionRow.manifest, RegionRow.arrays, RegionRow.box)]
 
 
 def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any], proof: bytes) -> RegionRow:
@@ -29,10 +30,12 @@ def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any],
         id=str(uuid4()),
         job_id=job.id,
         scene_id=job.scene_id,
+        number=_changed(session, job.scene_id),
         iteration=iteration,
         guarantee=manifest["guarantee"],
         manifest=manifest,
         arrays={"C": np.array(manifest["halfspace_normals"]), "d": d},
+        box={side: np.array(bound) for side, bound in manifest["bounding_box"].items()},
         faces=len(d),
         proof_digest=proofs.put(session, [proof])[proof],
         ellipsoid_volume=volume,
@@ -81,19 +84,33 @@ def of_job(session: Session, job_id: str) -> Sequence[RegionRow]:
 
 @dataclass(frozen=True)
 class StoredPolytope:
-    """Holds a region's half-spaces in s: C (m, n), d (m,), joint limits included."""
+    """Holds a region's half-spaces in s: C (m, n), d (m,), joint limits included; and a box around it, lower (n,) and upper (n,)."""
 
     id: str
     guarantee: str
     C: Array
     d: Array
+    lower: Array
+    upper: Array
 
 
-def polytopes(session: Session, scene_id: str) -> list[StoredPolytope]:
-    """Returns the half-spaces of every region of a scene, without the manifests."""
-    query = select(RegionRow.id, RegionRow.guarantee, RegionRow.arrays).where(RegionRow.scene_id == scene_id)
-    rows = session.execute(query.order_by(RegionRow.created_at, RegionRow.id))
-    return [StoredPolytope(row.id, row.guarantee, row.arrays["C"], row.arrays["d"]) for row in rows]
+def version(session: Session, scene_id: str) -> int:
+    """Returns how often a region of this scene was added or deleted."""
+    return session.scalar(select(LibraryRow.version).where(LibraryRow.scene_id == scene_id)) or 0
+
+
+def roll(session: Session, scene_id: str) -> tuple[int, list[str]]:
+    """Returns the version of a scene's regions, and the ids of the regions that it has, in the order of their numbers."""
+    both = select(LibraryRow.version, RegionRow.id).outerjoin(RegionRow, RegionRow.scene_id == LibraryRow.scene_id)
+    rows = session.execute(both.where(LibraryRow.scene_id == scene_id).order_by(RegionRow.number)).all()
+    return rows[0][0] if rows else 0, [region_id for _, region_id in rows if region_id is not None]
+
+
+def polytopes(session: Session, ids: Sequence[str]) -> list[StoredPolytope]:
+    """Returns the half-spaces of these regions, without the manifests, by their numbers; those that are gone are left out."""
+    columns = RegionRow.id, RegionRow.guarantee, RegionRow.arrays, RegionRow.box
+    rows = session.execute(select(*columns).where(RegionRow.id.in_(ids)).order_by(RegionRow.number))
+    return [StoredPolytope(row.id, row.guarantee, **row.arrays, **row.box) for row in rows]
 
 
 def delete(session: Session, region_id: str) -> None:
@@ -108,11 +125,19 @@ def delete(session: Session, region_id: str) -> None:
     if region.id != region_id:
         raise CirisError("region_not_found", f"there is no region {region_id!r}", field="region", hint="give all of its id to delete it")
     job = jobs.lock(session, region.job_id)
+    _changed(session, region.scene_id)
     session.delete(region)
     session.flush()
     if not session.scalar(select(RegionRow.id).where(RegionRow.proof_digest == region.proof_digest).limit(1)):
         session.delete(session.get_one(ProofRow, region.proof_digest))
     job.region_id = session.scalar(_latest(job.id))
+
+
+def _changed(session: Session, scene_id: str) -> int:
+    """Counts a change of the scene's regions and returns the new version. Changes of one scene wait for each other until they commit."""
+    insert_new(session, LibraryRow, [{"scene_id": scene_id, "version": 0}])
+    counted = update(LibraryRow).where(LibraryRow.scene_id == scene_id).values(version=LibraryRow.version + 1)
+    return session.scalars(counted.returning(LibraryRow.version)).one()
 
 
 def _latest(job_id: str) -> Select[str]:

@@ -1,54 +1,81 @@
-"""This module finds which regions {s : C s <= d} contain which points, and by how much.
-
-It computes all faces of all regions in one matrix product.
-"""
+"""This module finds which regions {s : C s <= d} contain which points, and how deep inside they are."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from certifier.model import Array, Polytope, Scene
+from certifier.model import Array, Scene
+from planner.library import Library
+
+_POINTS, _PAIRS = 500, 10_000
+"""So many points, and so many pairs of a point and a region, are looked at together, which bounds the memory that this takes."""
+_FACES = 8
+"""So many faces of a region are tried first, and twice as many each time after."""
+
+_Found = tuple[NDArray[np.intp], NDArray[np.intp], Array]
 
 
 @dataclass(frozen=True)
-class Membership:
-    """Holds the answer for k points and r regions.
+class Hits:
+    """Says of points and regions which point is in which region.
 
     Attributes:
-        inside: (k, r) True where the point satisfies every inequality of the region.
-        margin: (k, r) distance in s from the point to the nearest face's hyperplane, negative outside:
-            min_j (d_j - c_j's) / |c_j|. Minus infinity where the point has no coordinates s.
+        point: (h,) numbers of points, ascending.
+        region: (h,) numbers of regions in the library; those of one point by margin, the largest first.
+        margin: (h,) distance in s from the point to the nearest face's hyperplane, min_j (d_j - c_j's) / |c_j| >= 0.
     """
 
-    inside: NDArray[np.bool_]
+    point: NDArray[np.intp]
+    region: NDArray[np.intp]
     margin: Array
 
 
-class MembershipIndex:
-    """Holds the faces of r >= 0 regions of an n-joint scene, stacked."""
+def locate(library: Library, s: Array) -> Hits:
+    """Returns which regions contain which of the points s, (k, n). A row with a value that is not finite is in no region."""
+    none = np.zeros(0, dtype=np.intp)
+    found: list[_Found] = [(none, none, np.zeros(0))]
+    for begin in range(0, len(s), _POINTS):
+        point, region = in_boxes(library, s[begin : begin + _POINTS])
+        for pair in range(0, len(point), _PAIRS):
+            found += _inside(library, s, begin + point[pair : pair + _PAIRS], region[pair : pair + _PAIRS])
+    points, regions, margin = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    order = np.lexsort((-margin, points))
+    return Hits(points[order], regions[order], margin[order])
 
-    def __init__(self, polytopes: Sequence[Polytope], n: int) -> None:
-        self._count = len(polytopes)
-        self._C = np.concatenate([np.zeros((0, n)), *(p.C for p in polytopes)])
-        self._d = np.concatenate([np.zeros(0), *(p.d for p in polytopes)])
-        self._first = np.cumsum([0, *(len(p.d) for p in polytopes[:-1])])
-        norms = np.linalg.norm(self._C, axis=1)
-        self._norms = np.where(norms > 0, norms, 1.0)
 
-    def locate(self, s: Array) -> Membership:
-        """Returns the membership of the points s, (k, n). A row with a value that is not finite is outside of every region."""
-        k = len(s)
-        if not self._count:
-            return Membership(np.zeros((k, 0), dtype=bool), np.zeros((k, 0)))
-        finite = np.isfinite(s).all(axis=1, keepdims=True)
-        slack = self._d - np.where(finite, s, 0.0) @ self._C.T
-        inside = np.logical_and.reduceat(slack >= 0, self._first, axis=1) & finite
-        margin: Array = np.minimum.reduceat(slack / self._norms, self._first, axis=1)
-        return Membership(inside, np.where(finite, margin, -np.inf))
+def in_boxes(library: Library, s: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Returns which points are in the boxes of which regions."""
+    point, region = library.grid.candidates(s)
+    at = s[point]
+    within = ((at >= library.lower[region]) & (at <= library.upper[region])).all(axis=1)
+    return point[within], region[within]
+
+
+def _inside(library: Library, s: Array, point: NDArray[np.intp], region: NDArray[np.intp]) -> Iterator[_Found]:
+    """Yields those of the pairs whose point is in their region, with the margins.
+
+    A pair is dropped at the first faces that the point is beyond, which most often are the very first.
+    """
+    margin = np.full(len(point), np.inf)
+    tried, more = 0, _FACES
+    while len(point):
+        last = library.first[region + 1][:, None] - 1
+        # The last face stands in for those that a region with fewer faces lacks.
+        rows = np.minimum(library.first[region][:, None] + np.arange(tried, tried + more), last)
+        faces = library.faces.take(rows, axis=0)
+        slack = faces[:, :, -1] - np.einsum("cfn,cn->cf", faces[:, :, :-1], s[point])
+        inside = (slack >= 0).all(axis=1)
+        nearest = (slack[inside] / library.norms.take(rows[inside])).min(axis=1, initial=np.inf)
+        margin = np.minimum(margin[inside], nearest)
+        settled = rows[inside, -1] == last[inside, 0]
+        point, region = point[inside], region[inside]
+        yield point[settled], region[settled], margin[settled]
+        point, region, margin = point[~settled], region[~settled], margin[~settled]
+        tried, more = tried + more, 2 * more
 
 
 def to_s(scene: Scene, q: Array) -> Array:

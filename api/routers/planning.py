@@ -2,33 +2,170 @@
 
 from __future__ import annotations
 
-import numpy as np
-from fastapi import APIRouter
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated
 
-from api import checks
+import numpy as np
+from fastapi import APIRouter, Query
+
+from api import checks, graph
 from api.access import READ, Db
-from api.schemas.regions import Containment, ContainsRequest, ContainsResponse, Hit
-from certifier.model import Polytope
+from api.children import Children
+from api.libraries import KeptLibraries, Libraries
+from api.schemas.planning import (
+    Containment,
+    ContainsRequest,
+    ContainsResponse,
+    Covering,
+    GraphResponse,
+    Hit,
+    Near,
+    NearestPoint,
+    NearestRequest,
+    NearestResponse,
+    PathRequest,
+    PathResponse,
+    Piece,
+    SegmentRequest,
+    SegmentResponse,
+    Uncovered,
+)
+from certifier.model import Array, Scene
 from certifier.outcome import Guarantee
-from db import regions, scenes
-from planner.membership import MembershipIndex, to_s
+from db import scenes
+from db.session import Database
+from planner.library import Library
+from planner.membership import locate, to_s
+from planner.motion.path import Space, follow
+from planner.nearest import Nearest, nearest
 
 router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ])
 
 
 @router.post("/contains")
-def contains(body: ContainsRequest, db: Db) -> ContainsResponse:
+def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries) -> ContainsResponse:
     """Returns, for each point, the certified regions of the scene that contain it, and how deep inside it is."""
-    with db.read() as session:
-        scene_id = scenes.find(session, body.scene)
-        stored = regions.polytopes(session, scene_id)
-    scene = scenes.load(db, scene_id)
-    points = to_s(scene, checks.points(scene, body.q, "q")) if body.q is not None else checks.points(scene, body.s or [], "s")
-    found = MembershipIndex([Polytope(r.C, r.d) for r in stored], scene.n).locate(points)
+    scene_id, scene, library = _asked(db, libraries, body.scene)
+    points = _points(scene, body.q, body.s)
+    found = locate(library, points)
+    ends = np.searchsorted(found.point, np.arange(len(points) + 1)).tolist()
     answers = []
-    for inside, margin in zip(found.inside, found.margin, strict=True):
-        deepest = np.argsort(-margin)
-        hits = [Hit(region=stored[i].id, margin=margin[i], guarantee=Guarantee(stored[i].guarantee)) for i in deepest if inside[i]]
-        best = float(margin.max(initial=-np.inf))
-        answers.append(Containment(inside=bool(hits), regions=hits, margin=best if np.isfinite(best) else None))
-    return ContainsResponse(scene=scene_id, regions=len(stored), points=answers)
+    for begin, end in pairwise(ends):
+        deepest = zip(found.region[begin:end].tolist(), found.margin[begin:end].tolist(), strict=True)
+        hits = [Hit(region=library.ids[i], margin=margin, guarantee=_guarantee(library, i)) for i, margin in deepest]
+        answers.append(Containment(inside=bool(hits), regions=hits, margin=hits[0].margin if hits else None))
+    return ContainsResponse(scene=scene_id, version=library.version, regions=len(library), points=answers)
+
+
+@router.post("/nearest")
+def find_nearest(body: NearestRequest, db: Db, libraries: KeptLibraries) -> NearestResponse:
+    """Returns, for each point, the nearest certified region of the scene, its nearest point and how far that is."""
+    scene_id, scene, library = _asked(db, libraries, body.scene)
+    points = _points(scene, body.q, body.s)
+    found = [nearest(library, s) if np.isfinite(s).all() else None for s in points]
+    answers = [NearestPoint(nearest=_near(library, scene, near)) for near in found]
+    return NearestResponse(scene=scene_id, version=library.version, regions=len(library), points=answers)
+
+
+@router.post("/segment")
+def cover_segments(body: SegmentRequest, db: Db, libraries: KeptLibraries) -> SegmentResponse:
+    """Says of each straight motion whether every point of it is in certified regions, and which.
+
+    `covered` is proved, for the numbers of the request taken literally. A motion that is straight in `s` is cut with the regions exactly.
+    One that is straight in `q` is proved piece by piece, with bounds on what lies between, so one that only touches may not be proved.
+    """
+    scene_id, scene, library = _asked(db, libraries, body.scene)
+    given, name = (body.q, "q") if body.q is not None else (body.s or [], "s")
+    answers = [
+        _covering(library, scene, body.space, _waypoints(scene, body.space, ends, f"{name}[{i}]", name), [0.0, 1.0])
+        for i, ends in enumerate(given)
+    ]
+    return SegmentResponse(scene=scene_id, version=library.version, regions=len(library), segments=answers)
+
+
+@router.post("/path")
+def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries) -> PathResponse:
+    """Says whether every point of a path, straight between its waypoints, is in certified regions, and which.
+
+    With `times` the path is a trajectory, and the answer is in its times. What `covered` means is said at `/v1/planning/segment`.
+    """
+    scene_id, scene, library = _asked(db, libraries, body.scene)
+    given, name = (body.q, "q") if body.q is not None else (body.s or [], "s")
+    times = body.times if body.times is not None else [float(i) for i in range(len(given))]
+    answer = _covering(library, scene, body.space, _waypoints(scene, body.space, given, name, name), times)
+    return PathResponse(scene=scene_id, version=library.version, regions=len(library), **dict(answer))
+
+
+@router.get("/graph")
+async def get_graph(
+    db: Db,
+    libraries: KeptLibraries,
+    children: Children,
+    scene: Annotated[str, Query(min_length=1, max_length=255, description="The id or the name of a scene.", examples=["planar-2dof"])],
+) -> GraphResponse:
+    """Returns which regions of a scene overlap, which sets of them hang together, and where to seed a region that may join two sets.
+
+    Pairs of regions that were not compared yet are compared now, for a few seconds. Ask again until `complete` is true.
+    """
+    return await children.run(_graph, db, libraries, scene)
+
+
+def _graph(db: Database, libraries: Libraries, name: str) -> GraphResponse:
+    return graph.describe(db, *_asked(db, libraries, name))
+
+
+def _asked(db: Database, libraries: Libraries, name: str) -> tuple[str, Scene, Library]:
+    """Returns the id of the scene that a request names, the scene, and its regions as they are now."""
+    with db.read() as session:
+        scene_id = scenes.find(session, name)
+    scene = scenes.load(db, scene_id)
+    return scene_id, scene, libraries.of(db, scene_id, scene.n)
+
+
+def _points(scene: Scene, q: Sequence[Sequence[float]] | None, s: Sequence[Sequence[float]] | None) -> Array:
+    """Returns the points of a request in s, (k, n), with a row of NaN where a joint is outside its limits."""
+    return to_s(scene, checks.points(scene, q, "q")) if q is not None else checks.points(scene, s or [], "s")
+
+
+def _waypoints(scene: Scene, space: Space, rows: Sequence[Sequence[float]], field: str, given: str) -> Array:
+    """Returns waypoints (k, n) in the coordinates of the space."""
+    waypoints = checks.points(scene, rows, field)
+    return waypoints if space == given else checks.in_s(scene, waypoints, field)
+
+
+def _covering(library: Library, scene: Scene, space: Space, waypoints: Array, times: Sequence[float]) -> Covering:
+    found = follow(library, scene, space, waypoints, times)
+    stop = found.uncovered
+    return Covering(
+        covered=stop is None,
+        pieces=[
+            Piece(begin=part.begin, end=part.end, region=library.ids[part.region], guarantee=_guarantee(library, part.region))
+            for part in found.stretches
+        ],
+        uncovered=None
+        if stop is None
+        else Uncovered(
+            time=stop.time,
+            segment=stop.segment,
+            q=stop.q.tolist(),
+            s=None if stop.s is None else stop.s.tolist(),
+            next=_near(library, scene, stop.next),
+        ),
+    )
+
+
+def _near(library: Library, scene: Scene, near: Nearest | None) -> Near | None:
+    if near is None:
+        return None
+    return Near(
+        region=library.ids[near.region],
+        guarantee=_guarantee(library, near.region),
+        distance=near.distance,
+        q=scene.to_q(near.s).tolist(),
+        s=near.s.tolist(),
+    )
+
+
+def _guarantee(library: Library, region: int) -> Guarantee:
+    return Guarantee(library.guarantees[region])

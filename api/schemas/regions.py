@@ -1,17 +1,15 @@
-"""These models describe regions and the questions that planners ask about them."""
+"""These models describe regions."""
 
 from __future__ import annotations
 
 from datetime import datetime
 from typing import Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, Field
 
-from api.schemas.common import Document, Page, Request, SceneName, Vector
+from api.schemas.common import Document, Page
 from certifier.outcome import Guarantee
 from db.models import RegionRow
-
-MAX_POINTS = 10_000
 
 
 class Share(BaseModel):
@@ -91,47 +89,3 @@ class Verification(BaseModel):
     guarantee: Guarantee = Guarantee.NONE
     error: Document | None = Field(None, description="Why the proof does not hold: code, message, field, hint; null when it holds.")
     seconds: float
-
-
-class ContainsRequest(Request):
-    """Asks about points. The request gives either joint positions `q` or tangent-space coordinates `s`."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "iiwa-shelf", "q": [[0, 0.3, 0, -1.8, 0, 0.9, 0]]}]})
-
-    scene: SceneName
-    q: list[Vector] | None = Field(
-        None, min_length=1, max_length=MAX_POINTS, description="(k, n), joint positions in radians or metres, one row a point."
-    )
-    s: list[Vector] | None = Field(
-        None, min_length=1, max_length=MAX_POINTS, description="(k, n), tangent-space coordinates s, one row a point."
-    )
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        if (self.q is None) == (self.s is None):
-            raise ValueError("give either q or s")
-        return self
-
-
-class Hit(BaseModel):
-    """Names a region that contains the point."""
-
-    region: str
-    margin: float = Field(description="Distance in s from the point to the region's nearest face.")
-    guarantee: Guarantee
-
-
-class Containment(BaseModel):
-    """Answers for one point."""
-
-    inside: bool
-    regions: list[Hit] = Field(description="The regions that contain the point, the one with the largest margin first.")
-    margin: float | None = Field(description="The largest margin over all regions, negative outside; null where there is none.")
-
-
-class ContainsResponse(BaseModel):
-    """Holds one answer for each point, in order."""
-
-    scene: str
-    regions: int = Field(description="Number of regions that were looked at.")
-    points: list[Containment]

@@ -85,6 +85,7 @@ def certified_region(
             "s_upper": scene.s_upper.tolist(),
         },
         **_halfspaces(polytope),
+        "bounding_box": {"lower": bound.lower.tolist(), "upper": bound.upper.tolist()},
         "interior_point": interior.tolist(),
         "inscribed_ellipsoid": {"center": ellipsoid.center.tolist(), "shape": ellipsoid.shape.tolist()},
         "joint_ranges": _joint_ranges(scene, polytope, candidate.seed),

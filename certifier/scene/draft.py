@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,7 +21,8 @@ import numpy as np
 import yaml
 
 from certifier.errors import SceneError
-from certifier.model import Array, JointKind, Pair, Scene
+from certifier.kinematics import Kinematics
+from certifier.model import WORLD, Array, JointKind, Pair, Scene
 from certifier.scene.contacts import touching
 from certifier.scene.load import MEMORY_BYTES, TIMEOUT_S, load_scene, read_in_child
 from certifier.scene.mimics import Mimic, at_rest
@@ -31,6 +33,8 @@ TRIED = 200
 """So many random configurations tell which pairs always overlap."""
 SEEDS = 2000
 """A free configuration is looked for among so many."""
+MANY_PARTS = 4
+"""Where a body that moves has more polytopes than this, the draft has their hull stand for them."""
 SLIDE = 1.0
 """A slide without limits is drafted to go so far from its limit, in metres, or to either side of 0 if it has neither."""
 _PACKAGES = ("package://", "model://")
@@ -77,6 +81,9 @@ def draft(robot: Path, worlds: Sequence[Path], out: Path, packages: Mapping[str,
     held = _inventory("\n".join([head, *add.values()]), models, directory)
     head = "\n".join([head, *_directives(add, held["roots"]), *_limits(held), *_fix(held)]) + "\n"
     scene = _loaded(head, directory)
+    if hulls := _hulls(scene):
+        head += hulls
+        scene = _loaded(head, directory)
     random = np.random.default_rng(0).uniform(scene.q_lower, scene.q_upper, (TRIED + SEEDS, scene.n))
     middle = scene.q_star.clip(scene.q_lower, scene.q_upper)
     always = set(scene.pairs)
@@ -88,6 +95,19 @@ def draft(robot: Path, worlds: Sequence[Path], out: Path, packages: Mapping[str,
     others = tuple(pair for pair in overlapping if pair not in ignored)
     text = head + _joints(scene) + _ignore(ignored, scene)
     return Draft(text, _loaded(text, directory), _free(scene, middle, random[TRIED:], always), ignored, others)
+
+
+def _hulls(scene: Scene) -> str:
+    """Returns that hulls stand for the bodies of many parts, each part of which would be a pair with each part of all other bodies."""
+    moved = [joint.child for joint in scene.joints if Kinematics.of(scene).chain(WORLD, joint.child)]
+    parts = Counter(geometry.body for geometry in scene.geometries if geometry.radius == 0)
+    bodies = [body for body in moved if parts[body] > MANY_PARTS]
+    if not bodies:
+        return ""
+    lines = [f"  - {_quoted(body)}  # {parts[body]} parts" for body in bodies]
+    return (
+        "\n".join(["# One hull stands for all parts of each of these. Leave a body out where its hollows matter.", "hulls:", *lines]) + "\n"
+    )
 
 
 def _free(scene: Scene, middle: Array, random: Array, always: set[Pair]) -> Array | None:

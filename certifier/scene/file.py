@@ -19,7 +19,7 @@ import yaml
 from certifier.errors import SceneError, close_matches
 from certifier.model import ALPHABET, MAX_SENTENCE, is_name, is_sentence
 
-KEYS = ("name", "packages", "directives", "q_star", "limits", "fix", "padding", "ignore", "mesh", "cylinder_sides")
+KEYS = ("name", "packages", "directives", "q_star", "limits", "fix", "padding", "ignore", "hulls", "mesh", "cylinder_sides")
 """The keys of a scene file."""
 MAX_BYTES = 2**20
 MAX_DEPTH = 50
@@ -52,6 +52,7 @@ class SceneFile:
         fix: positions by joint, radians or metres, at which joints are held.
         padding: metres that are added around every geometry.
         ignore: the pairs that are not certified.
+        hulls: the bodies that one hull of all their polytopes stands for.
         max_vertices: greatest number of vertices that stand for a mesh or an ellipsoid.
         cylinder_sides: number of sides of the prism that stands for a cylinder.
     """
@@ -67,6 +68,7 @@ class SceneFile:
     fix: dict[str, float] = field(default_factory=dict)
     padding: float = 0.0
     ignore: tuple[IgnoreEntry, ...] = field(default=())
+    hulls: tuple[str, ...] = ()
     max_vertices: int = 32
     cylinder_sides: int = 12
 
@@ -108,6 +110,7 @@ def read_scene_file(path: Path) -> SceneFile:
         fix={name: _number(value, f"fix.{name}") for name, value in _by_joint(values.get("fix", {}), "fix").items()},
         padding=_number(values.get("padding", 0.0), "padding", minimum=0.0),
         ignore=_ignore(values.get("ignore", [])),
+        hulls=_hulls(values.get("hulls", [])),
         max_vertices=_integer(mesh.get("max_vertices", 32), "mesh.max_vertices", minimum=MIN_HULL_VERTICES),
         cylinder_sides=_integer(values.get("cylinder_sides", 12), "cylinder_sides", minimum=3),
     )
@@ -326,6 +329,12 @@ def _ignore(value: Any) -> tuple[IgnoreEntry, ...]:
         a, b = (_string(name, f"{where}[{k}]") for k, name in enumerate(entry))
         entries.append(IgnoreEntry(a, b, reason, where))
     return tuple(entries)
+
+
+def _hulls(value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list):
+        raise _wrong("hulls", "must be a list of bodies, such as [arm/link_1]")
+    return tuple(dict.fromkeys(_string(name, f"hulls[{k}]") for k, name in enumerate(value)))
 
 
 def _check_directives(node: yaml.Node) -> None:

@@ -31,7 +31,7 @@ def pairs(
     wanted: list[Pair] = []
     ignored: list[Ignored] = []
     used: set[IgnoreEntry] = set()
-    for a, b in sorted(tuple(sorted(c)) for c in candidates):
+    for a, b in sorted({(min(candidate), max(candidate)) for candidate in candidates}):
         if tree.group[body[a]] == tree.group[body[b]]:
             continue
         names_a, names_b = {a, body[a]}, {b, body[b]}

@@ -41,6 +41,7 @@ from certifier.errors import SceneError
 from certifier.model import ALPHABET, MAX_NAME, MAX_SENTENCE, WORLD, Array, Geometry, Joint, JointKind, Scene, escaped, is_name
 from certifier.scene import shapes
 from certifier.scene.file import SceneFile, read_scene_file
+from certifier.scene.hulls import with_hulls
 from certifier.scene.joints import Coupling, centered, held, narrowed
 from certifier.scene.lint import findings
 from certifier.scene.pairs import pairs
@@ -78,9 +79,10 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     inspector = scene_graph.model_inspector()
     joints, q_star = centered(narrowed(held(_joints(plant), scene_file.fix, couplings(plant)), scene_file.limits), scene_file.q_star)
     tree = Tree(joints, _bodies(plant))
-    by_id = _geometries(scene_file, strict, plant, inspector, tree)
-    candidates = [(by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()]
-    geometries = tuple(by_id.values())
+    parts = _geometries(scene_file, strict, plant, inspector, tree)
+    by_id = with_hulls(parts, scene_file.hulls, tree.bodies, scene_file.max_vertices)
+    candidates = list(dict.fromkeys((by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()))
+    geometries = tuple({geometry.name: geometry for geometry in by_id.values()}.values())
     wanted, ignored, unused = pairs(candidates, geometries, tree, scene_file.ignore)
     scene = Scene(
         name=scene_file.name,

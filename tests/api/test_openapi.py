@@ -1,5 +1,7 @@
 """The OpenAPI document: operation ids are stable, errors are problems, examples hold."""
 
+import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,7 @@ from pydantic import TypeAdapter
 from api import checks
 from api.problems import Problem
 from api.schemas.jobs import NewJob, WebhookRequest
-from api.schemas.regions import ContainsRequest
+from api.schemas.planning import ContainsRequest, NearestRequest, PathRequest, SegmentRequest
 from certifier.scene import load_scene
 from db import scenes
 from db.keys import Scope
@@ -42,6 +44,10 @@ OPERATIONS = {
     "delete_region": "DELETE /v1/regions/{region_id}",
     "contains": "POST /v1/planning/contains",
     "certify_path": "POST /v1/planning/certify-path",
+    "find_nearest": "POST /v1/planning/nearest",
+    "cover_segments": "POST /v1/planning/segment",
+    "cover_path": "POST /v1/planning/path",
+    "get_graph": "GET /v1/planning/graph",
     "get_health": "GET /healthz",
     "get_readiness": "GET /readyz",
     "get_metrics": "GET /metrics",
@@ -77,8 +83,9 @@ def test_the_examples_are_accepted_by_the_schemas(client: TestClient) -> None:
     for name in ("GrowRequest", "CertifyRequest"):
         for example in schemas[name]["examples"]:
             TypeAdapter(NewJob).validate_python(example)
-    for example in schemas["ContainsRequest"]["examples"]:
-        ContainsRequest.model_validate(example)
+    for model in (ContainsRequest, NearestRequest, SegmentRequest, PathRequest):
+        for example in schemas[model.__name__]["examples"]:
+            model.model_validate(example)
     for example in schemas["WebhookRequest"]["examples"]:
         checks.webhook(WebhookRequest.model_validate(example))
     for example in schemas["Problem"]["examples"]:
@@ -95,10 +102,26 @@ def test_the_examples_work_on_the_scenes_that_they_name(client: TestClient, data
         ("CertifyRequest", "/v1/jobs", 201),
         ("ContainsRequest", "/v1/planning/contains", 200),
         ("MotionRequest", "/v1/planning/certify-path", 200),
+        ("NearestRequest", "/v1/planning/nearest", 200),
+        ("SegmentRequest", "/v1/planning/segment", 200),
+        ("PathRequest", "/v1/planning/path", 200),
     ):
         for example in schemas[name]["examples"]:
             answer = client.post(path, json=example)
             assert answer.status_code == status, answer.text
+
+
+def test_every_field_of_planning_is_described(client: TestClient) -> None:
+    document = client.get("/openapi.json").json()
+    schemas, seen = document["components"]["schemas"], set()
+    waiting = [json.dumps(path) for name, path in document["paths"].items() if name.startswith("/v1/planning/")]
+    while waiting:
+        for name in set(re.findall(r"#/components/schemas/(\w+)", waiting.pop())) - seen - {"Problem"}:
+            seen.add(name)
+            waiting.append(json.dumps(schemas[name]))
+            for field, described in schemas[name].get("properties", {}).items():
+                assert described.get("description"), f"{name}.{field}"
+    assert {"ContainsRequest", "PathResponse", "Near", "Gap"} <= seen
 
 
 def test_every_operation_says_which_scope_it_needs(client: TestClient) -> None:

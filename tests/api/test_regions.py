@@ -155,29 +155,3 @@ def test_a_deleted_region_is_gone(client: TestClient, region: str) -> None:
     for answer in (client.get(f"/v1/regions/{region}"), client.get(f"/v1/regions/{region}/proof"), client.delete(f"/v1/regions/{region}")):
         assert (answer.status_code, answer.json()["code"]) == (404, "region_not_found")
     assert client.get("/v1/jobs").json()["jobs"][0]["region"] is None
-
-
-@pytest.mark.parametrize("space", ["q", "s"])
-def test_contains_says_which_region_holds_a_point_and_how_deep(client: TestClient, region: str, space: str) -> None:
-    body = {"scene": "slider", space: [[0.1], [0.9], [-0.3]]}
-    answer = client.post("/v1/planning/contains", json=body).json()
-    inside, outside, edge = answer["points"]
-    assert (answer["regions"], inside["inside"], inside["regions"][0]["region"]) == (1, True, region)
-    assert inside["margin"] == inside["regions"][0]["margin"] == pytest.approx(0.1)
-    assert inside["regions"][0]["guarantee"] == "exact"
-    assert (outside["inside"], outside["regions"], outside["margin"]) == (False, [], pytest.approx(-0.7))
-    assert (edge["inside"], edge["margin"]) == (True, 0.0)
-
-
-def test_contains_without_any_region_is_no(client: TestClient, scene) -> None:
-    answer = client.post("/v1/planning/contains", json={"scene": "slider", "q": [[0.1]]}).json()
-    assert answer == {"scene": scene.hash[:16], "regions": 0, "points": [{"inside": False, "regions": [], "margin": None}]}
-
-
-@pytest.mark.parametrize(
-    ("body", "field"),
-    [({"q": [[0.1, 0.2]]}, "q[0]"), ({"q": [[0.1]], "s": [[0.1]]}, "body"), ({}, "body"), ({"q": [["x"]]}, "q[0][0]"), ({"q": []}, "q")],
-)
-def test_contains_refuses_what_makes_no_sense(client: TestClient, scene, body: dict[str, object], field: str | None) -> None:
-    answer = client.post("/v1/planning/contains", json={"scene": "slider"} | body)
-    assert (answer.status_code, answer.json()["field"]) == (422, field)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import agreement, catalogue, compare, growth, path, report, service, store, survey
+from benchmarks import agreement, catalogue, compare, growth, path, query, report, service, store, survey
 from benchmarks.compare import Verdict, verdict
 from certifier.errors import CirisError
 from certifier.kinematics import Kinematics
@@ -186,6 +186,15 @@ def test_the_survey_decides_every_pair() -> None:
     by_cells = survey.survey(["planar_2dof"], 5.0, lambda _: None, cells=500)
     assert by_cells["undecided"] == []
     assert {outcome for row in by_cells["counts"] for outcome in row["outcomes"]} <= {"certified", "refuted", "too_close"}
+
+
+def test_questions_about_many_regions_are_measured_beside_a_plain_product() -> None:
+    document = query.query(60, lambda _: None, sizes=[2.0])
+    (row,) = document["rows"]
+    assert (row["regions"], row["size"]) == (60, 2.0)
+    assert 60 * 50 <= row["faces"] <= 60 * 600
+    assert all(value > 0 for value in row.values())
+    assert "plain product, 1 point" in report.text(document)
 
 
 def test_the_page_shows_the_figures_that_lie_beside_it() -> None:

@@ -79,6 +79,11 @@ def test_several_seeds_grow_at_once_and_each_says_what_became_of_it(machine: Mac
     assert ["none" in row for row in rows] == [False, True, False]
     assert "overlap" in rows[1]
     assert machine.ciris("contains", "planar-2dof", "--q", "0.02,0.02").status == 0
+    for space in ("q", "s"):
+        assert machine.ciris("path", "planar-2dof", "--q", "0.05,-0.05", "--q", "0,0.1", "--space", space).status == 0
+        assert machine.ciris("path", "planar-2dof", "--q", "0,0.1", "--q", "-1.2,1.0", "--space", space).status == 1
+    found = machine.ciris("graph", "planar-2dof", "--json").json
+    assert (found["complete"], found["regions"] >= 2, len(found["edges"]) >= 1) == (True, True, True)
     assert machine.ciris("grow", PLANAR, *seeds, "--local").status == 2
 
 

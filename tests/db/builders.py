@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from certifier.outcome import Outcome, Stage
 from certifier.pair.result import PairResult
-from db import jobs, pairs, scenes
-from db.models import JobRow, SceneRow
+from db import jobs, pairs, regions, scenes
+from db.models import IterationRow, JobRow, RegionRow, SceneRow
 from tests.scenes import slider
 
 
@@ -47,3 +49,23 @@ def add_pairs(session: Session, job: JobRow, pair_count: int, *, failures: int |
 
 def certified(index: int, proof: bytes = b"proof") -> dict[tuple[int, int], PairResult]:
     return {(index, 0): PairResult(Outcome.CERTIFIED, Stage.SOS, seconds=0.1, margin=0.01, proof=proof)}
+
+
+def add_region(session: Session, job: JobRow, lower: float = -1.0, upper: float = 1.0, proof: bytes = b"proof") -> RegionRow:
+    """Stores lower <= s <= upper as the region of a new iteration of the job."""
+    index = session.scalar(select(func.count()).where(IterationRow.job_id == job.id)) or 0
+    faces = {"C": np.array([[1.0], [-1.0]]), "d": np.array([upper, -lower])}
+    session.add(IterationRow(job_id=job.id, index=index, label="contract", arrays=faces, faces=2, hard=[], reuse={}))
+    session.flush()
+    manifest = {
+        "scene": {"hash": job.scene_id},
+        "space": {"s_lower": [-2.0], "s_upper": [2.0]},
+        "volume": {"ellipsoid": 0.5},
+        "q_volume": {"value": upper - lower, "stderr": 0.0, "unit": "m", "box_side": None},
+        "guarantee": "exact",
+        "halfspace_normals": faces["C"].tolist(),
+        "halfspace_offsets": faces["d"].tolist(),
+        "bounding_box": {"lower": [lower], "upper": [upper]},
+        "share": None,
+    }
+    return regions.add(session, job, index, manifest, proof)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from sqlalchemy import inspect
 
-from db import jobs, migrate, pairs, scenes, work
+from db import jobs, migrate, overlaps, pairs, regions, scenes, work
 from db.session import Database
 from db.types import utcnow
-from tests.db.builders import a_running_job, certified
+from tests.db.builders import a_running_job, add_region, certified
 from tests.scenes import slider
 
 
@@ -109,6 +109,27 @@ def test_iterations_stored_before_there_were_cells_say_that_they_have_none(empty
     with database.read() as session:
         assert [(row.cells, row.begun, row.parts, row.ending) for row in pairs.iterations(session, job_id)] == [(1, None, {}, [])]
         assert {row.open_cells for row in pairs.of_job(session, job_id)} == {None}
+    database.close()
+
+
+def test_regions_stored_before_there_were_boxes_have_their_limits_and_numbers(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.write() as session:
+        job = a_running_job(session)
+        made = [add_region(session, job).id for _ in range(3)]
+        scene_id = job.scene_id
+    database.close()
+    migrate.downgrade(empty_database_url, "0011")
+    migrate.upgrade(empty_database_url)
+    assert migrate.drift(empty_database_url) == []
+    database = Database(empty_database_url)
+    with database.write() as session:
+        assert regions.roll(session, scene_id) == (3, made)
+        assert list(overlaps.numbers(session, scene_id).values()) == [(1, 0), (2, 0), (3, 0)]
+        assert {(*box.lower, *box.upper) for box in regions.polytopes(session, made)} == {(-2.0, 2.0)}
+        regions.delete(session, made[0])
+        assert regions.roll(session, scene_id) == (4, made[1:])
     database.close()
 
 

@@ -25,6 +25,7 @@ MANIFEST = {
     "guarantee": "exact",
     "halfspace_normals": [[1.0], [-1.0]],
     "halfspace_offsets": [1.0, 1.0],
+    "bounding_box": {"lower": [-1.0], "upper": [1.0]},
     "share": SHARE,
 }
 
@@ -152,8 +153,10 @@ def test_a_region_is_its_jobs_latest_until_it_is_deleted(db: Database) -> None:
         assert events.since(session, job.id)[-1].data["share"] == SHARE
         job_id, scene_id, region_id, digest = job.id, job.scene_id, earlier.id, earlier.proof_digest
     with db.read() as session:
-        (stored,) = regions.polytopes(session, scene_id)
+        assert regions.roll(session, scene_id) == (1, [region_id])
+        (stored,) = regions.polytopes(session, [region_id])
         np.testing.assert_array_equal(stored.C, [[1.0], [-1.0]])
+        np.testing.assert_array_equal([stored.lower, stored.upper], [[-1.0], [1.0]])
         assert proofs.get(session, digest) == b"first"
         assert [row.id for row in regions.page(session, job_id=job_id).rows] == [region_id]
         assert not regions.page(session, scene_id="other").rows
@@ -162,6 +165,8 @@ def test_a_region_is_its_jobs_latest_until_it_is_deleted(db: Database) -> None:
     with db.read() as session:
         assert jobs.get(session, job_id).region_id is None
         assert session.get(ProofRow, digest) is None
+        assert regions.roll(session, scene_id) == (2, [])
+        assert regions.version(session, scene_id) == 2
 
 
 def test_times_keep_their_zone_and_numbers_that_json_lacks_are_refused(db: Database) -> None:

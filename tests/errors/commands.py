@@ -75,6 +75,16 @@ COMMANDS: list[Row] = [
         ),
     ),
     *rows(
+        "client/planning.py",
+        (
+            "option",
+            "--q",
+            "a path has two waypoints or more",
+            "give it once for each waypoint",
+            lambda t: t.ciris("path", "slider", "--q", "0.1"),
+        ),
+    ),
+    *rows(
         "client/commands.py",
         ("option", "--deadline", "must be a number of seconds above 0, not {deadline}", "", lambda t: grow(t, "--deadline", "0")),
         (

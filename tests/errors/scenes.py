@@ -140,6 +140,7 @@ FILES = rows(
     ),
     ("scene_field", "ignore", "must be a list of pairs of names", "", lambda t: t.load(D + "ignore: 3\n")),
     ("scene_field", "ignore[0]", "must be two names, [a, b] or {pair: [a, b], reason: ...}", "", lambda t: t.load(D + "ignore: [[a]]\n")),
+    ("scene_field", "hulls", "must be a list of bodies, such as [arm/link_1]", "", lambda t: t.load("hulls: arm/hand\n" + D)),
     (
         "scene_field",
         "directives",
@@ -256,6 +257,23 @@ MODELS = [
             "no polytope of {max_vertices} vertices was found around a mesh of {...} points",
             "raise it, or simplify the mesh",
             "no mesh is known for which none is found",
+        ),
+    ),
+    *rows(
+        "certifier/scene/hulls.py",
+        (
+            "unknown_name",
+            "hulls[{k}]",
+            "the scene has no body {body}",
+            "`ciris scene check` lists the geometries, whose names begin with their bodies",
+            lambda t: t.scene(extra="hulls: [elsewhere]\n"),
+        ),
+        (
+            "few_parts",
+            "hulls[{k}]",
+            "{body} has {...} boxes, cylinders and meshes, of which there have to be two or more",
+            "leave it out of hulls",
+            lambda t: t.scene(extra="hulls: [arm/hand]\n"),
         ),
     ),
     *rows(

@@ -58,6 +58,12 @@ def twins(t: Trial) -> None:
     t.ask("GET", f"/v1/jobs/{first[:4]}")
 
 
+def outside(t: Trial) -> None:
+    """Asks for a path, straight in s, to where the slider cannot go."""
+    t.request.getfixturevalue("scene")
+    t.ask("POST", "/v1/planning/path", json={"scene": "slider", "q": [[0.0], [5.0]], "space": "s"})
+
+
 def too_many(t: Trial) -> None:
     t.request.getfixturevalue("environment").setenv("CIRIS_MAX_JOBS_PER_KEY", "1")
     settings.cache_clear()
@@ -268,6 +274,13 @@ REQUESTS = [
             "{...} numbers were given; {name} has {n} joints",
             "in the order {names}",
             lambda t: post(t, GROW | {"seed": {"q": [0.1, 0.2]}}),
+        ),
+        (
+            "waypoint_outside_limits",
+            "q[1]",
+            "a joint of this waypoint is outside of its limits, or of the window that the scene covers, and has no s",
+            "`ciris scene show` lists the limits",
+            outside,
         ),
     ),
     *rows(

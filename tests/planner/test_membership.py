@@ -5,37 +5,87 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from certifier.model import Joint, JointKind, Polytope, Scene
-from planner.membership import MembershipIndex, to_s
+from certifier.model import Joint, JointKind, Scene
+from planner.library import Library, Region
+from planner.membership import locate, to_s
+from tests.planner.regions import box, cut_box, cut_boxes, library
 
 
-def polytopes(rng: np.random.Generator, n: int, count: int) -> list[Polytope]:
-    return [Polytope(rng.normal(size=(m, n)), rng.uniform(-0.5, 1.5, size=m)) for m in rng.integers(1, 9, size=count)]
-
-
-@given(seed=st.integers(0, 2**32 - 1), n=st.integers(1, 7), regions=st.integers(1, 6), points=st.integers(1, 20))
-def test_the_stacked_index_agrees_with_one_inequality_at_a_time(seed: int, n: int, regions: int, points: int) -> None:
+@given(seed=st.integers(0, 2**32 - 1), n=st.integers(1, 5), regions=st.integers(1, 5), faces=st.integers(0, 20))
+def test_points_are_located_as_one_inequality_at_a_time_says(seed: int, n: int, regions: int, faces: int) -> None:
     rng = np.random.default_rng(seed)
-    stored, s = polytopes(rng, n, regions), rng.normal(size=(points, n))
-    found = MembershipIndex(stored, n).locate(s)
-    for i, point in enumerate(s):
-        for j, polytope in enumerate(stored):
+    stored, s = cut_boxes(rng, n, regions, faces), rng.uniform(-1.5, 1.5, size=(6, n))
+    found = locate(stored, s)
+    margins = {(k, r): margin for k, r, margin in zip(found.point, found.region, found.margin, strict=True)}
+    for k, point in enumerate(s):
+        for r in range(regions):
+            polytope = stored.polytope(r)
             distances = [(d - c @ point) / np.linalg.norm(c) for c, d in zip(polytope.C, polytope.d, strict=True)]
-            assert found.margin[i, j] == pytest.approx(min(distances))
             if abs(min(distances)) > 1e-12:
-                assert found.inside[i, j] == (min(distances) > 0) == bool(polytope.contains(point))
+                assert ((k, r) in margins) == (min(distances) > 0) == bool(polytope.contains(point))
+            if (k, r) in margins:
+                assert margins[k, r] == pytest.approx(min(distances), abs=1e-12)
+
+
+def test_hits_are_in_the_order_of_points_and_the_deepest_region_comes_first() -> None:
+    stored = library(box("wide", [-1, -1], [1, 1]), box("narrow", [-0.5, -0.5], [0.5, 0.5]), box("far", [2, 2], [3, 3]))
+    found = locate(stored, np.array([[0.0, 0.0], [2.5, 2.5], [9.0, 9.0], [0.5, 0.5]]))
+    assert found.point.tolist() == [0, 0, 1, 3, 3]
+    assert [stored.ids[i] for i in found.region] == ["wide", "narrow", "far", "wide", "narrow"]
+    assert found.margin.tolist() == [1.0, 0.5, 0.5, 0.5, 0.0]
+
+
+def test_many_points_and_regions_are_answered_like_few(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    stored, s = cut_boxes(rng, 3, 300), rng.uniform(-1, 1, size=(40, 3))
+    at_once = locate(stored, s)
+    monkeypatch.setattr("planner.membership._POINTS", 7)
+    monkeypatch.setattr("planner.membership._PAIRS", 11)
+    bit_by_bit = locate(stored, s)
+    assert len(at_once.point) > 100
+    for name in ("point", "region", "margin"):
+        np.testing.assert_array_equal(getattr(at_once, name), getattr(bit_by_bit, name))
 
 
 def test_no_regions_hold_nothing() -> None:
-    found = MembershipIndex([], 3).locate(np.zeros((4, 3)))
-    assert found.inside.shape == found.margin.shape == (4, 0)
+    assert locate(Library(3), np.zeros((4, 3))).point.shape == (0,)
 
 
 def test_a_point_without_coordinates_is_outside_of_everything() -> None:
-    everywhere = Polytope(np.zeros((1, 2)), np.ones(1))
-    found = MembershipIndex([everywhere], 2).locate(np.array([[0.0, 0.0], [np.nan, 0.0]]))
-    assert found.inside.tolist() == [[True], [False]]
-    assert found.margin[1, 0] == -np.inf
+    limits = np.array([1e9, 1e9])
+    everywhere = Region("all", "exact", np.zeros((1, 2)), np.ones(1), -limits, limits)
+    found = locate(library(box("a", [0, 0], [1, 1]), everywhere), np.array([[0.0, 0.0], [np.nan, 0.0]]))
+    assert set(found.point.tolist()) == {0}
+
+
+@given(seed=st.integers(0, 2**32 - 1), steps=st.lists(st.tuples(st.sampled_from([0, 1, 40]), st.integers(0, 3)), max_size=4))
+def test_a_library_that_changed_again_and_again_is_like_a_new_one(seed: int, steps: list[tuple[int, int]]) -> None:
+    """And the versions before stay as they were."""
+    rng = np.random.default_rng(seed)
+    s = rng.uniform(-1.5, 1.5, size=(10, 2))
+    regions: dict[str, Region] = {}
+    changing, history = Library(2), []
+    for version, (more, fewer) in enumerate(steps, start=1):
+        for name in list(regions)[:fewer]:
+            del regions[name]
+        added = [cut_box(rng, f"{version}.{i}", 2, 3) for i in range(more)]
+        changing = changing.changed(version, list(regions), added)
+        regions |= {region.id: region for region in added}
+        history.append((changing, list(regions.values())))
+    for version, (changed, expected) in enumerate(history, start=1):
+        anew = Library(2).changed(version, [], expected)
+        assert (changed.version, changed.ids, changed.first.tolist()) == (version, anew.ids, anew.first.tolist())
+        np.testing.assert_array_equal(changed.faces, anew.faces)
+        for name in ("point", "region", "margin"):
+            np.testing.assert_array_equal(getattr(locate(changed, s), name), getattr(locate(anew, s), name))
+
+
+def test_an_added_region_copies_no_faces_of_the_others() -> None:
+    rng = np.random.default_rng(0)
+    stored = cut_boxes(rng, 2, 50)
+    once = stored.changed(2, stored.ids, [cut_box(rng, "first", 2, 3)])
+    again = once.changed(3, once.ids, [cut_box(rng, "second", 2, 3)])
+    assert np.shares_memory(once.faces, again.faces)
 
 
 def elbow() -> Scene:

@@ -145,6 +145,12 @@ def test_what_cannot_be_is_named(tmp_path, change, code, field, words):
     assert words in str(caught.value) + caught.value.hint
 
 
+BOX_AT = '<collision name="{0}"><origin xyz="0 0 {1}"/><geometry><box size="0.02 0.02 0.02"/></geometry></collision>'
+RING = f"""<link name="ring">{BOX_AT.format("low", 0)}{BOX_AT.format("high", 0.1)}</link>
+  <joint name="hold" type="fixed"><parent link="hand"/><child link="ring"/></joint>"""
+"""A body of two parts."""
+
+
 def test_the_documents_example_is_read_and_its_table_has_every_key(tmp_path):
     text = (EXAMPLES.parent / "docs" / "scenes.md").read_text()
     example = text.split("```yaml\n")[1].split("```")[0]
@@ -153,7 +159,7 @@ def test_the_documents_example_is_read_and_its_table_has_every_key(tmp_path):
     assert set(yaml.safe_load(example)) == set(KEYS)
     (tmp_path / "cell").mkdir()
     (tmp_path / "my_robot_description").mkdir()
-    path = write(tmp_path / "cell", example, limit=WIDE, more=FINGERS)
+    path = write(tmp_path / "cell", example, limit=WIDE, more=FINGERS + RING)
     scene = parsed(path)
     assert [j.name for j in scene.moving] == ["arm/turn"]
     assert (scene.q_lower[0], scene.padding, scene.name) == (-1.5, 0.005, "my-cell")

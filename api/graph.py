@@ -1,0 +1,85 @@
+"""This module answers how the regions of a scene hang together, and compares those pairs of regions that nobody has compared yet."""
+
+from __future__ import annotations
+
+import time
+
+from api.schemas.planning import Edge, Gap, GraphRegion, GraphResponse
+from certifier.model import Scene
+from certifier.outcome import Guarantee
+from db import overlaps
+from db.overlaps import Overlap
+from db.session import Database
+from planner.library import Library
+from planner.overlap import beside, components, gap, overlap
+
+COMPARE_SECONDS = 5.0
+"""One request compares regions for about so long."""
+MOST_GAPS = 20
+"""Gaps are looked for around so many components at most, the largest."""
+
+
+def describe(db: Database, scene_id: str, scene: Scene, library: Library) -> GraphResponse:
+    """Returns the graph of the library's regions, after comparing pairs for at most COMPARE_SECONDS."""
+    complete = _compare(db, scene_id, library, time.monotonic() + COMPARE_SECONDS)
+    number = {region_id: i for i, region_id in enumerate(library.ids)}
+    with db.read() as session:
+        known = [edge for edge in overlaps.all_of(session, scene_id) if edge.earlier in number and edge.later in number]
+    parts = components(len(library), [(number[edge.earlier], number[edge.later]) for edge in known])
+    part_of = {region: part for part, regions in enumerate(parts) for region in regions}
+    return GraphResponse(
+        scene=scene_id,
+        version=library.version,
+        regions=len(library),
+        complete=complete,
+        nodes=[
+            GraphRegion(region=region_id, guarantee=Guarantee(guarantee), component=part_of[i])
+            for i, (region_id, guarantee) in enumerate(zip(library.ids, library.guarantees, strict=True))
+        ],
+        edges=[Edge(a=edge.earlier, b=edge.later, depth=edge.depth, q=scene.to_q(edge.witness).tolist(), s=edge.witness) for edge in known],
+        components=len(parts),
+        gaps=_gaps(library, scene, parts) if complete else [],
+    )
+
+
+def _compare(db: Database, scene_id: str, library: Library, until: float) -> bool:
+    """Compares regions of the library that were not compared yet, until the time is over, and saves what it finds.
+
+    Returns:
+        Whether all pairs of the library's regions have been compared.
+    """
+    with db.read() as session:
+        known = overlaps.numbers(session, scene_id)
+    rows = [(row, *known[region_id]) for row, region_id in enumerate(library.ids) if region_id in known]
+    for row, number, linked in rows:
+        if linked >= number - 1:
+            continue
+        found, reached = [], number - 1
+        number_of = {other: its for other, its, _ in rows if linked < its < number}
+        for other in beside(library, row, list(number_of)):
+            if time.monotonic() > until:
+                reached = number_of[other] - 1
+                break
+            common = overlap(library, other, row)
+            if common is not None:
+                found.append(Overlap(library.ids[other], library.ids[row], common.depth, common.witness.tolist()))
+        with db.write() as session:
+            overlaps.save(session, scene_id, library.ids[row], reached, found)
+        if reached < number - 1:
+            return False
+    return True
+
+
+def _gaps(library: Library, scene: Scene, parts: list[list[int]]) -> list[Gap]:
+    found = {frozenset((near.a, near.b)): near for part in parts[:MOST_GAPS] if (near := gap(library, part)) is not None}
+    return [
+        Gap(
+            a=library.ids[near.a],
+            b=library.ids[near.b],
+            distance=near.distance,
+            q=scene.to_q((near.s_a + near.s_b) / 2).tolist(),
+            q_a=scene.to_q(near.s_a).tolist(),
+            q_b=scene.to_q(near.s_b).tolist(),
+        )
+        for near in found.values()
+    ]

@@ -1,0 +1,282 @@
+"""These models describe the questions that planners ask about the regions of a scene, and the answers."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from api.schemas.common import Real, Request, SceneName, Vector
+from certifier.outcome import Guarantee
+from planner.motion.path import Space
+
+MAX_POINTS, MAX_NEAREST = 10_000, 1000
+MAX_SEGMENTS = MAX_WAYPOINTS = 500
+
+SCENE, REGION = "planar-2dof", "1f0c6d4e-6d0e-4f0e-9a51-0c1f5d0a7b11"
+
+POINTS_IN_Q = "(k, n), joint positions in radians or metres, one row a point."
+POINTS_IN_S = "(k, n), tangent-space coordinates s, one row a point."
+Ends = Annotated[list[Vector], Field(min_length=2, max_length=2)]
+Q = Annotated[list[float], Field(description="(n,), joint positions in radians or metres.", examples=[[0.4, 0.3]])]
+S = Annotated[list[float], Field(description="(n,), tangent-space coordinates.", examples=[[0.2027, 0.1511]])]
+RegionId = Annotated[str, Field(description="Id of a region.", examples=[REGION])]
+Distance = Annotated[float, Field(description="Euclidean distance in s.", examples=[0.05])]
+
+
+class _Points(Request):
+    """Gives points, either as joint positions `q` or as tangent-space coordinates `s`."""
+
+    scene: SceneName
+    q: list[Vector] | None = Field(None, min_length=1, max_length=MAX_POINTS, description=POINTS_IN_Q, examples=[[[0.4, 0.3]]])
+    s: list[Vector] | None = Field(None, min_length=1, max_length=MAX_POINTS, description=POINTS_IN_S, examples=[[[0.2027, 0.1511]]])
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        if (self.q is None) == (self.s is None):
+            raise ValueError("give either q or s")
+        return self
+
+
+class ContainsRequest(_Points):
+    """Asks which regions contain points. The request gives either joint positions `q` or tangent-space coordinates `s`."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "iiwa-shelf", "q": [[0, 0.3, 0, -1.8, 0, 0.9, 0]]}]})
+
+
+class NearestRequest(_Points):
+    """Asks for the region that is nearest to each point, either joint positions `q` or tangent-space coordinates `s`."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "iiwa-shelf", "q": [[0, 0.3, 0, -1.8, 0, 0.9, 0]]}]})
+
+    q: list[Vector] | None = Field(None, min_length=1, max_length=MAX_NEAREST, description=POINTS_IN_Q, examples=[[[0.4, 0.3]]])
+    s: list[Vector] | None = Field(None, min_length=1, max_length=MAX_NEAREST, description=POINTS_IN_S, examples=[[[0.2027, 0.1511]]])
+
+
+class _Motion(Request):
+    """Says in which coordinates a motion is straight."""
+
+    scene: SceneName
+    space: Space = Field(
+        Space.Q,
+        description="Where the motion is straight between waypoints: in joint positions `q`, as a robot's interpolation usually is, or in "
+        "tangent-space coordinates `s`. Waypoints that are given as `q` are rounded to `s` first in the latter case; those given as `s` "
+        "need the space `s`.",
+        examples=["q"],
+    )
+
+    def one_kind(self, q: object, s: object) -> None:
+        """Refuses waypoints of no kind or both, and those in s for a motion that is straight in q."""
+        if (q is None) == (s is None):
+            raise ValueError("give either q or s")
+        if s is not None and self.space is Space.Q:
+            raise ValueError("a motion through waypoints in s is straight in s: give space s, or waypoints in q")
+
+
+class SegmentRequest(_Motion):
+    """Asks about straight motions, each of its own, such as the edges of a roadmap."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"scene": "planar-2dof", "q": [[[0.4, 0.3], [0.6, 0.3]], [[0.4, 0.3], [1.5, -2.0]]]}]}
+    )
+
+    q: list[Ends] | None = Field(
+        None,
+        min_length=1,
+        max_length=MAX_SEGMENTS,
+        description="(k, 2, n), begin and end of each motion, joint positions in radians or metres.",
+        examples=[[[[0.4, 0.3], [0.6, 0.3]]]],
+    )
+    s: list[Ends] | None = Field(
+        None,
+        min_length=1,
+        max_length=MAX_SEGMENTS,
+        description="(k, 2, n), begin and end of each motion, tangent-space coordinates.",
+        examples=[[[[0.2, 0.15], [0.3, 0.15]]]],
+    )
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        self.one_kind(self.q, self.s)
+        return self
+
+
+class PathRequest(_Motion):
+    """Asks about a path that is straight between its waypoints, or about a trajectory, which is a path with times."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"scene": "planar-2dof", "q": [[0.4, 0.3], [0.6, 0.3], [0.6, 0.5]], "times": [0, 0.5, 1.25]}]}
+    )
+
+    q: list[Vector] | None = Field(
+        None,
+        min_length=2,
+        max_length=MAX_WAYPOINTS,
+        description="(k, n), waypoints, joint positions in radians or metres.",
+        examples=[[[0.4, 0.3], [0.6, 0.3]]],
+    )
+    s: list[Vector] | None = Field(
+        None,
+        min_length=2,
+        max_length=MAX_WAYPOINTS,
+        description="(k, n), waypoints, tangent-space coordinates.",
+        examples=[[[0.2, 0.15], [0.3, 0.15]]],
+    )
+    times: list[Real] | None = Field(
+        None,
+        min_length=2,
+        max_length=MAX_WAYPOINTS,
+        description="(k,), ascending: when the path is at each waypoint. The answer is in these; 0, 1, 2 ... where they are left out.",
+        examples=[[0.0, 0.5]],
+    )
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        self.one_kind(self.q, self.s)
+        waypoints = self.q or self.s or []
+        if self.times is not None and len(self.times) != len(waypoints):
+            raise ValueError(f"there are {len(waypoints)} waypoints and {len(self.times)} times")
+        if self.times is not None and any(b <= a for a, b in pairwise(self.times)):
+            raise ValueError("times must ascend")
+        return self
+
+
+class _Answer(BaseModel):
+    """All answers say which regions they are about."""
+
+    scene: str = Field(description="Id of the scene.", examples=["5a9e0c7b12de34f0"])
+    version: int = Field(
+        description="How often a region of the scene had been added or deleted. Answers with the same version are about the same regions.",
+        examples=[12],
+    )
+    regions: int = Field(description="Number of regions of the scene.", examples=[12])
+
+
+class Hit(BaseModel):
+    """Names a region that contains the point."""
+
+    region: RegionId
+    margin: float = Field(description="Distance in s from the point to the region's nearest face.", examples=[0.05])
+    guarantee: Guarantee = Field(description="What the region's certificate is worth.", examples=["exact"])
+
+
+class Containment(BaseModel):
+    """Answers for one point."""
+
+    inside: bool = Field(description="Whether some region contains the point.", examples=[True])
+    regions: list[Hit] = Field(description="The regions that contain the point, the one with the largest margin first.")
+    margin: float | None = Field(description="The largest margin; null where no region contains the point.", examples=[0.05])
+
+
+class ContainsResponse(_Answer):
+    """Holds one answer for each point, in order."""
+
+    points: list[Containment] = Field(description="One answer for each point, in order.")
+
+
+class Near(BaseModel):
+    """Names a region near a point. The nearest point is found in floating point and lies 1e-9 behind every face, in s."""
+
+    region: RegionId
+    guarantee: Guarantee = Field(description="What the region's certificate is worth.", examples=["exact"])
+    distance: Distance
+    q: Q
+    s: S
+
+
+class NearestPoint(BaseModel):
+    """Answers for one point."""
+
+    nearest: Near | None = Field(
+        description="The nearest region and its nearest point, distance 0 where the region contains the point; null where the scene has no "
+        "region, or a joint is outside its limits."
+    )
+
+
+class NearestResponse(_Answer):
+    """Holds one answer for each point, in order."""
+
+    points: list[NearestPoint] = Field(description="One answer for each point, in order.")
+
+
+class Piece(BaseModel):
+    """Says that a region contains all of the motion between two times."""
+
+    begin: float = Field(description="Time at which the piece begins; the doubles nearest to the exact ends are shown.", examples=[0.0])
+    end: float = Field(description="Time at which the piece ends, and the next begins.", examples=[0.625])
+    region: RegionId
+    guarantee: Guarantee = Field(description="What the region's certificate is worth.", examples=["exact"])
+
+
+class Uncovered(BaseModel):
+    """Says where a motion stops being covered."""
+
+    time: float = Field(description="The motion is covered up to here, and not proved to be from here on.", examples=[0.625])
+    segment: int = Field(description="Number of the segment between two waypoints, from 0 on.", examples=[0])
+    q: Q
+    s: S | None = Field(description="The same configuration in s; null where a joint is outside its limits.")
+    next: Near | None = Field(
+        description="The nearest region that does not contain this configuration, and how far it is; null where there is none, or no s."
+    )
+
+
+class Covering(BaseModel):
+    """Says whether every point of a motion is in certified regions."""
+
+    covered: bool = Field(description="True only if this is proved, for the numbers of the request taken literally.", examples=[True])
+    pieces: list[Piece] = Field(description="The regions that cover the motion, in order, as far as it is covered from its start on.")
+    uncovered: Uncovered | None = Field(description="Where the motion stops being covered; null where it is covered.")
+
+
+class SegmentResponse(_Answer):
+    """Holds one answer for each motion, in order, with times from 0 at its begin to 1 at its end."""
+
+    segments: list[Covering] = Field(description="One answer for each motion, in order.")
+
+
+class PathResponse(Covering, _Answer):
+    """Says whether a path is covered."""
+
+
+class GraphRegion(BaseModel):
+    """Names a region and the component that it belongs to."""
+
+    region: RegionId
+    guarantee: Guarantee = Field(description="What the region's certificate is worth.", examples=["exact"])
+    component: int = Field(description="Number of its component, from 0 on; the component with the most regions is number 0.", examples=[0])
+
+
+class Edge(BaseModel):
+    """Names two regions that overlap. A motion may go from one to the other through the witness."""
+
+    a: RegionId
+    b: RegionId
+    depth: float = Field(description="Radius of the largest ball inside of both, in s.", examples=[0.1])
+    q: Q
+    s: S
+
+
+class Gap(BaseModel):
+    """Names the place where a component comes nearest to another. A region that is grown there may join them."""
+
+    a: RegionId
+    b: RegionId
+    distance: Distance
+    q: Annotated[list[float], Field(description="(n,), joint positions midway between a and b: a seed to try.", examples=[[0.4, 0.3]])]
+    q_a: Annotated[list[float], Field(description="(n,), joint positions of a's point that is nearest to b.", examples=[[0.3, 0.3]])]
+    q_b: Annotated[list[float], Field(description="(n,), joint positions of b's point that is nearest to a.", examples=[[0.5, 0.3]])]
+
+
+class GraphResponse(_Answer):
+    """Says how the regions of a scene hang together."""
+
+    complete: bool = Field(
+        description="Whether every pair of regions has been compared. Pairs are compared once, when this is asked, for a few seconds at a "
+        "time: ask again until it is true.",
+        examples=[True],
+    )
+    nodes: list[GraphRegion] = Field(description="All regions of the scene.")
+    edges: list[Edge] = Field(description="The pairs of regions that overlap; regions that only touch do not.")
+    components: int = Field(description="Number of sets of regions that edges join.", examples=[1])
+    gaps: list[Gap] = Field(description="For up to 20 of the largest components, the gap to the nearest other; empty until complete.")

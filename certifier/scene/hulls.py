@@ -1,0 +1,54 @@
+"""Links of many convex parts, as programs that decompose meshes write them, become one hull of their parts here, where a scene asks for it.
+
+Pairs are what certifying costs. Two links of fifteen parts each make 225 of them, and their hulls one.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Mapping, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from certifier.errors import SceneError, close_matches
+from certifier.model import Geometry
+from certifier.scene.hull import outer
+
+_Key = TypeVar("_Key")
+
+
+def with_hulls(
+    geometries: Mapping[_Key, Geometry], hulls: Sequence[str], bodies: Collection[str], max_vertices: int
+) -> dict[_Key, Geometry]:
+    """Returns the geometries with one hull in the place of all polytopes of each body named; balls and capsules remain.
+
+    Args:
+        hulls: names of bodies, as the scene file has them.
+        bodies: all bodies of the scene.
+        max_vertices: so many vertices has a hull at most; it is a polytope around the hull where that has more.
+
+    Raises:
+        SceneError: ``unknown_name``; ``few_parts`` for a body with fewer than two polytopes; ``hull``, as :func:`outer`.
+    """
+    found = dict(geometries)
+    for k, body in enumerate(hulls):
+        if body not in bodies:
+            hint = close_matches(body, list(bodies)) or "`ciris scene check` lists the geometries, whose names begin with their bodies"
+            raise SceneError("unknown_name", f"the scene has no body {body!r}", field=f"hulls[{k}]", hint=hint)
+        parts = {key: geometry for key, geometry in geometries.items() if geometry.body == body and geometry.radius == 0}
+        if len(parts) < 2:
+            message = f"{body} has {len(parts)} boxes, cylinders and meshes, of which there have to be two or more"
+            raise SceneError("few_parts", message, field=f"hulls[{k}]", hint="leave it out of hulls")
+        taken = {geometry.name for geometry in found.values()}
+        name = next(name for i in itertools.count(1) if (name := f"{body}/hull{i if i > 1 else ''}") not in taken)
+        found |= dict.fromkeys(parts, _hull(name, list(parts.values()), max_vertices))
+    return found
+
+
+def _hull(name: str, parts: list[Geometry], max_vertices: int) -> Geometry:
+    """Returns the hull of the parts; its inflation is about the hull of the shapes that the parts stand for."""
+    vertices, inflation, _ = outer(np.concatenate([part.vertices for part in parts]), max_vertices)
+    substitution = f"{len(parts)} parts -> hull with {len(vertices)} vertices"
+    shape = {"kind": "hull", "of": [part.name for part in parts]}
+    return Geometry(name, parts[0].body, vertices, 0.0, shape, substitution, inflation + max(part.inflation for part in parts))

@@ -1,0 +1,1 @@
+"""These modules prove that every point of a motion is in certified regions."""

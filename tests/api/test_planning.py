@@ -1,0 +1,187 @@
+"""Questions of planners over HTTP, about really certified regions, which come and go."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from api import graph
+from api.app import create_app
+from certifier.jobs.region import Region, certified_region
+from certifier.model import Scene
+from certifier.pair.certification import Certification
+from db import overlaps
+from db.session import Database
+from tests.api.conftest import BASE_URL, store_region
+from tests.certifier.scenes import accepted
+from tests.db.builders import a_running_job, add_region
+from tests.scenes import slider
+
+
+@pytest.mark.parametrize("space", ["q", "s"])
+def test_contains_says_which_region_holds_a_point_and_how_deep(client: TestClient, region: str, space: str) -> None:
+    body = {"scene": "slider", space: [[0.1], [0.9], [-0.3]]}
+    answer = client.post("/v1/planning/contains", json=body).json()
+    inside, outside, edge = answer["points"]
+    assert (answer["regions"], inside["inside"], inside["regions"][0]["region"]) == (1, True, region)
+    assert inside["margin"] == inside["regions"][0]["margin"] == pytest.approx(0.1)
+    assert inside["regions"][0]["guarantee"] == "exact"
+    assert (outside["inside"], outside["regions"], outside["margin"]) == (False, [], None)
+    assert (edge["inside"], edge["margin"]) == (True, 0.0)
+
+
+def test_contains_without_any_region_is_no(client: TestClient, scene) -> None:
+    answer = client.post("/v1/planning/contains", json={"scene": "slider", "q": [[0.1]]}).json()
+    assert answer == {"scene": scene.hash[:16], "version": 0, "regions": 0, "points": [{"inside": False, "regions": [], "margin": None}]}
+
+
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [({"q": [[0.1, 0.2]]}, "q[0]"), ({"q": [[0.1]], "s": [[0.1]]}, "body"), ({}, "body"), ({"q": [["x"]]}, "q[0][0]"), ({"q": []}, "q")],
+)
+def test_contains_refuses_what_makes_no_sense(client: TestClient, scene, body: dict[str, object], field: str | None) -> None:
+    answer = client.post("/v1/planning/contains", json={"scene": "slider"} | body)
+    assert (answer.status_code, answer.json()["field"]) == (422, field)
+
+
+def test_nearest_names_the_nearest_region_and_its_nearest_point(client: TestClient, region: str) -> None:
+    answer = client.post("/v1/planning/nearest", json={"scene": "slider", "q": [[0.1], [0.9], [5.0]]}).json()
+    inside, outside, beyond = (point["nearest"] for point in answer["points"])
+    assert (answer["version"], answer["regions"]) == (1, 1)
+    assert inside == {"region": region, "guarantee": "exact", "distance": 0.0, "q": [0.1], "s": [0.1]}
+    assert (outside["region"], outside["distance"]) == (region, pytest.approx(0.7))
+    assert outside["q"] == outside["s"] == [pytest.approx(0.2)]
+    assert client.post("/v1/planning/contains", json={"scene": "slider", "q": [outside["q"]]}).json()["points"][0]["inside"]
+    assert beyond is None, "5 m is beyond the joint's limits"
+
+
+@pytest.mark.parametrize("space", ["q", "s"])
+def test_a_segment_is_covered_or_it_is_said_where_it_is_not(client: TestClient, region: str, space: str) -> None:
+    body = {"scene": "slider", "q": [[[-0.2], [0.15]], [[0.0], [0.4]], [[0.5], [0.6]]], "space": space}
+    inside, leaving, outside = client.post("/v1/planning/segment", json=body).json()["segments"]
+    assert inside == {"covered": True, "pieces": [{"begin": 0.0, "end": 1.0, "region": region, "guarantee": "exact"}], "uncovered": None}
+    assert (leaving["covered"], leaving["pieces"][0]["end"]) == (False, pytest.approx(0.5))
+    assert leaving["uncovered"] | {"next": None} == {
+        "time": leaving["pieces"][0]["end"],
+        "segment": 0,
+        "q": [pytest.approx(0.2)],
+        "s": [pytest.approx(0.2)],
+        "next": None,
+    }
+    assert leaving["uncovered"]["next"] is None, "there is no other region"
+    assert (outside["covered"], outside["pieces"], outside["uncovered"]["time"]) == (False, [], 0.0)
+    assert (outside["uncovered"]["next"]["region"], outside["uncovered"]["next"]["distance"]) == (region, pytest.approx(0.3))
+
+
+def test_a_path_with_times_is_answered_in_them(client: TestClient, region: str) -> None:
+    body = {"scene": "slider", "q": [[0.0], [0.1], [0.5]], "times": [2.0, 3.0, 7.0]}
+    answer = client.post("/v1/planning/path", json=body).json()
+    (piece,) = answer["pieces"]
+    assert (answer["covered"], piece["begin"], piece["end"]) == (False, 2.0, pytest.approx(4.0))
+    assert (answer["uncovered"]["segment"], answer["uncovered"]["time"]) == (1, piece["end"])
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "field"),
+    [
+        ("segment", {"q": [[[0.1, 0.2], [0.1, 0.2]]]}, "q[0][0]"),
+        ("segment", {"q": [[[0.1]]]}, "q[0]"),
+        ("segment", {"s": [[[0.1], [0.2]]]}, "body"),
+        ("segment", {"q": [[[0.1], [5.0]]], "space": "s"}, "q[0][1]"),
+        ("path", {"q": [[0.1]]}, "q"),
+        ("path", {"q": [[0.1], [0.2]], "s": [[0.1], [0.2]]}, "body"),
+        ("path", {"q": [[0.1], [0.2]], "times": [1.0]}, "times"),
+        ("path", {"q": [[0.1], [0.2]], "times": [1.0, 2.0, 3.0]}, "body"),
+        ("path", {"q": [[0.1], [0.2]], "times": [1.0, 1.0]}, "body"),
+        ("nearest", {}, "body"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(client: TestClient, scene: Scene, path: str, body: dict[str, object], field: str | None) -> None:
+    answer = client.post(f"/v1/planning/{path}", json={"scene": "slider"} | body)
+    assert (answer.status_code, answer.json()["field"]) == (422, field)
+
+
+def a_part(lower: float, upper: float) -> Region:
+    """A certified region of the slider."""
+    scene = slider(posts=2)
+    polytope = scene.polytope([[1.0], [-1.0]], [upper, -lower])
+    certification = Certification(scene, polytope, np.full(1, (lower + upper) / 2))
+    proofs = {index: certification.certify(index).proof or b"" for index in range(2)}
+    return certified_region(scene, accepted(polytope, np.full(1, (lower + upper) / 2)), proofs, {"seconds": 1.0})
+
+
+def test_answers_follow_the_regions_that_come_and_go_by_whoever_changes_them(client: TestClient, region: str, database: Database) -> None:
+    """Two API processes, and a worker that adds a region without either."""
+    path = {"scene": "slider", "q": [[0.0], [0.6]], "space": "s"}
+    with TestClient(create_app(database), base_url=BASE_URL) as other:
+        for api in (client, other):
+            assert (api.post("/v1/planning/path", json=path).json() | {"pieces": 0, "uncovered": 0})["covered"] is False
+        more = store_region(database, a_part(0.1, 0.7))
+        for api in (client, other):
+            answer = api.post("/v1/planning/path", json=path).json()
+            assert (answer["version"], answer["regions"], answer["covered"]) == (2, 2, True)
+            assert [piece["region"] for piece in answer["pieces"]] == [region, more]
+        assert other.delete(f"/v1/regions/{region}").status_code == 204
+        for api in (client, other):
+            answer = api.post("/v1/planning/path", json=path).json()
+            assert (answer["version"], answer["regions"], answer["covered"]) == (3, 1, False)
+            assert answer["uncovered"]["next"]["region"] == more
+
+
+def test_the_graph_grows_with_the_regions_and_shows_gaps(client: TestClient, region: str, database: Database) -> None:
+    alone = client.get("/v1/planning/graph?scene=slider").json()
+    assert (alone["complete"], alone["edges"], alone["components"], alone["gaps"]) == (True, [], 1, [])
+    beside, far = store_region(database, a_part(0.1, 0.4)), store_region(database, a_part(0.6, 0.9))
+    found = client.get("/v1/planning/graph?scene=slider").json()
+    (edge,) = found["edges"]
+    assert (edge["a"], edge["b"], edge["depth"], edge["q"]) == (region, beside, pytest.approx(0.05), [pytest.approx(0.15)])
+    assert (found["version"], found["components"]) == (3, 2)
+    assert {node["region"]: node["component"] for node in found["nodes"]} == {region: 0, beside: 0, far: 1}
+    (gap,) = found["gaps"]
+    assert ({gap["a"], gap["b"]}, gap["distance"], gap["q"]) == ({beside, far}, pytest.approx(0.2), [pytest.approx(0.5)])
+    assert client.delete(f"/v1/regions/{beside}").status_code == 204
+    assert client.get("/v1/planning/graph?scene=slider").json()["edges"] == []
+
+
+def test_regions_are_compared_once_and_for_a_few_seconds_at_a_time(
+    client: TestClient, scene: Scene, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with database.write() as session:
+        job = a_running_job(session)
+        made = [add_region(session, job, -0.1 * i, 0.5).id for i in range(4)]
+        scene_id = job.scene_id
+    monkeypatch.setattr(graph, "COMPARE_SECONDS", -1.0)
+    unfinished = client.get("/v1/planning/graph?scene=slider").json()
+    assert (unfinished["complete"], unfinished["edges"], unfinished["gaps"]) == (False, [], [])
+    monkeypatch.setattr(graph, "COMPARE_SECONDS", 60.0)
+    assert len(client.get("/v1/planning/graph?scene=slider").json()["edges"]) == 6
+    with database.read() as session:
+        assert overlaps.numbers(session, scene_id) == {region: (i + 1, i) for i, region in enumerate(made)}
+
+    def again(*_: object) -> None:
+        raise AssertionError("this pair was compared before")
+
+    monkeypatch.setattr(graph, "overlap", again)
+    assert len(client.get("/v1/planning/graph?scene=slider").json()["edges"]) == 6
+
+
+def test_comparing_goes_on_where_it_stopped(client: TestClient, scene: Scene, database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    with database.write() as session:
+        job = a_running_job(session)
+        for i in range(4):
+            add_region(session, job, -0.1 * i, 0.5)
+    seconds = iter(range(1000))
+    monkeypatch.setattr(graph, "time", SimpleNamespace(monotonic=lambda: next(seconds)))
+    monkeypatch.setattr(graph, "COMPARE_SECONDS", 1.0)
+    counts = []
+    for _ in range(20):
+        answer = client.get("/v1/planning/graph?scene=slider").json()
+        counts.append(len(answer["edges"]))
+        if answer["complete"]:
+            break
+    assert counts[-1] == 6
+    assert len(counts) > 3
+    assert counts == sorted(counts)
