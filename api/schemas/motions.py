@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from api.schemas.common import Request, SceneName, Vector
 from certifier.outcome import Guarantee, Outcome
-from certifier.proof.motion import Space
+from planner.motion.path import Space
 
 Waypoints = Annotated[list[Vector], Field(min_length=2, max_length=2000)]
 
@@ -39,8 +39,8 @@ class MotionRequest(Request):
 class SceneReference(BaseModel):
     """Names a scene, and its content by its hash."""
 
-    name: str
-    hash: str
+    name: str = Field(description="What the scene is called.")
+    hash: str = Field(description="SHA-256 of the scene's content.")
 
 
 class Place(BaseModel):
@@ -54,24 +54,24 @@ class Place(BaseModel):
 class Contact(Place):
     """Says where a motion first could not be certified, and for which pair of bodies."""
 
-    a: str
-    b: str
+    a: str = Field(description="The first geometry of the pair.")
+    b: str = Field(description="The second geometry of the pair.")
     distance: float = Field(description="How far the padded bodies are apart there, in metres; 0 where they overlap.")
 
 
 class MotionResponse(BaseModel):
     """Says what has become of a motion. The proof has passed the verifier."""
 
-    scene: SceneReference
-    space: Space
-    waypoints: int
-    outcome: Outcome
-    guarantee: Guarantee
+    scene: SceneReference = Field(description="The scene that the motion is certified in.")
+    space: Space = Field(description="In which coordinates the motion is straight.")
+    waypoints: int = Field(description="Number of waypoints.")
+    outcome: Outcome = Field(description="`certified`, `refuted` (a contact), `too_close`, or `inconclusive` (too many intervals).")
+    guarantee: Guarantee = Field(description="`exact` for a motion that is certified, otherwise `none`.")
     certified_to: Place | None = Field(description="Up to where every pair is proved to be apart; null where nothing is proved.")
     margin: float | None = Field(description="A lower bound of all padded distances up to there, and in the tube, in metres.")
     tube: float | None = Field(description="Joint positions that are off by this much, in radians or metres, are proved as well.")
     stop: Contact | None = Field(description="The first contact, or where bodies come too close; null for a motion that is certified.")
     intervals: int = Field(description="How many planes the proof has.")
-    seconds: float
-    verify_seconds: float
+    seconds: float = Field(description="How long the search and the verification took together.")
+    verify_seconds: float = Field(description="How long the verification took.")
     proof: str | None = Field(description="The proof file in base 64, of the motion or of its beginning; null where it was not asked for.")
