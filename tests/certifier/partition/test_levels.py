@@ -181,4 +181,5 @@ def test_points_are_named_where_the_volumes_at_hand_touch_so_that_these_become_e
     ends = [area.kinematics.points("world", volume.body, volume.vertices, weakness.points) for volume in (a, b)]
     reach = np.linalg.norm(ends[0][:, :, None] - ends[1][:, None], axis=3).min(axis=(1, 2))
     assert (reach < a.radius + b.radius + 0.05).all()
-    assert len(weakness.points) <= len(certification.certify(HANDS, CELLS, cut_off=CutOff.ALL).weakness.points)
+    # How many points there are depends on the last digits, and so on the processor. What they are about does not.
+    assert certification.certify(HANDS, CELLS, cut_off=CutOff.ALL).weakness.joints == ()
