@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
 from fastapi import APIRouter, FastAPI, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
 from fastapi.staticfiles import StaticFiles
@@ -78,15 +77,20 @@ def job_live(request: Request, job_id: str, db: Db) -> Response:
     return page(request, "job_live.html", _job(db, job_id))
 
 
+def _alone(known: dict[str, Any] | None) -> dict[str, Any] | None:
+    """Returns how far a joint moves while the others stay at the seed, as ranges are; None where that is not known."""
+    ends = None if known is None else known.get("through_seed")
+    return None if known is None or ends is None else {"lower": ends[0], "upper": ends[1], "unit": known["unit"]}
+
+
 @router.get("/regions/{region_id}")
 def region_page(request: Request, region_id: str, db: Db) -> Response:
     region = regions.get_region(region_id, db)
-    shape = np.array(region.manifest["inscribed_ellipsoid"]["shape"])
-    reach = np.linalg.norm(shape, axis=1).tolist()
     # Regions that an earlier checkout stored have no ranges, and their units are not known.
     ranges = [region.manifest.get("joint_ranges", {}).get(name) for name in region.manifest["space"]["joints"]]
     limits = [_limits(*joint) for joint in zip(*(region.manifest["space"][name] for name in ("q_lower", "q_upper")), ranges, strict=True)]
-    context = {"region": region, "manifest": region.manifest, "reach": reach, "ranges": ranges, "limits": limits}
+    alone = [_alone(known) for known in ranges]
+    context = {"region": region, "manifest": region.manifest, "ranges": ranges, "alone": alone, "limits": limits}
     return page(request, "region.html", context)
 
 

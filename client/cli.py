@@ -10,6 +10,7 @@ import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from importlib import metadata
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -40,6 +41,9 @@ OPTIONS = {
 
 
 class _Parser(argparse.ArgumentParser):
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options, allow_abbrev=False)
+
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"error: {escaped(message)} (see {self.prog} --help)\n")
 
@@ -138,6 +142,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("--version", action="version", version=f"ciris {metadata.version('ciris')}")
     verbs = _group(parser)
     remote = _Parser(add_help=False)
     remote.add_argument("--url", help="URL of the service; default: CIRIS_URL, or the service that `ciris up` runs here")
@@ -212,7 +217,12 @@ def _parser() -> argparse.ArgumentParser:
         help="whole (default) keeps the first polytope and certifies it cell by cell; the others shrink it until every pair has one plane",
     )
     grow.add_argument("--cells", type=int, metavar="N", help="for whole: what is open after N cells of a pair in a stage is cut off")
-    grow.add_argument("--deadline", type=float, metavar="SECONDS", help="end after so long with the best region by then; default: none")
+    grow.add_argument(
+        "--deadline",
+        type=float,
+        metavar="SECONDS",
+        help="end after so long with the best region by then, once it is verified; default: none",
+    )
     grow.add_argument("--pushes", type=int, help="how often the faces are pushed out again; default: more often for smaller arms")
     grow.add_argument("--rounds", type=int, help="rounds of the polytope step; default: a few for small arms, none for large ones")
     grow.add_argument("--random-seed", type=int, help="seed of every random choice; default 0")

@@ -85,6 +85,10 @@ def scene_show(args: Namespace) -> int:
 
 def grow(args: Namespace) -> int:
     screen = Screen()
+    if args.local:
+        from client.local import check_is_file
+
+        check_is_file(args.scene)
     common: dict[str, Any] = {"contain": [configuration(q, "--contain") for q in args.contain]} if args.contain else {}
     if args.method is not None:
         common["method"] = args.method
@@ -153,13 +157,13 @@ def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, 
             (
                 ", ".join(f"{x:g}" for x in seed["q"]),
                 job["region"] or "none",
-                _box(grown[job["region"]]) if job["region"] else "",
+                _size(grown[job["region"]]) if job["region"] else "",
                 output.share(grown[job["region"]]["share"]) if job["region"] else "",
                 job["reason"] or "",
             )
             for seed, job in zip(seeds, jobs, strict=True)
         ]
-        output.print_table(("q", "region", "box", "share", "ended"), rows, right="box share")
+        output.print_table(("q", "region", "size", "share", "ended"), rows, right="size share")
     return OK if len(grown) == len(jobs) else NO
 
 
@@ -228,21 +232,21 @@ def region_ls(args: Namespace) -> int:
             r["id"],
             names.get(r["scene"]) or r["scene"],
             str(r["faces"]),
-            _box(r),
+            _size(r),
             output.share(r["share"]),
             r["guarantee"],
             r["created_at"][:19],
         )
         for r in regions
     ]
-    output.print_table(("id", "scene", "faces", "box", "share", "guarantee", "created"), rows, right="faces box share")
+    output.print_table(("id", "scene", "faces", "size", "share", "guarantee", "created"), rows, right="faces size share")
     return OK
 
 
-def _box(region: dict[str, Any]) -> str:
+def _size(region: dict[str, Any]) -> str:
     """Returns the size of a region in a list: the side of a box that is as large, or its q-volume where joints slide."""
     size = region["q_volume"]
-    return "-" if size is None else f"{size['box_side']:.3g} deg" if size["box_side"] else f"{size['value']:.3g} {size['unit']}"
+    return "-" if size is None else f"box of {size['box_side']:.3g} deg" if size["box_side"] else f"{size['value']:.3g} {size['unit']}"
 
 
 def region_show(args: Namespace) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import tempfile
 from pathlib import Path
 
 from certifier.errors import CirisError
@@ -59,9 +60,12 @@ def check_writable(out: str | None) -> None:
         raise CirisError("file_exists", f"{out} is there already", field="--out", hint="move it away, or name another file")
     if not directory.is_dir():
         raise CirisError("not_writable", f"there is no directory {directory.absolute()}", field="--out", hint="make it, or name another")
-    if not os.access(directory, os.W_OK):
+    try:
+        with tempfile.TemporaryFile(dir=directory):
+            pass
+    except OSError:
         message = f"nothing can be written into {directory.absolute()}"
-        raise CirisError("not_writable", message, field="--out", hint="name a file elsewhere")
+        raise CirisError("not_writable", message, field="--out", hint="name a file elsewhere") from None
 
 
 def file_name(name: str) -> str:

@@ -242,7 +242,7 @@ def _segment(name: str) -> str:
     Raises:
         CirisError: not_found for what no name can be.
     """
-    if not name.strip("."):
+    if not name.strip(".") or "/" in name:
         raise CirisError("not_found", f"{name!r} is no name and no id", hint="`scene ls`, `job ls` and `region ls` of ciris list them")
     return quote(name, safe="")
 

@@ -25,11 +25,20 @@ def load(scene: str) -> Scene:
     Raises:
         SceneError: scene_not_found for a name that only a service could know, or what is wrong with the file.
     """
-    if not is_scene_file(scene):
-        raise SceneError("scene_not_found", f"{scene!r} is not a scene file", field="SCENE", hint="--local needs the path of a .yaml file")
+    check_is_file(scene)
     from certifier.scene import load_scene
 
     return load_scene(scene)
+
+
+def check_is_file(scene: str) -> None:
+    """Refuses a name that only a service could know.
+
+    Raises:
+        SceneError: scene_not_found.
+    """
+    if not is_scene_file(scene):
+        raise SceneError("scene_not_found", f"{scene!r} is not a scene file", field="SCENE", hint="--local needs the path of a .yaml file")
 
 
 def grow(

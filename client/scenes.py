@@ -16,6 +16,7 @@ from certifier.scene.contacts import touching
 from certifier.scene.draft import draft
 from certifier.scene.load import load_scene
 from certifier.seeding.limits import check_limits
+from certifier.verify.uncovered import unlisted
 from client import output
 from client.inputs import configuration, seed_file, seed_of
 
@@ -85,6 +86,8 @@ def scene_check(args: Namespace) -> int:
         print(f"warning: {warning}")
     for ignored in scene.ignored:
         print(f"ignored: {ignored.a} and {ignored.b}: {ignored.reason}")
+    if missing := unlisted(scene):
+        print(f"no pairs, as neighbours or by a filter of the model: {missing}")
     for pair in bad:
         print(f"touching at {whence}: {pair.a} and {pair.b}")
     if not bad:

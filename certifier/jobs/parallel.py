@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 
@@ -46,6 +47,7 @@ _adopted: list[CertifyPart] = []
 
 
 def _adopt(certify: CertifyPart) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # a terminal interrupts children too, and they have nothing to say about it
     _adopted.append(certify)
 
 

@@ -24,6 +24,8 @@ KEYS = ("name", "packages", "directives", "q_star", "limits", "fix", "padding", 
 MAX_BYTES = 2**20
 MAX_DEPTH = 50
 MIN_HULL_VERTICES = 8
+MAX_VERTICES, MAX_SIDES = 512, 128
+"""What certifying costs grows with the vertices of a body, so nobody needs more."""
 _MEND = "mend the YAML there; docs/scenes.md shows a scene file"
 
 
@@ -111,8 +113,8 @@ def read_scene_file(path: Path) -> SceneFile:
         padding=_number(values.get("padding", 0.0), "padding", minimum=0.0),
         ignore=_ignore(values.get("ignore", [])),
         hulls=_hulls(values.get("hulls", [])),
-        max_vertices=_integer(mesh.get("max_vertices", 32), "mesh.max_vertices", minimum=MIN_HULL_VERTICES),
-        cylinder_sides=_integer(values.get("cylinder_sides", 12), "cylinder_sides", minimum=3),
+        max_vertices=_integer(mesh.get("max_vertices", 32), "mesh.max_vertices", minimum=MIN_HULL_VERTICES, maximum=MAX_VERTICES),
+        cylinder_sides=_integer(values.get("cylinder_sides", 12), "cylinder_sides", minimum=3, maximum=MAX_SIDES),
     )
 
 
@@ -267,9 +269,11 @@ def _number(value: Any, where: str, minimum: float = -math.inf) -> float:
     return float(value)
 
 
-def _integer(value: Any, where: str, minimum: int) -> int:
+def _integer(value: Any, where: str, minimum: int, maximum: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise _wrong(where, f"must be a whole number, not {value!r}")
+    if value > maximum:
+        raise _wrong(where, f"must be at most {maximum}, not {value}")
     return int(_number(value, where, minimum))
 
 

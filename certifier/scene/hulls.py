@@ -38,7 +38,7 @@ def with_hulls(
             raise SceneError("unknown_name", f"the scene has no body {body!r}", field=f"hulls[{k}]", hint=hint)
         parts = {key: geometry for key, geometry in geometries.items() if geometry.body == body and geometry.radius == 0}
         if len(parts) < 2:
-            message = f"{body} has {len(parts)} boxes, cylinders and meshes, of which there have to be two or more"
+            message = f"{body} must have two or more boxes, cylinders and meshes; it has {len(parts)}"
             raise SceneError("few_parts", message, field=f"hulls[{k}]", hint="leave it out of hulls")
         taken = {geometry.name for geometry in found.values()}
         name = next(name for i in itertools.count(1) if (name := f"{body}/hull{i if i > 1 else ''}") not in taken)

@@ -15,10 +15,13 @@ from __future__ import annotations
 
 import logging
 import math
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from enum import StrEnum
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -199,17 +202,44 @@ class _Recorder(logging.Handler):
 
 @contextmanager
 def _listening() -> Iterator[list[logging.LogRecord]]:
-    """Yields the records that Drake logs meanwhile, at level INFO and above, and keeps them from other handlers."""
+    """Yields the records that Drake logs meanwhile, at level INFO and above, and keeps them from other handlers.
+
+    Raises:
+        KeyboardInterrupt: somebody interrupted meanwhile. Where that is raised within a call of the log, Drake swallows it.
+    """
     recorder = _Recorder(logging.INFO)
     logger = logging.getLogger("drake")
     level, propagate, handlers = logger.level, logger.propagate, logger.handlers
     logger.setLevel(logging.INFO)
     logger.propagate, logger.handlers = False, [recorder]
     try:
-        yield recorder.records
+        with _interrupts_kept():
+            yield recorder.records
     finally:
         logger.setLevel(level)
         logger.propagate, logger.handlers = propagate, handlers
+
+
+@contextmanager
+def _interrupts_kept() -> Iterator[None]:
+    """Raises a KeyboardInterrupt at the end where one was swallowed meanwhile. Only the main thread hears of interrupts."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    heard: list[int] = []
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        heard.append(number)
+        before(number, frame)
+
+    signal.signal(signal.SIGINT, hear)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if heard:
+        raise KeyboardInterrupt
 
 
 _ENDINGS = (

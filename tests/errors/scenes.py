@@ -140,6 +140,7 @@ FILES = rows(
     ),
     ("scene_field", "ignore", "must be a list of pairs of names", "", lambda t: t.load(D + "ignore: 3\n")),
     ("scene_field", "ignore[0]", "must be two names, [a, b] or {pair: [a, b], reason: ...}", "", lambda t: t.load(D + "ignore: [[a]]\n")),
+    ("scene_field", "cylinder_sides", "must be at most {maximum}, not {value}", "", lambda t: t.load("cylinder_sides: 100000\n" + D)),
     ("scene_field", "hulls", "must be a list of bodies, such as [arm/link_1]", "", lambda t: t.load("hulls: arm/hand\n" + D)),
     (
         "scene_field",
@@ -271,7 +272,7 @@ MODELS = [
         (
             "few_parts",
             "hulls[{k}]",
-            "{body} has {...} boxes, cylinders and meshes, of which there have to be two or more",
+            "{body} must have two or more boxes, cylinders and meshes; it has {...}",
             "leave it out of hulls",
             lambda t: t.scene(extra="hulls: [arm/hand]\n"),
         ),

@@ -1,7 +1,9 @@
 """IRIS: Drake's own s is the scene's, a small epsilon only cuts from what a coarse one gives, and threads change nothing."""
 
+import contextlib
 import math
 import os
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -17,7 +19,7 @@ from pydrake.planning import IrisParameterizationFunction
 from certifier.model import Geometry, Joint, JointKind, Pair, Scene
 from certifier.outcome import Guarantee
 from certifier.scene.drake_model import build_diagram
-from certifier.seeding.iris import _checker, iris
+from certifier.seeding.iris import _checker, _listening, iris
 from certifier.seeding.options import Method, SeedOptions
 
 
@@ -143,3 +145,19 @@ def printed():
     C, d, _ = iris(posts(5), np.zeros((1, 2)), SeedOptions(Method.IRIS_NP2, max_iterations=1, epsilon=0.005))
     print(Parallelism.Max().num_threads(), "threads")
     print([value.hex() for value in [*C.ravel().tolist(), *d.tolist()]])
+
+
+def interrupted_within_the_log(heard):
+    with _listening():
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        heard.append("the call of Drake went on")
+
+
+def test_an_interrupt_that_drakes_log_swallows_is_raised_in_the_end():
+    """Python raises it in whatever runs, and Drake's log forgets what is raised in it."""
+    heard = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupted_within_the_log(heard)
+    assert heard
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
