@@ -109,7 +109,7 @@ def _wait(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:
         screen.line(f"warning: the job waits until the service is ready ({wrong})")
     try:
         return follow(client, job_id, screen, watch)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, CirisError):
         screen.line(f"job {job_id} goes on while the service runs: {client.url}/jobs/{job_id}")
         screen.line(f"come back to it with `ciris job follow {job_id[:8]}`, or end it with `ciris job cancel {job_id[:8]}`")
         raise

@@ -27,6 +27,7 @@ def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn:
     return [
         *_substituted(scene),
         *_windows(scene),
+        *_off_center(scene),
         *_filtered(scene, tree, candidates),
         *_unguarded(scene, tree, drawn),
         *_steep(scene),
@@ -58,6 +59,15 @@ def _windows(scene: Scene) -> list[str]:
         f"joint {j.name} may turn half a turn from q* and farther: the scene covers {lower:.6g} to {upper:.6g} degrees"
         for j, lower, upper in zip(scene.moving, np.degrees(scene.q_lower), np.degrees(scene.q_upper), strict=True)
         if j.own_limits is not None
+    ]
+
+
+def _off_center(scene: Scene) -> list[str]:
+    """Returns a finding about every joint whose q* is outside of its own limits."""
+    return [
+        f"q_star of joint {j.name} is {center:.6g}, which is not within its limits, {lower:.6g} to {upper:.6g}"
+        for j, center, lower, upper in zip(scene.moving, scene.q_star, *scene.own_limits, strict=True)
+        if not lower <= center <= upper
     ]
 
 

@@ -14,6 +14,7 @@ import httpx2
 import numpy as np
 import pytest
 
+from certifier.errors import CirisError
 from certifier.jobs import local
 from certifier.jobs.region import Region
 from certifier.jobs.verdict import Verdict
@@ -364,6 +365,17 @@ def test_contains_answers_by_its_exit_status(ciris: Ciris, url: str, region: str
     assert [point["inside"] for point in outside.json["points"]] == [True, False]
     wrong = ciris("contains", "slider", "--q", "0,1", CIRIS_URL=url)
     assert (wrong.status, wrong.error.startswith("q[0]: 2 numbers were given")) == (2, True)
+
+
+def test_who_loses_the_service_is_told_how_to_come_back(ciris: Ciris, url: str, scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    def lost(*_: object) -> None:
+        raise CirisError("unreachable", f"the service at {url} does not answer")
+
+    monkeypatch.setattr("client.service.follow", lost)
+    done = ciris("grow", "slider", "--q", "0", "--deadline", "3600", CIRIS_URL=url)
+    assert done.status == 2
+    assert "come back to it with `ciris job follow" in done.stderr.splitlines()[-2]
+    assert "does not answer" in done.stderr.splitlines()[-1]
 
 
 def test_an_interrupted_wait_leaves_the_job_alone(url: str, scene: Scene, tmp_path: Path) -> None:
