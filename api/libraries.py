@@ -11,7 +11,7 @@ from fastapi import Depends, Request
 
 from db import regions
 from db.session import Database
-from planner.library import Library, Region
+from planner.library import Library
 
 MOST = 8
 """The regions of so many scenes are kept, those that were asked about last."""
@@ -57,7 +57,7 @@ def _changed(database: Database, scene_id: str, library: Library) -> Library:
         version, ids = regions.roll(session, scene_id)
         new = [region_id for region_id in ids if region_id not in known]
         read = [regions.polytopes(session, new[begin : begin + AT_ONCE]) for begin in range(0, len(new), AT_ONCE)]
-    added = [Region(**vars(polytope)) for part in read for polytope in part]
+    added = [region for part in read for region in part]
     if len(added) < len(new):
         return library  # a region was deleted in between: the version is another one by now
     return library.changed(version, ids, added)

@@ -15,9 +15,9 @@ import numpy as np
 from benchmarks import measure
 from benchmarks.arms import serial_arm
 from benchmarks.measure import Progress
-from certifier.model import Array, Polytope, Scene
+from certifier.model import Array, Polytope, Scene, StoredRegion
 from certifier.polytopes.polytope import bounds
-from planner.library import Library, Region
+from planner.library import Library
 from planner.membership import locate
 from planner.motion.path import Space, follow
 from planner.nearest import nearest
@@ -74,7 +74,7 @@ def _measured(count: int, size: float) -> dict[str, Any]:
     }
 
 
-def _changed(library: Library, added: Sequence[Region]) -> tuple[Library, float]:
+def _changed(library: Library, added: Sequence[StoredRegion]) -> tuple[Library, float]:
     """Returns the library with these regions too, and the processor seconds that this took."""
     start = time.process_time()
     changed = library.changed(library.version + 1, library.ids, added)
@@ -94,7 +94,7 @@ def _plain(library: Library, s: Array) -> Array:
     return np.asarray(np.minimum.reduceat(slack / library.norms[:, None], library.first[:-1]).T)
 
 
-def _regions(rng: np.random.Generator, count: int, size: float) -> tuple[list[Region], Array]:
+def _regions(rng: np.random.Generator, count: int, size: float) -> tuple[list[StoredRegion], Array]:
     """Returns regions, and their centres (count, n)."""
     centers, half = rng.uniform(-1.5, 1.5, (count, JOINTS)), size * rng.uniform(0.3, 1.2, (count, JOINTS))
     eye, made = np.eye(JOINTS), []
@@ -104,7 +104,7 @@ def _regions(rng: np.random.Generator, count: int, size: float) -> tuple[list[Re
         C = np.concatenate([normals / half[i], eye, -eye])
         far = rng.uniform(0.7, 1.3, faces)
         d = np.concatenate([C[:faces] @ centers[i] + far, centers[i] + half[i], half[i] - centers[i]])
-        made.append(Region(str(i), "exact", C, d, *bounds(Polytope(C, d))))
+        made.append(StoredRegion(str(i), "exact", C, d, *bounds(Polytope(C, d))))
     return made, centers
 
 

@@ -521,6 +521,25 @@ class Box:
         return (s - self.mid) / self.half
 
 
+@dataclass(frozen=True, eq=False)
+class StoredRegion:
+    """A stored region is a certified one as the database keeps it for planners.
+
+    Attributes:
+        guarantee: what its certificate is worth.
+        C: (m, n) and d (m,), the half-spaces {s : C s <= d}, m >= 1, joint limits included.
+        lower: (n,) lower corner of a box that contains the region, in s.
+        upper: (n,) its upper corner.
+    """
+
+    id: str
+    guarantee: str
+    C: Array
+    d: Array
+    lower: Array
+    upper: Array
+
+
 @dataclass(frozen=True)
 class Volume:
     """A volume is a convex body conv(vertices) + ball(radius), fixed to a link. It contains, and stands for, every geometry that it names.

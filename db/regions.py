@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 from uuid import uuid4
 
@@ -12,7 +11,7 @@ from sqlalchemy import Select, select, update
 from sqlalchemy.orm import Session, defer
 
 from certifier.errors import CirisError
-from certifier.model import Array
+from certifier.model import StoredRegion
 from db import events, jobs, pages, proofs
 from db.ids import expanded
 from db.models import IterationRow, JobRow, LibraryRow, ProofRow, RegionRow
@@ -82,18 +81,6 @@ def of_job(session: Session, job_id: str) -> Sequence[RegionRow]:
     return session.scalars(select(RegionRow).where(RegionRow.job_id == job_id).order_by(RegionRow.iteration).options(*_UNREAD)).all()
 
 
-@dataclass(frozen=True)
-class StoredPolytope:
-    """Holds a region's half-spaces in s: C (m, n), d (m,), joint limits included; and a box around it, lower (n,) and upper (n,)."""
-
-    id: str
-    guarantee: str
-    C: Array
-    d: Array
-    lower: Array
-    upper: Array
-
-
 def version(session: Session, scene_id: str) -> int:
     """Returns how often a region of this scene was added or deleted."""
     return session.scalar(select(LibraryRow.version).where(LibraryRow.scene_id == scene_id)) or 0
@@ -106,11 +93,11 @@ def roll(session: Session, scene_id: str) -> tuple[int, list[str]]:
     return rows[0][0] if rows else 0, [region_id for _, region_id in rows if region_id is not None]
 
 
-def polytopes(session: Session, ids: Sequence[str]) -> list[StoredPolytope]:
+def polytopes(session: Session, ids: Sequence[str]) -> list[StoredRegion]:
     """Returns the half-spaces of these regions, without the manifests, by their numbers; those that are gone are left out."""
     columns = RegionRow.id, RegionRow.guarantee, RegionRow.arrays, RegionRow.box
     rows = session.execute(select(*columns).where(RegionRow.id.in_(ids)).order_by(RegionRow.number))
-    return [StoredPolytope(row.id, row.guarantee, **row.arrays, **row.box) for row in rows]
+    return [StoredRegion(row.id, row.guarantee, **row.arrays, **row.box) for row in rows]
 
 
 def delete(session: Session, region_id: str) -> None:

@@ -3,32 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from certifier.model import Array, Polytope
+from certifier.model import Array, Polytope, StoredRegion
 from planner.boxes import BoxGrid
 from planner.rows import Rows
-
-
-@dataclass(frozen=True)
-class Region:
-    """Describes one region for a library.
-
-    Attributes:
-        C: (m, n) and d (m,), the half-spaces {s : C s <= d}, m >= 1, joint limits included.
-        lower: (n,) lower corner of a box that contains the region, in s.
-        upper: (n,) its upper corner.
-    """
-
-    id: str
-    guarantee: str
-    C: Array
-    d: Array
-    lower: Array
-    upper: Array
 
 
 class Library:
@@ -80,7 +61,7 @@ class Library:
         faces = self.faces[self.rows(region)]
         return Polytope(faces[:, :-1], faces[:, -1])
 
-    def changed(self, version: int, ids: Sequence[str], added: Sequence[Region]) -> Library:
+    def changed(self, version: int, ids: Sequence[str], added: Sequence[StoredRegion]) -> Library:
         """Returns the library of another version: the regions of this one whose ids are still there, and those added.
 
         Regions that are added cost no work on those that are there. Where some are gone, the faces of the others are copied once. Only the
@@ -100,7 +81,7 @@ class Library:
         library._faces, library._norms = Rows(self.faces[rows]), Rows(self.norms[rows])
         return library
 
-    def _plus(self, version: int, added: Sequence[Region]) -> Library:
+    def _plus(self, version: int, added: Sequence[StoredRegion]) -> Library:
         library = Library.__new__(Library)
         library.version = version
         library.ids = (*self.ids, *(region.id for region in added))
@@ -115,7 +96,7 @@ class Library:
         return library
 
 
-def _sorted(region: Region) -> Array:
+def _sorted(region: StoredRegion) -> Array:
     """Returns the faces (m, n + 1) of a region: first those that cut most off its box, which most points of the box are outside of."""
     spread = np.linalg.norm(region.C * (region.upper - region.lower), axis=1)
     slack = region.d - region.C @ (region.lower + region.upper) / 2

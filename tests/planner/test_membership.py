@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from certifier.model import Joint, JointKind, Scene
-from planner.library import Library, Region
+from certifier.model import Joint, JointKind, Scene, StoredRegion
+from planner.library import Library
 from planner.membership import locate, to_s
 from tests.planner.regions import box, cut_box, cut_boxes, library
 
@@ -53,7 +53,7 @@ def test_no_regions_hold_nothing() -> None:
 
 def test_a_point_without_coordinates_is_outside_of_everything() -> None:
     limits = np.array([1e9, 1e9])
-    everywhere = Region("all", "exact", np.zeros((1, 2)), np.ones(1), -limits, limits)
+    everywhere = StoredRegion("all", "exact", np.zeros((1, 2)), np.ones(1), -limits, limits)
     found = locate(library(box("a", [0, 0], [1, 1]), everywhere), np.array([[0.0, 0.0], [np.nan, 0.0]]))
     assert set(found.point.tolist()) == {0}
 
@@ -63,7 +63,7 @@ def test_a_library_that_changed_again_and_again_is_like_a_new_one(seed: int, ste
     """And the versions before stay as they were."""
     rng = np.random.default_rng(seed)
     s = rng.uniform(-1.5, 1.5, size=(10, 2))
-    regions: dict[str, Region] = {}
+    regions: dict[str, StoredRegion] = {}
     changing, history = Library(2), []
     for version, (more, fewer) in enumerate(steps, start=1):
         for name in list(regions)[:fewer]:

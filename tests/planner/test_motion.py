@@ -10,8 +10,8 @@ from flint import arb, ctx, fmpq
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from certifier.model import Array, Joint, JointKind, Scene
-from planner.library import Library, Region
+from certifier.model import Array, Joint, JointKind, Scene, StoredRegion
+from planner.library import Library
 from planner.motion.cover import Cover, cover
 from planner.motion.path import Space, follow
 from planner.motion.straight_q import _TURN, StraightInQ
@@ -145,7 +145,7 @@ def test_a_curve_that_leaves_a_region_between_its_ends_is_not_covered() -> None:
     eye, limits = np.eye(2), np.full(4, 1.5)
     for sign in (1.0, -1.0):
         C, d = np.concatenate([sign * normal[None], eye, -eye]), np.concatenate([[sign * level + 1e-9], limits])
-        stored = library(Region("half", "exact", C, d, np.full(2, -1.5), np.full(2, 1.5)))
+        stored = library(StoredRegion("half", "exact", C, d, np.full(2, -1.5), np.full(2, 1.5)))
         assert (cover(StraightInQ(stored, scene, a, b)).uncovered is None) == (sign * middle < sign * level)
 
 

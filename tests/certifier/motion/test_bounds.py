@@ -42,10 +42,7 @@ def without_pairs(tree, motion, rho):
 
 def bounds(tree, frame, body, shape, motion, rho=0.0):
     """Levers, and the bounds of the acceleration on each piece, as the verifier and as the search computes them."""
-    empty = MotionProof(
-        tree, motion, 1.0, rho, np.zeros(0, np.int32), np.zeros((0, motion.pieces), np.int32), np.zeros(0), np.zeros((0, 3))
-    )
-    check, chain = _Check(empty), Chain.between(tree, ExactKinematics.by_joint(tree), frame, body)
+    check, chain = _Check(without_pairs(tree, motion, rho)), Chain.between(tree, ExactKinematics.by_joint(tree), frame, body)
     pieces = np.arange(motion.pieces)
     rates, changes = check._rates(pieces, np.zeros(len(pieces)), np.ones(len(pieces)))
     levers, _ = chain.levers(shape.vertices, check._slid[:, chain.joints])
