@@ -29,12 +29,16 @@ def certify_path(args: Namespace) -> int:
     Raises:
         CirisError: the motion, its file or the scene cannot be used, or there is no service.
     """
-    path, field = _path(args), "--path" if args.path else "--q"
+    path = _path(args)
     kept = None
     if args.out is not None:
         check_writable(args.out)
         kept = ProofFile(args.out)
-    document, proof = (_here if args.local else _by_service)(args, path, field)
+    try:
+        document, proof = (_here if args.local else _by_service)(args, path)
+    except CirisError as error:
+        error.field = named(error.field, "--path" if args.path else "--q")
+        raise
     written = None if kept is None or proof is None else str(kept.write(document["scene"]["name"], proof))
     document = _timed({**document, "proof": written}, path)
     if args.json:
@@ -44,32 +48,27 @@ def certify_path(args: Namespace) -> int:
     return OK if document["outcome"] == "certified" else NO
 
 
-def _here(args: Namespace, path: PathFile, field: str) -> tuple[dict[str, Any], bytes | None]:
+def _here(args: Namespace, path: PathFile) -> tuple[dict[str, Any], bytes | None]:
     """Returns the document of the verdict of this process, and the proof where there is one."""
     scene = load(args.scene)
     from certifier.jobs.motion import certify
-    from certifier.motion.given import given
+    from certifier.motion.given import motion_of
 
-    motion = given(scene, path.waypoints, path.coordinates, Space(args.space) if args.space else None, field)
-    verdict = certify(scene, motion, args.tube)
+    verdict = certify(scene, motion_of(scene, path.motion, Space(args.space) if args.space else None), args.tube)
     return verdict.document(), verdict.proof
 
 
-def _by_service(args: Namespace, path: PathFile, field: str) -> tuple[dict[str, Any], bytes | None]:
+def _by_service(args: Namespace, path: PathFile) -> tuple[dict[str, Any], bytes | None]:
     """Returns the document of the service's verdict, and the proof where it was asked for and there is one."""
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)["id"]
         asked = {"space": args.space, "tube": args.tube, "prove": args.out is not None}
-        try:
-            document = client.certify_path({"scene": scene, path.coordinates.value: path.waypoints.tolist(), **asked})
-        except CirisError as error:
-            error.field = re.sub(r"^[qs](?=\[|$)", field, error.field) if error.field else None
-            raise
+        document = client.certify_path({"scene": scene, **path.document(), **asked})
     return document, None if document["proof"] is None else base64.b64decode(document["proof"])
 
 
 def _path(args: Namespace) -> PathFile:
-    """Returns the waypoints of the arguments."""
+    """Returns the motion of the arguments."""
     if bool(args.q) == bool(args.path):
         hint = "give them with --q, once for each, or as a file with --path"
         raise CirisError("option", "a motion needs its waypoints, from one place", field="--path", hint=hint)
@@ -80,7 +79,12 @@ def _path(args: Namespace) -> PathFile:
         raise RegionError(
             "motion_shape", "the waypoints have different numbers of joints", field="--q", hint="give one number for each joint"
         )
-    return PathFile(Space.Q, np.array(waypoints), None)
+    return PathFile({"q": np.array(waypoints)}, None)
+
+
+def named(field: str | None, option: str) -> str | None:
+    """Returns the place of an error in a motion as the command's user knows it, by the option that gave the motion."""
+    return field and re.sub(r"^[qs](?=\[|$)", option, re.sub(r"^(?=bezier|knots|control_points)", f"{option} ", field))
 
 
 def _timed(document: dict[str, Any], path: PathFile) -> dict[str, Any]:
@@ -93,15 +97,17 @@ def _timed(document: dict[str, Any], path: PathFile) -> dict[str, Any]:
 
 
 def _print(document: dict[str, Any]) -> None:
-    stop, certified, tube = document["stop"], document["certified_to"], document["tube"]
+    stop, certified, tube, degree = (document[name] for name in ("stop", "certified_to", "tube", "degree"))
     if stop:
         apart = f"are {at_least_mm(stop['distance'])} apart"
         how = {"refuted": "touch", "too_close": f"{apart}, too close to tell,"}.get(document["outcome"], f"{apart} where the search ended,")
-        print(f"{stop['a']} and {stop['b']} {how} {_place(stop)}")
+        print(f"{stop['a']} and {stop['b']} {how} {_place(stop, degree)}")
         print(f"q = {', '.join(f'{value:.6g}' for value in stop['q'])}")
-        print(f"all pairs are certified up to {_place(certified)}" if certified else "nothing is certified before that")
+        print(f"all pairs are certified up to {_place(certified, degree)}" if certified else "nothing is certified before that")
+    pieces = document["waypoints"] - 1
+    what = f"{pieces + 1} waypoints, straight" if degree == 1 else f"{pieces} piece{'s' * (pieces > 1)} of degree {degree}"
     facts = [
-        ("motion", f"{document['scene']['name']}, {document['waypoints']} waypoints, straight in {document['space']}"),
+        ("motion", f"{document['scene']['name']}, {what} in {document['space']}"),
         ("outcome", f"{output.plain(document['outcome'])}, guarantee {document['guarantee']}"),
     ]
     if not stop:
@@ -116,7 +122,10 @@ def _print(document: dict[str, Any]) -> None:
     output.print_facts(facts)
 
 
-def _place(place: dict[str, Any]) -> str:
+def _place(place: dict[str, Any], degree: int) -> str:
     """Returns a place on the motion for people."""
     at = "" if place["t"] is None else f", t = {place['t']:.9g}"
-    return f"{place['time']:.12g} of the way from waypoint {place['piece']} to {place['piece'] + 1}{at}"
+    part, piece = f"{place['time']:.12g}", place["piece"]
+    if degree > 1:
+        return f"at the part {part} of the time of piece {piece}{at}; pieces count from 0"
+    return f"{part} of the way from waypoint {piece} to {piece + 1}{at}"

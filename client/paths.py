@@ -14,36 +14,41 @@ import yaml
 
 from certifier.errors import CirisError, RegionError
 from certifier.model import Array
-from certifier.proof.motion import Space
+from certifier.motion.splines import curve
 
 FIELD = "--path"
 KINDS = (".npz", ".json", ".yaml", ".yml", ".csv")
-_HINT = "give q or s, one row of numbers for each waypoint, and perhaps t"
+_HINT = "give q or s, one row of numbers for each waypoint, and perhaps t; or bezier, or knots and control_points"
+_NAMES = ("q", "s", "bezier", "knots", "control_points", "t")
 
 
 @dataclass(frozen=True)
 class PathFile:
-    """Holds the waypoints of a file.
+    """Holds the motion of a file.
 
     Attributes:
-        coordinates: what they are, q or s.
-        waypoints: (K, n); whether they fit a scene is not known here.
-        times: (K,) when the robot is there, in the file's unit, ascending; None where the file does not say.
+        motion: waypoints as ``q`` or ``s``, (K, n); ``bezier``, (P, m + 1, n); or ``knots`` and ``control_points``. Whether they fit a
+            scene is not known here.
+        times: when the robot is at each waypoint, (K,), or where pieces begin and end, (P + 1,), in the file's unit, ascending; None
+            where the file does not say.
     """
 
-    coordinates: Space
-    waypoints: Array
+    motion: dict[str, Array]
     times: Array | None
+
+    def document(self) -> dict[str, Any]:
+        """Returns the motion as JSON-able data, for requests."""
+        return {name: array.tolist() for name, array in self.motion.items()}
 
 
 def path_file(path: str) -> PathFile:
-    """Reads q or s and perhaps t from an npz, JSON, YAML or CSV file.
+    """Reads q or s and perhaps t from an npz, JSON, YAML or CSV file; or a curve, but not from CSV.
 
     A CSV file has one row for each waypoint. Its first row may name the columns; one that is called t holds the times. Its numbers are q,
     unless all other columns' names begin with s.
 
     Raises:
-        RegionError: path_file, saying what is wrong with it.
+        RegionError: path_file, saying what is wrong with it; or what is wrong with the curve, as certifier.motion.splines.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in KINDS:
@@ -57,19 +62,28 @@ def path_file(path: str) -> PathFile:
     except (OSError, ValueError, TypeError, BadZipFile, EOFError, yaml.YAMLError, RecursionError):
         kind = suffix[1:].upper().replace("NPZ", "npz")
         raise RegionError("path_file", f"{path} is no {kind} file of numbers", field=FIELD, hint=_HINT) from None
-    spaces = [space for space in Space if space.value in content]
-    if len(spaces) != 1:
-        raise RegionError("path_file", f"{path} must have either q or s", field=FIELD, hint=_HINT)
-    waypoints, times = content[spaces[0].value], content.get("t")
-    if times is not None and not (times.shape == waypoints.shape[:1] and (np.diff(times) > 0).all()):
-        problem = f"t of {path} must be ascending numbers, one for each waypoint"
+    given = {name: content[name] for name in _NAMES[:-1] if name in content}
+    if tuple(given) not in (("q",), ("s",), ("bezier",), ("knots", "control_points")):
+        raise RegionError("path_file", f"{path} must have either q or s, or one curve", field=FIELD, hint=_HINT)
+    try:
+        found, times = curve(given), content.get("t")
+    except RegionError as error:
+        error.field = f"{FIELD} {error.field}"
+        raise
+    if found is not None and found.times is not None:
+        if times is not None:
+            raise RegionError("path_file", f"{path} has knots, which are its times, and t", field=FIELD, hint="leave t out")
+        return PathFile(given, found.times)
+    places = next(iter(given.values())) if found is None else found.controls[:: found.degree]
+    if times is not None and not (times.shape == places.shape[:1] and (np.diff(times) > 0).all()):
+        problem = f"t of {path} must be ascending numbers, one for each waypoint, or for each piece's beginning and for the end"
         raise RegionError("path_file", problem, field=FIELD, hint="t may be left out")
-    return PathFile(spaces[0], waypoints, times)
+    return PathFile(given, times)
 
 
 def _arrays(path: str) -> dict[str, Array]:
     with np.load(path, allow_pickle=False) as arrays:
-        return {name: arrays[name].astype(float, casting="same_kind") for name in arrays.files if name in ("q", "s", "t")}
+        return {name: arrays[name].astype(float, casting="same_kind") for name in arrays.files if name in _NAMES}
 
 
 def _document(path: str) -> dict[str, Array]:
@@ -77,7 +91,7 @@ def _document(path: str) -> dict[str, Array]:
     document: Any = json.loads(text) if path.lower().endswith(".json") else yaml.safe_load(text)
     if not isinstance(document, dict):
         raise TypeError("not a mapping")
-    return {name: np.array(document[name], dtype=float) for name in ("q", "s", "t") if name in document}
+    return {name: np.array(document[name], dtype=float) for name in _NAMES if name in document}
 
 
 def _table(path: str) -> dict[str, Array]:

@@ -21,7 +21,7 @@ router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[SUBMI
 
 @router.post("/certify-path")
 async def certify_path(body: MotionRequest, db: Db, children: Children) -> MotionResponse:
-    """Certifies a motion, straight from waypoint to waypoint, for every pair of the scene, or finds its first contact.
+    """Certifies a motion, through waypoints or along a spline, for every pair of the scene, or finds its first contact.
 
     Most motions take a fraction of a second. A process of its own, with limits on time and memory, certifies and verifies.
     """

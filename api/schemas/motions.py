@@ -7,14 +7,16 @@ from typing import Annotated, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from api.schemas.common import Request, SceneName, Vector
+from api.schemas.curves import BEZIER, CONTROL_POINTS, KNOTS, Bezier, ControlPoints, Knots, one_curve
 from certifier.outcome import Guarantee, Outcome
 from planner.motion.path import Space
 
+MAX_PIECES = 2000
 Waypoints = Annotated[list[Vector], Field(min_length=2, max_length=2000)]
 
 
 class MotionRequest(Request):
-    """Asks for a proof of a motion. The request gives the waypoints either as joint positions `q` or as coordinates `s`."""
+    """Asks for a proof of a motion: straight between waypoints `q` or `s`, or along Bezier pieces or a B-spline."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -25,14 +27,20 @@ class MotionRequest(Request):
     scene: SceneName
     q: Waypoints | None = Field(None, description="(k, n), joint positions in radians or metres, one row for each waypoint.")
     s: Waypoints | None = Field(None, description="(k, n), tangent-space coordinates s, one row for each waypoint.")
-    space: Space | None = Field(None, description="In which coordinates the motion is straight; without it, in those given.")
+    bezier: Bezier | None = Field(None, max_length=MAX_PIECES, description=BEZIER)
+    knots: Knots | None = Field(None, description=KNOTS)
+    control_points: ControlPoints | None = Field(None, description=CONTROL_POINTS)
+    space: Space | None = Field(
+        None,
+        description="In which coordinates the motion is straight; without it, in those given. Of `bezier` and `control_points`, which ones "
+        "they are; without it, joint positions.",
+    )
     tube: bool = Field(False, description="Whether to look for the largest certified tube about the motion.")
     prove: bool = Field(False, description="Whether to answer with the proof file as well.")
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        if (self.q is None) == (self.s is None):
-            raise ValueError("give either q or s")
+        one_curve(self.q, self.s, self.bezier, self.knots, self.control_points)
         return self
 
 
@@ -46,7 +54,7 @@ class SceneReference(BaseModel):
 class Place(BaseModel):
     """Names a place on a motion."""
 
-    piece: int = Field(description="The piece from waypoint `piece` to the next one; they count from 0.")
+    piece: int = Field(description="The polynomial piece, or that from waypoint `piece` to the next one; they count from 0.")
     time: float = Field(description="Which part of the piece is behind, from 0 to 1.")
     q: list[float] = Field(description="Joint positions there, in radians or metres.")
 
@@ -63,8 +71,9 @@ class MotionResponse(BaseModel):
     """Says what has become of a motion. The proof has passed the verifier."""
 
     scene: SceneReference = Field(description="The scene that the motion is certified in.")
-    space: Space = Field(description="In which coordinates the motion is straight.")
-    waypoints: int = Field(description="Number of waypoints.")
+    space: Space = Field(description="In which coordinates the motion is straight, or polynomial.")
+    degree: int = Field(description="The degree of the polynomial pieces; 1 for a motion that is straight between waypoints.")
+    waypoints: int = Field(description="Number of waypoints; of polynomial pieces, the number of places where they begin or end.")
     outcome: Outcome = Field(description="`certified`, `refuted` (a contact), `too_close`, or `inconclusive` (too many intervals).")
     guarantee: Guarantee = Field(description="`exact` for a motion that is certified, otherwise `none`.")
     certified_to: Place | None = Field(description="Up to where every pair is proved to be apart; null where nothing is proved.")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
-from certifier.motion.given import given
+from certifier.motion.given import motion_of
 from certifier.motion.search import Stop, search
 from certifier.outcome import Guarantee, Outcome
 from certifier.proof.container import with_scene
@@ -50,6 +50,7 @@ class MotionVerdict:
         return {
             "scene": {"name": scene.name, "hash": scene.hash},
             "space": self.motion.space.value,
+            "degree": self.motion.degree,
             "waypoints": len(self.motion.waypoints),
             "outcome": self.outcome.value,
             "guarantee": (Guarantee.EXACT if stop is None else Guarantee.NONE).value,
@@ -96,16 +97,14 @@ def certify_in_child(payload: dict[str, Any]) -> dict[str, Any]:
     """Returns the document of a verdict, with the ``proof`` in base 64 or None. A child process runs this function.
 
     Args:
-        payload: the ``scene``'s document; the waypoints, as ``q`` or as ``s``; ``space`` or None; ``tube``; and ``prove``, whether to give
-            the proof.
+        payload: the ``scene``'s document; the motion, as certifier.motion.given.motion_of takes it; ``space`` or None; ``tube``; and
+            ``prove``, whether to give the proof.
 
     Raises:
         RegionError: as certifier.motion.given; the field names the place in the payload.
     """
     scene = Scene.from_document(payload["scene"])
-    coordinates = Space.S if payload["q"] is None else Space.Q
-    space = Space(payload["space"]) if payload["space"] else None
-    motion = given(scene, payload[coordinates.value], coordinates, space, coordinates.value)
+    motion = motion_of(scene, payload, Space(payload["space"]) if payload["space"] else None)
     verdict = certify(scene, motion, payload["tube"])
     proof = base64.b64encode(verdict.proof).decode() if verdict.proof and payload["prove"] else None
     return {**verdict.document(), "proof": proof}

@@ -37,7 +37,7 @@ class Side(NamedTuple):
     Attributes:
         chain: from the planes' frame to the body.
         vertices: (V, 3) metres in the body's frame.
-        levers: (K - 1, m) for every piece of the motion, how far a vertex can be from each joint's axis at most, in metres; 1 for a
+        levers: (P, m) for every piece of the motion, how far a vertex can be from each joint's axis at most, in metres; 1 for a
             prismatic joint. A change of the joint's position moves no vertex farther than by the lever times the change.
         size: metres; no vertex can be farther than this from the frame's origin.
     """
@@ -79,7 +79,7 @@ def side(chain: Chain, geometry: Geometry, reaches: Array) -> Side:
     """Returns a geometry's side.
 
     Args:
-        reaches: (K - 1, n) for every piece, how far each joint's position is from 0 at most.
+        reaches: (P, n) for every piece, how far each joint's position is from 0 at most.
     """
     vertices = np.ascontiguousarray(geometry.vertices)
     levers = np.ones((len(reaches), len(chain.joints)))

@@ -2,18 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from certifier.errors import RegionError
 from certifier.model import Array, Scene
+from certifier.motion.splines import Curve, curve
 from certifier.proof import limits
 from certifier.proof.motion import Motion, Space
 
 
+def motion_of(scene: Scene, document: Mapping[str, Any], space: Space | None = None) -> Motion:
+    """Returns a motion from a document that has one of these: waypoints as ``q`` or ``s``; ``bezier``; ``knots`` and ``control_points``.
+
+    Args:
+        space: in which coordinates the motion is straight between waypoints, or which ones control points are given in; None for those of
+            the waypoints, and for q.
+
+    Raises:
+        RegionError: as :func:`given`, :func:`curved` and certifier.motion.splines; the field names the place in the document.
+    """
+    found = curve(document)
+    if found is None:
+        coordinates = Space.S if document.get("q") is None else Space.Q
+        return given(scene, document.get(coordinates.value), coordinates, space, coordinates.value)
+    return curved(scene, found, space or Space.Q, "bezier" if document.get("knots") is None else "control_points")
+
+
 def given(scene: Scene, waypoints: Any, coordinates: Space, space: Space | None = None, field: str = "waypoints") -> Motion:
-    """Returns a motion from what users give: nested lists or an array of numbers, (K, n).
+    """Returns the motion that is straight between waypoints: nested lists or an array of numbers, (K, n).
 
     A motion that is straight in q may go beyond a joint's window, up to the joint's own limits. It goes the way that the numbers say; no
     waypoint is taken to another turn of a joint.
@@ -35,6 +54,32 @@ def given(scene: Scene, waypoints: Any, coordinates: Space, space: Space | None 
     return Motion(space, points if space is coordinates else np.clip(scene.to_q(points), *space.limits(scene)))
 
 
+def curved(scene: Scene, found: Curve, space: Space, field: str = "bezier") -> Motion:
+    """Returns the motion along a curve, whose control points are in the coordinates of the space.
+
+    All of a piece lies between its control points. So they have to be within the joint limits, which is more than the motion itself needs.
+
+    Raises:
+        RegionError: as :func:`given`, with the piece and its control point.
+    """
+    motion = Motion(space, found.controls, found.degree)
+    if found.controls.shape[1] != scene.n:
+        hint = f"give {scene.n} numbers for each, in the scene's order of joints"
+        raise RegionError("motion_shape", f"the control points have {found.controls.shape[1]} coordinates each", field=field, hint=hint)
+    _check_scene(scene, motion.pieces + 1, field)
+    lower, upper = space.limits(scene)
+    outside = np.argwhere((found.controls < lower) | (found.controls > upper))
+    if len(outside):
+        i, j = outside[0]
+        piece = min(int(i) // found.degree, motion.pieces - 1)
+        k = int(i) - piece * found.degree
+        place = f"control point {k} of Bezier piece {piece}"
+        problem = f"joint {scene.moving[j].name} is at {found.controls[i, j]:.6g} in {place}, not between {lower[j]:.6g} and {upper[j]:.6g}"
+        hint = "all control points must be within the limits, as then all of the motion is; divide a piece whose own are far out"
+        raise RegionError("outside_limits", problem, field=f"bezier[{piece}][{k}][{j}]" if field == "bezier" else field, hint=hint)
+    return motion
+
+
 def _numbers(scene: Scene, waypoints: Any, field: str) -> Array:
     try:
         points = np.array(waypoints, dtype=float)
@@ -44,18 +89,23 @@ def _numbers(scene: Scene, waypoints: Any, field: str) -> Array:
         hint = f"give two or more, with {scene.n} numbers each, in the scene's order of joints"
         shape = "no lists of numbers of one length" if points is None else f"of shape {points.shape}"
         raise RegionError("motion_shape", f"the waypoints are {shape}", field=field, hint=hint)
-    if not scene.pairs:
-        hint = "add what moves against something else"
-        raise RegionError("motion_shape", "the scene has no pair of bodies to keep apart", field="scene", hint=hint)
-    if len(points) * len(scene.pairs) > limits.INTERVALS:
-        most = limits.INTERVALS // len(scene.pairs)
-        problem = f"there are {len(points)} waypoints, and a proof about this scene holds at most {most}"
-        raise RegionError("motion_too_long", problem, field=field, hint="divide the motion")
+    _check_scene(scene, len(points), field)
     wrong = np.argwhere(~(np.abs(points) <= limits.MAGNITUDE))
     if len(wrong):
         i, j = wrong[0]
         raise RegionError("motion_not_finite", f"{points[i, j]} is no number of at most {limits.MAGNITUDE:g}", field=f"{field}[{i}][{j}]")
     return points
+
+
+def _check_scene(scene: Scene, waypoints: int, field: str) -> None:
+    """Checks that the scene has pairs, and that a proof of them holds a motion of so many waypoints, or of one less pieces."""
+    if not scene.pairs:
+        hint = "add what moves against something else"
+        raise RegionError("motion_shape", "the scene has no pair of bodies to keep apart", field="scene", hint=hint)
+    if waypoints * len(scene.pairs) > limits.INTERVALS:
+        most = limits.INTERVALS // len(scene.pairs)
+        problem = f"there are {waypoints} waypoints, and a proof about this scene holds at most {most}"
+        raise RegionError("motion_too_long", problem, field=field, hint="divide the motion")
 
 
 def _check_limits(scene: Scene, points: Array, bounds: tuple[Array, Array], field: str) -> None:

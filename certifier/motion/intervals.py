@@ -60,7 +60,7 @@ def acceleration(side: Side, levers: Array, rates: Array, changes: Array) -> flo
     for k in range(len(chain.joints)):
         rate = rates[chain.joints[k]]
         if chain.slides[k]:
-            total += 2.0 * turning * rate
+            total += 2.0 * turning * rate + changes[chain.joints[k]]
         else:
             total += levers[k] * (rate * (rate + 2.0 * turning) + changes[chain.joints[k]])
             turning += rate
@@ -77,30 +77,57 @@ def _moved(side: Side, levers: Array, rates: Array) -> float:
 
 
 @njit(cache=True)
-def positions(start: Array, end: Array, time: float, turns: Array, q_star: Array, q: Array) -> None:
-    """Fills in the joint positions at a time of a piece.
+def positions(coordinates: Array, turns: Array, q_star: Array, q: Array) -> None:
+    """Fills in the joint positions that coordinates, (n,), stand for.
 
     Args:
         turns: (n,) whether the coordinate is the tangent of half an angle from q*.
         q_star: (n,) 0 for a motion in q.
     """
     for i in range(len(q)):
-        x = start[i] + time * (end[i] - start[i])
-        q[i] = q_star[i] + (2.0 * np.arctan(x) if turns[i] else x)
+        q[i] = q_star[i] + (2.0 * np.arctan(coordinates[i]) if turns[i] else coordinates[i])
 
 
 @njit(cache=True)
-def _bound_rates(start: Array, end: Array, t0: float, t1: float, turns: Array, rates: Array, changes: Array) -> None:
-    """Fills in bounds of |dq/dt| and |d2q/dt2| in an interval of a piece; for tangents of half angles, q = q* + 2 atan(x)."""
+def _evaluate(controls: Array, time: float, at: Array) -> None:
+    """Fills in the coordinates, their rates and the rates' changes, (3, n), at a time of a piece, (m + 1, n). Source: de Casteljau."""
+    m, steps = len(controls) - 1, np.empty(len(controls))
+    for i in range(controls.shape[1]):
+        at[2, i] = 0.0
+        for k in range(m + 1):
+            steps[k] = controls[k, i]
+        for left in range(m, 0, -1):
+            if left == 2:
+                at[2, i] = m * (m - 1) * ((steps[2] - steps[1]) - (steps[1] - steps[0]))
+            elif left == 1:
+                at[1, i] = m * (steps[1] - steps[0])
+            for k in range(left):
+                steps[k] += time * (steps[k + 1] - steps[k])
+        at[0, i] = steps[0]
+
+
+@njit(cache=True)
+def _bound_rates(
+    here: Array, there: Array, hull: Array, width: float, inexact: tuple[float, float], turns: Array, rates: Array, changes: Array
+) -> None:
+    """Fills in bounds of |dq/dt| and |d2q/dt2| in an interval of a piece; for tangents of half angles, q = q* + 2 atan(x).
+
+    Args:
+        here, there: (3, n) as :func:`_evaluate` fills them in, at both ends of the interval.
+        hull: (4, n) bounds of the first four derivatives on the whole piece.
+        inexact: what the verifier adds to rates and to changes for what they may be wrong by.
+    """
+    bulge = width * width / 8.0
     for i in range(len(rates)):
-        step = end[i] - start[i]
-        rates[i], changes[i] = abs(step), 0.0
+        rate = min(hull[0, i], max(abs(here[1, i]), abs(there[1, i])) + bulge * hull[2, i] + inexact[0])
+        change = min(hull[1, i], max(abs(here[2, i]), abs(there[2, i])) + bulge * hull[3, i] + inexact[1])
+        rates[i], changes[i] = rate, change
         if turns[i]:
-            x0, x1 = start[i] + t0 * step, start[i] + t1 * step
-            least = 0.0 if x0 * x1 <= 0.0 else min(abs(x0), abs(x1))
+            x0, x1, off = here[0, i], there[0, i], bulge * change
+            least = 0.0 if x0 * x1 <= 0.0 else max(0.0, min(abs(x0), abs(x1)) - off)
             norm = 1.0 + least * least
-            rates[i] = 2.0 * abs(step) / norm
-            changes[i] = 4.0 * step * step * max(abs(x0), abs(x1)) / (norm * norm)
+            rates[i] = 2.0 * rate / norm
+            changes[i] = 2.0 * change / norm + 4.0 * rate * rate * (max(abs(x0), abs(x1)) + off) / (norm * norm)
 
 
 @njit(cache=True)
@@ -126,7 +153,9 @@ def clearance(a: Side, b: Side, q: Array) -> float:
 def divide(
     a: Side,
     b: Side,
-    waypoints: Array,
+    controls: Array,
+    hulls: Array,
+    inexact: tuple[float, float],
     turns: Array,
     q_star: Array,
     reach: float,
@@ -140,41 +169,46 @@ def divide(
     """Divides the motion into intervals with a plane each, from its beginning on, until it ends or the pair touches.
 
     Args:
-        waypoints: (K, n).
+        controls: (P, m + 1, n) control points of the pieces.
+        hulls: (P, 4, n) bounds of the first four derivatives of the coordinates on every piece.
+        inexact: as for :func:`_bound_rates`.
         turns, q_star: as for :func:`positions`.
         reach: the radii and paddings of both bodies, metres.
         slack: metres that the planes have to leave for what the verifier rounds.
         rho: the tube, radians or metres; it becomes smaller where it has to, if it is above 0.
         until: the number of the piece and the time in it at which the search ends.
         ends, normals: (I,), (I, 3); they are filled in.
-        counts: (K - 1,) is filled in.
+        counts: (P,) is filled in.
 
     Returns:
         how it ends; the piece where it does; the beginning and the end of the interval there; how far the padded bodies are apart at its
         beginning or, for a contact, where they touch; and what is left of rho.
     """
-    n, V, W = waypoints.shape[1], len(a.vertices), len(b.vertices)
+    n, V, W = controls.shape[2], len(a.vertices), len(b.vertices)
     # The vertices of the interval's beginning come first, then those of its end.
     A, B, X, Y = np.empty((2 * V, 3)), np.empty((2 * W, 3)), np.empty((3, 4)), np.empty((3, 4))
     q, rates, changes, normal, other, stack = np.empty(n), np.empty(n), np.empty(n), np.zeros(3), np.empty(3), np.empty(64)
+    here, there = np.empty((3, n)), np.empty((3, n))
     found = 0
-    for piece in range(len(waypoints) - 1):
-        start, end, t0, top = waypoints[piece], waypoints[piece + 1], 0.0, 1
+    for piece in range(len(controls)):
+        t0, top = 0.0, 1
         stack[0] = 1.0
         widening = 0.0
         for k in range(len(a.chain.joints)):
             widening += a.levers[piece, k]
         for k in range(len(b.chain.joints)):
             widening += b.levers[piece, k]
-        positions(start, end, 0.0, turns, q_star, q)
+        _evaluate(controls[piece], 0.0, here)
+        positions(here[0], turns, q_star, q)
         place(a, q, X, Y, A[:V])
         place(b, q, X, Y, B[:W])
         while top:
             t1 = stack[top - 1]
-            positions(start, end, t1, turns, q_star, q)
+            _evaluate(controls[piece], t1, there)
+            positions(there[0], turns, q_star, q)
             place(a, q, X, Y, A[V:])
             place(b, q, X, Y, B[W:])
-            _bound_rates(start, end, t0, t1, turns, rates, changes)
+            _bound_rates(here, there, hulls[piece], t1 - t0, inexact, turns, rates, changes)
             bent = acceleration(a, a.levers[piece], rates, changes) + acceleration(b, b.levers[piece], rates, changes)
             need = reach + slack + (t1 - t0) ** 2 / 8.0 * bent
             apart = _gap(normal, A, B) > need + rho * widening
@@ -195,6 +229,7 @@ def divide(
                     return DONE, piece, t0, t1, 0.0, rho
                 A[:V] = A[V:]
                 B[:W] = B[W:]
+                here[:] = there
                 t0, top = t1, top - 1
                 continue
             moved = _moved(a, a.levers[piece], rates) + _moved(b, b.levers[piece], rates)
@@ -209,4 +244,4 @@ def divide(
                     return NARROW, piece, t0, t1, now, rho
             stack[top] = (t0 + t1) / 2.0
             top += 1
-    return DONE, len(waypoints) - 2, 1.0, 1.0, 0.0, rho
+    return DONE, len(controls) - 1, 1.0, 1.0, 0.0, rho

@@ -23,6 +23,10 @@ ROUNDED = 2.0**-41
 """The planes leave this part of the bodies' sizes, for every joint and two more, for what the verifier rounds."""
 
 
+INEXACT = 2.0**-44
+"""Bounds of a polynomial's derivatives leave this part of its control points, more for higher degrees, for what the verifier rounds."""
+
+
 @dataclass(frozen=True)
 class Stop:
     """Says where a motion first could not be certified any further.
@@ -88,8 +92,10 @@ class _Search:
         in_s = motion.space is Space.S
         self._turns = scene.revolute & in_s
         self._q_star = scene.q_star if in_s else np.zeros(scene.n)
-        self._positions = motion.waypoints + self._q_star  # of joints that slide, to whose positions alone it matters
-        self._rates = np.abs(np.diff(motion.waypoints, axis=0)).max(axis=0) * np.where(self._turns, 2.0, 1.0)
+        self._controls = motion.bezier
+        self._farthest = np.abs(self._controls + self._q_star).max(axis=1)  # of joints that slide, to whose positions alone it matters
+        self._inexact = [INEXACT * motion.degree * (motion.degree - 1) ** k * float(np.abs(motion.controls).max()) for k in (1, 2, 3)]
+        self._hulls = self._bounds()
         self._sides: dict[tuple[str, str], Side] = {}
         self._frames: dict[tuple[str, str], str] = {}
 
@@ -128,8 +134,7 @@ class _Search:
             kept.append(before + int(row[piece]))
         ends = np.concatenate([part.ends[:k] for part, k in zip(parts, kept, strict=True)])
         normals = np.concatenate([part.normals[:k] for part, k in zip(parts, kept, strict=True)])
-        motion = Motion(self._motion.space, self._motion.waypoints[: piece + 2])
-        return MotionProof(self._scene, motion, end, rho, frames, counts, ends, normals)
+        return MotionProof(self._scene, self._motion.beginning(piece + 1), end, rho, frames, counts, ends, normals)
 
     def _pairs(self) -> Iterator[tuple[Pair, Geometry, Geometry, str]]:
         """Yields every pair with its geometries and the body in whose frame its planes are constant."""
@@ -141,12 +146,13 @@ class _Search:
 
     def _frame(self, a: Geometry, b: Geometry) -> str:
         """Returns the body between two others from which their accelerations look least."""
-        farthest, still = self._reaches(0.0).max(axis=0, keepdims=True), np.zeros(self._scene.n)
+        farthest = self._farthest.max(axis=0, keepdims=True)
+        rates, changes = self._hulls[:, :2].max(axis=0) * np.where(self._turns, 2.0, 1.0)
         moving = dict.fromkeys(self._kinematics.rigid_root(body) for body in self._kinematics.bodies_between(a.body, b.body))
 
         def bent(frame: str) -> float:
             sides = (side(chain(self._kinematics, frame, geometry.body), geometry, farthest) for geometry in (a, b))
-            return sum(acceleration(side, side.levers[0], self._rates, still) for side in sides)
+            return sum(acceleration(side, side.levers[0], rates, changes) for side in sides)
 
         return min(moving, key=bent)
 
@@ -154,19 +160,21 @@ class _Search:
         """Returns a side whose levers hold in a tube of rho, or of a larger one that was asked about before."""
         key = frame, geometry.name
         if key not in self._sides:
-            self._sides[key] = side(chain(self._kinematics, frame, geometry.body), geometry, self._reaches(rho))
+            self._sides[key] = side(chain(self._kinematics, frame, geometry.body), geometry, self._farthest + rho)
         return self._sides[key]
 
-    def _reaches(self, rho: float) -> Array:
-        """Returns, (K - 1, n), how far from 0 the joints' positions are at most in a tube about each piece."""
-        size = np.abs(self._positions)
-        return np.maximum(size[:-1], size[1:]) + rho
+    def _bounds(self) -> Array:
+        """Returns bounds of the first four derivatives of the coordinates on every piece, (P, 4, n), as much larger as the verifier's."""
+        steps, bounds = self._controls, []
+        for k in range(4):
+            steps = (self._motion.degree - k) * np.diff(steps, axis=1)
+            bounds.append(np.abs(steps).max(axis=1, initial=0.0) + (self._inexact[k - 1] if k else 0.0))
+        return np.ascontiguousarray(np.stack(bounds, axis=1))
 
     def widest(self) -> float:
-        """Returns a tube beyond which the bodies' distances at the first waypoint do not let any be, radians or metres."""
-        first, widest = self._motion.waypoints[0], np.inf
-        q = np.empty(self._scene.n)
-        positions(first, first, 0.0, self._turns, self._q_star, q)
+        """Returns a tube beyond which the bodies' distances at the beginning do not let any be, radians or metres."""
+        q, widest = np.empty(self._scene.n), np.inf
+        positions(self._motion.controls[0], self._turns, self._q_star, q)
         for _, a, b, frame in self._pairs():
             sides = self._side(frame, a, 0.0), self._side(frame, b, 0.0)
             levers = sum(side.levers[0].sum() for side in sides)
@@ -179,14 +187,14 @@ class _Search:
         """Divides the motion for a pair, as :func:`divide` does, with ``most`` more intervals than there are pieces at most."""
         a, b = sides
         joints = len(a.chain.joints) + len(b.chain.joints)
-        waypoints = np.ascontiguousarray(self._motion.waypoints)
-        slack = ROUNDED * (reach + (joints + 2) * (a.size + b.size) * (1 + float(np.abs(waypoints).max())))
+        slack = ROUNDED * (reach + (joints + 2) * (a.size + b.size) * (1 + float(np.abs(self._controls).max())))
+        curve = self._controls, self._hulls, (self._inexact[0], self._inexact[1])
         most += self._motion.pieces
         room = min(FIRST, most)
         while True:
             ends, normals, counts = np.empty(room), np.empty((room, 3)), np.zeros(self._motion.pieces, dtype=np.int32)
             how, piece, t0, t1, distance, left = divide(
-                a, b, waypoints, self._turns, self._q_star, reach, slack, rho, until, ends, normals, counts
+                a, b, *curve, self._turns, self._q_star, reach, slack, rho, until, ends, normals, counts
             )
             if how != MANY or room == most:
                 total = counts.sum()

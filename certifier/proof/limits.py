@@ -64,6 +64,8 @@ LOCALISED = 1 << 23
 
 INTERVALS = 1 << 20
 """The proof of a motion has at most this many intervals."""
+DEGREE = 15
+"""Its pieces are polynomials of at most this degree."""
 SWEPT = 1 << 32
 """Its intervals together have at most this many vertices, a joint on the way counting as JOINT_COST of them."""
 JOINT_COST = 16

@@ -9,6 +9,7 @@ import numpy as np
 
 from certifier.errors import CirisError, ProofError
 from certifier.model import Array, Scene
+from certifier.proof import limits
 from certifier.proof.container import FORMAT, Arrays, head, malformed, pack, unpack
 from certifier.proof.separation import same_scene
 
@@ -16,37 +17,58 @@ KIND = "motion"
 
 
 class Space(StrEnum):
-    """The space says in which coordinates a motion is straight between its waypoints."""
+    """The space says in which coordinates a motion is a polynomial of time, piece by piece."""
 
     Q = "q"
     S = "s"
 
     def limits(self, scene: Scene) -> tuple[Array, Array]:
-        """Returns the joint limits that waypoints keep to, (n,) each: the joints' own ones in q; rounded outwards to doubles in s."""
+        """Returns the joint limits that control points keep to, (n,) each: the joints' own ones in q; rounded outwards to doubles in s."""
         return scene.own_limits if self is Space.Q else scene.outer_limits
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion goes straight from waypoint to waypoint; piece k begins at waypoint k, and its time runs from 0 to 1.
+    """A motion is made of polynomial pieces of one degree m, in Bernstein form. The time of each runs from 0 to 1.
+
+    Piece k has the control points from number k m to (k + 1) m: it begins at the first of them and ends at the last, where the next piece
+    begins. Of degree 1 it goes straight from waypoint to waypoint.
 
     Attributes:
-        space: whether the waypoints are joint positions q, in radians or metres, or the coordinates s.
-        waypoints: (K, n), two or more.
+        space: whether the control points are joint positions q, in radians or metres, or the coordinates s.
+        controls: (P m + 1, n) control points of P pieces, one or more.
+        degree: m, 1 or more.
     """
 
     space: Space
-    waypoints: Array
+    controls: Array
+    degree: int = 1
 
     @property
     def pieces(self) -> int:
-        """Returns the number of pieces, K - 1."""
-        return len(self.waypoints) - 1
+        """Returns the number of pieces, P."""
+        return (len(self.controls) - 1) // self.degree
+
+    @property
+    def waypoints(self) -> Array:
+        """Returns where pieces begin and end, (P + 1, n)."""
+        return self.controls[:: self.degree]
+
+    @property
+    def bezier(self) -> Array:
+        """Returns the control points of every piece, (P, m + 1, n)."""
+        return self.controls[np.arange(self.pieces)[:, None] * self.degree + np.arange(self.degree + 1)]
+
+    def beginning(self, pieces: int) -> Motion:
+        """Returns the first pieces."""
+        return Motion(self.space, self.controls[: pieces * self.degree + 1], self.degree)
 
     def at(self, piece: int, time: float) -> Array:
-        """Returns the waypoint's coordinates, (n,), at a time of a piece, from 0 to 1; they are rounded."""
-        start, end = self.waypoints[piece], self.waypoints[piece + 1]
-        return start + time * (end - start)
+        """Returns the motion's coordinates, (n,), at a time of a piece, from 0 to 1; they are rounded. Source: de Casteljau."""
+        points = self.controls[piece * self.degree : (piece + 1) * self.degree + 1]
+        while len(points) > 1:
+            points = points[:-1] + time * (points[1:] - points[:-1])
+        return points[0]
 
 
 @dataclass(frozen=True)
@@ -59,8 +81,8 @@ class MotionProof:
     Attributes:
         end: the time of the last piece up to which the motion is proved, above 0; 1 where all of it is.
         rho: the tube: joint positions that are off by this much, in radians or metres, are proved as well.
-        frames: (P,) int32, for every pair of the scene the number of the body in whose frame its planes are constant.
-        counts: (P, K - 1) int32, in how many intervals the time of each piece is divided for each pair.
+        frames: (R,) int32, for every one of the scene's R pairs, the number of the body in whose frame its planes are constant.
+        counts: (R, P) int32, in how many intervals the time of each piece is divided for each pair.
         ends: (I,) when each interval ends; it begins where the one before ends, or at 0.
         normals: (I, 3) of the planes, unit vectors to rounding that point from b to a.
     """
@@ -76,10 +98,10 @@ class MotionProof:
 
     def to_bytes(self) -> bytes:
         """Returns the proof as a file."""
-        said = {"space": self.motion.space.value, "end": self.end, "rho": self.rho}
+        said = {"space": self.motion.space.value, "degree": self.motion.degree, "end": self.end, "rho": self.rho}
         header = {"format": FORMAT, "kind": KIND, "scene_hash": self.scene.hash, **said}
         arrays = {name: getattr(self, name) for name in ("frames", "counts", "ends", "normals")}
-        return pack(header, {"waypoints": self.motion.waypoints, **arrays})
+        return pack(header, {"controls": self.motion.controls, **arrays})
 
     @classmethod
     def from_bytes(cls, data: bytes, scene: Scene) -> MotionProof:
@@ -90,16 +112,17 @@ class MotionProof:
         """
         header, unpacked = unpack(data, KIND)
         with malformed():
-            fields, arrays = head(header, "space", "end", "rho"), Arrays(unpacked)
+            fields, arrays = head(header, "space", "degree", "end", "rho"), Arrays(unpacked)
             same_scene(fields, scene)
             space = fields["space"].text()
             if space not in set(Space):
                 raise CirisError("document", f"{space[:40]!r} is no space of a motion", field="header.space")
+            degree = fields["degree"].count()
             frames, counts = arrays.take("frames", "int32"), arrays.take("counts", "int32")
-            waypoints, ends, normals = (arrays.floats(name) for name in ("waypoints", "ends", "normals"))
+            controls, ends, normals = (arrays.floats(name) for name in ("controls", "ends", "normals"))
             arrays.end()
             end, rho = (float(fields[name].number()) for name in ("end", "rho"))
-        proof = cls(scene, Motion(Space(space), waypoints), end, rho, frames, counts, ends, normals)
+        proof = cls(scene, Motion(Space(space), controls, degree), end, rho, frames, counts, ends, normals)
         proof.check_shapes()
         return proof
 
@@ -109,9 +132,12 @@ class MotionProof:
         Raises:
             ProofError: proof_malformed.
         """
-        pairs, waypoints = len(self.scene.pairs), self.motion.waypoints
-        if waypoints.ndim != 2 or waypoints.shape[1] != self.scene.n or len(waypoints) < 2:
-            raise ProofError("proof_malformed", f"the waypoints are {waypoints.shape}, where (2 or more, {self.scene.n}) belong")
+        pairs, controls, degree = len(self.scene.pairs), self.motion.controls, self.motion.degree
+        if not 1 <= degree <= limits.DEGREE:
+            raise ProofError("proof_malformed", f"the motion's degree is {degree}, where 1 to {limits.DEGREE} belong")
+        if controls.ndim != 2 or controls.shape[1] != self.scene.n or len(controls) < 2 or (len(controls) - 1) % degree:
+            problem = f"the control points are {controls.shape}, where ({degree} for each piece and one more, {self.scene.n}) belong"
+            raise ProofError("proof_malformed", problem)
         if self.frames.shape != (pairs,) or self.counts.shape != (pairs, self.motion.pieces):
             problem = f"frames are {self.frames.shape} and counts {self.counts.shape}, for {pairs} pairs on {self.motion.pieces} pieces"
             raise ProofError("proof_malformed", problem)

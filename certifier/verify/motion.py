@@ -3,7 +3,14 @@
 In an interval of time from t0 to t1, of length h, a point p moves on a curve that stays within h^2/8 times the largest |p''| of the chord
 from p(t0) to p(t1). A plane is constant in the frame that the proof names. If it has all vertices of a on one side and all of b on the
 other at t0 and at t1, with room for these bulges, for the radii and paddings, for the tube and for what doubles are wrong by, it keeps the
-bodies apart in all of the interval. The bounds of |p''| and of the tube are computed here, from the scene and the waypoints alone.
+bodies apart in all of the interval. The bounds of |p''| and of the tube are computed here, from the scene and the control points alone.
+
+Doubles and de Casteljau's algorithm evaluate a piece, a polynomial of degree m whose control points are at most M in magnitude. With
+u = 2^-53, a step from a to b, a + t (b - a), is wrong by less than 8 u M, and what was wrong in a and b is averaged. So after m steps a
+coordinate is wrong by less than 8 m u M, and what is a tangent's counts twice in its angle. A k-th derivative is k + 1 of the values
+before the last k steps, differenced k times and multiplied by m (m - 1) ... (m - k + 1): for k of 1 and 2 it is wrong by less than
+2^5 u m (m - 1)^k M. The same differences of the control points, whose hull bounds it, are wrong by less than 2^8 u m (m - 1)^(k - 1) M for
+k of 2 to 4. A first difference of two doubles is wrong by a part of itself, which rounding upwards makes good.
 """
 
 from __future__ import annotations
@@ -51,17 +58,21 @@ class MotionStatement:
     def lines(self) -> list[str]:
         """Returns the statement in plain words, without the scene."""
         motion, scene = self.motion, self.scene
-        start, end = (", ".join(map(exactly, motion.waypoints[i])) for i in (0, -1))
+        start, end = (", ".join(map(exactly, motion.controls[i])) for i in (0, -1))
         names = ", ".join(f"'{joint.name}'" for joint in scene.moving)
-        digest = hashlib.sha256(np.ascontiguousarray(motion.waypoints).tobytes()).hexdigest()
+        digest = hashlib.sha256(np.ascontiguousarray(motion.controls).tobytes()).hexdigest()
         part = "all along it" if self.end == 1.0 else f"from its beginning to the part {exactly(self.end)} of its last piece"
         tube = f"at every configuration whose joints are within {exactly(self.rho)} rad or m of this at a time, all one number"
+        if motion.degree == 1:
+            points, what = "waypoints", f"through {len(motion.controls)} waypoints, straight in {motion.space.value} from each to the next"
+        else:
+            points, what = "control points", f"of {motion.pieces} polynomial pieces of degree {motion.degree} in {motion.space.value}"
         return [
-            f"a motion through {len(motion.waypoints)} waypoints, straight in {motion.space.value} from each to the next:",
-            f"  joints {names}, all waypoints within their limits",
+            f"a motion {what}:",
+            f"  joints {names}, all {points} within their limits",
             f"  from {motion.space.value} = {start}",
             f"  to {motion.space.value} = {end}",
-            f"  SHA-256 of the waypoints as doubles: {digest}",
+            f"  SHA-256 of the {points} as doubles: {digest}",
             f"{part} the padded bodies of each of the scene's {len(scene.pairs)} pairs are at least {rounded_down(self.gap)} m apart",
             *([f"and {tube}, beyond the limits as well"] if self.rho else []),
             *not_covered(scene),
@@ -87,13 +98,13 @@ def verify_motion(proof: MotionProof) -> MotionStatement:
 
 
 def _check_motion(proof: MotionProof) -> None:
-    """Checks that the waypoints are within the joint limits, and that the tube is one."""
-    scene, waypoints = proof.scene, proof.motion.waypoints
-    if not (np.isfinite(waypoints).all() and np.abs(waypoints).max(initial=0.0) <= limits.MAGNITUDE):
-        raise ProofError("proof_motion", f"a waypoint has a number larger than {limits.MAGNITUDE:g}")
+    """Checks that the control points are within the joint limits, as then all of the motion is, and that the tube is one."""
+    scene, controls = proof.scene, proof.motion.controls
+    if not (np.isfinite(controls).all() and np.abs(controls).max(initial=0.0) <= limits.MAGNITUDE):
+        raise ProofError("proof_motion", f"a control point has a number larger than {limits.MAGNITUDE:g}")
     lower, upper = proof.motion.space.limits(scene)
-    if not ((lower <= waypoints) & (waypoints <= upper)).all():
-        raise ProofError("proof_motion", "a waypoint is not within the joint limits")
+    if not ((lower <= controls) & (controls <= upper)).all():
+        raise ProofError("proof_motion", "a control point is not within the joint limits")
     if not 0 <= proof.rho <= limits.MAGNITUDE:
         raise ProofError("proof_motion", "the tube has no width")
 
@@ -181,10 +192,14 @@ class _Check:
         )
         self._turns = self._scene.revolute & (self._motion.space is Space.S)
         self._base = self._scene.q_star if self._motion.space is Space.S else np.zeros(self._scene.n)
-        # Seven roundings and fewer lie between two waypoints and a position; a tangent's counts twice in its angle.
-        self._inexact = 2.0**-48 * float(np.abs(self._motion.waypoints).max() + np.abs(self._base).max(initial=0.0))
-        waypoints = np.abs(self._motion.waypoints + self._base)
-        self._slid = np.maximum(waypoints[:-1], waypoints[1:]) * UP + self._inexact + proof.rho
+        self._bezier = np.moveaxis(self._motion.bezier, 1, 0)
+        self._degree = degree = self._motion.degree
+        largest, base = float(np.abs(self._motion.controls).max()), float(np.abs(self._base).max(initial=0.0))
+        # A coordinate of a tangent counts twice in its angle, and one of a slide is added to q*.
+        self._inexact = 2.0**-49 * (degree + 1) * (largest + base)
+        self._wrong = [2.0**-45 * degree * (degree - 1) ** k * largest for k in range(1, 4)]
+        self._slid = np.abs(self._bezier + self._base).max(axis=0) * UP + self._inexact + proof.rho
+        self._hulls = self._bounds()
 
     def gaps(self) -> Iterator[float]:
         """Yields, for some intervals at a time, how far the padded bodies are apart in them at least, in metres.
@@ -217,7 +232,7 @@ class _Check:
     def _group(self, chains: list[Chain], pairs: list[int]) -> Iterator[float]:
         """Yields the gaps of pairs of the same two bodies, some intervals at a time."""
         both = [[self._scene.geometry(name) for name in (self._scene.pairs[i].a, self._scene.pairs[i].b)] for i in pairs]
-        most = max(1, min(BLOCK, PRODUCTS // max(len(geometry.vertices) for two in both for geometry in two)))
+        most = max(1, min(BLOCK // self._degree, PRODUCTS // max(len(geometry.vertices) for two in both for geometry in two)))
         rows = np.concatenate([np.arange(self._first[i], self._first[i] + self._count[i]) for i in pairs])
         owner = np.repeat(np.arange(len(pairs)), self._count[pairs])
         sides = [_Side(chain, [two[k] for two in both], self._slid) for k, chain in enumerate(chains)]
@@ -255,8 +270,7 @@ class _Check:
 
     def _poses(self, chains: list[Chain], piece: np.ndarray, time: Array) -> list[_Poses]:
         """Returns the poses of both bodies at times of pieces, (N,) each."""
-        start, end = self._motion.waypoints[piece], self._motion.waypoints[piece + 1]
-        x = start + time[:, None] * (end - start)
+        x, _, _ = self._at(piece, time)
         if self._motion.space is Space.Q:
             cosines, sines = cosines_and_sines(np.where(self._scene.revolute, x, 0.0))
         else:
@@ -266,33 +280,59 @@ class _Check:
             cosines, sines = c * cosine - s * sine, s * cosine + c * sine
         return [_Poses(*chain.poses(x + self._base, cosines, sines)) for chain in chains]
 
+    def _at(self, piece: np.ndarray, time: Array) -> tuple[Array, Array, Array]:
+        """Returns the coordinates, their rates and the rates' changes at times of pieces, (N, n) each."""
+        m, points = self._degree, self._bezier[:, piece]
+        rates = changes = np.zeros(points.shape[1:])
+        while len(points) > 1:
+            steps = points[1:] - points[:-1]
+            if len(steps) == 2:
+                changes = m * (m - 1) * (steps[1] - steps[0])
+            rates = m * steps[0]
+            points = points[:-1] + time[:, None] * steps
+        return points[0], rates, changes
+
+    def _bounds(self) -> list[Array]:
+        """Returns bounds of the first four derivatives of the coordinates on every piece, (P, n) each, from their control points."""
+        m, steps, bounds = self._degree, self._bezier, []
+        for k in range(4):
+            steps = (m - k) * (steps[1:] - steps[:-1])
+            bounds.append(np.abs(steps).max(axis=0, initial=0.0) + (self._wrong[k - 1] if k else 0.0))
+        return bounds
+
     def _rates(self, piece: np.ndarray, t0: Array, t1: Array) -> tuple[Array, Array]:
         """Returns bounds of |dq/dt| and |d2q/dt2| in intervals of pieces, (I, n) each, rounded upwards.
 
-        For a tangent of half an angle, q = q* + 2 atan(x), these are 2 |x'|/(1 + x^2) and 4 |x'|^2 |x|/(1 + x^2)^2.
+        A function is at most what it is at the ends of an interval and h^2/8 of its second derivative's bound. For a tangent of half an
+        angle, q = q* + 2 atan(x), the bounds are 2 |x'|/(1 + x^2) and 2 |x''|/(1 + x^2) + 4 |x'|^2 |x|/(1 + x^2)^2.
         """
-        start, end = self._motion.waypoints[piece], self._motion.waypoints[piece + 1]
-        step = np.abs(end - start)
+        (x0, rate0, change0), (x1, rate1, change1) = self._at(piece, t0), self._at(piece, t1)
+        first, second, third, fourth = (bound[piece] for bound in self._hulls)
+        bulge = ((t1 - t0) ** 2 / 8)[:, None]
+        rates = np.minimum(first, np.maximum(np.abs(rate0), np.abs(rate1)) + bulge * third + self._wrong[0])
+        changes = np.minimum(second, np.maximum(np.abs(change0), np.abs(change1)) + bulge * fourth + self._wrong[1])
         if self._motion.space is Space.Q:
-            return step * UP, np.zeros_like(step)
-        x0, x1 = (start + t[:, None] * (end - start) for t in (t0, t1))
-        least = np.where(x0 * x1 > 0, np.minimum(np.abs(x0), np.abs(x1)) - self._inexact, 0.0).clip(0.0)
-        most = np.maximum(np.abs(x0), np.abs(x1)) + self._inexact
+            return rates * UP, changes * UP
+        off = self._inexact + bulge * changes * UP
+        least = np.where(x0 * x1 > 0, np.minimum(np.abs(x0), np.abs(x1)) - off, 0.0).clip(0.0)
+        most = np.maximum(np.abs(x0), np.abs(x1)) + off
         norm = 1 + least**2
-        rates = np.where(self._turns, 2 * step / norm, step)
-        return rates * UP, np.where(self._turns, 4 * step**2 * most / norm**2, 0.0) * UP
+        turning, bending = 2 * rates / norm, 2 * changes / norm + 4 * rates**2 * most / norm**2
+        return np.where(self._turns, turning, rates) * UP, np.where(self._turns, bending, changes) * UP
 
 
 def _acceleration(chain: Chain, levers: Array, rates: Array, changes: Array) -> Array:
     """Returns a bound of the acceleration of every vertex, (I,), from levers (I, m), rates and their changes (I, n), rounded upwards.
 
     Joints i and then k on the path contribute twice the product of their rates times the lever of k, where i is revolute, and nothing where
-    it is prismatic; a revolute joint alone contributes its lever times the square of its rate and times its change.
+    it is prismatic; a revolute joint alone contributes its lever times the square of its rate, and every joint its lever times its change.
     """
     total, turning = np.zeros(len(levers)), np.zeros(len(levers))
     for k, j in enumerate(chain.joints):
         total += 2 * turning * rates[:, j] * levers[:, k]
-        if not chain.slides[k]:
+        if chain.slides[k]:
+            total += changes[:, j]
+        else:
             total += levers[:, k] * (rates[:, j] ** 2 + changes[:, j])
             turning += rates[:, j]
     return total * UP

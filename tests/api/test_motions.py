@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -10,7 +11,7 @@ from fastapi.testclient import TestClient
 from api.schemas.motions import MotionResponse
 from certifier.jobs.motion import certify
 from certifier.model import Scene
-from certifier.motion.given import given
+from certifier.motion.given import given, motion_of
 from certifier.proof.motion import Space
 from certifier.verify.file import verify_file
 from db import scenes
@@ -42,6 +43,23 @@ def test_the_answer_is_that_of_a_plain_call(client: TestClient, database: Databa
     assert (found["outcome"], found["space"], found["proof"]) == ("refuted", "q", None)
 
 
+@pytest.mark.parametrize("space", Space)
+@pytest.mark.parametrize(
+    "curve",
+    [
+        {"bezier": [[[0.1], [-0.3], [0.0]], [[0.0], [0.2], [0.1]]]},
+        {"knots": [0, 0, 0, 1, 5, 5, 5], "control_points": [[0.1], [-0.3], [0.3], [0.0]]},
+    ],
+    ids=["bezier", "spline"],
+)
+def test_a_curve_is_certified_as_by_a_plain_call(client: TestClient, scene: Scene, curve: dict[str, Any], space: Space) -> None:
+    found = client.post(ROUTE, json={"scene": "slider", "space": space, "prove": True} | curve).json()
+    assert (found["outcome"], found["degree"], found["waypoints"], found["space"]) == ("certified", 2, 3, space)
+    assert any("of 2 polynomial pieces of degree 2" in line for line in verify_file(base64.b64decode(found["proof"])).lines)
+    expected = certify(scene, motion_of(scene, curve, space)).document()
+    assert {name: found[name] for name in ("margin", "intervals")} == {name: expected[name] for name in ("margin", "intervals")}
+
+
 @pytest.mark.parametrize(
     ("body", "code", "field"),
     [
@@ -51,6 +69,14 @@ def test_the_answer_is_that_of_a_plain_call(client: TestClient, database: Databa
         ({"q": [[0.1], [0.2]], "s": [[0.1], [0.2]]}, "invalid_request", "body"),
         ({}, "invalid_request", "body"),
         ({"q": [[0.1], [0.2]], "space": "x"}, "invalid_request", "space"),
+        ({"bezier": [[[0.1], [0.2]]], "q": [[0.1], [0.2]]}, "invalid_request", "body"),
+        ({"bezier": [[[0.1]]]}, "invalid_request", "bezier[0]"),
+        ({"bezier": [[[0.1]] * 17]}, "invalid_request", "bezier[0]"),
+        ({"bezier": [[[0.1], [0.2]], [[0.1], [0.2]]]}, "curve_not_continuous", "bezier[1][0]"),
+        ({"bezier": [[[0.1], [99], [0.2]]]}, "outside_limits", "bezier[0][1][0]"),
+        ({"knots": [0, 0, 1, 1]}, "invalid_request", "body"),
+        ({"knots": [0, 0, 1, 0.5], "control_points": [[0.1], [0.2]]}, "knots", "knots[3]"),
+        ({"knots": [0, 0, 0, 1, 1], "control_points": [[0.1], [0.2]]}, "curve_shape", "knots"),
         ({"q": [[0.1], [0.2]], "speed": 1}, "invalid_request", "speed"),
     ],
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import binom
 
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Pair
@@ -22,11 +23,27 @@ def swing(gap, padding=0.0, length=1.0):
     return replace(planar_arm(1, post, padding=padding), geometries=(tip, post), pairs=(Pair(tip.name, post.name),))
 
 
+def coordinates(motion, piece, times):
+    """The motion's own coordinates at times of a piece, (N, n): the sum of its control points with Bernstein's polynomials."""
+    weights = binom.pmf(np.arange(motion.degree + 1), motion.degree, np.asarray(times)[:, None])
+    return weights @ motion.bezier[piece]
+
+
 def positions(scene, motion, piece, times):
     """Joint positions at times of a piece, (N, n)."""
-    start, end = motion.waypoints[piece], motion.waypoints[piece + 1]
-    x = start + np.asarray(times)[:, None] * (end - start)
+    x = coordinates(motion, piece, times)
     return x if motion.space is Space.Q else scene.to_q(x)
+
+
+def raised(motion, degree):
+    """The same motion with pieces of a higher degree."""
+    pieces = motion.bezier
+    while pieces.shape[1] <= degree:
+        m = pieces.shape[1]
+        part = np.arange(m + 1)[:, None] / m
+        ends = np.zeros((len(pieces), 1, pieces.shape[2]))
+        pieces = part * np.concatenate([ends, pieces], axis=1) + (1 - part) * np.concatenate([pieces, ends], axis=1)
+    return Motion(motion.space, np.concatenate([pieces[:, :-1].reshape(-1, pieces.shape[2]), pieces[-1:, -1]]), degree)
 
 
 def distances(scene, q):

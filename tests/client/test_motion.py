@@ -10,7 +10,6 @@ import pytest
 
 from certifier.errors import RegionError
 from certifier.model import Scene
-from certifier.proof.motion import Space
 from client.paths import path_file
 from tests.client.conftest import PLANAR, Ciris
 
@@ -50,6 +49,26 @@ def test_the_service_answers_as_well(ciris: Ciris, url: str, scene: Scene, tmp_p
     assert refused.error.startswith("--q[1][0]: joint ")
 
 
+def test_a_curve_is_certified_here_and_by_the_service(ciris: Ciris, url: str, scene: Scene, tmp_path: Path) -> None:
+    path, proof = tmp_path / "curve.json", tmp_path / "motion.proof"
+    path.write_text(json.dumps({"knots": [0, 0, 0, 0, 2, 3, 3, 3, 3], "control_points": [[0.1], [-0.2], [-0.3], [0.2], [0.0]]}))
+    done = ciris("certify-path", "slider", "--path", path, "--url", url, "--out", proof)
+    assert (done.status, done.stderr) == (0, "")
+    assert "2 pieces of degree 3 in q" in done.stdout
+    assert "a motion of 2 polynomial pieces of degree 3 in q" in ciris("verify", proof).stdout
+    path.write_text(json.dumps({"bezier": [[[0.1], [99.0], [0.0]]]}))
+    refused = ciris("certify-path", "slider", "--path", path, "--url", url)
+    assert refused.error.startswith("--path bezier[0][1][0]: joint ")
+    path.write_text(json.dumps({"bezier": [[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]]], "t": [1.0, 3.0]}))
+    done = ciris("certify-path", PLANAR, "--path", path, "--local", "--json")
+    found = json.loads(done.stdout)
+    assert (done.status, found["outcome"], found["degree"], found["waypoints"]) == (1, "refuted", 2, 2)
+    assert found["stop"]["t"] == pytest.approx(1 + 2 * found["stop"]["time"])
+    assert "of the time of piece 0, t = " in ciris("certify-path", PLANAR, "--path", path, "--local").stdout
+    path.write_text(json.dumps({"bezier": [[[0.0, 0.0], [0.1, 0.0]], [[0.2, 0.0], [0.1, 0.0]]]}))
+    assert ciris("certify-path", PLANAR, "--path", path, "--local").error.startswith("--path bezier[1][0]: piece 1 does not begin")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -77,10 +96,23 @@ def test_files_of_every_kind_say_the_same(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(f"t,s1,s2\n{rows}\n\n")
     for suffix in ("npz", "json", "yaml", "csv"):
         found = path_file(str(tmp_path / f"a.{suffix}"))
-        assert (found.coordinates, found.waypoints.tolist(), found.times.tolist()) == (Space.S, s.tolist(), t.tolist())
+        assert (found.document(), found.times.tolist()) == ({"s": s.tolist()}, t.tolist())
     (tmp_path / "b.csv").write_text("0.1,-0.2\n0.3,0.4\n")
     found = path_file(str(tmp_path / "b.csv"))
-    assert (found.coordinates, found.waypoints.tolist(), found.times) == (Space.Q, s[:2].tolist(), None)
+    assert (found.document(), found.times) == ({"q": s[:2].tolist()}, None)
+
+
+def test_files_of_curves_say_the_same(tmp_path: Path) -> None:
+    points, knots = np.array([[0.1, -0.2], [0.3, 0.4], [0.5, 0.25], [0.2, 0.0]]), np.array([0.0, 0, 0, 0.5, 2, 2, 2])
+    pieces, t = np.array([points, points[::-1]]), np.array([3.0, 4.0, 6.0])
+    for name, arrays in (("spline", {"knots": knots, "control_points": points}), ("pieces", {"bezier": pieces, "t": t})):
+        np.savez(tmp_path / f"{name}.npz", **arrays)
+        (tmp_path / f"{name}.json").write_text(json.dumps({key: array.tolist() for key, array in arrays.items()}))
+        (tmp_path / f"{name}.yaml").write_text("\n".join(f"{key}: {array.tolist()}" for key, array in arrays.items()))
+        for suffix in ("npz", "json", "yaml"):
+            found = path_file(str(tmp_path / f"{name}.{suffix}"))
+            assert found.document() == {key: array.tolist() for key, array in arrays.items() if key != "t"}
+            assert found.times.tolist() == (t.tolist() if name == "pieces" else [0.0, 0.5, 2.0])
 
 
 @pytest.mark.parametrize(
@@ -89,6 +121,11 @@ def test_files_of_every_kind_say_the_same(tmp_path: Path) -> None:
         ("a.txt", "0 0", "neither .npz"),
         ("a.json", "[1]", "no JSON file"),
         ("a.json", '{"x": [[1]]}', "either q or s"),
+        ("a.json", '{"q": [[1]], "bezier": [[[1], [2]]]}', "either q or s, or one curve"),
+        ("a.json", '{"knots": [0, 0, 1, 1]}', "either q or s, or one curve"),
+        ("a.json", '{"knots": [0, 0, 1, 1], "control_points": [[0], [1]], "t": [0, 1]}', "leave t out"),
+        ("a.json", '{"bezier": [[[0], [1]]], "t": [0, 1, 2]}', "for each piece's beginning and for the end"),
+        ("a.json", '{"bezier": [[[0], [1]], [[1]]]}', "no JSON file"),
         ("a.json", '{"q": [[1]], "s": [[1]]}', "either q or s"),
         ("a.json", '{"q": [[1], [2]], "t": [1, 1]}', "ascending"),
         ("a.json", '{"q": [[1], ["x"]]}', "no JSON file"),

@@ -46,7 +46,8 @@ PROOFS: list[Row] = [
     *proofs(
         "certifier/proof/motion.py",
         ("document", "{...} is no space of a motion"),
-        ("proof_malformed", "the waypoints are {shape}, where (2 or more, {n}) belong"),
+        ("proof_malformed", "the motion's degree is {degree}, where 1 to {DEGREE} belong"),
+        ("proof_malformed", "the control points are {shape}, where ({degree} for each piece and one more, {n}) belong"),
         ("proof_malformed", "frames are {shape} and counts {shape}, for {pairs} pairs on {pieces} pieces"),
         ("proof_motion", "a pair has no interval on a piece of the motion"),
         ("proof_malformed", "ends are {shape} and normals {shape}, for {total} intervals"),
@@ -171,8 +172,8 @@ PROOFS: list[Row] = [
     *proofs(
         "certifier/verify/motion.py",
         ("proof_motion", "the scene has no pair to keep apart"),
-        ("proof_motion", "a waypoint has a number larger than {MAGNITUDE}"),
-        ("proof_motion", "a waypoint is not within the joint limits"),
+        ("proof_motion", "a control point has a number larger than {MAGNITUDE}"),
+        ("proof_motion", "a control point is not within the joint limits"),
         ("proof_motion", "the tube has no width"),
         ("proof_too_large", "the proof has {total} intervals; at most {INTERVALS} are checked"),
         ("proof_motion", "a plane is in the frame of a body that is not there"),

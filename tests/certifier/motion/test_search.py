@@ -6,19 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given as drawn
+from hypothesis import settings
+from hypothesis import strategies as st
 
 from benchmarks.arms import random_arm
 from certifier.errors import RegionError
 from certifier.kinematics import Kinematics
 from certifier.model import JointKind
-from certifier.motion.given import given
+from certifier.motion.given import given, motion_of
 from certifier.motion.intervals import RESOLUTION
 from certifier.motion.search import search
 from certifier.outcome import Outcome
 from certifier.proof import limits
 from certifier.proof.motion import Motion, MotionProof, Space
 from certifier.verify.motion import verify_motion
-from tests.certifier.motions import POST, TIP, distances, least_distance, positions, swing
+from tests.certifier.motions import POST, TIP, distances, least_distance, positions, raised, swing
 from tests.certifier.scenes import planar_arm
 
 
@@ -176,3 +179,82 @@ def test_what_is_said_of_random_arms_is_true(seed):
         for piece in range(proof.motion.pieces):
             q = positions(scene, proof.motion, piece, rng.uniform(0, proof.end, 40))
             assert distances(scene, q + proof.rho * rng.choice([-1.0, 1.0], q.shape)).min() >= statement.gap - 1e-7
+
+
+KINDS = (JointKind.REVOLUTE, JointKind.PRISMATIC, None)
+"""Of all joints of an arm; None for an arm of both."""
+
+
+def spline(scene, rng, degree, space, wide=0.8):
+    """A random B-spline of three spans within the limits."""
+    inner = np.sort(rng.uniform(0.5, 2.5, 2))
+    knots = np.concatenate([np.zeros(degree + 1), inner, np.full(degree + 1, 3.0)])
+    points = rng.uniform(-wide, wide, (degree + 3, scene.n))
+    return motion_of(scene, {"knots": knots, "control_points": points if space is Space.Q else scene.to_s(points)}, space)
+
+
+@settings(max_examples=60)
+@drawn(
+    seed=st.integers(0, 2**32 - 1), degree=st.integers(2, 7), space=st.sampled_from(Space), kind=st.sampled_from(["turn", "slide", "any"])
+)
+def test_what_is_said_of_splines_is_true(seed, degree, space, kind):
+    """By sampling the motion and the tube; a motion that is certified has its twin that touches, which passes where an obstacle is put."""
+    rng = np.random.default_rng(seed)
+    scene = (
+        random_arm(rng, 3, rounded=True)
+        if kind == "any"
+        else planar_arm(2, kind=JointKind.REVOLUTE if kind == "turn" else JointKind.PRISMATIC)
+    )
+    way = spline(scene, rng, degree, space)
+    found = search(scene, way, tube=True)
+    if found.stop:
+        assert found.stop.outcome is Outcome.REFUTED
+        assert abs(distances(scene, positions(scene, way, found.stop.piece, [found.stop.time]))[0]) < 1e-6 or found.stop.time == 0.0
+    else:
+        verified = verify_motion(MotionProof.from_bytes(found.proof.to_bytes(), scene))
+        assert (verified.motion.pieces, verified.end) == (way.pieces, 1.0)
+        assert found.proof.rho > 0
+    if found.proof:
+        proof = found.proof
+        statement = verify_motion(proof)
+        last = proof.motion.pieces - 1
+        for piece in range(proof.motion.pieces):
+            q = positions(scene, proof.motion, piece, rng.uniform(0, proof.end if piece == last else 1.0, 60))
+            assert distances(scene, q + proof.rho * rng.choice([-1.0, 1.0], q.shape)).min() >= statement.gap - 1e-7
+        # The twin: padding that the motion does not have room for.
+        least = distances(scene, positions(scene, proof.motion, last, np.linspace(0, proof.end, 50))).min()
+        thick = replace(scene, padding=scene.padding + least / 2 + 1e-6)
+        assert search(thick, way).stop is not None
+
+
+@pytest.mark.parametrize("space", Space)
+@pytest.mark.parametrize("degree", [2, 3, 8, 15])
+@pytest.mark.parametrize("gap", [0.05, 1e-6, -1e-6, -0.05])
+def test_a_straight_motion_of_any_degree_has_the_answer_of_degree_1(degree, space, gap):
+    scene = swing(gap, padding=0.01)
+    straight = motion(scene, [-1.5], [-1.0], [0.9], space=space)
+    curve = raised(straight, degree)
+    one, other = search(scene, straight), search(scene, curve)
+    assert (one.stop is None) == (other.stop is None) == (gap > 0)
+    if gap > 0:
+        assert verify_motion(other.proof).gap == pytest.approx(verify_motion(one.proof).gap, rel=1e-3, abs=1e-9)
+        assert len(other.proof.ends) == pytest.approx(len(one.proof.ends), rel=0.1, abs=2)
+        return
+    assert (other.stop.outcome, other.stop.piece, other.stop.pair) == (one.stop.outcome, one.stop.piece, one.stop.pair)
+    assert other.stop.time == pytest.approx(one.stop.time, abs=1e-6)
+    assert verify_motion(other.proof).end == pytest.approx(verify_motion(one.proof).end, abs=1e-6)
+
+
+@pytest.mark.parametrize(("above", "passes"), [(1e-5, True), (-1e-5, False)])
+def test_a_parabola_passes_a_post_or_touches_it_by_where_its_top_is(above, passes):
+    """The arm swings to a post and back. The control point is far beyond the contact, and the motion's top a hair before or behind it."""
+    scene, reach, away = swing(-0.05), TIP + POST, 1.0 + TIP + POST - 0.05
+    contact = -np.arccos((1 + away**2 - reach**2) / (2 * away))
+    top = contact - above
+    found = search(scene, motion_of(scene, {"bezier": [[[-1.0], [2 * top + 1.0], [-1.0]]]}))
+    assert 2 * top + 1.0 > contact + 0.5
+    assert (found.stop is None) is passes
+    if passes:
+        assert verify_motion(found.proof).gap == pytest.approx(distances(scene, np.array([[top]]))[0], rel=0.5)
+    else:
+        assert found.stop.time == pytest.approx(0.5 - np.sqrt(-above / (top + 1)) / 2, abs=1e-4)

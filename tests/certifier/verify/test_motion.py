@@ -15,7 +15,7 @@ from certifier.proof import limits
 from certifier.proof.container import pack, unpack
 from certifier.proof.motion import Motion, MotionProof, Space
 from certifier.verify.motion import verify_motion
-from tests.certifier.motions import distances, positions, swing
+from tests.certifier.motions import distances, positions, raised, swing
 from tests.certifier.proofs import motion
 from tests.certifier.scenes import ball, planar_arm
 
@@ -39,25 +39,37 @@ def changed(array, rng):
 def swung_past(proof: MotionProof) -> float:
     """How far the tip stays from the post, by the law of cosines, at 500 times of each piece, or how far it goes in."""
     tip, post = proof.scene.geometries
+    if len(proof.motion.controls) != proof.motion.pieces * proof.motion.degree + 1:
+        return -1.0
     q = np.concatenate([positions(proof.scene, proof.motion, k, np.linspace(0, 1, 500)) for k in range(proof.motion.pieces)])
     away = post.vertices[0, 0]
     return float(np.sqrt(1 + away**2 - 2 * away * np.cos(q)).min()) - tip.radius - post.radius - 2 * proof.scene.padding
 
 
 @pytest.mark.parametrize("space", Space)
-def test_of_thousands_of_single_changes_none_is_accepted_that_is_not_true(space):
+@pytest.mark.parametrize("degree", [1, 3])
+def test_of_thousands_of_single_changes_none_is_accepted_that_is_not_true(space, degree):
     """The motion passes at a millimetre. A changed plane or time says the same of it; a changed motion or scene is sampled."""
     scene = swing(1e-3)
-    points = np.array([[-1.0], [0.3], [-0.2]])
-    found = search(scene, Motion(space, points if space is Space.Q else scene.to_s(points))).proof
+    points = np.array([[-1.0], [0.3], [-0.2]] if degree == 1 else [[-1.0], [0.6], [-0.4], [0.2], [-0.9], [0.5], [-0.2]])
+    found = search(scene, Motion(space, points if space is Space.Q else scene.to_s(points), degree)).proof
     rng, accepted, untrue = np.random.default_rng(0), 0, 0
     for _ in range(2000):
-        kind = rng.choice(["normals", "ends", "counts", "waypoints", "padding", "radius", "rho", "end", "dropped"])
+        kind = rng.choice(["normals", "ends", "counts", "controls", "degree", "swapped", "padding", "radius", "rho", "end", "dropped"])
         proof = found
         if kind in ("normals", "ends", "counts"):
             proof = replace(found, **{kind: changed(getattr(found, kind), rng)})
-        elif kind == "waypoints":
-            proof = replace(found, motion=Motion(space, changed(found.motion.waypoints, rng)))
+        elif kind == "controls":
+            proof = replace(found, motion=replace(found.motion, controls=changed(found.motion.controls, rng)))
+        elif kind == "degree":
+            proof = replace(found, motion=replace(found.motion, degree=int(rng.choice([1, 2, 3, 6]))))
+            if rng.random() < 0.5:  # with as many pieces as before, which is another motion
+                controls = changed(found.motion.controls, rng)[: 2 * proof.motion.degree + 1]
+                proof = replace(proof, motion=replace(proof.motion, controls=controls))
+        elif kind == "swapped":
+            pieces = found.motion.bezier[::-1]
+            controls = np.concatenate([pieces[:, :-1].reshape(-1, 1), pieces[-1:, -1]])
+            proof = replace(found, motion=replace(found.motion, controls=controls))
         elif kind == "padding":
             proof = replace(found, scene=replace(scene, padding=rng.uniform(0, 2e-3)))
         elif kind == "radius":
@@ -104,10 +116,19 @@ def test_a_pair_is_not_left_out():
         {"end": 1.5},
         {"end": float("nan")},
         {"space": "r"},
-        {"waypoints": np.zeros((1, 2))},
-        {"waypoints": np.zeros((3, 3))},
-        {"waypoints": np.full((3, 2), np.nan)},
-        {"waypoints": np.full((3, 2), 1e9)},
+        {"controls": np.zeros((1, 2))},
+        {"controls": np.zeros((3, 3))},
+        {"controls": np.full((3, 2), np.nan)},
+        {"controls": np.full((3, 2), 1e9)},
+        {"controls": np.full((3, 2), 2.5)},
+        {"degree": 0},
+        {"degree": -1},
+        {"degree": 2},
+        {"degree": 3},
+        {"degree": 16},
+        {"degree": 1.0},
+        {"degree": True},
+        {"degree": 10**30},
         {"frames": np.full(2, -1, np.int32)},
         {"frames": np.full(2, 3, np.int32)},
         {"frames": np.zeros(2)},
@@ -126,6 +147,26 @@ def test_hostile_files_are_refused(change):
     data = pack(header, {**arrays, **{name: value for name, value in change.items() if isinstance(value, np.ndarray)}})
     with pytest.raises(ProofError):
         verify_motion(MotionProof.from_bytes(data, scene))
+
+
+def test_a_file_that_does_not_say_the_degree_is_refused_with_words():
+    """As those were that held waypoints alone."""
+    scene, proof = motion()
+    header, arrays = unpack(proof.to_bytes(), "motion")
+    del header["degree"]
+    with pytest.raises(ProofError, match="degree is missing"):
+        MotionProof.from_bytes(pack(header, {**arrays, "waypoints": arrays["controls"]}), scene)
+
+
+@pytest.mark.parametrize("space", Space)
+def test_a_control_point_beyond_the_limits_is_refused_where_the_motion_itself_is_within(space):
+    scene = swing(0.5)
+    proof = search(scene, Motion(space, np.array([[0.0], [0.1], [0.2], [0.0]]), 3)).proof
+    assert verify_motion(proof).motion.degree == 3
+    controls = np.array([[0.0], [scene.q_upper[0] + 0.1 if space is Space.Q else scene.s_upper[0] + 0.1], [0.2], [0.0]])
+    assert positions(scene, Motion(space, controls, 3), 0, np.linspace(0, 1, 99)).max() < scene.q_upper[0]
+    with pytest.raises(ProofError, match="a control point is not within the joint limits"):
+        verify_motion(replace(proof, motion=Motion(space, controls, 3)))
 
 
 def test_times_that_run_back_or_end_early_are_refused():
@@ -153,6 +194,11 @@ def test_the_statement_names_the_motion_and_what_is_not_covered():
     assert lines[2] == "  from q = -0.9, -0.4"
     assert any("'arm/link1' and 'arm/link2'" in line and "not covered" in line for line in lines)
     assert len(json.dumps(lines)) < 2000
+    curve = search(scene, raised(proof.motion, 3)).proof
+    assert verify_motion(curve).lines()[:2] == [
+        "a motion of 2 polynomial pieces of degree 3 in q:",
+        "  joints 'arm/joint1', 'arm/joint2', all control points within their limits",
+    ]
     plain = search(scene, proof.motion).proof
     assert not any("and at every configuration" in line for line in verify_motion(plain).lines())
 
