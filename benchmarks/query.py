@@ -19,7 +19,8 @@ from certifier.model import Array, Polytope, Scene, StoredRegion
 from certifier.polytopes.polytope import bounds
 from planner.library import Library
 from planner.membership import locate
-from planner.motion.path import Space, follow
+from planner.motion.path import follow
+from planner.motion.space import Space
 from planner.nearest import nearest
 from planner.overlap import beside, overlap
 

@@ -310,8 +310,9 @@ def _parser() -> argparse.ArgumentParser:
 
     path = verbs.add_parser("path", parents=[remote, json], help="say whether every point of a path is in certified regions")
     path.add_argument("scene", metavar="SCENE")
-    path.add_argument("--q", metavar='"0,0.3,..."', required=True, action="append", help="a waypoint, joint positions; give two or more")
-    path.add_argument("--space", choices=["q", "s"], default="q", help="straight in joint positions q (default) or in tangent space s")
+    path.add_argument("--q", metavar='"0,0.3,..."', action="append", help="a waypoint, joint positions; give two or more")
+    path.add_argument("--path", metavar="FILE", help="npz, JSON, YAML or CSV with waypoints q or s and perhaps times t, or with a spline")
+    path.add_argument("--space", choices=["q", "s"], help="straight in joint positions q or in s; of a spline, its coordinates; default q")
     path.set_defaults(run="client.planning:path")
 
     graph = verbs.add_parser("graph", parents=[remote, json], help="say which regions of a scene overlap, and where gaps are")

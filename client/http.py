@@ -198,10 +198,9 @@ class Client:
         """Returns for each pair of configurations whether the motion between them, straight in ``q`` or ``s``, is in certified regions."""
         return self._json("POST", "/v1/planning/segment", json={"scene": scene, "q": q, "space": space})
 
-    def path(self, scene: str, q: list[list[float]], space: str = "q", times: list[float] | None = None) -> Document:
-        """Returns whether a path through these configurations, straight in ``q`` or ``s`` between them, is in certified regions."""
-        body = {"scene": scene, "q": q, "space": space, **({} if times is None else {"times": times})}
-        return self._json("POST", "/v1/planning/path", json=body)
+    def path(self, request: Document) -> Document:
+        """Returns whether a path, through waypoints or along a curve, is in certified regions."""
+        return self._json("POST", "/v1/planning/path", json=request)
 
     def graph(self, scene: str) -> Document:
         """Returns which regions of a scene overlap, as far as the service has compared them."""

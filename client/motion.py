@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import base64
 import math
-import re
 from argparse import Namespace
 from typing import Any
 
-import numpy as np
-
-from certifier.errors import CirisError, RegionError
+from certifier.errors import CirisError
 from certifier.proof.motion import Space
 from certifier.verify.decimals import at_least_mm, rounded_down
 from client import output, service
 from client.files import ProofFile, check_writable
-from client.inputs import configuration
 from client.local import load
 from client.output import print_json
-from client.paths import PathFile, path_file
+from client.paths import PathFile, named, path_of
 
 OK, NO = 0, 1
 
@@ -29,7 +25,7 @@ def certify_path(args: Namespace) -> int:
     Raises:
         CirisError: the motion, its file or the scene cannot be used, or there is no service.
     """
-    path = _path(args)
+    path = path_of(args)
     kept = None
     if args.out is not None:
         check_writable(args.out)
@@ -37,7 +33,7 @@ def certify_path(args: Namespace) -> int:
     try:
         document, proof = (_here if args.local else _by_service)(args, path)
     except CirisError as error:
-        error.field = named(error.field, "--path" if args.path else "--q")
+        error.field = named(error.field, args)
         raise
     written = None if kept is None or proof is None else str(kept.write(document["scene"]["name"], proof))
     document = _timed({**document, "proof": written}, path)
@@ -65,26 +61,6 @@ def _by_service(args: Namespace, path: PathFile) -> tuple[dict[str, Any], bytes 
         asked = {"space": args.space, "tube": args.tube, "prove": args.out is not None}
         document = client.certify_path({"scene": scene, **path.document(), **asked})
     return document, None if document["proof"] is None else base64.b64decode(document["proof"])
-
-
-def _path(args: Namespace) -> PathFile:
-    """Returns the motion of the arguments."""
-    if bool(args.q) == bool(args.path):
-        hint = "give them with --q, once for each, or as a file with --path"
-        raise CirisError("option", "a motion needs its waypoints, from one place", field="--path", hint=hint)
-    if args.path:
-        return path_file(args.path)
-    waypoints = [configuration(text, f"--q {i}") for i, text in enumerate(args.q)]
-    if len({len(waypoint) for waypoint in waypoints}) > 1:
-        raise RegionError(
-            "motion_shape", "the waypoints have different numbers of joints", field="--q", hint="give one number for each joint"
-        )
-    return PathFile({"q": np.array(waypoints)}, None)
-
-
-def named(field: str | None, option: str) -> str | None:
-    """Returns the place of an error in a motion as the command's user knows it, by the option that gave the motion."""
-    return field and re.sub(r"^[qs](?=\[|$)", option, re.sub(r"^(?=bezier|knots|control_points)", f"{option} ", field))
 
 
 def _timed(document: dict[str, Any], path: PathFile) -> dict[str, Any]:

@@ -1,9 +1,11 @@
-"""This module reads a planner's path from a file."""
+"""This module reads a planner's path from the command line or from a file."""
 
 from __future__ import annotations
 
 import csv
 import json
+import re
+from argparse import Namespace
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ import yaml
 from certifier.errors import CirisError, RegionError
 from certifier.model import Array
 from certifier.motion.splines import curve
+from client.inputs import configuration
 
 FIELD = "--path"
 KINDS = (".npz", ".json", ".yaml", ".yml", ".csv")
@@ -39,6 +42,32 @@ class PathFile:
     def document(self) -> dict[str, Any]:
         """Returns the motion as JSON-able data, for requests."""
         return {name: array.tolist() for name, array in self.motion.items()}
+
+
+def path_of(args: Namespace) -> PathFile:
+    """Returns the motion that ``--q`` or ``--path`` gives.
+
+    Raises:
+        RegionError: as :func:`path_file`, or waypoints of different lengths.
+        CirisError: there is neither of them, or both.
+    """
+    if bool(args.q) == bool(args.path):
+        hint = "give them with --q, once for each, or as a file with --path"
+        raise CirisError("option", "a motion needs its waypoints, from one place", field=FIELD, hint=hint)
+    if args.path:
+        return path_file(args.path)
+    waypoints = [configuration(text, f"--q {i}") for i, text in enumerate(args.q)]
+    if len({len(waypoint) for waypoint in waypoints}) > 1:
+        raise RegionError(
+            "motion_shape", "the waypoints have different numbers of joints", field="--q", hint="give one number for each joint"
+        )
+    return PathFile({"q": np.array(waypoints)}, None)
+
+
+def named(field: str | None, args: Namespace) -> str | None:
+    """Returns the place of an error in a motion by the option that gave the motion, as the command's user knows it."""
+    option = FIELD if args.path else "--q"
+    return field and re.sub(r"^[qs](?=\[|$)", option, re.sub(r"^(?=bezier|knots|control_points)", f"{option} ", field))
 
 
 def path_file(path: str) -> PathFile:

@@ -10,6 +10,7 @@ from certifier.errors import CirisError
 from client import output, service
 from client.inputs import configuration
 from client.output import Screen, print_json
+from client.paths import named, path_of
 
 OK, NO = 0, 1
 
@@ -28,11 +29,19 @@ def nearest(args: Namespace) -> int:
 
 
 def path(args: Namespace) -> int:
-    waypoints = [configuration(text) for text in args.q]
-    if len(waypoints) < 2:
+    given = path_of(args)
+    asked: dict[str, Any] = {**given.document(), "space": args.space or ("s" if "s" in given.motion else "q")}
+    if len(asked.get("q", [0, 0])) < 2:
         raise CirisError("option", "a path has two waypoints or more", field="--q", hint="give it once for each waypoint")
+    if given.times is not None and "knots" not in asked:
+        asked["times"] = given.times.tolist()
     with service.connect(args.url) as client:
-        answer = client.path(service.known_scene(client, args.scene)["id"], waypoints, args.space)
+        scene = service.known_scene(client, args.scene)["id"]
+        try:
+            answer = client.path({"scene": scene, **asked})
+        except CirisError as error:
+            error.field = named(error.field, args)
+            raise
     stop = answer["uncovered"]
     if args.json:
         print_json(answer)

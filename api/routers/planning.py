@@ -32,12 +32,14 @@ from api.schemas.planning import (
     Uncovered,
 )
 from certifier.model import Array, Scene
+from certifier.motion.splines import Curve, curve
 from certifier.outcome import Guarantee
 from db import scenes
 from db.session import Database
 from planner.library import Library
 from planner.membership import locate, to_s
-from planner.motion.path import Space, follow
+from planner.motion.path import follow
+from planner.motion.space import Space
 from planner.nearest import Nearest, nearest
 
 router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ])
@@ -86,14 +88,14 @@ def cover_segments(body: SegmentRequest, db: Db, libraries: KeptLibraries) -> Se
 
 @router.post("/path")
 def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries) -> PathResponse:
-    """Says whether every point of a path, straight between its waypoints, is in certified regions, and which.
+    """Says whether every point of a path, straight between its waypoints or along a curve, is in certified regions, and which.
 
     With `times` the path is a trajectory, and the answer is in its times. What `covered` means is said at `/v1/planning/segment`.
     """
     scene_id, scene, library = _asked(db, libraries, body.scene)
-    given, name = (body.q, "q") if body.q is not None else (body.s or [], "s")
-    times = body.times if body.times is not None else [float(i) for i in range(len(given))]
-    answer = _covering(library, scene, body.space, _waypoints(scene, body.space, given, name, name), times)
+    found = _curve(scene, body)
+    times = body.times or (np.arange(len(found.controls) // found.degree + 1.0) if found.times is None else found.times).tolist()
+    answer = _covering(library, scene, body.space, found.controls, times, found.degree)
     return PathResponse(scene=scene_id, version=library.version, regions=len(library), **dict(answer))
 
 
@@ -134,8 +136,18 @@ def _waypoints(scene: Scene, space: Space, rows: Sequence[Sequence[float]], fiel
     return waypoints if space == given else checks.in_s(scene, waypoints, field)
 
 
-def _covering(library: Library, scene: Scene, space: Space, waypoints: Array, times: Sequence[float]) -> Covering:
-    found = follow(library, scene, space, waypoints, times)
+def _curve(scene: Scene, body: PathRequest) -> Curve:
+    """Returns the path of a request as pieces, in the coordinates of its space; straight ones have the degree 1."""
+    found = curve(body.model_dump(include={"bezier", "knots", "control_points"}))
+    if found is None:
+        given, name = (body.q, "q") if body.q is not None else (body.s or [], "s")
+        return Curve(_waypoints(scene, body.space, given, name, name), 1, None)
+    checks.points(scene, found.controls[:1].tolist(), "bezier" if body.knots is None else "control_points")
+    return found
+
+
+def _covering(library: Library, scene: Scene, space: Space, controls: Array, times: Sequence[float], degree: int = 1) -> Covering:
+    found = follow(library, scene, space, controls, times, degree)
     stop = found.uncovered
     return Covering(
         covered=stop is None,

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from api.schemas.common import Request, SceneName, Vector
 from api.schemas.curves import BEZIER, CONTROL_POINTS, KNOTS, Bezier, ControlPoints, Knots, one_curve
 from certifier.outcome import Guarantee, Outcome
-from planner.motion.path import Space
+from planner.motion.space import Space
 
 MAX_PIECES = 2000
 Waypoints = Annotated[list[Vector], Field(min_length=2, max_length=2000)]

@@ -8,8 +8,9 @@ from typing import Annotated, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from api.schemas.common import Real, Request, SceneName, Vector
+from api.schemas.curves import BEZIER, CONTROL_POINTS, KNOTS, Bezier, ControlPoints, Knots, one_curve
 from certifier.outcome import Guarantee
-from planner.motion.path import Space
+from planner.motion.space import Space
 
 MAX_POINTS, MAX_NEAREST = 10_000, 1000
 MAX_SEGMENTS = MAX_WAYPOINTS = 500
@@ -62,14 +63,12 @@ class _Motion(Request):
         Space.Q,
         description="Where the motion is straight between waypoints: in joint positions `q`, as a robot's interpolation usually is, or in "
         "tangent-space coordinates `s`. Waypoints that are given as `q` are rounded to `s` first in the latter case; those given as `s` "
-        "need the space `s`.",
+        "need the space `s`. Of a curve, the coordinates of its control points.",
         examples=["q"],
     )
 
-    def one_kind(self, q: object, s: object) -> None:
-        """Refuses waypoints of no kind or both, and those in s for a motion that is straight in q."""
-        if (q is None) == (s is None):
-            raise ValueError("give either q or s")
+    def fits(self, s: object) -> None:
+        """Refuses waypoints in s for a motion that is straight in q."""
         if s is not None and self.space is Space.Q:
             raise ValueError("a motion through waypoints in s is straight in s: give space s, or waypoints in q")
 
@@ -98,12 +97,14 @@ class SegmentRequest(_Motion):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        self.one_kind(self.q, self.s)
+        if (self.q is None) == (self.s is None):
+            raise ValueError("give either q or s")
+        self.fits(self.s)
         return self
 
 
 class PathRequest(_Motion):
-    """Asks about a path that is straight between its waypoints, or about a trajectory, which is a path with times."""
+    """Asks about a path that is straight between its waypoints, or about a curve; with times, it is a trajectory."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"scene": "planar-2dof", "q": [[0.4, 0.3], [0.6, 0.3], [0.6, 0.5]], "times": [0, 0.5, 1.25]}]}
@@ -123,20 +124,27 @@ class PathRequest(_Motion):
         description="(k, n), waypoints, tangent-space coordinates.",
         examples=[[[0.2, 0.15], [0.3, 0.15]]],
     )
+    bezier: Bezier | None = Field(None, max_length=MAX_SEGMENTS, description=BEZIER)
+    knots: Knots | None = Field(None, description=KNOTS)
+    control_points: ControlPoints | None = Field(None, description=CONTROL_POINTS)
     times: list[Real] | None = Field(
         None,
         min_length=2,
-        max_length=MAX_WAYPOINTS,
-        description="(k,), ascending: when the path is at each waypoint. The answer is in these; 0, 1, 2 ... where they are left out.",
+        max_length=MAX_WAYPOINTS + 1,
+        description="(k,), ascending: when the path is at each waypoint, or, of `bezier`, when pieces begin and end. The "
+        "answer is in these; 0, 1, 2 ... where they are left out. A B-spline has its knots instead.",
         examples=[[0.0, 0.5]],
     )
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        self.one_kind(self.q, self.s)
-        waypoints = self.q or self.s or []
-        if self.times is not None and len(self.times) != len(waypoints):
-            raise ValueError(f"there are {len(waypoints)} waypoints and {len(self.times)} times")
+        one_curve(self.q, self.s, self.bezier, self.knots, self.control_points)
+        self.fits(self.s)
+        if self.times is not None and self.knots is not None:
+            raise ValueError("the knots are the times of a B-spline: leave times out")
+        places = len(self.q or self.s or []) or len(self.bezier or []) + 1
+        if self.times is not None and len(self.times) != places:
+            raise ValueError(f"there are {len(self.times)} times, where {places} belong")
         if self.times is not None and any(b <= a for a, b in pairwise(self.times)):
             raise ValueError("times must ascend")
         return self

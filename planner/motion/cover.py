@@ -1,4 +1,4 @@
-"""A straight motion is covered here, region by region from its start."""
+"""A piece of a motion is covered here, region by region from its start."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 
 class Line(Protocol):
-    """A straight motion. Its parameter t goes from 0 to 1 and is exact, in whatever kind of number the line counts."""
+    """A straight or curved motion. Its parameter t goes from 0 to 1 and is exact, in whatever kind of number the line counts."""
 
     def furthest(self, t: Any) -> tuple[int, Any] | None:
         """Returns a region that is proved to contain the line from t to as far as any, and the parameter where that ends.

@@ -1,30 +1,20 @@
-"""A path of waypoints is covered here: segment by segment, until its end or until a point that no region is proved to contain."""
+"""A path is covered here: segment by segment, until its end or until a point that no region is proved to contain."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
-from itertools import pairwise
 
 import numpy as np
 
 from certifier.model import Array, Scene
 from planner.library import Library
 from planner.membership import locate, to_s
-from planner.motion.cover import cover
-from planner.motion.straight_q import StraightInQ
+from planner.motion.cover import Line, cover
+from planner.motion.curve import Curve, at
+from planner.motion.space import Space
 from planner.motion.straight_s import StraightInS
 from planner.nearest import Nearest, nearest
-
-
-class Space(StrEnum):
-    """Names the coordinates in which a motion is straight between two waypoints."""
-
-    Q = "q"
-    """Joint positions, in radians or metres."""
-    S = "s"
-    """Tangent-space coordinates."""
 
 
 @dataclass(frozen=True)
@@ -63,17 +53,20 @@ class Covering:
     uncovered: Uncovered | None
 
 
-def follow(library: Library, scene: Scene, space: Space, waypoints: Array, times: Sequence[float]) -> Covering:
+def follow(library: Library, scene: Scene, space: Space, controls: Array, times: Sequence[float], degree: int = 1) -> Covering:
     """Covers a path with certified regions.
 
     Args:
-        waypoints: (k, n), k >= 2, in the coordinates of ``space``, in which the path is straight between them. The doubles are taken
+        controls: (k m + 1, n), k >= 1, in the coordinates of ``space``: control points of k segments of degree m. Those of segment i are
+            from number i m to (i + 1) m. Of degree 1 they are waypoints, between which the path is straight. The doubles are taken
             literally.
-        times: k ascending numbers, when the path is at each waypoint. They only name the points of the path.
+        times: k + 1 ascending numbers, when the path is where segments begin and end. They only name the points of the path.
     """
     stretches: list[Stretch] = []
-    for i, (a, b) in enumerate(pairwise(waypoints)):
-        line = StraightInS(library, a, b) if space is Space.S else StraightInQ(library, scene, a, b)
+    for i in range((len(controls) - 1) // degree):
+        segment = controls[i * degree : (i + 1) * degree + 1]
+        straight = space is Space.S and degree == 1
+        line: Line = StraightInS(library, *segment) if straight else Curve(library, scene, space, segment)
         found = cover(line)
         for piece in found.pieces:
             begin, end = (_time(times[i], times[i + 1], t) for t in (piece.begin, piece.end))
@@ -82,7 +75,7 @@ def follow(library: Library, scene: Scene, space: Space, waypoints: Array, times
             else:
                 stretches.append(Stretch(begin, end, piece.region))
         if found.uncovered is not None:
-            time, point = _time(times[i], times[i + 1], found.uncovered), a + found.uncovered * (b - a)
+            time, point = _time(times[i], times[i + 1], found.uncovered), at(segment, found.uncovered)
             held = {stretches[-1].region} if stretches else set()
             return Covering(tuple(stretches), _uncovered(library, scene, space, time, i, point, held))
     return Covering(tuple(stretches), None)

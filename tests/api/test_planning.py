@@ -84,9 +84,33 @@ def test_a_path_with_times_is_answered_in_them(client: TestClient, region: str) 
     assert (answer["uncovered"]["segment"], answer["uncovered"]["time"]) == (1, piece["end"])
 
 
+@pytest.mark.parametrize("space", ["q", "s"])
+def test_a_curve_is_answered_in_its_times(client: TestClient, region: str, space: str) -> None:
+    """The slider goes out to 0.3, or to 0.1, and back; the region ends at 0.2. Its joint slides, so that s is q."""
+    out: list[list[list[float]]] = [[[0.0], [0.1], [0.2]], [[0.2], [0.4], [0.2]]]
+    body = {"scene": "slider", "space": space, "bezier": out}
+    for times, begin, end in ((None, 0.0, 1.0), ([2.0, 3.0, 7.0], 2.0, 3.0)):
+        answer = client.post("/v1/planning/path", json=body | ({} if times is None else {"times": times})).json()
+        (piece,) = answer["pieces"]
+        assert (answer["covered"], piece["begin"], piece["end"]) == (False, begin, pytest.approx(end, abs=1e-6))
+    spline = {"scene": "slider", "space": space, "knots": [5, 5, 5, 6, 8, 8, 8], "control_points": [[0.0], [0.1], [-0.1], [0.1]]}
+    answer = client.post("/v1/planning/path", json=spline).json()
+    (piece,) = answer["pieces"]
+    assert (answer["covered"], piece["begin"], piece["end"]) == (True, 5.0, 8.0)
+
+
 @pytest.mark.parametrize(
     ("path", "body", "field"),
     [
+        ("path", {"bezier": [[[0.1], [0.2]]], "q": [[0.1], [0.2]]}, "body"),
+        ("path", {"bezier": [[[0.1], [0.2]]], "times": [1.0, 2.0, 3.0]}, "body"),
+        ("path", {"bezier": [[[0.1], [0.2]], [[0.1], [0.2]]]}, "bezier[1][0]"),
+        ("path", {"bezier": [[[0.1, 0.2], [0.2, 0.3]]]}, "bezier[0]"),
+        ("path", {"bezier": [[[0.1]]]}, "bezier[0]"),
+        ("path", {"knots": [0, 0, 1, 1], "control_points": [[0.1], [0.2]], "times": [0, 1]}, "body"),
+        ("path", {"knots": [0, 0, 1, 0], "control_points": [[0.1], [0.2]]}, "knots[3]"),
+        ("path", {"knots": [0, 0, 1, 1], "control_points": [[0.1, 0], [0.2, 0]]}, "control_points[0]"),
+        ("path", {"knots": [0, 0, 1, 1]}, "body"),
         ("segment", {"q": [[[0.1, 0.2], [0.1, 0.2]]]}, "q[0][0]"),
         ("segment", {"q": [[[0.1]]]}, "q[0]"),
         ("segment", {"s": [[[0.1], [0.2]]]}, "body"),

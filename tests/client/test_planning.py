@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import pytest
 
 from certifier.model import Scene
@@ -26,7 +29,7 @@ def test_nearest_without_a_region_is_a_negative_answer(ciris: Ciris, url: str, s
     assert (done.status, done.stdout) == (1, "0.1: the scene has no regions\n")
 
 
-def test_a_path_is_answered_by_the_exit_status(ciris: Ciris, url: str, region: str, database: Database) -> None:
+def test_a_path_is_answered_by_the_exit_status(ciris: Ciris, url: str, region: str, database: Database, tmp_path: Path) -> None:
     more = store_region(database, a_part(0.1, 0.4))
     covered = ciris("path", "slider", "--q", "-0.2", "--q", "0.1", "--q", "0.3", CIRIS_URL=url)
     assert (covered.status, covered.stderr) == (0, "")
@@ -41,6 +44,16 @@ def test_a_path_is_answered_by_the_exit_status(ciris: Ciris, url: str, region: s
         f"next: 0.1 in s from {region} (exact), whose nearest point is -0.3",
     ]
     assert ciris("path", "slider", "--q", "-0.4", "--q", "0.1", "--json", CIRIS_URL=url).json["covered"] is False
+    curve = tmp_path / "curve.json"
+    curve.write_text(json.dumps({"bezier": [[[0.0], [0.5], [-0.1]]], "t": [3.0, 5.0]}))
+    done = ciris("path", "slider", "--path", curve, CIRIS_URL=url)
+    assert (done.status, done.stdout.splitlines()[1].split()[0], done.stdout.splitlines()[-2].split()[1]) == (0, "3", "5")
+    curve.write_text(json.dumps({"knots": [0, 0, 0, 2, 2, 2], "control_points": [[0.0], [2.0], [-0.1]]}))
+    assert ciris("path", "slider", "--path", curve, "--json", CIRIS_URL=url).json["covered"] is False
+    curve.write_text(json.dumps({"bezier": [[[0.0, 0.1], [0.1, 0.0]]]}))
+    assert ciris("path", "slider", "--path", curve, CIRIS_URL=url).error.startswith("--path bezier[0]: 2 numbers were given")
+    curve.write_text(json.dumps({"s": [[0.0], [0.1]], "t": [1.0, 2.0]}))
+    assert ciris("path", "slider", "--path", curve, CIRIS_URL=url).status == 0
     alone = ciris("path", "slider", "--q", "0.1", CIRIS_URL=url)
     assert (alone.status, alone.error) == (2, "--q: a path has two waypoints or more (give it once for each waypoint)")
 

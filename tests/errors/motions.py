@@ -139,7 +139,7 @@ MOTIONS: list[Row] = [
         ),
     ),
     *rows(
-        "client/motion.py",
+        "client/paths.py",
         (
             "option",
             "--path",
@@ -154,9 +154,6 @@ MOTIONS: list[Row] = [
             "give one number for each joint",
             lambda t: planned(t, "--q", "0,0", "--q", "0"),
         ),
-    ),
-    *rows(
-        "client/paths.py",
         ("path_file", "--path", "{path} is neither .npz nor .json, .yaml or .csv", FILE, lambda t: from_file(t, "path.txt", "0 0")),
         ("path_file", "--path", "there is no file {path}", FILE, lambda t: planned(t, "--path", "none.json", "--local")),
         ("path_file", "--path", "{path} is no {kind} file of numbers", FILE, lambda t: from_file(t, "path.json", "[")),

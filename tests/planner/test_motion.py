@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from certifier.model import Array, Joint, JointKind, Scene, StoredRegion
 from planner.library import Library
 from planner.motion.cover import Cover, cover
-from planner.motion.path import Space, follow
-from planner.motion.straight_q import _TURN, StraightInQ
+from planner.motion.curve import Curve
+from planner.motion.path import follow
+from planner.motion.space import Space
 from planner.motion.straight_s import StraightInS
 from tests.planner.regions import box, cut_boxes, library
 
@@ -32,6 +33,10 @@ def arm(n: int, lower: float = -2.0, upper: float = 2.0, own: tuple[float | None
 
 def in_s(stored: Library, a: list[float], b: list[float]) -> Cover:
     return cover(StraightInS(stored, np.array(a), np.array(b)))
+
+
+def in_q(stored: Library, scene: Scene, a: Array, b: Array) -> Curve:
+    return Curve(stored, scene, Space.Q, np.array([a, b]))
 
 
 def exact_interval(stored: Library, region: int, a: Array, b: Array) -> tuple[Fraction, Fraction] | None:
@@ -124,7 +129,7 @@ def test_no_point_of_a_piece_in_q_is_outside_of_its_region_and_no_piece_could_go
     rng = np.random.default_rng(seed)
     stored, scene = cut_boxes(rng, n, count, spread=0.4), arm(n)
     a, b = rng.uniform(-0.8, 0.8, n), rng.uniform(-0.8, 0.8, n)
-    found = cover(StraightInQ(stored, scene, a, b))
+    found = cover(in_q(stored, scene, a, b))
     for piece in found.pieces:
         for t in [*np.linspace(piece.begin, piece.end, 30), piece.begin, piece.end]:
             assert not beyond(stored, piece.region, scene, a, b, float(t))
@@ -146,14 +151,14 @@ def test_a_curve_that_leaves_a_region_between_its_ends_is_not_covered() -> None:
     for sign in (1.0, -1.0):
         C, d = np.concatenate([sign * normal[None], eye, -eye]), np.concatenate([[sign * level + 1e-9], limits])
         stored = library(StoredRegion("half", "exact", C, d, np.full(2, -1.5), np.full(2, 1.5)))
-        assert (cover(StraightInQ(stored, scene, a, b)).uncovered is None) == (sign * middle < sign * level)
+        assert (cover(in_q(stored, scene, a, b)).uncovered is None) == (sign * middle < sign * level)
 
 
 @pytest.mark.parametrize(("off", "covered"), [(HAIR, True), (-HAIR, False)])
 def test_a_motion_in_q_that_ends_a_hair_before_a_face_is_covered_and_a_hair_beyond_is_not(off: float, covered: bool) -> None:
     scene, end = arm(1), 0.7
     stored = library(box("a", [-1.0], [float(np.tan(end / 2)) + off]))
-    found = cover(StraightInQ(stored, scene, np.array([0.1]), np.array([end])))
+    found = cover(in_q(stored, scene, np.array([0.1]), np.array([end])))
     assert (found.uncovered is None) is covered
     if not covered:
         assert found.uncovered == pytest.approx(1.0, abs=1e-10)
@@ -162,11 +167,11 @@ def test_a_motion_in_q_that_ends_a_hair_before_a_face_is_covered_and_a_hair_beyo
 def test_a_motion_in_q_is_covered_across_regions_that_overlap_by_little() -> None:
     stored = library(box("a", [-1.0], [0.2]), box("b", [0.2 - 1e-10], [1.0]), box("c", [1.0 + 1e-10], [1.2]))
     scene = arm(1)
-    found = cover(StraightInQ(stored, scene, np.array([0.0]), np.array([1.0])))
+    found = cover(in_q(stored, scene, np.array([0.0]), np.array([1.0])))
     assert found.uncovered is None
     assert [piece.region for piece in found.pieces] == [0, 1]
     assert found.pieces[0].end == found.pieces[1].begin == pytest.approx(2 * np.arctan(0.2), abs=1e-9)
-    far = cover(StraightInQ(stored, scene, np.array([0.0]), np.array([1.7])))
+    far = cover(in_q(stored, scene, np.array([0.0]), np.array([1.7])))
     assert far.uncovered == pytest.approx(2 * np.arctan(1.0) / 1.7, abs=1e-9)
 
 
@@ -176,7 +181,7 @@ def test_a_joint_that_turns_is_covered_in_any_turn_and_stops_at_its_window() -> 
     stored = library(box("all", [float(scene.s_lower[0])], [float(scene.s_upper[0])]))
 
     def goes(a: float, b: float) -> float | None:
-        return cover(StraightInQ(stored, scene, np.array([a]), np.array([b]))).uncovered
+        return cover(in_q(stored, scene, np.array([a]), np.array([b]))).uncovered
 
     assert goes(-1.0, 2.0) is None
     assert goes(2 * pi - 1.0, 2 * pi + 2.0) is None
@@ -187,17 +192,7 @@ def test_a_joint_that_turns_is_covered_in_any_turn_and_stops_at_its_window() -> 
     assert goes(half - 1e-9, half - 1e-9) is None
     assert goes(np.deg2rad(175), 0.0) == 0.0
     limited = arm(1, -half, half, (None, 2 * pi + 1.0))
-    assert cover(StraightInQ(stored, limited, np.array([2 * pi]), np.array([2 * pi + 2.0]))).uncovered == pytest.approx(0.5)
-
-
-def test_the_shift_by_turns_lies_between_rational_bounds() -> None:
-    precision = ctx.prec
-    ctx.prec = 200
-    try:
-        assert arb(_TURN[0]) < 2 * arb.pi() < arb(_TURN[1])
-        assert _TURN[1] - _TURN[0] < fmpq(1, 10**29)
-    finally:
-        ctx.prec = precision
+    assert cover(in_q(stored, limited, np.array([2 * pi]), np.array([2 * pi + 2.0]))).uncovered == pytest.approx(0.5)
 
 
 def test_a_path_is_followed_from_waypoint_to_waypoint_with_its_times() -> None:
