@@ -19,7 +19,7 @@ from benchmarks.measure import Progress
 from certifier.jobs.motion import MotionVerdict, certify
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Array, Geometry, Pair, Scene
-from certifier.motion.given import given
+from certifier.motion.given import given, motion_of
 from certifier.outcome import Outcome
 from certifier.pair.collisions import in_collision
 from certifier.proof.motion import Motion, MotionProof, Space
@@ -33,6 +33,10 @@ APART = 0.9
 """The two arms of 14 joints stand so far apart, in metres, before the same shelf."""
 LENGTHS = (1.0, 0.3)
 """A motion goes from one free configuration to another, drawn within the joint limits, or this part of the way."""
+SPANS = 4
+"""A cubic spline of so many spans goes from one free configuration to another,"""
+AROUND = 0.1
+"""with control points off the straight line by this part of the joints' ranges, normally distributed."""
 SAMPLES = 1001
 """A motion is sampled at so many times."""
 MILLIMETRE = 1e-3
@@ -130,7 +134,42 @@ def _row(name: str, count: int, progress: Progress) -> dict[str, Any]:
         "sampling_seconds": _spread([seconds for _, seconds in sampled]),
         "told_apart": sum(told),
         "millimetres": len(told),
+        "splines": _splines(found, rng, count, lambda text: progress(f"{name}, spline: {text}")),
     }
+
+
+def _splines(found: Scene, rng: np.random.Generator, count: int, progress: Progress) -> dict[str, Any]:
+    """Certifies random cubic splines, and samples them."""
+    verdicts, taken, sampled = [], [], []
+    for _ in range(count):
+        motion = _spline(found, rng)
+        verdict, seconds = _timed(certify, found, motion)
+        verdicts.append(verdict)
+        taken.append(seconds)
+        sampled.append(_samples_touch(found, motion))
+        progress(f"{verdict.outcome.value}, {seconds:.3f} s")
+    proofs = [verdict.proof for verdict in verdicts if verdict.proof is not None]
+    return {
+        "motions": count,
+        "certified": sum(verdict.stop is None for verdict in verdicts),
+        "contacts": sum(verdict.outcome is Outcome.REFUTED for verdict in verdicts),
+        "certified_but_sampled_in_contact": sum(v.stop is None and c for v, c in zip(verdicts, sampled, strict=True)),
+        "contacts_between_samples": sum(v.outcome is Outcome.REFUTED and not c for v, c in zip(verdicts, sampled, strict=True)),
+        "seconds": _spread(taken),
+        "certified_seconds": _spread([seconds for verdict, seconds in zip(verdicts, taken, strict=True) if verdict.stop is None]),
+        "verify_seconds": _spread([_timed(_verify, found, proof)[1] for proof in proofs]),
+        "intervals": _spread([float(verdict.intervals) for verdict in verdicts if verdict.stop is None]),
+    }
+
+
+def _spline(found: Scene, rng: np.random.Generator) -> Motion:
+    """Returns a random cubic spline between free configurations, within the joint limits."""
+    start, end = _free(found, rng), _free(found, rng)
+    along = np.linspace(0, 1, SPANS + 3)[:, None]
+    points = start + along * (end - start)
+    points[1:-1] += AROUND * (found.q_upper - found.q_lower) * rng.normal(size=(SPANS + 1, found.n))
+    knots = np.concatenate([np.zeros(3), np.linspace(0, 1, SPANS + 1), np.ones(3)])
+    return motion_of(found, {"knots": knots, "control_points": np.clip(points, found.q_lower, found.q_upper)})
 
 
 def _motion(found: Scene, q: Array) -> Motion:
@@ -156,9 +195,10 @@ def _verify(found: Scene, proof: bytes) -> None:
 
 
 def _samples_touch(found: Scene, motion: Motion) -> bool:
-    """Returns whether a sample of a motion of one piece is in contact."""
-    times = np.linspace(0, 1, SAMPLES)[:, None]
-    return bool(in_collision(found, found.to_s((1 - times) * motion.waypoints[0] + times * motion.waypoints[1])).any())
+    """Returns whether a sample of a motion in q is in contact."""
+    pieces, times = np.divmod(np.linspace(0, motion.pieces, SAMPLES)[:-1], 1)
+    q = [motion.at(int(piece), time) for piece, time in zip(pieces, times, strict=True)]
+    return bool(in_collision(found, found.to_s(np.array([*q, motion.controls[-1]]))).any())
 
 
 def _told_apart(found: Scene, verdict: MotionVerdict) -> bool | None:

@@ -92,7 +92,7 @@ class _Search:
         in_s = motion.space is Space.S
         self._turns = scene.revolute & in_s
         self._q_star = scene.q_star if in_s else np.zeros(scene.n)
-        self._controls = motion.bezier
+        self._controls = np.ascontiguousarray(motion.bezier)
         self._farthest = np.abs(self._controls + self._q_star).max(axis=1)  # of joints that slide, to whose positions alone it matters
         self._inexact = [INEXACT * motion.degree * (motion.degree - 1) ** k * float(np.abs(motion.controls).max()) for k in (1, 2, 3)]
         self._hulls = self._bounds()

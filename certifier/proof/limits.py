@@ -67,5 +67,6 @@ INTERVALS = 1 << 20
 DEGREE = 15
 """Its pieces are polynomials of at most this degree."""
 SWEPT = 1 << 32
-"""Its intervals together have at most this many vertices, a joint on the way counting as JOINT_COST of them."""
+"""Its intervals together have at most this many vertices. A joint on the way counts as JOINT_COST of them, and every joint of the scene as
+the square of the degree."""
 JOINT_COST = 16

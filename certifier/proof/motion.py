@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from certifier.errors import CirisError, ProofError
 from certifier.model import Array, Scene
@@ -56,8 +57,8 @@ class Motion:
 
     @property
     def bezier(self) -> Array:
-        """Returns the control points of every piece, (P, m + 1, n)."""
-        return self.controls[np.arange(self.pieces)[:, None] * self.degree + np.arange(self.degree + 1)]
+        """Returns the control points of every piece, (P, m + 1, n), which cannot be written to."""
+        return sliding_window_view(self.controls, self.degree + 1, axis=0)[:: self.degree].swapaxes(1, 2)
 
     def beginning(self, pieces: int) -> Motion:
         """Returns the first pieces."""

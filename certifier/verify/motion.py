@@ -18,7 +18,7 @@ from __future__ import annotations
 import hashlib
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -198,7 +198,8 @@ class _Check:
         # A coordinate of a tangent counts twice in its angle, and one of a slide is added to q*.
         self._inexact = 2.0**-49 * (degree + 1) * (largest + base)
         self._wrong = [2.0**-45 * degree * (degree - 1) ** k * largest for k in range(1, 4)]
-        self._slid = np.abs(self._bezier + self._base).max(axis=0) * UP + self._inexact + proof.rho
+        farthest = replace(self._motion, controls=np.abs(self._motion.controls + self._base)).bezier.max(axis=1)
+        self._slid = farthest * UP + self._inexact + proof.rho
         self._hulls = self._bounds()
 
     def gaps(self) -> Iterator[float]:
@@ -225,7 +226,7 @@ class _Check:
             joints = sum(len(self._kinematics.path(frame, body)) for body in bodies)
             for i in pairs:
                 vertices = sum(len(self._scene.geometry(name).vertices) for name in (self._scene.pairs[i].a, self._scene.pairs[i].b))
-                cost += int(self._count[i]) * (vertices + limits.JOINT_COST * joints)
+                cost += int(self._count[i]) * (vertices + limits.JOINT_COST * joints + self._scene.n * self._degree**2)
         if cost > limits.SWEPT:
             raise ProofError("proof_too_large", "the intervals have more vertices, behind more joints, than are checked")
 
@@ -297,7 +298,8 @@ class _Check:
         m, steps, bounds = self._degree, self._bezier, []
         for k in range(4):
             steps = (m - k) * (steps[1:] - steps[:-1])
-            bounds.append(np.abs(steps).max(axis=0, initial=0.0) + (self._wrong[k - 1] if k else 0.0))
+            wrong = self._wrong[k - 1] if k else 0.0
+            bounds.append(np.abs(steps).max(axis=0) + wrong if len(steps) else np.broadcast_to(0.0, steps.shape[1:]))
         return bounds
 
     def _rates(self, piece: np.ndarray, t0: Array, t1: Array) -> tuple[Array, Array]:

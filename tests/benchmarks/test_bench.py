@@ -210,7 +210,11 @@ def test_motions_are_measured_beside_sampling() -> None:
     assert row["certified"] + row["contacts"] == 8
     assert row["certified_but_sampled_in_contact"] == 0
     assert row["told_apart"] == row["millimetres"] > 0
+    splines = row["splines"]
+    assert splines["certified"] + splines["contacts"] == splines["motions"] == 4
+    assert splines["certified_but_sampled_in_contact"] == 0
     assert "planar_2dof" in report.text(document)
+    assert "splines certified" in report.text(document)
 
 
 def test_two_arms_of_seven_joints_make_one_of_fourteen() -> None:
