@@ -156,7 +156,6 @@ def _splines(found: Scene, rng: np.random.Generator, count: int, progress: Progr
         "certified_but_sampled_in_contact": sum(v.stop is None and c for v, c in zip(verdicts, sampled, strict=True)),
         "contacts_between_samples": sum(v.outcome is Outcome.REFUTED and not c for v, c in zip(verdicts, sampled, strict=True)),
         "seconds": _spread(taken),
-        "certified_seconds": _spread([seconds for verdict, seconds in zip(verdicts, taken, strict=True) if verdict.stop is None]),
         "verify_seconds": _spread([_timed(_verify, found, proof)[1] for proof in proofs]),
         "intervals": _spread([float(verdict.intervals) for verdict in verdicts if verdict.stop is None]),
     }

@@ -256,7 +256,9 @@ def _parser() -> argparse.ArgumentParser:
     motion.add_argument("scene", metavar="SCENE")
     motion.add_argument("--q", metavar='"0,0.3,..."', action="append", help="a waypoint: joint positions; give it two times or more")
     motion.add_argument("--path", metavar="FILE", help="npz, JSON, YAML or CSV with waypoints q or s and perhaps times t, or with a spline")
-    motion.add_argument("--space", choices=["q", "s"], help="straight in q or s, not as given; of a spline, its coordinates; default q")
+    motion.add_argument(
+        "--space", choices=["q", "s"], help="straight in q or s; default: as given. Of a spline, what its control points are; default: q"
+    )
     motion.add_argument("--tube", action="store_true", help="look for the largest certified tube about the motion")
     motion.add_argument("--local", action="store_true", help="certify in this process, without a service")
     motion.add_argument("--out", metavar="FILE", help="new file for the proof; default: none")
@@ -312,7 +314,7 @@ def _parser() -> argparse.ArgumentParser:
     path.add_argument("scene", metavar="SCENE")
     path.add_argument("--q", metavar='"0,0.3,..."', action="append", help="a waypoint, joint positions; give two or more")
     path.add_argument("--path", metavar="FILE", help="npz, JSON, YAML or CSV with waypoints q or s and perhaps times t, or with a spline")
-    path.add_argument("--space", choices=["q", "s"], help="straight in joint positions q or in s; of a spline, its coordinates; default q")
+    path.add_argument("--space", choices=["q", "s"], help="straight in q (default) or in s; of a spline, what its control points are")
     path.set_defaults(run="client.planning:path")
 
     graph = verbs.add_parser("graph", parents=[remote, json], help="say which regions of a scene overlap, and where gaps are")

@@ -205,7 +205,7 @@ def motion() -> bytes:
     far = replace(bodies[1], vertices=bodies[1].vertices + np.array([0.0, 0.0, 1e4]))
     scene = replace(scene, geometries=(bodies[0], far), pairs=(Pair(first.name, other.name),))
     joints = sum(len(ExactKinematics.by_joint(scene).path(WORLD, body.body)) for body in scene.geometries)
-    count = min(limits.INTERVALS, limits.SWEPT // (2 * many + limits.JOINT_COST * joints))
+    count = min(limits.INTERVALS, limits.SWEPT // (2 * many + limits.JOINT_COST * joints + scene.n))
     ends, normals = np.arange(1, count + 1) / count, np.tile([0.0, 0.0, -1.0], (count, 1))
     frames, counts = np.zeros(1, np.int32), np.array([[count]], np.int32)
     still = Motion(Space.Q, np.zeros((2, scene.n)))
