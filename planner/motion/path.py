@@ -73,7 +73,8 @@ def follow(library: Library, scene: Scene, space: Space, waypoints: Array, times
     """
     stretches: list[Stretch] = []
     for i, (a, b) in enumerate(pairwise(waypoints)):
-        line = StraightInS(library, a, b) if space is Space.S else StraightInQ(library, scene, a, b)
+        last = stretches[-1].region if stretches else None
+        line = StraightInS(library, a, b) if space is Space.S else StraightInQ(library, scene, a, b, last)
         found = cover(line)
         for piece in found.pieces:
             begin, end = (_time(times[i], times[i + 1], t) for t in (piece.begin, piece.end))

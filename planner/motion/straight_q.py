@@ -30,10 +30,15 @@ _UP = 1 + 1e-9
 
 
 class StraightInQ:
-    """The line q(t) = a + t (b - a), 0 <= t <= 1, taken literally for the doubles a and b, (n,), radians or metres."""
+    """The line q(t) = a + t (b - a), 0 <= t <= 1, taken literally for the doubles a and b, (n,), radians or metres.
 
-    def __init__(self, library: Library, scene: Scene, a: Array, b: Array) -> None:
+    Args:
+        held: number of a region that may contain all of the line, and is tried first; None for none.
+    """
+
+    def __init__(self, library: Library, scene: Scene, a: Array, b: Array, held: int | None = None) -> None:
         self._library, self._revolute = library, scene.revolute
+        self._held = np.array([] if held is None else [held], dtype=np.intp)
         self._a, self._b, self._q_star = a.tolist(), b.tolist(), scene.q_star.tolist()
         self._half_speed = np.abs(b - a) / 2 * _UP
         self._last = _within_limits(scene, a, b)
@@ -48,6 +53,8 @@ class StraightInQ:
         if self._last is None:
             return None
         begin = float(t)
+        if self._contain(self._held, begin, 1.0).any() and self._last == 1.0:
+            return int(self._held[0]), 1.0
         _, near = in_boxes(self._library, self._s(begin)[0][None])
         regions = near[self._contain(near, begin, begin)]
         if not len(regions):

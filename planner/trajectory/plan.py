@@ -20,7 +20,7 @@ from planner.nearest import project
 from planner.overlap import Gap, components, gap
 from planner.trajectory.routes import Links, Route, Terminal, routes
 
-ROUTES = 3
+ROUTES = 5
 """So many routes are made curves of; the shortest curve counts."""
 MARGIN = 1e-3
 """A curve keeps this far, in s, from the faces of its regions, or a quarter of the depth of its overlaps where that is less."""

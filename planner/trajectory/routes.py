@@ -16,6 +16,9 @@ from scipy.spatial.distance import cdist
 
 from certifier.model import Array
 
+LONGEST = 1.5
+"""No route is taken that is so many times as long as the shortest."""
+
 
 @dataclass(frozen=True, eq=False)
 class Links:
@@ -53,13 +56,13 @@ class Terminal:
 def routes(links: Links, start: Terminal, goal: Terminal, most: int) -> list[Route]:
     """Returns the shortest routes through each overlap, the shortest first, without repeats, so many at most.
 
-    Where one region has both ends, the routes are of one region each.
+    None is longer than LONGEST times the shortest. Where one region has both ends, the routes are of one region each.
     """
     common = [region for region in start.regions if region in goal.regions]
     if common:
         return [Route((region,), ()) for region in common[:most]]
-    ahead, came = _sweep(links, start)
-    behind, goes = _sweep(links, goal)
+    ahead, came, limit = _sweep(links, start, goal, np.inf)
+    behind, goes, _ = _sweep(links, goal, start, limit)
     # Entry 2e + k of the first is about going through overlap e into its end k; of the second, about coming out of it the other way.
     length = ahead + behind.reshape(-1, 2)[:, ::-1].ravel()
     found: dict[tuple[int, ...], Route] = {}
@@ -86,40 +89,46 @@ def _chain(before: NDArray[np.intp], entry: int) -> list[int]:
     return entries
 
 
-def _sweep(links: Links, begin: Terminal) -> tuple[Array, NDArray[np.intp]]:
+def _sweep(links: Links, begin: Terminal, end: Terminal, limit: float) -> tuple[Array, NDArray[np.intp], float]:
     """Returns how far it is from one end of the motion through each overlap, both ways.
 
+    Args:
+        limit: no route that is longer is looked for, nor one longer than LONGEST times the shortest.
+
     Returns:
-        The lengths in q, (2E,), infinite where no route leads: entry 2e + k is about going through overlap e into its end k. And the entry
-        before each, (2E,); -1 for none.
+        The lengths in q, (2E,), infinite where no route leads: entry 2e + k is about going through overlap e into its end k. The entry
+        before each, (2E,); -1 for none. And the least limit.
     """
     into = links.ends.ravel()
     order = np.argsort(into, kind="stable")
     regions, first = np.unique(into[order], return_index=True)
     entering = dict(zip(regions.tolist(), np.split(order, first)[1:], strict=True))
+    to_begin, to_end = (np.repeat(_distance(links, terminal), 2) for terminal in (begin, end))
+    last = np.isin(into, end.regions)
     length, before = np.full(len(into), np.inf), np.full(len(into), -1)
     heap: list[tuple[float, int]] = []
 
-    def reach(entries: NDArray[np.intp], lengths: Array, sources: NDArray[np.intp] | None) -> None:
-        better = np.flatnonzero(lengths < length[entries])
-        length[entries[better]] = lengths[better]
-        before[entries[better]] = -1 if sources is None else sources[better]
+    def reach(entries: NDArray[np.intp], lengths: Array, sources: NDArray[np.intp] | int) -> float:
+        """Takes shorter ways to entries, and returns the least limit."""
+        least = lengths + to_end[entries]
+        better = (lengths < length[entries]) & (least <= limit)
+        entries, least = entries[better], least[better]
+        length[entries], before[entries] = lengths[better], np.broadcast_to(sources, better.shape)[better]
         nearest: dict[int, float] = {}
-        for region, reached in zip(into[entries[better]].tolist(), lengths[better].tolist(), strict=True):
+        for region, reached in zip(into[entries].tolist(), least.tolist(), strict=True):
             nearest[region] = min(reached, nearest.get(region, np.inf))
         for region, reached in nearest.items():
             heapq.heappush(heap, (reached, region))
+        return min(limit, LONGEST * float(least[last[entries]].min(initial=np.inf)))
 
     for region in begin.regions:
-        if region in entering:
-            leaving = entering[region] ^ 1
-            way = np.zeros(len(leaving)) if begin.q is None else np.linalg.norm(links.q[leaving // 2] - begin.q, axis=1)
-            reach(leaving, way, None)
+        leaving = entering.get(region, order[:0]) ^ 1
+        limit = reach(leaving, to_begin[leaving], -1)
     swept: dict[int, float] = {}
-    while heap:
-        _, region = heapq.heappop(heap)
-        # A region is gone through again where an entry of it has become shorter since it was.
+    while heap and heap[0][0] <= limit:
+        region = heapq.heappop(heap)[1]
         entries = entering[region]
+        # A region is gone through again where an entry of it has become shorter since it was.
         total = float(length[entries].sum(where=np.isfinite(length[entries])))
         if swept.get(region) == total:
             continue
@@ -128,5 +137,10 @@ def _sweep(links: Links, begin: Terminal) -> tuple[Array, NDArray[np.intp]]:
         lengths = length[entries][:, None] + cdist(places, places)
         np.fill_diagonal(lengths, np.inf)  # in and out through the same overlap
         source = lengths.argmin(axis=0)
-        reach(entries ^ 1, lengths[source, np.arange(len(entries))], entries[source])
-    return length, before
+        limit = reach(entries ^ 1, lengths[source, np.arange(len(entries))], entries[source])
+    return length, before, limit
+
+
+def _distance(links: Links, terminal: Terminal) -> Array:
+    """Returns the distance in q of each witness to an end of the motion, (E,); 0 where that may be any point of a region."""
+    return np.zeros(len(links.q)) if terminal.q is None else np.linalg.norm(links.q - terminal.q, axis=1)
