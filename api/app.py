@@ -18,7 +18,7 @@ from api.children import AT_ONCE, ChildLimiter
 from api.libraries import Libraries
 from api.metrics import Requests
 from api.reading import READERS
-from api.routers import events, jobs, motions, planning, regions, scenes, service
+from api.routers import events, jobs, motions, planning, plans, regions, scenes, service
 from certifier.scene.bundle import expect_bundles
 from db.session import CONNECTIONS, Database, database
 from db.settings import LOOPBACK_NAMES, settings
@@ -60,7 +60,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     )
     app.add_middleware(AccessLog, requests=app.state.requests)
     problems.install(app, pages.render_problem)
-    for module in (scenes, jobs, events, regions, planning, motions, service):
+    for module in (scenes, jobs, events, regions, planning, plans, motions, service):
         app.include_router(module.router)
     app.include_router(login.router)
     pages.install(app)

@@ -93,6 +93,25 @@ def points(scene: Scene, rows: Sequence[Sequence[float]], field: str) -> Array:
     return np.array(rows, dtype=float)
 
 
+def point(scene: Scene, row: Sequence[float], field: str) -> Array:
+    """Returns a configuration of a request as an array (n,).
+
+    Raises:
+        RegionError: wrong_length.
+    """
+    _length(scene, row, field, "wrong_length")
+    return np.array(row, dtype=float)
+
+
+def of_each_joint(scene: Scene, value: float | Sequence[float], field: str) -> Array:
+    """Returns a number for each joint, (n,): the one that was given for all of them, or those that were given.
+
+    Raises:
+        RegionError: wrong_length.
+    """
+    return np.full(scene.n, float(value)) if isinstance(value, int | float) else point(scene, value, field)
+
+
 def in_s(scene: Scene, q: Array, field: str) -> Array:
     """Returns waypoints q, (k, n), in s.
 

@@ -21,10 +21,8 @@ MOST_GAPS = 20
 
 def describe(db: Database, scene_id: str, scene: Scene, library: Library) -> GraphResponse:
     """Returns the graph of the library's regions, after comparing pairs for at most COMPARE_SECONDS."""
-    complete = _compare(db, scene_id, library, time.monotonic() + COMPARE_SECONDS)
+    complete, known = compared(db, scene_id, library)
     number = {region_id: i for i, region_id in enumerate(library.ids)}
-    with db.read() as session:
-        known = [edge for edge in overlaps.all_of(session, scene_id) if edge.earlier in number and edge.later in number]
     parts = components(len(library), [(number[edge.earlier], number[edge.later]) for edge in known])
     part_of = {region: part for part, regions in enumerate(parts) for region in regions}
     return GraphResponse(
@@ -40,6 +38,14 @@ def describe(db: Database, scene_id: str, scene: Scene, library: Library) -> Gra
         components=len(parts),
         gaps=_gaps(library, scene, parts) if complete else [],
     )
+
+
+def compared(db: Database, scene_id: str, library: Library) -> tuple[bool, list[Overlap]]:
+    """Compares pairs for at most COMPARE_SECONDS. Returns whether none is left, and what overlaps are known."""
+    complete = _compare(db, scene_id, library, time.monotonic() + COMPARE_SECONDS)
+    there = set(library.ids)
+    with db.read() as session:
+        return complete, [edge for edge in overlaps.all_of(session, scene_id) if edge.earlier in there and edge.later in there]
 
 
 def _compare(db: Database, scene_id: str, library: Library, until: float) -> bool:

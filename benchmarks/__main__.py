@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks import agreement, catalogue, compare, growth, models, path, query, report, robots, scaling, service, store, survey
+from benchmarks import agreement, catalogue, compare, growth, models, path, plan, query, report, robots, scaling, service, store, survey
 from certifier.errors import CirisError
 from client.output import Screen, print_json
 
@@ -67,6 +67,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "store": lambda args, screen: store.store(args.postgresql, store.COUNTS, screen.line),
     "robots": lambda args, screen: robots.robots(args.robots, args.deadline, screen.line),
     "query": lambda args, screen: query.query(args.regions, screen.line),
+    "plan": lambda args, screen: plan.trajectories(args.scene, args.regions, args.url, args.queries, screen.line),
     "survey": lambda args, screen: survey.survey(args.scenes, args.most, screen.line, args.cells),
 }
 
@@ -122,6 +123,13 @@ def _parser() -> ArgumentParser:
     )
     asked = kinds.add_parser("query", parents=[as_json], help="measure questions of planners about many regions, beside a plain product")
     asked.add_argument("--regions", type=_count, default=query.REGIONS, metavar="N", help=f"default {query.REGIONS}")
+    planned = kinds.add_parser("plan", parents=[as_json], help="plan trajectories through regions, beside RRT-Connect")
+    planned.add_argument("scene", metavar="SCENE", help=f"a scene file, or one of {', '.join(catalogue.SCENES)}")
+    planned.add_argument(
+        "--regions", type=Path, action="append", default=[], metavar="PATH", help="a proof, a manifest or a polytope, or a folder of them"
+    )
+    planned.add_argument("--url", help="the service that has the regions, where no --regions are given; default: the one that is found")
+    planned.add_argument("--queries", type=_count, default=plan.QUERIES, metavar="N", help=f"so many trajectories; default {plan.QUERIES}")
     kinds.add_parser("docs", help="write the tables of docs/benchmarks.md from docs/benchmarks/*.json")
     return parser
 

@@ -273,6 +273,24 @@ def _query(document: Document) -> list[str]:
     return ["Milliseconds of processor time, of one question where nothing else is said.", _table(header, rows)]
 
 
+def _plan(document: Document) -> list[str]:
+    """Returns a table of both planners, and a sentence about the lengths where both found a path."""
+    header = ["planner", "found", "p50, s", "p99, s", "length, p50", "collide between samples"]
+    rows = []
+    for name, side in (("ciris plan", document["plan"]), ("RRT-Connect with shortcuts", document["rrt"])):
+        length = f"{side['length']['p50']:.2f}" if side["length"] else "-"
+        times = [f"{side['seconds'][which]:.3f}" for which in ("p50", "p99")]
+        rows.append([name, f"{side['found']} of {document['queries']}", *times, length, str(side["collide"])])
+    about = (
+        f"{document['scene']}: {document['joints']} joints, {document['regions']} regions with {document['faces']} faces, "
+        f"{document['overlaps']} overlaps, {document['components']} components; the two ends were connected "
+        f"{document['connected']} of {document['queries']} times."
+    )
+    ratio = document["length_ratio"]
+    lengths = f"Our length over theirs, {document['both']} paths: median {ratio['p50']:.2f}." if ratio else "No question has two paths."
+    return [about, _table(header, rows), lengths]
+
+
 def _counts(counts: dict[str, int]) -> str:
     return ", ".join(f"{number} {_plain(name)}" for name, number in sorted(counts.items(), key=lambda item: -item[1]))
 
@@ -320,4 +338,5 @@ _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "store": _store,
     "survey": _survey,
     "query": _query,
+    "plan": _plan,
 }

@@ -36,6 +36,10 @@ OPTIONS = {
     "seed.method": "--method",
     "seed.q": "--q",
     "deadline_seconds": "--deadline",
+    "start": "--from",
+    "goal": "--to",
+    "speed": "--speed",
+    "acceleration": "--acceleration",
 }
 """The fields of a request, and the options that people type for them."""
 
@@ -124,7 +128,7 @@ def _joined(arguments: Sequence[str]) -> list[str]:
     """Joins ``--q -0.5,1`` to ``--q=-0.5,1``, because argparse takes a list that begins with a minus for an option."""
     joined: list[str] = []
     for argument in arguments:
-        if joined and joined[-1] in ("--q", "--contain") and re.match(r"-[\d.]", argument):
+        if joined and joined[-1] in ("--q", "--contain", "--from", "--to") and re.match(r"-[\d.]", argument):
             joined[-1] = f"{joined[-1]}={argument}"
         else:
             joined.append(argument)
@@ -310,6 +314,20 @@ def _parser() -> argparse.ArgumentParser:
     near.add_argument("--q", metavar='"0,0.3,..."', required=True, action="append", help="joint positions; may be given several times")
     near.set_defaults(run="client.planning:nearest")
 
+    plan = verbs.add_parser(
+        "plan",
+        parents=[remote, json],
+        help="plan a trajectory between two configurations through the certified regions",
+        epilog="for instance: ciris plan planar-2dof --from 0,0 --to 0.35,-0.2 --speed 1.5",
+    )
+    plan.add_argument("scene", metavar="SCENE")
+    of_end = "joint positions, or the id of a region for any point of it"
+    plan.add_argument("--from", dest="start", metavar='"0,0.3,..."', required=True, help=f"where the motion begins: {of_end}")
+    plan.add_argument("--to", dest="goal", metavar='"0,0.3,..."', required=True, help=f"where it ends: {of_end}")
+    plan.add_argument("--speed", help="largest speed in rad/s or m/s, one for all joints or one for each; default 1")
+    plan.add_argument("--acceleration", help="largest acceleration in rad/s² or m/s², one for all joints or one for each; default 2")
+    plan.set_defaults(run="client.planning:plan")
+
     path = verbs.add_parser("path", parents=[remote, json], help="say whether every point of a path is in certified regions")
     path.add_argument("scene", metavar="SCENE")
     path.add_argument("--q", metavar='"0,0.3,..."', action="append", help="a waypoint, joint positions; give two or more")
@@ -322,7 +340,7 @@ def _parser() -> argparse.ArgumentParser:
     graph.set_defaults(run="client.planning:graph")
 
     bench = verbs.add_parser("bench", help="measure ciris, and Drake beside it if asked; see ciris bench BENCHMARK --help")
-    kinds = ["pairs", "scene", "growth", "path", "agreement", "scaling", "service", "store", "survey", "robots", "query", "docs"]
+    kinds = ["pairs", "scene", "growth", "path", "agreement", "scaling", "service", "store", "survey", "robots", "query", "plan", "docs"]
     bench.add_argument("benchmark", choices=kinds)
     bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...")
     bench.set_defaults(run="client.bench:bench")

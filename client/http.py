@@ -20,6 +20,7 @@ from certifier.errors import CirisError
 from certifier.scene.bundle import pack_bundle
 
 Document = dict[str, Any]
+Limit = float | list[float]
 
 TIMEOUT_S = 120.0
 QUIET_S = 60.0
@@ -201,6 +202,18 @@ class Client:
     def path(self, request: Document) -> Document:
         """Returns whether a path, through waypoints or along a curve, is in certified regions."""
         return self._json("POST", "/v1/planning/path", json=request)
+
+    def plan(
+        self, scene: str, start: list[float] | str, goal: list[float] | str, speed: Limit | None = None, acceleration: Limit | None = None
+    ) -> Document:
+        """Returns a trajectory through certified regions from one configuration, or any of a region with this id, to another; or why not.
+
+        Args:
+            speed, acceleration: limits, one for all joints or one for each, in rad/s and rad/s² (or m); None for the service's defaults.
+        """
+        limits = {"speed": speed, "acceleration": acceleration}
+        given = {name: limit for name, limit in limits.items() if limit is not None}
+        return self._json("POST", "/v1/planning/plan", json={"scene": scene, "start": start, "goal": goal, **given})
 
     def graph(self, scene: str) -> Document:
         """Returns which regions of a scene overlap, as far as the service has compared them."""

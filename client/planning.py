@@ -1,18 +1,24 @@
-"""These commands ask the service about its regions: which is nearest, whether a path stays inside, how they hang together."""
+"""These commands ask the service about its regions: for a trajectory through them, which is nearest, whether a path stays inside, and
+how they hang together.
+"""
 
 from __future__ import annotations
 
+import re
 from argparse import Namespace
 from collections.abc import Sequence
 from typing import Any
 
 from certifier.errors import CirisError
 from client import output, service
+from client.http import Client
 from client.inputs import configuration
 from client.output import Screen, print_json
 from client.paths import named, path_of
 
 OK, NO = 0, 1
+REGION = re.compile(r"[0-9a-f]{4,8}|[0-9a-f]{8}-[0-9a-f-]*")
+"""An id of a region, or its beginning."""
 
 
 def nearest(args: Namespace) -> int:
@@ -26,6 +32,23 @@ def nearest(args: Namespace) -> int:
         for q, near in zip(points, found, strict=True):
             print(f"{_place(q)}: {_near(near) if near else _no_region(answer)}")
     return NO if None in found else OK
+
+
+def plan(args: Namespace) -> int:
+    ends = [_end(args.start, "--from"), _end(args.goal, "--to")]
+    limits = [_limit(args.speed, "--speed"), _limit(args.acceleration, "--acceleration")]
+    with service.connect(args.url) as client:
+        scene = service.known_scene(client, args.scene)["id"]
+        answer = _planned(client, scene, ends, limits)
+    if args.json:
+        print_json(answer)
+    elif answer["found"]:
+        _print_pieces(answer["pieces"])
+        print(f"{len(answer['q'])} configurations, {answer['length']:.4g} long in q, {answer['duration']:.4g} s; --json prints them")
+        print(f"every point between them is in certified regions, guarantee {answer['guarantee']}")
+    else:
+        print(_why_not(answer))
+    return OK if answer["found"] else NO
 
 
 def path(args: Namespace) -> int:
@@ -46,11 +69,10 @@ def path(args: Namespace) -> int:
     if args.json:
         print_json(answer)
         return OK if answer["covered"] else NO
-    rows = [(f"{piece['begin']:.6g}", f"{piece['end']:.6g}", piece["region"], piece["guarantee"]) for piece in answer["pieces"]]
-    if rows:
-        output.print_table(("from", "to", "region", "guarantee"), rows, right="from to")
+    _print_pieces(answer["pieces"])
     if stop is None:
-        print(f"covered: every point of the path is in certified regions, {len({row[2] for row in rows})} of {answer['regions']}")
+        count = len({piece["region"] for piece in answer["pieces"]})
+        print(f"covered: every point of the path is in certified regions, {count} of {answer['regions']}")
     else:
         print(f"not covered from {stop['time']:.6g} on, at q = {_place(stop['q'])}")
         print(f"next: {_near(stop['next']) if stop['next'] else _no_region(answer)}")
@@ -76,6 +98,57 @@ def graph(args: Namespace) -> int:
     for gap in answer["gaps"]:
         print(f"gap of {gap['distance']:.3g} in s between {gap['a']} and {gap['b']}; try the seed {_place(gap['q'])}")
     return OK
+
+
+def _planned(client: Client, scene: str, ends: Sequence[Any], limits: Sequence[Any]) -> dict[str, Any]:
+    """Returns the answer of the service. It is asked again as long as pairs of regions are compared that may join the ends."""
+    screen = Screen()
+    answer = client.plan(scene, *ends, *limits)
+    while answer["reason"] == "disconnected" and not answer["complete"]:
+        screen.status("comparing regions")
+        answer = client.plan(scene, *ends, *limits)
+    screen.clear()
+    return answer
+
+
+def _end(text: str, field: str) -> list[float] | str:
+    """Returns the configuration that a text is, or the text where it is no number and may be the id of a region."""
+    try:
+        return configuration(text, field)
+    except CirisError:
+        if REGION.fullmatch(text):
+            return text
+        raise
+
+
+def _limit(text: str | None, field: str) -> float | list[float] | None:
+    """Returns the limit of all joints, or of each."""
+    if text is None:
+        return None
+    values = configuration(text, field)
+    return values[0] if len(values) == 1 else values
+
+
+def _why_not(answer: dict[str, Any]) -> str:
+    """Returns in words why there is no trajectory."""
+    gap, stop = answer["gap"], answer["uncovered"]
+    match answer["reason"]:
+        case "start_uncovered" | "goal_uncovered":
+            end = "--from" if answer["reason"] == "start_uncovered" else "--to"
+            return f"{end} is in no certified region; nearest: {_near(answer['nearest']) if answer['nearest'] else _no_region(answer)}"
+        case "disconnected":
+            sides = f"{gap['start_regions']} of {answer['regions']} regions hang together with --from, {gap['goal_regions']} with --to"
+            between = f"between {gap['start']} and {gap['goal']}"
+            return f"{sides}\ngap of {gap['distance']:.3g} in s {between}; try the seed {_place(gap['q'])}"
+        case _:
+            where = f", the last one not at {stop['time']:.6g} s, q = {_place(stop['q'])}" if stop else ""
+            return f"regions lead from --from to --to, but no trajectory was proved to be in them{where}"
+
+
+def _print_pieces(pieces: Sequence[dict[str, Any]]) -> None:
+    rows = [(f"{piece['begin']:.6g}", f"{piece['end']:.6g}", piece["region"], piece["guarantee"]) for piece in pieces]
+    if rows:
+        output.print_table(("from", "to", "region", "guarantee"), rows, right="from to")
 
 
 def _near(near: dict[str, Any]) -> str:

@@ -92,12 +92,12 @@ class Gap:
     distance: float
 
 
-def gap(library: Library, component: Sequence[int]) -> Gap | None:
-    """Returns where a component comes nearest to the regions outside of it; None where there are none.
+def gap(library: Library, component: Sequence[int], others: Sequence[int] | None = None) -> Gap | None:
+    """Returns where a component comes nearest to other regions, by default all that are outside of it; None where there are none.
 
     Pairs of regions are looked at by the distance of their boxes, until boxes are farther apart than the best pair.
     """
-    outside = np.setdiff1d(np.arange(len(library)), component)
+    outside = np.setdiff1d(np.arange(len(library)) if others is None else others, component)
     if not len(outside):
         return None
 

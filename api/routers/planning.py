@@ -9,8 +9,9 @@ from typing import Annotated
 import numpy as np
 from fastapi import APIRouter, Query
 
-from api import checks, graph
+from api import answers, checks, graph
 from api.access import READ, Db
+from api.answers import asked
 from api.children import Children
 from api.libraries import KeptLibraries, Libraries
 from api.schemas.planning import (
@@ -20,27 +21,22 @@ from api.schemas.planning import (
     Covering,
     GraphResponse,
     Hit,
-    Near,
     NearestPoint,
     NearestRequest,
     NearestResponse,
     PathRequest,
     PathResponse,
-    Piece,
     SegmentRequest,
     SegmentResponse,
-    Uncovered,
 )
 from certifier.model import Array, Scene
 from certifier.motion.splines import Curve, curve
-from certifier.outcome import Guarantee
-from db import scenes
 from db.session import Database
 from planner.library import Library
 from planner.membership import locate, to_s
 from planner.motion.path import follow
 from planner.motion.space import Space
-from planner.nearest import Nearest, nearest
+from planner.nearest import nearest
 
 router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ])
 
@@ -48,26 +44,26 @@ router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ]
 @router.post("/contains")
 def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries) -> ContainsResponse:
     """Returns, for each point, the certified regions of the scene that contain it, and how deep inside it is."""
-    scene_id, scene, library = _asked(db, libraries, body.scene)
+    scene_id, scene, library = asked(db, libraries, body.scene)
     points = _points(scene, body.q, body.s)
     found = locate(library, points)
     ends = np.searchsorted(found.point, np.arange(len(points) + 1)).tolist()
-    answers = []
+    containments = []
     for begin, end in pairwise(ends):
         deepest = zip(found.region[begin:end].tolist(), found.margin[begin:end].tolist(), strict=True)
-        hits = [Hit(region=library.ids[i], margin=margin, guarantee=_guarantee(library, i)) for i, margin in deepest]
-        answers.append(Containment(inside=bool(hits), regions=hits, margin=hits[0].margin if hits else None))
-    return ContainsResponse(scene=scene_id, version=library.version, regions=len(library), points=answers)
+        hits = [Hit(region=library.ids[i], margin=margin, guarantee=answers.guarantee(library, i)) for i, margin in deepest]
+        containments.append(Containment(inside=bool(hits), regions=hits, margin=hits[0].margin if hits else None))
+    return ContainsResponse(scene=scene_id, version=library.version, regions=len(library), points=containments)
 
 
 @router.post("/nearest")
 def find_nearest(body: NearestRequest, db: Db, libraries: KeptLibraries) -> NearestResponse:
     """Returns, for each point, the nearest certified region of the scene, its nearest point and how far that is."""
-    scene_id, scene, library = _asked(db, libraries, body.scene)
+    scene_id, scene, library = asked(db, libraries, body.scene)
     points = _points(scene, body.q, body.s)
     found = [nearest(library, s) if np.isfinite(s).all() else None for s in points]
-    answers = [NearestPoint(nearest=_near(library, scene, near)) for near in found]
-    return NearestResponse(scene=scene_id, version=library.version, regions=len(library), points=answers)
+    points_found = [NearestPoint(nearest=answers.near(library, scene, near)) for near in found]
+    return NearestResponse(scene=scene_id, version=library.version, regions=len(library), points=points_found)
 
 
 @router.post("/segment")
@@ -77,13 +73,13 @@ def cover_segments(body: SegmentRequest, db: Db, libraries: KeptLibraries) -> Se
     `covered` is proved, for the numbers of the request taken literally. A motion that is straight in `s` is cut with the regions exactly.
     One that is straight in `q` is proved piece by piece, with bounds on what lies between, so one that only touches may not be proved.
     """
-    scene_id, scene, library = _asked(db, libraries, body.scene)
+    scene_id, scene, library = asked(db, libraries, body.scene)
     given, name = (body.q, "q") if body.q is not None else (body.s or [], "s")
-    answers = [
+    segments = [
         _covering(library, scene, body.space, _waypoints(scene, body.space, ends, f"{name}[{i}]", name), [0.0, 1.0])
         for i, ends in enumerate(given)
     ]
-    return SegmentResponse(scene=scene_id, version=library.version, regions=len(library), segments=answers)
+    return SegmentResponse(scene=scene_id, version=library.version, regions=len(library), segments=segments)
 
 
 @router.post("/path")
@@ -92,7 +88,7 @@ def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries) -> PathRespo
 
     With `times` the path is a trajectory, and the answer is in its times. What `covered` means is said at `/v1/planning/segment`.
     """
-    scene_id, scene, library = _asked(db, libraries, body.scene)
+    scene_id, scene, library = asked(db, libraries, body.scene)
     found = _curve(scene, body)
     times = body.times or (np.arange(len(found.controls) // found.degree + 1.0) if found.times is None else found.times).tolist()
     answer = _covering(library, scene, body.space, found.controls, times, found.degree)
@@ -114,15 +110,7 @@ async def get_graph(
 
 
 def _graph(db: Database, libraries: Libraries, name: str) -> GraphResponse:
-    return graph.describe(db, *_asked(db, libraries, name))
-
-
-def _asked(db: Database, libraries: Libraries, name: str) -> tuple[str, Scene, Library]:
-    """Returns the id of the scene that a request names, the scene, and its regions as they are now."""
-    with db.read() as session:
-        scene_id = scenes.find(session, name)
-    scene = scenes.load(db, scene_id)
-    return scene_id, scene, libraries.of(db, scene_id, scene.n)
+    return graph.describe(db, *asked(db, libraries, name))
 
 
 def _points(scene: Scene, q: Sequence[Sequence[float]] | None, s: Sequence[Sequence[float]] | None) -> Array:
@@ -148,36 +136,5 @@ def _curve(scene: Scene, body: PathRequest) -> Curve:
 
 def _covering(library: Library, scene: Scene, space: Space, controls: Array, times: Sequence[float], degree: int = 1) -> Covering:
     found = follow(library, scene, space, controls, times, degree)
-    stop = found.uncovered
-    return Covering(
-        covered=stop is None,
-        pieces=[
-            Piece(begin=part.begin, end=part.end, region=library.ids[part.region], guarantee=_guarantee(library, part.region))
-            for part in found.stretches
-        ],
-        uncovered=None
-        if stop is None
-        else Uncovered(
-            time=stop.time,
-            segment=stop.segment,
-            q=stop.q.tolist(),
-            s=None if stop.s is None else stop.s.tolist(),
-            next=_near(library, scene, stop.next),
-        ),
-    )
-
-
-def _near(library: Library, scene: Scene, near: Nearest | None) -> Near | None:
-    if near is None:
-        return None
-    return Near(
-        region=library.ids[near.region],
-        guarantee=_guarantee(library, near.region),
-        distance=near.distance,
-        q=scene.to_q(near.s).tolist(),
-        s=near.s.tolist(),
-    )
-
-
-def _guarantee(library: Library, region: int) -> Guarantee:
-    return Guarantee(library.guarantees[region])
+    stop = answers.uncovered(library, scene, found.uncovered)
+    return Covering(covered=stop is None, pieces=answers.pieces(library, found.stretches), uncovered=stop)

@@ -150,7 +150,7 @@ class PathRequest(_Motion):
         return self
 
 
-class _Answer(BaseModel):
+class Answer(BaseModel):
     """All answers say which regions they are about."""
 
     scene: str = Field(description="Id of the scene.", examples=["5a9e0c7b12de34f0"])
@@ -177,7 +177,7 @@ class Containment(BaseModel):
     margin: float | None = Field(description="The largest margin; null where no region contains the point.", examples=[0.05])
 
 
-class ContainsResponse(_Answer):
+class ContainsResponse(Answer):
     """Holds one answer for each point, in order."""
 
     points: list[Containment] = Field(description="One answer for each point, in order.")
@@ -202,7 +202,7 @@ class NearestPoint(BaseModel):
     )
 
 
-class NearestResponse(_Answer):
+class NearestResponse(Answer):
     """Holds one answer for each point, in order."""
 
     points: list[NearestPoint] = Field(description="One answer for each point, in order.")
@@ -237,13 +237,13 @@ class Covering(BaseModel):
     uncovered: Uncovered | None = Field(description="Where the motion stops being covered; null where it is covered.")
 
 
-class SegmentResponse(_Answer):
+class SegmentResponse(Answer):
     """Holds one answer for each motion, in order, with times from 0 at its begin to 1 at its end."""
 
     segments: list[Covering] = Field(description="One answer for each motion, in order.")
 
 
-class PathResponse(Covering, _Answer):
+class PathResponse(Covering, Answer):
     """Says whether a path is covered."""
 
 
@@ -276,7 +276,7 @@ class Gap(BaseModel):
     q_b: Annotated[list[float], Field(description="(n,), joint positions of b's point that is nearest to a.", examples=[[0.5, 0.3]])]
 
 
-class GraphResponse(_Answer):
+class GraphResponse(Answer):
     """Says how the regions of a scene hang together."""
 
     complete: bool = Field(

@@ -126,7 +126,7 @@ class _Iris:
         self._function, self._options = (IrisNp2, IrisNp2Options()) if options.method is Method.IRIS_NP2 else (IrisZo, IrisZoOptions())
         self._scene = scene
         with _listening():  # Drake tells how many contexts it allocates, which is nothing to people who grow a region
-            self._checker = _checker(scene)
+            self._checker = checker(scene)
         self._kinematics = RationalForwardKinematics(self._checker.plant())  # Drake's parameterization does not keep it alive
         self._options.parameterization = IrisParameterizationFunction(self._kinematics, scene.q_star)
         sampled = self._options.sampled_iris_options
@@ -161,7 +161,8 @@ class _Iris:
         return region, {"epsilon": epsilon, **_account(records)}
 
 
-def _checker(scene: Scene) -> SceneGraphCollisionChecker:
+def checker(scene: Scene) -> SceneGraphCollisionChecker:
+    """Returns Drake's collision checker of a scene, with its padding; its distance is the length in q."""
     diagram = build_diagram(_apart(scene))
     robot = diagram.plant().GetJointByName(scene.moving[0].name).model_instance()
     checker = SceneGraphCollisionChecker(

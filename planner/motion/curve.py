@@ -54,10 +54,14 @@ class Curve:
     """The polynomial with control points (m + 1, n), 0 <= t <= 1, taken literally for these doubles: s, or q in radians or metres.
 
     In q, a joint that turns a whole turn and more may begin in another turn than its window, and stays in that one.
+
+    Args:
+        held: number of a region that may contain all of the curve, and is tried first; None for none.
     """
 
-    def __init__(self, library: Library, scene: Scene, space: Space, controls: Array) -> None:
+    def __init__(self, library: Library, scene: Scene, space: Space, controls: Array, held: int | None = None) -> None:
         in_q = space is Space.Q
+        self._held = np.array([] if held is None else [held], dtype=np.intp)
         self._library, self._tangent = library, scene.revolute & in_q
         self._base = scene.q_star if in_q else np.zeros(scene.n)
         self._exact = np.array([[arb(x) for x in row] for row in controls.tolist()])
@@ -77,6 +81,8 @@ class Curve:
         all pieces so far. None where no region is proved to contain the point at t.
         """
         begin = float(t)
+        if self._contain(self._held, begin, 1.0).any():
+            return int(self._held[0]), 1.0
         _, near = in_boxes(self._library, self._at(begin).s[None])
         regions = near[self._contain(near, begin, begin)]
         if not len(regions):

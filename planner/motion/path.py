@@ -65,8 +65,9 @@ def follow(library: Library, scene: Scene, space: Space, controls: Array, times:
     stretches: list[Stretch] = []
     for i in range((len(controls) - 1) // degree):
         segment = controls[i * degree : (i + 1) * degree + 1]
+        last = stretches[-1].region if stretches else None
         straight = space is Space.S and degree == 1
-        line: Line = StraightInS(library, *segment) if straight else Curve(library, scene, space, segment)
+        line: Line = StraightInS(library, *segment) if straight else Curve(library, scene, space, segment, last)
         found = cover(line)
         for piece in found.pieces:
             begin, end = (_time(times[i], times[i + 1], t) for t in (piece.begin, piece.end))

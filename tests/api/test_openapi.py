@@ -12,6 +12,7 @@ from api import checks
 from api.problems import Problem
 from api.schemas.jobs import NewJob, WebhookRequest
 from api.schemas.planning import ContainsRequest, NearestRequest, PathRequest, SegmentRequest
+from api.schemas.plans import PlanRequest
 from certifier.scene import load_scene
 from db import scenes
 from db.keys import Scope
@@ -47,6 +48,7 @@ OPERATIONS = {
     "find_nearest": "POST /v1/planning/nearest",
     "cover_segments": "POST /v1/planning/segment",
     "cover_path": "POST /v1/planning/path",
+    "plan_trajectory": "POST /v1/planning/plan",
     "get_graph": "GET /v1/planning/graph",
     "get_health": "GET /healthz",
     "get_readiness": "GET /readyz",
@@ -83,7 +85,7 @@ def test_the_examples_are_accepted_by_the_schemas(client: TestClient) -> None:
     for name in ("GrowRequest", "CertifyRequest"):
         for example in schemas[name]["examples"]:
             TypeAdapter(NewJob).validate_python(example)
-    for model in (ContainsRequest, NearestRequest, SegmentRequest, PathRequest):
+    for model in (ContainsRequest, NearestRequest, SegmentRequest, PathRequest, PlanRequest):
         for example in schemas[model.__name__]["examples"]:
             model.model_validate(example)
     for example in schemas["WebhookRequest"]["examples"]:
@@ -105,6 +107,7 @@ def test_the_examples_work_on_the_scenes_that_they_name(client: TestClient, data
         ("NearestRequest", "/v1/planning/nearest", 200),
         ("SegmentRequest", "/v1/planning/segment", 200),
         ("PathRequest", "/v1/planning/path", 200),
+        ("PlanRequest", "/v1/planning/plan", 200),
     ):
         for example in schemas[name]["examples"]:
             answer = client.post(path, json=example)

@@ -74,9 +74,40 @@ def test_the_client_asks_about_many_segments_at_once(url: str, region: str) -> N
     assert [segment["covered"] for segment in answer["segments"]] == [True, False]
 
 
-@pytest.mark.parametrize("command", ["nearest", "path", "graph"])
+@pytest.mark.parametrize("command", ["nearest", "path", "plan", "graph"])
 def test_an_unknown_scene_is_said_in_one_line(ciris: Ciris, url: str, command: str) -> None:
-    q = [] if command == "graph" else ["--q", "0", "--q", "1"]
+    q = {"graph": [], "plan": ["--from", "0", "--to", "1"]}.get(command, ["--q", "0", "--q", "1"])
     done = ciris(command, "nope", *q, CIRIS_URL=url)
     assert (done.status, done.stdout) == (2, "")
     assert "there is no scene 'nope'" in done.error
+
+
+def test_a_plan_is_printed_with_its_regions(ciris: Ciris, url: str, region: str, database: Database) -> None:
+    more = store_region(database, a_part(0.1, 0.4))
+    done = ciris("plan", "slider", "--from", "-0.2", "--to", "0.3", "--speed", "0.5", "--acceleration", "1", CIRIS_URL=url)
+    assert (done.status, done.stderr) == (0, "")
+    header, first, second, what, verdict = done.stdout.splitlines()
+    assert header.split() == ["from", "to", "region", "guarantee"]
+    assert [first.split()[0], first.split()[2], second.split()[2]] == ["0", region, more]
+    assert " configurations, 0.5 long in q, " in what
+    assert verdict == "every point between them is in certified regions, guarantee exact"
+    found = ciris("plan", "slider", "--from=-0.2", "--to", more, "--json", CIRIS_URL=url).json
+    assert (found["found"], found["q"][0], found["t"][0]) == (True, [-0.2], 0.0)
+
+
+def test_a_plan_that_is_not_found_says_why(ciris: Ciris, url: str, region: str, database: Database) -> None:
+    far = store_region(database, a_part(0.6, 0.9))
+    apart = ciris("plan", "slider", "--from", "0.1", "--to", "0.7", CIRIS_URL=url)
+    assert (apart.status, apart.stdout) == (
+        1,
+        f"1 of 2 regions hang together with --from, 1 with --to\ngap of 0.4 in s between {region} and {far}; try the seed 0.4\n",
+    )
+    outside = ciris("plan", "slider", "--from", "0.1", "--to", "-0.8", CIRIS_URL=url)
+    assert (outside.status, outside.stdout) == (
+        1,
+        f"--to is in no certified region; nearest: 0.5 in s from {region} (exact), whose nearest point is -0.3\n",
+    )
+    wrong = ciris("plan", "slider", "--from", "0.1,0.2", "--to", "far", CIRIS_URL=url)
+    assert (wrong.status, wrong.error) == (2, "--to[0]: 'far' is not a finite number (joint positions, separated by commas)")
+    longer = ciris("plan", "slider", "--from", "0.1,0.2", "--to", "0.1", CIRIS_URL=url)
+    assert (longer.status, longer.error.partition(" (")[0]) == (2, "--from: 2 numbers were given; slider has 1 joints")

@@ -11,7 +11,7 @@ import pytest
 from api.access import KEYS_SECONDS
 from certifier.model import ALPHABET
 from certifier.pair.forecast import forecast
-from db import keys, proofs
+from db import keys, proofs, scenes
 from db.keys import Scope
 from db.session import Database
 from db.settings import Settings, settings
@@ -47,6 +47,14 @@ def queued(t: Trial) -> str:
     t.request.getfixturevalue("scene")
     job: str = t.request.getfixturevalue("client").post("/v1/jobs", json=GROW).json()["id"]
     return job
+
+
+def elsewhere(t: Trial) -> None:
+    """Asks for a trajectory to a region of another scene."""
+    region = t.request.getfixturevalue("region")
+    with database(t).write() as session:
+        other = scenes.add(session, slider(posts=1)).id
+    t.ask("POST", "/v1/planning/plan", json={"scene": other, "start": [0.1], "goal": region})
 
 
 def twins(t: Trial) -> None:
@@ -199,6 +207,16 @@ STORED = [
             "there is no region {region_id}",
             "give all of its id to delete it",
             lambda t: t.ask("DELETE", f"/v1/regions/{t.request.getfixturevalue('region')[:8]}"),
+        ),
+    ),
+    *rows(
+        "api/routers/plans.py",
+        (
+            "region_elsewhere",
+            "{field}",
+            "region {region_id} is of another scene",
+            "`ciris region ls --scene SCENE` lists them",
+            elsewhere,
         ),
     ),
     *rows(

@@ -1,0 +1,55 @@
+"""This module writes what the planner finds as parts of answers, with the ids of regions and with joint positions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from api.libraries import Libraries
+from api.schemas.planning import Near, Piece, Uncovered
+from certifier.model import Scene
+from certifier.outcome import Guarantee
+from db import scenes
+from db.session import Database
+from planner.library import Library
+from planner.motion import path
+from planner.nearest import Nearest
+
+
+def asked(db: Database, libraries: Libraries, name: str) -> tuple[str, Scene, Library]:
+    """Returns the id of the scene that a request names, the scene, and its regions as they are now."""
+    with db.read() as session:
+        scene_id = scenes.find(session, name)
+    scene = scenes.load(db, scene_id)
+    return scene_id, scene, libraries.of(db, scene_id, scene.n)
+
+
+def pieces(library: Library, stretches: Sequence[path.Stretch]) -> list[Piece]:
+    return [Piece(begin=s.begin, end=s.end, region=library.ids[s.region], guarantee=guarantee(library, s.region)) for s in stretches]
+
+
+def uncovered(library: Library, scene: Scene, stop: path.Uncovered | None) -> Uncovered | None:
+    if stop is None:
+        return None
+    return Uncovered(
+        time=stop.time,
+        segment=stop.segment,
+        q=stop.q.tolist(),
+        s=None if stop.s is None else stop.s.tolist(),
+        next=near(library, scene, stop.next),
+    )
+
+
+def near(library: Library, scene: Scene, found: Nearest | None) -> Near | None:
+    if found is None:
+        return None
+    return Near(
+        region=library.ids[found.region],
+        guarantee=guarantee(library, found.region),
+        distance=found.distance,
+        q=scene.to_q(found.s).tolist(),
+        s=found.s.tolist(),
+    )
+
+
+def guarantee(library: Library, region: int) -> Guarantee:
+    return Guarantee(library.guarantees[region])

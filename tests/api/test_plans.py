@@ -1,0 +1,101 @@
+"""Trajectories over HTTP, through really certified regions; a real child process makes the curves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from api import graph
+from certifier.model import Scene
+from db import scenes
+from db.session import Database
+from tests.api.conftest import store_region
+from tests.api.test_planning import a_part
+from tests.scenes import slider
+
+
+def plan(client: TestClient, start: object, goal: object, **limits: object) -> dict[str, Any]:
+    answer = client.post("/v1/planning/plan", json={"scene": "slider", "start": start, "goal": goal, **limits})
+    assert answer.status_code == 200, answer.text
+    return answer.json()
+
+
+def test_a_trajectory_names_its_regions_and_is_a_covered_path(client: TestClient, region: str, database: Database) -> None:
+    more = store_region(database, a_part(0.1, 0.7))
+    found = plan(client, [-0.2], [0.6], speed=0.5, acceleration=[1.0])
+    assert (found["found"], found["complete"], found["regions"], found["guarantee"]) == (True, True, 2, "exact")
+    assert (found["reason"], found["nearest"], found["gap"], found["uncovered"]) == (None, None, None, None)
+    assert (found["q"][0], found["q"][-1], found["t"][0], found["t"][-1]) == ([-0.2], [0.6], 0.0, found["duration"])
+    assert (found["length"], found["duration"]) == (pytest.approx(0.8), pytest.approx(0.8 / 0.5 + 0.5 / 1.0, rel=0.05))
+    assert [piece["region"] for piece in found["pieces"]] == [region, more]
+    velocity = np.diff(np.ravel(found["q"])) / np.diff(found["t"])
+    assert np.abs(velocity).max() <= 0.5
+    assert np.abs(np.diff(velocity) / found["t"][1]).max() <= 1.0 + 1e-6
+    path = client.post("/v1/planning/path", json={"scene": "slider", "q": found["q"], "times": found["t"]}).json()
+    assert (path["covered"], path["pieces"]) == (True, found["pieces"])
+
+
+def test_an_end_may_be_a_region_by_the_beginning_of_its_id(client: TestClient, region: str, database: Database) -> None:
+    more = store_region(database, a_part(0.1, 0.7))
+    there = plan(client, [-0.2], more[:13])
+    assert (there["found"], there["q"][-1]) == (True, [pytest.approx(0.1, abs=1e-2)])
+    stays = plan(client, region, more)
+    assert (stays["found"], stays["length"], stays["t"]) == (True, 0.0, [0.0, 0.0])
+
+
+@pytest.mark.parametrize(("start", "goal", "reason"), [(0.9, 0.1, "start_uncovered"), (0.1, 0.9, "goal_uncovered")])
+def test_an_end_outside_of_all_regions_is_shown_the_nearest(
+    client: TestClient, region: str, start: float, goal: float, reason: str
+) -> None:
+    answer = plan(client, [start], [goal])
+    assert (answer["found"], answer["reason"], answer["q"], answer["t"], answer["pieces"]) == (False, reason, [], [], [])
+    assert (answer["nearest"]["region"], answer["nearest"]["distance"]) == (region, pytest.approx(0.7))
+    assert plan(client, [5.0], [0.1])["nearest"] is None, "5 m is beyond the joint's limits"
+
+
+def test_regions_apart_are_told_with_the_gap_between_them(client: TestClient, region: str, database: Database) -> None:
+    beside, far = store_region(database, a_part(0.1, 0.4)), store_region(database, a_part(0.6, 0.9))
+    answer = plan(client, [-0.2], [0.8])
+    assert (answer["found"], answer["reason"], answer["complete"]) == (False, "disconnected", True)
+    gap = answer["gap"]
+    assert (gap["start_regions"], gap["goal_regions"], gap["start"], gap["goal"]) == (2, 1, beside, far)
+    assert (gap["distance"], gap["q"]) == (pytest.approx(0.2), [pytest.approx(0.5)])
+    assert (gap["q_start"], gap["q_goal"]) == ([pytest.approx(0.4)], [pytest.approx(0.6)])
+    store_region(database, a_part(0.3, 0.7))
+    assert plan(client, [-0.2], [0.8])["found"], "a region over the gap joins them"
+
+
+def test_an_answer_without_all_overlaps_says_so(
+    client: TestClient, region: str, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store_region(database, a_part(0.1, 0.7))
+    monkeypatch.setattr(graph, "COMPARE_SECONDS", -1.0)
+    answer = plan(client, region, [0.6])
+    assert (answer["found"], answer["reason"], answer["complete"]) == (False, "disconnected", False)
+
+
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [
+        ({"start": [0.1, 0.2], "goal": [0.1]}, "start"),
+        ({"start": [0.1], "goal": []}, "goal"),
+        ({"start": [0.1], "goal": "abc"}, "goal"),
+        ({"start": [0.1]}, "goal"),
+        ({"start": [0.1], "goal": [0.1], "speed": 0}, "speed"),
+        ({"start": [0.1], "goal": [0.1], "speed": [1, 2]}, "speed"),
+        ({"start": [0.1], "goal": [0.1], "acceleration": "fast"}, "acceleration"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(client: TestClient, scene: Scene, body: dict[str, object], field: str) -> None:
+    answer = client.post("/v1/planning/plan", json={"scene": "slider"} | body)
+    assert (answer.status_code, answer.json()["field"].split(".")[0]) == (422, field)
+
+
+def test_a_region_of_another_scene_is_no_end(client: TestClient, region: str, database: Database) -> None:
+    with database.write() as session:
+        other = scenes.add(session, slider(posts=1)).id
+    answer = client.post("/v1/planning/plan", json={"scene": other, "start": [0.1], "goal": region})
+    assert (answer.status_code, answer.json()["code"], answer.json()["field"]) == (422, "region_elsewhere", "goal")
