@@ -16,6 +16,7 @@ from api.access_log import AccessLog
 from api.announce import Announcer
 from api.children import AT_ONCE, ChildLimiter
 from api.libraries import Libraries
+from api.links import LinksKept
 from api.metrics import Requests
 from api.reading import READERS
 from api.routers import events, jobs, motions, planning, plans, regions, scenes, service
@@ -50,6 +51,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.requests = Requests(settings().requests_file)
     app.state.children = ChildLimiter()
     app.state.libraries = Libraries()
+    app.state.links = LinksKept()
     app.state.announcer = Announcer()
     app.add_middleware(
         guard.Guard,

@@ -5,13 +5,13 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-import numpy as np
 from fastapi import APIRouter
 
-from api import answers, checks, graph
+from api import answers, checks
 from api.access import READ, Db
 from api.children import Children
 from api.libraries import KeptLibraries, Libraries
+from api.links import KeptLinks, LinksKept
 from api.schemas.plans import PlanGap, PlanRequest, PlanResponse, Reason
 from certifier.errors import RegionError
 from certifier.isolation.child import run_in_child
@@ -23,7 +23,6 @@ from db.settings import settings
 from planner.library import Library
 from planner.nearest import nearest
 from planner.trajectory.plan import Apart, Limits, Outside, Trajectory, Unproved, plan
-from planner.trajectory.routes import Links
 
 TIMEOUT_S = 60.0
 
@@ -31,23 +30,23 @@ router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ]
 
 
 @router.post("/plan")
-async def plan_trajectory(body: PlanRequest, db: Db, libraries: KeptLibraries, children: Children) -> PlanResponse:
+async def plan_trajectory(body: PlanRequest, db: Db, libraries: KeptLibraries, links: KeptLinks, children: Children) -> PlanResponse:
     """Returns a trajectory from rest to rest between two configurations, or regions, through the certified regions of the scene.
 
     It is straight in `q` between the configurations of the answer, and every point of it is proved to be in the regions that the pieces
     name, like a path that you ask about at `/v1/planning/path`. Where there is none, the answer says why.
     """
-    return await children.run(_plan, db, libraries, body)
+    return await children.run(_plan, db, libraries, links, body)
 
 
-def _plan(db: Database, libraries: Libraries, body: PlanRequest) -> PlanResponse:
+def _plan(db: Database, libraries: Libraries, kept: LinksKept, body: PlanRequest) -> PlanResponse:
     scene_id, scene, library = answers.asked(db, libraries, body.scene)
     ends = [_end(db, scene, library, given, field) for given, field in ((body.start, "start"), (body.goal, "goal"))]
     limits = Limits(
         checks.of_each_joint(scene, body.speed, "speed"),
         checks.of_each_joint(scene, body.acceleration, "acceleration"),
     )
-    complete, links = _links(db, scene_id, scene, library)
+    complete, links = kept.of(db, scene_id, scene, library)
     found = plan(library, scene, links, ends[0], ends[1], limits, _optimise)
     answer = partial(PlanResponse, scene=scene_id, version=library.version, regions=len(library), complete=complete)
     if isinstance(found, Trajectory):
@@ -93,14 +92,6 @@ def _end(db: Database, scene: Scene, library: Library, given: list[float] | str,
             "region_elsewhere", f"region {region_id} is of another scene", field=field, hint="`ciris region ls --scene SCENE` lists them"
         )
     return library.ids.index(region_id)
-
-
-def _links(db: Database, scene_id: str, scene: Scene, library: Library) -> tuple[bool, Links]:
-    complete, known = graph.compared(db, scene_id, library)
-    number = {region_id: i for i, region_id in enumerate(library.ids)}
-    ends = np.array([(number[edge.earlier], number[edge.later]) for edge in known], dtype=np.intp).reshape(-1, 2)
-    witness = np.array([edge.witness for edge in known]).reshape(-1, scene.n)
-    return complete, Links(ends, witness, np.array([edge.depth for edge in known]), scene.to_q(witness))
 
 
 def _gap(library: Library, scene: Scene, apart: Apart) -> PlanGap:

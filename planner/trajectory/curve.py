@@ -43,11 +43,11 @@ def optimised(payload: dict[str, Any]) -> dict[str, Any] | None:
     """Returns a timed trajectory: ``q`` (k, n) and ``t`` (k,); None where Drake finds none. A child process runs this function.
 
     Args:
-        payload: either ``line`` (2, n), to be followed straight in q; or ``routes``, each with the ``polytopes`` of its regions, C (m, n)
-            and d (m,), the rows of C of length 1, and points ``via`` in the overlaps of consecutive ones, with ``start`` and ``goal`` in
-            s, (n,), or None for any point. Always ``q_star`` and ``revolute`` of the arm, ``speed`` and ``acceleration``, (n,) each,
-            ``steps``: in how many a curve is looked at in each region, and ``spacing``: how far a joint may move between two
-            configurations.
+        payload: either ``line`` (2, n), to be followed straight in q; or ``routes``, each with the numbers of its ``regions`` among the
+            ``polytopes``, C (m, n) and d (m,), the rows of C of length 1, and points ``via`` in the overlaps of consecutive ones; with
+            ``start`` and ``goal`` in s, (n,), or None for any point. Always ``q_star`` and ``revolute`` of the arm, ``speed`` and
+            ``acceleration``, (n,) each, ``steps``: in how many a curve is looked at in each region, and ``spacing``: how far a joint may
+            move between two configurations.
     """
     curve = _straight(payload["line"]) if "line" in payload else _shortest(payload)
     if curve is None:
@@ -82,7 +82,8 @@ class _Curve:
     """
 
     def __init__(self, route: dict[str, Any], payload: dict[str, Any]) -> None:
-        self._payload, self._polytopes = payload, route["polytopes"]
+        self._payload = payload
+        self._polytopes = [payload["polytopes"][region] for region in route["regions"]]
         self._start, self._goal = payload["start"], payload["goal"]
         first, *between = [s for s in (self._start, *route["via"], self._goal) if s is not None]
         last = between[-1] if between else first

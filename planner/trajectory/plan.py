@@ -154,13 +154,17 @@ def _straight(library: Library, scene: Scene, start: Terminal, goal: Terminal) -
 def _through(library: Library, scene: Scene, links: Links, ways: Sequence[Route], start: Terminal, goal: Terminal) -> dict[str, Any]:
     """Returns the task of going along one of several routes."""
     s = [None if end.q is None else scene.to_s(end.q) for end in (start, goal)]
-    asked = []
-    for route in ways:
-        overlaps = list(route.overlaps)
-        margin = min([MARGIN, *(links.depth[overlaps] / 4)])
-        inner = [_moved_in(library, region, margin, [x for x in s if x is not None]) for region in route.regions]
-        asked.append({"polytopes": [vars(polytope) for polytope in inner], "via": links.witness[overlaps]})
-    return {"routes": asked, "start": s[0], "goal": s[1]}
+    depths = [links.depth[overlap] for route in ways for overlap in route.overlaps]
+    margin = min([MARGIN, *(depth / 4 for depth in depths)])
+    used = sorted({region for route in ways for region in route.regions})
+    return {
+        "polytopes": [vars(_moved_in(library, region, margin, [x for x in s if x is not None])) for region in used],
+        "routes": [
+            {"regions": [used.index(region) for region in route.regions], "via": links.witness[list(route.overlaps)]} for route in ways
+        ],
+        "start": s[0],
+        "goal": s[1],
+    }
 
 
 def _moved_in(library: Library, region: int, margin: float, keep: Sequence[Array]) -> Polytope:

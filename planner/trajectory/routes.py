@@ -16,7 +16,7 @@ from scipy.spatial.distance import cdist
 
 from certifier.model import Array
 
-LONGEST = 1.5
+LONGEST = 1.2
 """No route is taken that is so many times as long as the shortest."""
 
 

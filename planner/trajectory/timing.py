@@ -14,8 +14,10 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from certifier.model import Array
 
-STILL = 1e-9
-"""A curve that is no longer than this is as good as a point, and so is a part of one that is so much shorter than all of it."""
+STILL = 1e-6
+"""A curve that is no longer than this is as good as a point, because solvers are not more exact; and so is a part of a curve that is so
+much shorter than all of it.
+"""
 FEWEST, MOST = 17, 4000
 """A trajectory has so many configurations at least and at most."""
 _UP = 1 + 1e-6

@@ -77,6 +77,18 @@ def test_an_answer_without_all_overlaps_says_so(
     assert (answer["found"], answer["reason"], answer["complete"]) == (False, "disconnected", False)
 
 
+def test_overlaps_that_are_kept_follow_the_regions(client: TestClient, region: str, database: Database) -> None:
+    more = store_region(database, a_part(0.1, 0.7))
+    assert plan(client, [-0.2], [0.6])["found"]
+    kept = client.app.state.links._kept  # type: ignore[attr-defined]
+    assert [version for version, _ in kept.values()] == [2]
+    assert client.delete(f"/v1/regions/{more}").status_code == 204
+    store_region(database, a_part(0.3, 0.7))
+    apart = plan(client, [-0.2], [0.6])
+    assert (apart["version"], apart["reason"]) == (4, "disconnected")
+    assert [version for version, _ in kept.values()] == [4]
+
+
 @pytest.mark.parametrize(
     ("body", "field"),
     [

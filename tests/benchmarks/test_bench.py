@@ -6,12 +6,13 @@ import json
 import subprocess
 import sys
 from contextlib import nullcontext
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from benchmarks import agreement, catalogue, compare, growth, path, query, report, service, store, survey
+from benchmarks import agreement, catalogue, compare, growth, path, plan, query, report, service, store, survey
 from benchmarks.compare import Verdict, verdict
 from certifier.errors import CirisError
 from certifier.kinematics import Kinematics
@@ -195,6 +196,35 @@ def test_questions_about_many_regions_are_measured_beside_a_plain_product() -> N
     assert 60 * 50 <= row["faces"] <= 60 * 600
     assert all(value > 0 for value in row.values())
     assert "plain product, 1 point" in report.text(document)
+
+
+@pytest.fixture
+def library_of_boxes(tmp_path: Path) -> Path:
+    """A folder with three boxes about the planar example's seed, of which two overlap. Nothing about them has to be certified here."""
+    scene = catalogue.scene("planar_2dof")
+    for name, (lower, upper) in {"a": ([-0.3, -0.4], [0.3, 0.4]), "b": ([0.1, -0.6], [0.4, 0.2]), "c": ([-1.5, -1], [-1.3, -0.8])}.items():
+        C, d = catalogue.cube(scene.to_s(np.add(lower, upper) / 2), 0.0)
+        d = np.concatenate([scene.to_s(upper), -scene.to_s(lower)])
+        (tmp_path / f"{name}.json").write_text(json.dumps({"C": C.tolist(), "d": d.tolist()}))
+    return tmp_path
+
+
+def test_trajectories_are_planned_beside_a_planner_that_samples(library_of_boxes: Path) -> None:
+    document = bench("plan", "planar_2dof", "--regions", str(library_of_boxes), "--queries", "12")
+    assert (document["regions"], document["overlaps"], document["components"]) == (3, 1, 2)
+    assert 0 < document["connected"] == document["plan"]["found"] < document["queries"] == len(document["rows"]) == 12
+    assert document["plan"]["collide"] == 0
+    assert document["rrt"]["found"] == 12
+    for row in document["rows"]:
+        assert (row["plan"]["length"] is None) is (row["outcome"] == "Apart")
+        assert row["plan"]["length"] is None or row["plan"]["length"] >= row["straight"] * (1 - 1e-9)
+    assert "RRT-Connect with shortcuts" in report.text(document)
+
+
+def test_a_path_that_collides_between_its_ends_is_seen() -> None:
+    scene = catalogue.scene("planar_2dof")
+    assert plan._path(scene, np.array([[0.0, 0.0], [1.72, -2.1]]))["collides"] is True
+    assert plan._path(scene, np.array([[0.0, 0.0], [0.1, -0.1]]))["collides"] is False
 
 
 def test_the_page_shows_the_figures_that_lie_beside_it() -> None:

@@ -29,6 +29,11 @@ def collision(path: Path, scene: Scene, polytope: Polytope, count: int = 100_000
 
     The shapes are the file's own: meshes and cylinders as they are, no padding.
     """
+    return collision_at(path, scene, scene.to_q(hit_and_run(polytope, chebyshev_center(polytope)[0], count, seed)))
+
+
+def collision_at(path: Path, scene: Scene, configurations: Array) -> Array | None:
+    """The first of the configurations, (k, n), at which Drake finds a pair of the scene in collision; None if there is none."""
     diagram = original_diagram(path)
     plant, scene_graph = diagram.plant(), diagram.scene_graph()
     inspector = scene_graph.model_inspector()
@@ -42,7 +47,7 @@ def collision(path: Path, scene: Scene, polytope: Polytope, count: int = 100_000
 
     context = diagram.CreateDefaultContext()
     plant_context, scene_context = diagram.mutable_plant_context(context), diagram.mutable_scene_graph_context(context)
-    for q in scene.to_q(hit_and_run(polytope, chebyshev_center(polytope)[0], count, seed)):
+    for q in configurations:
         plant.SetPositions(plant_context, q)
         if scene_graph.get_query_output_port().Eval(scene_context).HasCollisions():
             return q

@@ -235,3 +235,12 @@ def test_lines_along_axes_and_through_corners_miss_no_box(seed: int, along: int)
         found = line.furthest(fmpq(*float(t).as_integer_ratio()))
         assert (found is None) == (not held)
         assert found is None or found[0] in held
+
+
+def test_a_path_stays_in_the_region_that_it_is_in_for_as_long_as_that_contains_it() -> None:
+    """Many waypoints in what two regions have in common; without that, each segment would begin in whichever region comes first."""
+    stored = library(box("b", [0.2, 0.0], [1.0, 1.0]), box("a", [0.0, 0.0], [0.8, 1.0]))
+    s = np.column_stack([np.linspace(0.1, 0.9, 41), np.full(41, 0.5)])
+    found = follow(stored, arm(2), Space.Q, 2 * np.arctan(s), [float(i) for i in range(41)])
+    assert [part.region for part in found.stretches] == [1, 0]
+    assert found.stretches[0].end == 34.0, "the next segment ends on its face"
