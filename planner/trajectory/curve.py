@@ -52,7 +52,9 @@ def optimised(payload: dict[str, Any]) -> dict[str, Any] | None:
     curve = _straight(payload["line"]) if "line" in payload else _shortest(payload)
     if curve is None:
         return None
-    trajectory = timed(curve, payload["speed"], payload["acceleration"], payload["spacing"])
+    # Where the curve goes from one region into the next, there may be little room: no chord may cut that corner.
+    through = list(range(payload["steps"], len(curve) - 1, payload["steps"])) if "routes" in payload else []
+    trajectory = timed(curve, through, payload["speed"], payload["acceleration"], payload["spacing"])
     return None if trajectory is None else {"q": trajectory[0], "t": trajectory[1]}
 
 

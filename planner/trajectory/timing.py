@@ -28,54 +28,57 @@ def length(curve: Array) -> float:
     return float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum())
 
 
-def timed(curve: Array, speed: Array, acceleration: Array, spacing: float) -> tuple[Array, Array] | None:
-    """Returns configurations q (k, n) of a curve at equal steps of time, and their times t (k,) in seconds; None where Toppra finds none.
+def timed(curve: Array, through: list[int], speed: Array, acceleration: Array, spacing: float) -> tuple[Array, Array] | None:
+    """Returns configurations q (k, n) of a curve at about equal steps of time, and their times t (k,) in seconds.
 
+    None where Toppra finds none.
     First and second divided differences of what is returned are within the limits, those at the two ends, where the robot rests, as well.
 
     Args:
         curve: (m, n) points in q; a smooth spline goes through them.
+        through: numbers of points that are among the configurations, each in place of the one that is nearest in time; of those that are
+            nearer to each other than half a step, the first.
         speed, acceleration: (n,) limits of every joint.
-        spacing: no joint moves farther between two configurations, unless there would be more than MOST of them.
+        spacing: no joint moves much farther between two configurations, unless there would be more than MOST of them.
     """
     if length(curve) <= STILL:
         way = np.abs(curve[-1] - curve[0])
         return curve[[0, -1]], np.array([0.0, _UP * max((way / speed).max(), np.sqrt(way / acceleration).max())])
-    path = _spline(curve)
-    toppra = Toppra(path, _sliders(len(speed)), np.array(path.get_segment_times()))
+    along = _along(curve)
+    moves = np.concatenate([[True], np.diff(along) > 0])
+    path = PiecewisePolynomial.CubicWithContinuousSecondDerivatives(along[moves], curve[moves].T)
+    toppra = Toppra(path, _sliders(len(speed)), along[moves])
     toppra.AddJointVelocityLimit(-speed, speed)
     toppra.AddJointAccelerationLimit(-acceleration, acceleration)
     course = toppra.SolvePathParameterization()
     if course is None:
         return None
-    steps = np.abs(np.diff(_at(path, course, MOST), axis=0)).max() * (MOST - 1) / spacing
-    q = _at(path, course, int(np.clip(np.ceil(steps) + 1, FEWEST, MOST)))
-    q[0], q[-1] = curve[0], curve[-1]
-    t = np.linspace(0, course.end_time() - course.start_time(), len(q))
-    return q, t * _stretch(q, t[1], speed, acceleration)
+    fine = np.linspace(course.start_time(), course.end_time(), MOST)
+    reached = np.clip(course.vector_values(fine)[0], 0.0, along[-1])
+    steps = np.abs(np.diff(path.vector_values(reached))).max() * (MOST - 1) / spacing
+    t = np.linspace(fine[0], fine[-1], int(np.clip(np.ceil(steps) + 1, FEWEST, MOST)))
+    when = np.interp(along[through], reached, fine)
+    apart = np.diff(when, prepend=-np.inf) >= t[1] / 2
+    places = np.rint(when[apart] / t[1]).astype(int)
+    t[places] = when[apart]
+    q = path.vector_values(np.clip(course.vector_values(t)[0], 0.0, along[-1])).T
+    q[places], q[0], q[-1], t[0], t[-1] = curve[through][apart], curve[0], curve[-1], fine[0], fine[-1]
+    return q, t * _stretch(q, t, speed, acceleration)
 
 
-def _spline(curve: Array) -> PiecewisePolynomial:
-    """Returns a cubic spline through the points, by their distance along the curve. Points where the curve stays are left out."""
+def _along(curve: Array) -> Array:
+    """Returns how far along the curve its points are, (m,); those where it stays are no farther than the one before."""
     far = np.linalg.norm(np.diff(curve, axis=0), axis=1)
-    moves = far > STILL * far.sum()
-    points = np.concatenate([curve[:1], curve[1:][moves]])
-    along = np.concatenate([[0.0], np.cumsum(far[moves])])
-    return PiecewisePolynomial.CubicWithContinuousSecondDerivatives(along, points.T)
+    return np.concatenate([[0.0], np.cumsum(np.where(far > STILL * far.sum(), far, 0.0))])
 
 
-def _at(path: PiecewisePolynomial, course: PiecewisePolynomial, count: int) -> Array:
-    """Returns so many configurations, (count, n), at equal steps of time."""
-    t = np.linspace(course.start_time(), course.end_time(), count)
-    u = np.clip(course.vector_values(t)[0], path.start_time(), path.end_time())
-    return np.array(path.vector_values(u).T)
-
-
-def _stretch(q: Array, step: float, speed: Array, acceleration: Array) -> float:
+def _stretch(q: Array, t: Array, speed: Array, acceleration: Array) -> float:
     """Returns by what factor, 1 or more, the times have to be multiplied for the differences to be within the limits."""
-    velocity = np.diff(q, axis=0) / step
+    step = np.diff(t)[:, None]
     at_rest = np.zeros((1, q.shape[1]))
-    change = np.diff(np.concatenate([at_rest, velocity, at_rest]), axis=0) / step
+    velocity = np.concatenate([at_rest, np.diff(q, axis=0) / step, at_rest])
+    between = np.concatenate([step[:1], (step[:-1] + step[1:]) / 2, step[-1:]])
+    change = np.diff(velocity, axis=0) / between
     over = max(float((np.abs(velocity) / speed).max()), float(np.sqrt(np.abs(change) / acceleration).max()))
     return max(1.0, over * _UP)
 

@@ -15,7 +15,7 @@ THIRD_PARTIES = {
     "certifier": {"flint", "numba", "numpy", "pydrake", "scipy", "yaml"},
     "certifier.verify": {"flint", "numpy"},
     "db": {"alembic", "numpy", "pydantic", "pydantic_settings", "sqlalchemy", "structlog"},
-    "planner": {"flint", "numpy", "scipy"},
+    "planner": {"flint", "numpy", "pydrake", "scipy"},
     "client": {"flint", "httpx2", "numpy", "pydrake", "yaml"},
     "dashboard": set(),
 }

@@ -56,7 +56,8 @@ def assert_sound(stored: Library, scene: Scene, found: Trajectory, given: Limits
     step = np.diff(found.t)[:, None]
     velocity = np.diff(found.q, axis=0) / step
     rest = np.zeros((1, scene.n))
-    change = np.diff(np.concatenate([rest, velocity, rest]), axis=0) / step.mean()
+    between = np.concatenate([step[:1], (step[:-1] + step[1:]) / 2, step[-1:]])
+    change = np.diff(np.concatenate([rest, velocity, rest]), axis=0) / between
     assert (np.abs(velocity) <= given.speed * (1 + 1e-9)).all()
     assert (np.abs(change) <= given.acceleration * (1 + 1e-6)).all()
 
@@ -114,6 +115,14 @@ def test_the_robot_does_not_stop_at_a_corner() -> None:
     middle = (found.t[1:] > 0.2 * found.t[-1]) & (found.t[1:] < 0.8 * found.t[-1])
     assert speeds[middle].min() > 0.3
     assert found.length < 1.1 * np.linalg.norm(np.diff(scene.to_q([[0.05, 0.1], [0.8, 0.2], [0.9, 0.95]]), axis=0), axis=1).sum()
+
+
+@pytest.mark.parametrize("depth", [1e-2, 1e-4])
+def test_regions_that_hardly_overlap_are_gone_through(depth: float) -> None:
+    scene, thin = arm(2), library(box("a", [0.0, 0.0], [1.0, 0.2 + depth]), box("b", [0.8, 0.2 - depth], [1.0, 1.0]))
+    found = planned(thin, scene, scene.to_q([0.05, 0.1]), scene.to_q([0.9, 0.95]))
+    assert isinstance(found, Trajectory)
+    assert_sound(thin, scene, found, limits(2))
 
 
 def test_a_straight_line_that_is_covered_is_taken() -> None:
