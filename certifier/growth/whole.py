@@ -66,8 +66,8 @@ def begin_whole(scene: Scene, state: GrowthState, start: Start) -> Transition:
     """Asks to certify a smaller copy of the proposal; all of it where the copy has not all points to keep inside."""
     copy = _copy(scene, start, FIRST)
     if (start.keep @ copy.C.T < copy.d).all():
-        return _begin_stage(scene, state, FIRST, copy)
-    return _begin_stage(scene, state, 1.0, _copy(scene, start, 1.0))
+        return begin_stage(scene, state, FIRST, copy)
+    return begin_stage(scene, state, 1.0, _copy(scene, start, 1.0))
 
 
 def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
@@ -76,16 +76,23 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     assert whole is not None
     assert best is not None
     kept = _kept(scene, start, best.polytope)
+    if state.options.kind == "recertify":
+        return Transition(state, Finish(Outcome.CERTIFIED, f"certified; {100 * kept:.3g} % of the region is kept"))
     if kept == 1 or (whole.reach > 1 and kept < whole.kept + GAIN):
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
     reach = FAR if whole.reach >= 1 else FARTHEST if whole.passed <= SOON else FARTHER
-    return _begin_stage(scene, state, reach, pushed(scene, best.polytope, start.seed, reach, start.rows), kept, whole.passed)
+    return begin_stage(scene, state, reach, pushed(scene, best.polytope, start.seed, reach, start.rows), kept, whole.passed)
 
 
-def _begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float = 0.0, passed: float = 0.0) -> Transition:
+def begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float = 0.0, passed: float = 0.0) -> Transition:
     """Asks to certify all pairs on a polytope; what was proved on the one of the stage before says nothing about it."""
     box = Box.around(*bounds(polytope))
     return _next(scene, replace(state, whole=Whole(reach, kept, polytope, box.mid, box.half, since=passed, passed=passed)))
+
+
+def in_words(scene: Scene, s: Array) -> str:
+    """Returns a configuration as people read it."""
+    return f"q = ({', '.join(f'{x:.4g}' for x in scene.to_q(s))})"
 
 
 def _copy(scene: Scene, start: Start, scale: float) -> Polytope:
@@ -132,7 +139,9 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         pair = scene.pairs[failing[0]]
         reason = f"{pair.a} and {pair.b} touch, or come too close, at or between configurations that have to stay inside"
         return _ended(state, report, reason)
-    return _next(scene, replace(state, whole=replace(whole, polytope=smaller)))
+    gone = {i for i in failing if not smaller.contains(report.weaknesses[i].points).all()} if smaller is not whole.polytope else set()
+    cuts = whole.cuts | {i: whole.cuts.get(i, 0) + 1 for i in gone}
+    return _next(scene, replace(state, whole=replace(whole, polytope=smaller, cuts=cuts)))
 
 
 def _corners(scene: Scene, pair: int, weakness: Weakness, most: float) -> list[tuple[tuple[int, ...], Array, float]]:
@@ -175,6 +184,8 @@ def _ended(state: GrowthState, report: Outcomes, reason: str) -> Transition:
     """Ends the growth with the best region so far, or without one."""
     if state.best is not None:
         return Transition(state, Finish(Outcome.CERTIFIED, f"certified; growth ended early: {reason}"))
+    if state.options.kind == "recertify":
+        reason = f"revoked: {reason}"
     return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
 
 

@@ -67,7 +67,7 @@ GROWTH = [
     *rows(
         "certifier/growth/options.py",
         ("unknown_option", "options.{name}", "there is no option {name}", "options: {...}", lambda t: grow(speed=3)),
-        ("option_value", "options.kind", "kind must be 'grow' or 'certify'", "", lambda t: grow(kind="shrink")),
+        ("option_value", "options.kind", "kind must be 'grow', 'certify' or 'recertify'", "", lambda t: grow(kind="shrink")),
         (
             "option_value",
             "options.contraction",
