@@ -231,14 +231,18 @@ def _parser() -> argparse.ArgumentParser:
     grow.add_argument("--local", action="store_true", help="grow in this process, without a service")
     grow.set_defaults(run="client.commands:grow")
 
-    again = verbs.add_parser("recertify", parents=[json], help="make a region of a changed scene from one of the scene before it changed")
-    again.add_argument("region", metavar="REGION", help="the proof file of the region")
+    again = verbs.add_parser(
+        "recertify", parents=[remote, json], help="make a region of a changed scene from one of the scene before it changed"
+    )
+    again.add_argument("region", metavar="REGION", nargs="?", help="the region's id; with --local its proof file")
+    again.add_argument("--from", dest="old", metavar="SCENE", help="certify all regions of this scene again, one job a region")
     again.add_argument("--scene", metavar="SCENE", required=True, help="the scene as it is now")
     again.add_argument(
         "--q",
         metavar='"0,0.3,..."',
         action="append",
-        help="joint positions that have to stay inside; may be given several times; default: the point inside that the proof names",
+        help="with --local: joint positions that have to stay inside; may be given several times; "
+        "default: the point inside that the proof names. The service keeps the seed inside",
     )
     again.add_argument("--deadline", type=float, metavar="SECONDS", help="end after so long; default: none")
     again.add_argument("--out", metavar="FILE", help="new file for the proof; default: one in this directory, named after scene and proof")

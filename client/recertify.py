@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from certifier.errors import CirisError, unreadable
-from client import output
+from client import output, service
 from client.files import ProofFile, check_writable
+from client.http import Document
 from client.inputs import configuration
 from client.output import Screen, print_json
 
-OK = 0
+OK, NO = 0, 1
 
 
 def recertify(args: Namespace) -> int:
@@ -25,17 +26,58 @@ def recertify(args: Namespace) -> int:
     screen, keep = Screen(), [configuration(q) for q in args.q or []]
     if args.deadline is not None and not 0 < args.deadline < math.inf:
         raise CirisError("option", f"must be a number of seconds above 0, not {args.deadline:g}", field="--deadline")
+    if args.old is not None:
+        return _all(args, screen)
+    if args.region is None:
+        raise CirisError("option", "no region was named", field="REGION", hint="name one, or name its scene with --from")
     check_writable(args.out)
-    from client import local
+    url = None
+    if args.local:
+        from client import local
 
-    grown = local.recertify(_proof(Path(args.region)), args.scene, keep or None, args.deadline, screen, args.watch)
+        grown = local.recertify(_proof(Path(args.region)), args.scene, keep or None, args.deadline, screen, args.watch)
+    else:
+        if keep:
+            raise CirisError("option", "the service keeps what the region was grown around inside", field="--q", hint="leave it out")
+        with service.connect(args.url) as client:
+            scene = service.known_scene(client, args.scene)
+            grown = service.grow(client, _request(args, scene, args.region), screen, args.watch)
+            url = f"{client.url}/regions/{grown.region}"
     path = ProofFile(args.out).write(grown.manifest["scene"]["name"], grown.proof)
     if args.json:
         print_json({**grown.manifest, "seconds": grown.seconds, "proof": str(path)})
         return OK
     extra = [("time", output.seconds(grown.seconds)), ("ended", grown.remark), ("proof", f"{path} (check it: ciris verify {path})")]
-    output.print_region(grown.manifest, [*_facts(grown.manifest["provenance"]["recertified"]), *extra])
+    facts = [*_facts(grown.manifest["provenance"]["recertified"]), *extra, *([("region", url)] if url else [])]
+    output.print_region(grown.manifest, facts)
     return OK
+
+
+def _request(args: Namespace, scene: Document, region: str) -> Document:
+    request = {"kind": "recertify", "scene": scene["id"], "region": region}
+    return request if args.deadline is None else {**request, "deadline_seconds": args.deadline}
+
+
+def _all(args: Namespace, screen: Screen) -> int:
+    """Has the service certify every region of a scene again, one job a region. The new regions stay on the service."""
+    if args.local or args.out is not None or args.region is not None or args.q:
+        hint = "leave out REGION, --q, --local and --out"
+        raise CirisError("option", "all regions of a scene need a service, which keeps what becomes of them", field="--from", hint=hint)
+    with service.connect(args.url) as client:
+        old = client.scene(args.old)
+        scene = service.known_scene(client, args.scene)
+        regions = [region["id"] for region in client.regions(scene=old["id"])]
+        jobs = service.grow_many(client, [_request(args, scene, region) for region in regions], screen, args.watch)
+        found = [client.region(job["region"])["manifest"]["provenance"] if job["region"] else None for job in jobs]
+    if args.json:
+        print_json(jobs)
+    else:
+        rows = [
+            (region[:8], job["region"] or "none", output.share(said["recertified"]["kept"]) if said else "", job["reason"] or "")
+            for region, job, said in zip(regions, jobs, found, strict=True)
+        ]
+        output.print_table(("was", "region", "kept", "ended"), rows, right="kept")
+    return OK if all(found) else NO
 
 
 def _proof(path: Path) -> bytes:

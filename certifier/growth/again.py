@@ -14,7 +14,7 @@ import numpy as np
 from certifier.errors import ProofError, RegionError
 from certifier.growth.actions import Finish, Transition
 from certifier.growth.state import GrowthState, Start
-from certifier.growth.whole import begin_stage, in_words
+from certifier.growth.whole import REVOKED, begin_stage, in_words
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Array, Pair, Polytope, Scene, Volume
 from certifier.outcome import Outcome
@@ -63,7 +63,7 @@ def _contact(scene: Scene, polytope: Polytope, keep: Array) -> Finish | None:
         for s in keep[touching(kinematics, volumes, keep)]:
             outcome = Outcome.REFUTED if _is_witness(scene, pair, polytope, s) else Outcome.TOO_CLOSE
             how = "touch" if outcome is Outcome.REFUTED else "come too close"
-            return Finish(outcome, f"revoked: {pair.a} and {pair.b} {how} at {in_words(scene, s)}, which has to stay inside")
+            return Finish(outcome, f"{REVOKED}{pair.a} and {pair.b} {how} at {in_words(scene, s)}, which has to stay inside")
     return None
 
 

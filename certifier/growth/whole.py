@@ -58,8 +58,10 @@ LATE_LOSS, LATER = 0.01, 0.05
 passed, so that the rounds end before the deadline, however long they take."""
 LATEST = 0.65
 """When this share has passed, all open cells are cut off, not only those where coarse volumes touch."""
+REVOKED = "revoked: "
+"""The reason begins like this where nothing is left of a region that is certified again."""
 EARLY_EFFORT = 24 * SLICE
-"""The effort of the first two stages, so that the first regions come soon."""
+"""The effort of the first two stages, so that the first regions come soon, and where a region is certified again."""
 
 
 def begin_whole(scene: Scene, state: GrowthState, start: Start) -> Transition:
@@ -163,7 +165,8 @@ def _most_loss(state: GrowthState, whole: Whole, pair: int) -> float:
 def _effort(state: GrowthState, whole: Whole, pair: int) -> int:
     """Returns how many cells of a pair are looked at before its open cells are cut off."""
     effort = state.options.cells or MOST_CELLS
-    early = EARLY_EFFORT if whole.reach < 1 or whole.reach > FAR else effort
+    soon = whole.reach < 1 or whole.reach > FAR or state.options.kind == "recertify"
+    early = EARLY_EFFORT if soon else effort
     return min(effort, early, whole.spent.get(pair, 0) if _gone(whole) >= LATE else effort)
 
 
@@ -185,7 +188,7 @@ def _ended(state: GrowthState, report: Outcomes, reason: str) -> Transition:
     if state.best is not None:
         return Transition(state, Finish(Outcome.CERTIFIED, f"certified; growth ended early: {reason}"))
     if state.options.kind == "recertify":
-        reason = f"revoked: {reason}"
+        reason = f"{REVOKED}{reason}"
     return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
 
 

@@ -14,6 +14,7 @@ from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import Start
 from certifier.growth.trials import alike
+from certifier.growth.whole import REVOKED
 from certifier.jobs.former import Former
 from certifier.jobs.pairs import part_certifier
 from certifier.jobs.parallel import side_by_side
@@ -125,7 +126,8 @@ class _Run:
         results = side_by_side(certify, work, 1 if action.cells == 1 else self.processes, lambda index: alike(self.scene, index))
         for (index, _), result in zip(work, results, strict=False):
             found.setdefault(index, []).append(result)
-            settled = {"index": index, "state": result.outcome.value, "seconds": result.seconds}
+            stage = None if result.stage is None else result.stage.value
+            settled = {"index": index, "state": result.outcome.value, "stage": stage, "seconds": result.seconds}
             self.tell("pairs", {"iteration": action.iteration, "pairs": [settled]})
             failures += result.outcome is not Outcome.CERTIFIED
             if failures == action.failures:
@@ -247,8 +249,8 @@ def _carried_out(run: _Run, options: GrowthOptions, deliver: Deliver | None = No
         if deliver is not None and run.has_news and not isinstance(transition.action, Finish):
             deliver(run.make_region(options, "growing"))
     if run.candidate is None:
-        if run.former is not None and not late:
-            raise CirisError("revoked", transition.action.reason.removeprefix("revoked: "), hint="grow a region of the new scene")
+        if transition.action.reason.startswith(REVOKED):
+            raise CirisError("revoked", transition.action.reason, hint="grow a region of the new scene from another seed")
         hint = "allow more time" if late else "try another seed, or look at the pair named"
         raise CirisError("not_grown", transition.action.reason, hint=hint)
     return run.make_region(options, transition.action.reason)
