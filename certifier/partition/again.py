@@ -14,7 +14,7 @@ from certifier.partition.area import Area
 from certifier.partition.cell import Cell
 from certifier.partition.search import Search
 from certifier.partition.tree import Node, of_streams
-from certifier.proof.partition import PLANE, STREAMS, PartitionProof
+from certifier.proof.partition import STREAMS, PartitionProof
 
 _Key = tuple[object, ...] | None
 """The numbers of a coarse volume; None for a volume itself."""
@@ -27,7 +27,7 @@ def try_again(area: Area, search: Search, volumes: tuple[Volume, Volume], old: P
         search: that of the two volumes.
         old: a proof about two bodies that were much like these, in the same order or the other.
     """
-    seeds = _Seeds(search, volumes, old)
+    seeds = _Seeds(search, volumes, old, area.scene.padding)
     root = Node()
     waiting = [(seeds.root, root, area.lower, area.upper, area.samples)]
     while waiting:
@@ -49,7 +49,7 @@ def try_again(area: Area, search: Search, volumes: tuple[Volume, Volume], old: P
 class _Seeds:
     """Holds the old tree, and says which plane to try in a cell of it."""
 
-    def __init__(self, search: Search, volumes: tuple[Volume, Volume], old: PartitionProof) -> None:
+    def __init__(self, search: Search, volumes: tuple[Volume, Volume], old: PartitionProof, padding: float) -> None:
         vertices = [len(a.vertices) + len(b.vertices) for a, b in old.chosen]
         self.root = of_streams({name: getattr(old, name) for name in STREAMS}, vertices, 1)[0]
         turned = not set(volumes[0].geometries) & set(old.volumes[0].geometries)
@@ -58,13 +58,20 @@ class _Seeds:
         levels = {tuple(map(_key, chosen, volumes)): level for level, chosen in enumerate(search.volumes_of_levels)}
         keys = (tuple(map(_key, chosen, old.volumes)) for chosen in old.chosen)
         self._levels = [levels.get(key[::-1] if turned else key, 0) for key in keys]
+        # A plane of bodies without a radius has no bound of its normal's length, which bodies with one need.
+        rounded = [_is_round(pair, padding) for pair in search.volumes_of_levels]
+        was_round = [_is_round(pair, old.scene.padding) for pair in old.chosen]
+        self._usable = [self._same_frame and (was or not rounded[level]) for was, level in zip(was_round, self._levels, strict=True)]
 
     def of(self, was: Node) -> tuple[Array | None, int]:
         """Returns the plane to try in the cell of an old node, and the level of the bodies that it is about."""
-        if was.kind != PLANE or not self._same_frame:
+        if was.plane is None or not self._usable[was.choice]:
             return None, 0
-        assert was.plane is not None, "a cell with a plane holds it"
         return self._sign * was.plane, self._levels[was.choice]
+
+
+def _is_round(pair: tuple[Volume, Volume], padding: float) -> bool:
+    return max(volume.radius for volume in pair) + padding > 0
 
 
 def _key(chosen: Volume, own: Volume) -> _Key:

@@ -127,11 +127,12 @@ class Bodies:
         """Returns the proof that a given plane separates the bodies on the polytope and a cell; None where it cannot be proved.
 
         Args:
-            plane: (5, 1 + k), as a proof holds it that has the joints ``play`` in play, ascending.
+            plane: (5, 1 + k), as a proof holds it that has the joints ``play`` in play, ascending. Its last row bounds the normal's length
+                on the cell, where a radius is positive.
         """
         own = [0, *(1 + play.index(joint) for joint in self.joints)]
-        if np.delete(plane, own, axis=1).any() or (max(self._radii) > 0 and not plane[4].any()):
-            return None  # It moves with other joints, or it has no bound of its normal's length, which is needed now.
+        if np.delete(plane, own, axis=1).any():
+            return None  # It moves with joints that move neither body.
         plane = np.ascontiguousarray(plane[:, own])
         result = self._prove(cell, plane)
         return Separated(plane, result) if isinstance(result, tuple) else None
