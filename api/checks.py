@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
 
 from api.schemas.jobs import PolytopeBody, Seed, WebhookRequest
+from certifier.carry.robot import same_bodies
 from certifier.errors import CirisError, RegionError
 from certifier.model import Array, Scene
 from certifier.seeding.limits import check_limits
@@ -56,6 +58,24 @@ def polytope(scene: Scene, body: PolytopeBody) -> None:
                 field="polytope.center",
                 hint="leave it out to have one found",
             )
+
+
+def same_robot(old: Scene, new: Scene) -> None:
+    """Refuses to take a region over into a scene whose joints are other ones.
+
+    Raises:
+        SceneError: other_robot.
+    """
+    same_bodies(old, new)
+
+
+def kept(scene: Scene, manifest: dict[str, Any]) -> list[list[float]]:
+    """Returns the joint positions that stay inside of a region that is certified again: its seed, and what it had to contain."""
+    asked = manifest["provenance"].get("options", {})
+    if asked.get("kind") == "recertify":
+        return [list(map(float, q)) for q in asked["seed"]["q"]]
+    seed = manifest["seed"] or scene.to_q(manifest["interior_point"]).tolist()
+    return [seed, *(asked.get("seed", {}).get("contain") or [])]
 
 
 def webhook(body: WebhookRequest) -> None:

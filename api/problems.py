@@ -158,7 +158,7 @@ _EXPLANATIONS: dict[type, Callable[[Any], Problem]] = {
 def _field(loc: Sequence[str | int]) -> str:
     """Returns the name of a field as the client wrote it: ``("body", "grow", "seed", "q", 3)`` -> ``"seed.q[3]"``."""
     parts = list(loc[1:])
-    if loc[0] == "body" and parts and parts[0] in ("grow", "certify"):
+    if loc[0] == "body" and parts and parts[0] in ("grow", "certify", "recertify"):
         del parts[0]
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".")
 

@@ -10,7 +10,23 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks import agreement, catalogue, compare, growth, models, path, plan, query, report, robots, scaling, service, store, survey
+from benchmarks import (
+    agreement,
+    catalogue,
+    compare,
+    growth,
+    models,
+    path,
+    plan,
+    query,
+    recertify,
+    report,
+    robots,
+    scaling,
+    service,
+    store,
+    survey,
+)
 from certifier.errors import CirisError
 from client.output import Screen, print_json
 
@@ -66,6 +82,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "service": lambda args, screen: service.beside_local(args.example, args.processes, args.turns, screen.line),
     "store": lambda args, screen: store.store(args.postgresql, store.COUNTS, screen.line),
     "robots": lambda args, screen: robots.robots(args.robots, args.deadline, screen.line),
+    "recertify": lambda args, screen: recertify.changes(args.scenes, args.limit, screen.line),
     "query": lambda args, screen: query.query(args.regions, screen.line),
     "plan": lambda args, screen: plan.trajectories(args.scene, args.regions, args.url, args.queries, screen.line),
     "survey": lambda args, screen: survey.survey(args.scenes, args.most, screen.line, args.cells),
@@ -130,6 +147,13 @@ def _parser() -> ArgumentParser:
     )
     planned.add_argument("--url", help="the service that has the regions, where no --regions are given; default: the one that is found")
     planned.add_argument("--queries", type=_count, default=plan.QUERIES, metavar="N", help=f"so many trajectories; default {plan.QUERIES}")
+    changed = kinds.add_parser("recertify", parents=[as_json], help="certify regions again whose scenes have changed, and grow them anew")
+    changed.add_argument(
+        "scenes", nargs="*", metavar="EXAMPLE", default=list(recertify.SCENES), help=f"default: {', '.join(recertify.SCENES)}"
+    )
+    changed.add_argument(
+        "--limit", type=float, default=recertify.LIMIT, metavar="SECONDS", help=f"growing ends after so long; default {recertify.LIMIT:g}"
+    )
     kinds.add_parser("docs", help="write the tables of docs/benchmarks.md from docs/benchmarks/*.json")
     return parser
 

@@ -326,6 +326,22 @@ def _splines(document: Document) -> list[str]:
     return [_table(header, rows), f"Sampling finds a contact on {wrong} of the certified splines, and none on {between} of those with one."]
 
 
+def _recertify(document: Document) -> list[str]:
+    """Returns a table with one line for each change."""
+    header = ["example", "change", "seconds", "verify", "kept", "carried", "proved", "cut for", "contact", "anew as large", "anew", "of it"]
+    rows = []
+    for row in document["rows"]:
+        if "error" in row:
+            rows.append([row["example"], row["change"], seconds(row["seconds"]), *["-"] * 8, row["error"]])
+            continue
+        anew, counts = row["anew"], [str(row[what]) for what in ("carried", "proved", "cut")]
+        soon = "never" if anew["as_large"] is None else seconds(anew["as_large"])
+        kept = [seconds(row["seconds"]), seconds(row["verify_seconds"]), f"{100 * row['kept']['value']:.3g} %", *counts]
+        found = "found" if row["contact"] else "none"
+        rows.append([row["example"], row["change"], *kept, found, soon, seconds(anew["seconds"]), f"{anew['volume'] / row['volume']:.2f}"])
+    return [_table(header, rows)]
+
+
 _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "pairs": _compared,
     "scene": _compared,
@@ -339,4 +355,5 @@ _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "survey": _survey,
     "query": _query,
     "plan": _plan,
+    "recertify": _recertify,
 }

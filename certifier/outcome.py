@@ -30,6 +30,8 @@ class Stage(StrEnum):
     """The sums-of-squares program (11) settled it, or a contact that was looked for after it."""
     CELLS = "cells"
     """The search for a partition of the polytope settled it."""
+    CARRIED = "carried"
+    """Its proof was taken over from a region of the scene before it changed. It is checked again with the region's proof as a whole."""
 
 
 class Guarantee(StrEnum):

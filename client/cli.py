@@ -235,6 +235,25 @@ def _parser() -> argparse.ArgumentParser:
     grow.add_argument("--local", action="store_true", help="grow in this process, without a service")
     grow.set_defaults(run="client.commands:grow")
 
+    again = verbs.add_parser(
+        "recertify", parents=[remote, json], help="make a region of a changed scene from one of the scene before it changed"
+    )
+    again.add_argument("region", metavar="REGION", nargs="?", help="the region's id; with --local its proof file")
+    again.add_argument("--from", dest="old", metavar="SCENE", help="certify all regions of this scene again, one job a region")
+    again.add_argument("--scene", metavar="SCENE", required=True, help="the scene as it is now")
+    again.add_argument(
+        "--q",
+        metavar='"0,0.3,..."',
+        action="append",
+        help="with --local: joint positions that have to stay inside; may be given several times; "
+        "default: the point inside that the proof names. The service keeps the seed inside",
+    )
+    again.add_argument("--deadline", type=float, metavar="SECONDS", help="end after so long; default: none")
+    again.add_argument("--out", metavar="FILE", help="new file for the proof; default: one in this directory, named after scene and proof")
+    again.add_argument("--watch", action="store_true", help="print a line for every pair as it is settled")
+    again.add_argument("--local", action="store_true", help="certify in this process, without a service")
+    again.set_defaults(run="client.recertify:recertify")
+
     certify = verbs.add_parser("certify", parents=[remote, json], help="certify a given polytope: one outcome for each pair")
     certify.add_argument("scene", metavar="SCENE")
     certify.add_argument(
@@ -340,8 +359,8 @@ def _parser() -> argparse.ArgumentParser:
     graph.set_defaults(run="client.planning:graph")
 
     bench = verbs.add_parser("bench", help="measure ciris, and Drake beside it if asked; see ciris bench BENCHMARK --help")
-    kinds = ["pairs", "scene", "growth", "path", "agreement", "scaling", "service", "store", "survey", "robots", "query", "plan", "docs"]
-    bench.add_argument("benchmark", choices=kinds)
+    kinds = ["pairs", "scene", "growth", "path", "agreement", "scaling", "service", "store", "survey", "robots", "query", "plan"]
+    bench.add_argument("benchmark", choices=[*kinds, "recertify", "docs"])
     bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...")
     bench.set_defaults(run="client.bench:bench")
 

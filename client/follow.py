@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from certifier.outcome import Outcome
+from certifier.outcome import Outcome, Stage
 from client.http import Client, Document
 from client.output import Screen, plain, q_volume, seconds, share
 
@@ -52,7 +52,7 @@ class Teller:
     def _tell_pairs(self, data: dict[str, Any]) -> None:
         for pair in data["pairs"]:
             self._done += 1
-            text = f"{self._pairs[pair['index']]}: {plain(pair['state'])}"
+            text = f"{self._pairs[pair['index']]}: {plain(pair['state'])}{', carried over' if pair.get('stage') == Stage.CARRIED else ''}"
             if pair["state"] != Outcome.CERTIFIED:
                 self._failure = f"; {text}"
             if self._watch:

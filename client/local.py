@@ -71,6 +71,22 @@ def grow(
     return Grown(region.manifest, region.proof, provenance["seconds"], remark=provenance["reason"])
 
 
+def recertify(data: bytes, scene: str, keep: list[list[float]] | None, deadline_s: float | None, screen: Screen, watch: bool) -> Grown:
+    """Certifies a region of the scene before it changed again, in this process and children of it.
+
+    Args:
+        data: the proof file of the region.
+        keep, deadline_s: as for :func:`certifier.jobs.local.recertify`.
+    """
+    loaded = load(scene)
+    from certifier.jobs import local
+
+    region = local.recertify(loaded, data, keep, _teller(loaded, screen, watch), deadline_s, cores())
+    screen.clear()
+    provenance = region.manifest["provenance"]
+    return Grown(region.manifest, region.proof, provenance["seconds"], remark=provenance["reason"])
+
+
 def _teller(scene: Scene, screen: Screen, watch: bool) -> Callable[[str, dict[str, Any]], None]:
     """Returns what tells people of a job of this process, in the words in which they hear of one of the service."""
     teller = Teller(screen, [f"{pair.a} - {pair.b}" for pair in scene.pairs], watch)

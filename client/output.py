@@ -13,7 +13,7 @@ from certifier.verify.decimals import at_least_mm
 
 Row = Sequence[str]
 
-NEGATIVE = {"not_grown"}
+NEGATIVE = {"not_grown", "revoked"}
 """These errors are answers: the input was fine, and the answer is no."""
 
 

@@ -25,7 +25,7 @@ class JobState(StrEnum):
     CANCELLING = "cancelling"
     """Someone asked to cancel the job; its work is being stopped."""
     SUCCEEDED = "succeeded"
-    """The job has its answer: a certified region (grow), or a verdict for the polytope (certify)."""
+    """The job has its answer: a certified region (grow, recertify), or a verdict for the polytope (certify)."""
     FAILED = "failed"
     """The job ended without an answer; ``error`` says why. Regions certified before remain."""
     CANCELLED = "cancelled"
@@ -37,6 +37,8 @@ class JobKind(StrEnum):
     """The job grows a certified polytope from a seed, as large as the options allow."""
     CERTIFY = "certify"
     """The job finds one verdict for each pair on a given polytope."""
+    RECERTIFY = "recertify"
+    """The job makes a region of a scene from a region of the scene before it changed."""
 
 
 class PairState(StrEnum):

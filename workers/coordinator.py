@@ -14,6 +14,7 @@ from certifier.growth.actions import Failed, Report, Transition
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
+from certifier.growth.whole import REVOKED
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.seeding.proposal import Proposal
@@ -55,11 +56,12 @@ class Ending:
 def ending(kind: str, outcome: Outcome, reason: str, error: dict[str, Any] | None) -> Ending:
     """Returns how a job ends whose growth has finished.
 
-    A ``certify`` job succeeds with any verdict, a ``grow`` job only with a certified region.
+    A ``certify`` job succeeds with any verdict, the others only with a certified region.
 
     Args:
         error: what went wrong during the job, if something did.
     """
     if outcome == Outcome.CERTIFIED or (kind == JobKind.CERTIFY and outcome != Outcome.ERROR):
         return Ending(JobState.SUCCEEDED, outcome, reason)
-    return Ending(JobState.FAILED, outcome, reason, error or {"code": "not_grown", "message": reason, "field": None, "hint": ""})
+    code = "revoked" if reason.startswith(REVOKED) else "not_grown"
+    return Ending(JobState.FAILED, outcome, reason, error or {"code": code, "message": reason, "field": None, "hint": ""})

@@ -21,6 +21,7 @@ from db.settings import settings
 from db.states import JobState
 from workers.actions import certify_action
 from workers.failures import IN_LOG, LOST, ON_LOSS
+from workers.former import former_of
 from workers.scenes import load_scene
 from workers.transaction import persistently
 
@@ -79,13 +80,16 @@ def _certification(scene_id: str, job_id: str, iteration: int) -> CertifyPart:
     An iteration's polytope never changes, so the process keeps the last two.
     """
 
-    def read() -> tuple[Certify, int]:
+    def read() -> tuple[Certify, GrowthOptions]:
         with database().read() as session:
             action = certify_action(session.get_one(IterationRow, (job_id, iteration)), pairs=[])
-            return action, GrowthOptions.from_document(jobs.get(session, job_id).options).random_seed
+            return action, GrowthOptions.from_document(jobs.get(session, job_id).options)
 
-    action, seed = persistently(read)
-    return part_certifier(load_scene(scene_id), action, seed, partial(_left, job_id))
+    action, options = persistently(read)
+    scene = load_scene(scene_id)
+    # Proofs are taken over in the round in which partitions begin, and the rounds after it go on with what it left.
+    former = former_of(scene, options) if action.begun is None else None
+    return part_certifier(scene, action, options.random_seed, partial(_left, job_id), None if former is None else former.carried)
 
 
 def _left(job_id: str, iteration: int, index: int) -> list[bytes]:

@@ -31,6 +31,7 @@ from db.states import JobState, StepKind, StepState
 from db.types import utcnow
 from workers.app import send_work
 from workers.failures import IN_LOG, LOST, ON_LOSS
+from workers.former import former_of
 from workers.scenes import load_scene
 from workers.transaction import persistently
 
@@ -131,6 +132,11 @@ def _accept(scene: Scene, claim: steps.Claim) -> Done:
             return candidate, held, _provenance(session, scene, jobs.get(session, claim.job_id), proposal)
 
     candidate, held, provenance = persistently(read)
+    state = _growth(claim.job_id)
+    former = former_of(scene, state.options)
+    if former is not None and proposal is not None:
+        cut = {} if state.whole is None else state.whole.cuts
+        provenance["recertified"] = former.document(scene, cut, proposal, candidate.polytope)
     region = certified_region(scene, candidate, held, provenance, proposal)
 
     def save(session: Session, job: JobRow) -> None:
@@ -143,6 +149,13 @@ def _accept(scene: Scene, claim: steps.Claim) -> Done:
 def _sampled_proposal(scene_id: str, job_id: str) -> SampledProposal | None:
     """Returns what the job grows its regions from, sampled; None for a given polytope. It is kept, since a job may accept many regions."""
 
+    start = _growth(job_id).start
+    return None if start is None else SampledProposal.of(load_scene(scene_id), start.rows)
+
+
+def _growth(job_id: str) -> GrowthState:
+    """Returns what the growth of the job knows now."""
+
     def read() -> GrowthState:
         with database().read() as session:
             job = jobs.get(session, job_id)
@@ -150,8 +163,7 @@ def _sampled_proposal(scene_id: str, job_id: str) -> SampledProposal | None:
             assert growth is not None, "a job with a certified polytope has begun to grow"
             return GrowthState.from_document(growth, GrowthOptions.from_document(job.options))
 
-    start = persistently(read).start
-    return None if start is None else SampledProposal.of(load_scene(scene_id), start.rows)
+    return persistently(read)
 
 
 def _polytope(session: Session, job_id: str, iteration: int) -> tuple[Polytope, Array | None]:

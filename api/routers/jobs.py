@@ -32,6 +32,7 @@ from api.schemas.jobs import (
     NewJob,
     PairCell,
     PairMatrix,
+    RecertifyRequest,
     Webhook,
 )
 from api.schemas.scenes import PairInfo
@@ -41,6 +42,7 @@ from certifier.outcome import Stage
 from certifier.proof.container import with_scene
 from db import jobs, pairs, proofs, regions, scenes, webhooks
 from db.models import IterationRow, PairRow
+from db.session import Database
 from db.states import IterationState, JobKind, JobState, PairState
 from db.types import utcnow
 
@@ -61,13 +63,14 @@ def create_job(
     announcements: Announcements,
     idempotency_key: Annotated[str | None, Header(min_length=1, max_length=200)] = None,
 ) -> Job:
-    """Starts a job that grows a region or certifies a polytope.
+    """Starts a job that grows a region, certifies a polytope, or makes a region of a changed scene from one of the scene before.
 
     A repetition of the request with the same Idempotency-Key returns the same job. Another request with that key is refused (409).
     """
     with db.read() as session:
         scene_id = scenes.find(session, body.scene)
-    options = _options(body, scenes.load(db, scene_id))
+    scene = scenes.load(db, scene_id)
+    options = _recertify(body, scene, db) if isinstance(body, RecertifyRequest) else _options(body, scene)
     if body.webhook is not None:
         checks.webhook(body.webhook)
     with db.write() as session:
@@ -98,6 +101,16 @@ def _options(body: GrowRequest | CertifyRequest, scene: Scene) -> dict[str, Any]
         return {"kind": "grow", "seed": checks.seed(scene, body.seed).to_document(), **body.options.model_dump()}
     checks.polytope(scene, body.polytope)
     return {"kind": "certify", "seed": body.polytope.model_dump(exclude_none=True), "cells": body.cells, "random_seed": body.random_seed}
+
+
+def _recertify(body: RecertifyRequest, scene: Scene, db: Database) -> dict[str, Any]:
+    """Does as :func:`_options` for a region of another scene."""
+    with db.read() as session:
+        row = regions.get(session, body.region)
+        region, digest, manifest, old = row.id, row.proof_digest, row.manifest, row.scene_id
+    checks.same_robot(scenes.load(db, old), scene)
+    polytope = {"C": manifest["halfspace_normals"], "d": manifest["halfspace_offsets"], "q": checks.kept(scene, manifest)}
+    return {"kind": "recertify", "seed": {**polytope, "region": region, "proof": digest}, "random_seed": body.random_seed}
 
 
 def _digest(scene_id: str, options: dict[str, Any], body: JobRequest) -> str:

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector
 from api.schemas.scenes import PairInfo
 from certifier.growth.options import LARGEST_TOLERANCE, MOST_CELLS, WHOLE_NUMBERS, GrowthOptions
+from certifier.model import MAX_NAME
 from certifier.outcome import Outcome, Stage
 from certifier.seeding.options import Method
 from db.models import EventRow, JobRow, WebhookRow
@@ -124,7 +125,7 @@ class WebhookRequest(Request):
 
 
 class JobRequest(Request):
-    """Holds what the requests for both kinds of job have in common."""
+    """Holds what the requests for all kinds of job have in common."""
 
     scene: SceneName
     priority: int = Field(0, ge=-3, le=3, description="Each step up doubles the job's share of the work for its API key.")
@@ -174,7 +175,26 @@ class CertifyRequest(JobRequest):
     random_seed: RandomSeed = 0
 
 
-NewJob = Annotated[GrowRequest | CertifyRequest, Field(discriminator="kind")]
+class RecertifyRequest(JobRequest):
+    """Asks for what is left of a region of another scene, such as this one before it changed.
+
+    Proofs of pairs with the same numbers are taken over; the others are made again, cell by cell. What cannot be certified is cut off.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"kind": "recertify", "scene": "iiwa-shelf", "region": "1f9b2a7c-5b0e-4b58-9c39-2f1d6a3c8e10"}]}
+    )
+
+    kind: Literal["recertify"]
+    region: str = Field(
+        max_length=MAX_NAME,
+        description="Id of the region, or its first characters. Its scene must have the same joints, limits and q* as `scene`. "
+        "The seed that it was grown from, and what it had to contain, stay inside.",
+    )
+    random_seed: RandomSeed = 0
+
+
+NewJob = Annotated[GrowRequest | CertifyRequest | RecertifyRequest, Field(discriminator="kind")]
 
 
 class Job(BaseModel):

@@ -14,6 +14,7 @@ import numpy as np
 
 from certifier.errors import RegionError
 from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Transition
+from certifier.growth.again import begin_again
 from certifier.growth.options import GrowthOptions
 from certifier.growth.pushes import further, less, next_push
 from certifier.growth.rounds import after_round, certify_step, next_round
@@ -40,6 +41,8 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
     state = GrowthState(options)
     if options.kind == "grow":
         return Transition(state, Propose(options.seed))
+    if options.kind == "recertify":
+        return begin_again(scene, state)
     if "C" not in options.seed or "d" not in options.seed:
         raise RegionError("polytope_missing", "a polytope needs C and d", field="polytope", hint="give both")
     given, center = Polytope.given(options.seed["C"], options.seed["d"], scene.n), options.seed.get("center")

@@ -43,8 +43,10 @@ class GrowthOptions:
     """The options say what a job asks for.
 
     Attributes:
-        kind: ``grow`` a region from a seed, or ``certify`` a given polytope as it is.
-        seed: the document of :class:`certifier.seeding.propose.SeedOptions`; for ``certify`` its ``C``, ``d`` and optional ``center``.
+        kind: ``grow`` a region from a seed, ``certify`` a given polytope as it is, or ``recertify`` a region of the scene
+            before it changed.
+        seed: the document of :class:`certifier.seeding.propose.SeedOptions`; for ``certify`` its ``C``, ``d`` and optional ``center``; for
+            ``recertify`` the ``C`` and ``d`` of the region, joint limits included, and ``q``, the joint positions (k, n) that stay inside.
         contraction: ``whole`` keeps the proposal and certifies it cell by cell; ``targeted`` and ``uniform`` shrink it until every pair
             has one plane that moves with the joints (11). None is ``whole`` where IRIS makes the proposal. Where a box, a polytope or the
             joint limits are the proposal, None is ``targeted``: much may collide in them, or much more be free.
@@ -60,7 +62,7 @@ class GrowthOptions:
         random_seed: seeds every random choice of the certification.
     """
 
-    kind: Literal["grow", "certify"] = "grow"
+    kind: Literal["grow", "certify", "recertify"] = "grow"
     seed: dict[str, Any] = field(default_factory=dict)
     contraction: Literal["whole", "targeted", "uniform"] | None = None
     cells: int | None = None
@@ -75,8 +77,8 @@ class GrowthOptions:
     @property
     def by_cells(self) -> bool:
         """Returns whether pairs are certified cell by cell, and not by the program (11) on all of P."""
-        if self.kind == "certify":
-            return (self.cells or 1) > 1
+        if self.kind != "grow":
+            return self.kind == "recertify" or (self.cells or 1) > 1
         if self.contraction is not None:
             return self.contraction == "whole"
         return self.seed.get("method") in (None, *IRIS)
@@ -99,8 +101,8 @@ class GrowthOptions:
                     "unknown_option", f"there is no option {name!r}", field=f"options.{name}", hint=f"options: {', '.join(sorted(known))}"
                 )
         options = cls(**document)
-        if options.kind not in ("grow", "certify"):
-            raise RegionError("option_value", "kind must be 'grow' or 'certify'", field="options.kind")
+        if options.kind not in ("grow", "certify", "recertify"):
+            raise RegionError("option_value", "kind must be 'grow', 'certify' or 'recertify'", field="options.kind")
         if options.contraction not in ("whole", "targeted", "uniform", None):
             raise RegionError("option_value", "contraction must be 'whole', 'targeted' or 'uniform'", field="options.contraction")
         for name, (least, greatest) in WHOLE_NUMBERS.items():

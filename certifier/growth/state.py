@@ -114,6 +114,7 @@ class Whole:
         begun: the iteration with which this stage began; None before it.
         open_cells: pair index -> how many cells of its partition are open.
         spent: pair index -> how many cells were looked at.
+        cuts: pair index -> in how many rounds something was cut off for it; pairs for which nothing was are left out.
         since, passed: the shares of the time until the deadline that had passed when this stage began, and now; 0 without a deadline.
     """
 
@@ -126,6 +127,7 @@ class Whole:
     begun: int | None = None
     open_cells: dict[int, int] = field(default_factory=dict)
     spent: dict[int, int] = field(default_factory=dict)
+    cuts: dict[int, int] = field(default_factory=dict)
     since: float = 0.0
     passed: float = 0.0
 
@@ -201,7 +203,7 @@ class GrowthState:
 def _whole(document: dict[str, Any] | None) -> Whole | None:
     if document is None:
         return None
-    counts = {name: _by_pair(document[name]) for name in ("holds", "open_cells", "spent")}
+    counts = {name: _by_pair(document[name]) for name in ("holds", "open_cells", "spent", "cuts")}
     return replace(_part(Whole, {**document, **dict.fromkeys(counts, None)}), **counts)
 
 

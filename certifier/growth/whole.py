@@ -58,16 +58,18 @@ LATE_LOSS, LATER = 0.01, 0.05
 passed, so that the rounds end before the deadline, however long they take."""
 LATEST = 0.65
 """When this share has passed, all open cells are cut off, not only those where coarse volumes touch."""
+REVOKED = "revoked: "
+"""The reason begins like this where nothing is left of a region that is certified again."""
 EARLY_EFFORT = 24 * SLICE
-"""The effort of the first two stages, so that the first regions come soon."""
+"""The effort of the first two stages, so that the first regions come soon, and where a region is certified again."""
 
 
 def begin_whole(scene: Scene, state: GrowthState, start: Start) -> Transition:
     """Asks to certify a smaller copy of the proposal; all of it where the copy has not all points to keep inside."""
     copy = _copy(scene, start, FIRST)
     if (start.keep @ copy.C.T < copy.d).all():
-        return _begin_stage(scene, state, FIRST, copy)
-    return _begin_stage(scene, state, 1.0, _copy(scene, start, 1.0))
+        return begin_stage(scene, state, FIRST, copy)
+    return begin_stage(scene, state, 1.0, _copy(scene, start, 1.0))
 
 
 def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
@@ -76,16 +78,23 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     assert whole is not None
     assert best is not None
     kept = _kept(scene, start, best.polytope)
+    if state.options.kind == "recertify":
+        return Transition(state, Finish(Outcome.CERTIFIED, f"certified; {100 * kept:.3g} % of the region is kept"))
     if kept == 1 or (whole.reach > 1 and kept < whole.kept + GAIN):
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
     reach = FAR if whole.reach >= 1 else FARTHEST if whole.passed <= SOON else FARTHER
-    return _begin_stage(scene, state, reach, pushed(scene, best.polytope, start.seed, reach, start.rows), kept, whole.passed)
+    return begin_stage(scene, state, reach, pushed(scene, best.polytope, start.seed, reach, start.rows), kept, whole.passed)
 
 
-def _begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float = 0.0, passed: float = 0.0) -> Transition:
+def begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float = 0.0, passed: float = 0.0) -> Transition:
     """Asks to certify all pairs on a polytope; what was proved on the one of the stage before says nothing about it."""
     box = Box.around(*bounds(polytope))
     return _next(scene, replace(state, whole=Whole(reach, kept, polytope, box.mid, box.half, since=passed, passed=passed)))
+
+
+def in_words(scene: Scene, s: Array) -> str:
+    """Returns a configuration as people read it."""
+    return f"q = ({', '.join(f'{x:.4g}' for x in scene.to_q(s))})"
 
 
 def _copy(scene: Scene, start: Start, scale: float) -> Polytope:
@@ -132,7 +141,9 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
         pair = scene.pairs[failing[0]]
         reason = f"{pair.a} and {pair.b} touch, or come too close, at or between configurations that have to stay inside"
         return _ended(state, report, reason)
-    return _next(scene, replace(state, whole=replace(whole, polytope=smaller)))
+    gone = {i for i in failing if not smaller.contains(report.weaknesses[i].points).all()} if smaller is not whole.polytope else set()
+    cuts = whole.cuts | {i: whole.cuts.get(i, 0) + 1 for i in gone}
+    return _next(scene, replace(state, whole=replace(whole, polytope=smaller, cuts=cuts)))
 
 
 def _corners(scene: Scene, pair: int, weakness: Weakness, most: float) -> list[tuple[tuple[int, ...], Array, float]]:
@@ -154,7 +165,8 @@ def _most_loss(state: GrowthState, whole: Whole, pair: int) -> float:
 def _effort(state: GrowthState, whole: Whole, pair: int) -> int:
     """Returns how many cells of a pair are looked at before its open cells are cut off."""
     effort = state.options.cells or MOST_CELLS
-    early = EARLY_EFFORT if whole.reach < 1 or whole.reach > FAR else effort
+    soon = whole.reach < 1 or whole.reach > FAR or state.options.kind == "recertify"
+    early = EARLY_EFFORT if soon else effort
     return min(effort, early, whole.spent.get(pair, 0) if _gone(whole) >= LATE else effort)
 
 
@@ -175,6 +187,8 @@ def _ended(state: GrowthState, report: Outcomes, reason: str) -> Transition:
     """Ends the growth with the best region so far, or without one."""
     if state.best is not None:
         return Transition(state, Finish(Outcome.CERTIFIED, f"certified; growth ended early: {reason}"))
+    if state.options.kind == "recertify":
+        reason = f"{REVOKED}{reason}"
     return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +14,8 @@ from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import Start
 from certifier.growth.trials import alike
+from certifier.growth.whole import REVOKED
+from certifier.jobs.former import Former
 from certifier.jobs.pairs import part_certifier
 from certifier.jobs.parallel import side_by_side
 from certifier.jobs.region import REST, Region, certified_region, growth_point, versions
@@ -22,6 +24,8 @@ from certifier.jobs.verdict import Verdict
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee, Outcome, combine
 from certifier.pair.result import PairResult
+from certifier.proof.region import RegionProof
+from certifier.proof.separation import digest
 from certifier.seeding.options import SeedOptions
 from certifier.seeding.propose import propose
 from certifier.step.step import step
@@ -48,6 +52,8 @@ class _Run:
         rests_until: no region but the last one is made before this many seconds of the job.
         proposal: what the region is grown from; None before there is a candidate.
         curve: the growth curve of the manifest.
+        former: the region that is certified again; None where one is grown.
+        cuts: of the last stage, as :class:`certifier.growth.state.Whole` has them.
         start: when the job began.
     """
 
@@ -64,6 +70,8 @@ class _Run:
     rests_until: float = 0.0
     proposal: SampledProposal | None = None
     curve: list[dict[str, Any]] = field(default_factory=list)
+    former: Former | None = None
+    cuts: dict[int, int] = field(default_factory=dict)
 
     @property
     def seconds(self) -> float:
@@ -109,7 +117,7 @@ class _Run:
         self._tell_note(f"verifying the region: {done} of {total} cells and proofs", done / total)
 
     def certify(self, action: Certify) -> Outcomes:
-        certify = part_certifier(self.scene, action, self.seed, self.left)
+        certify = part_certifier(self.scene, action, self.seed, self.left, None if self.former is None else self.former.carried)
         found = self.results.setdefault(action.iteration, {})
         failures, work = 0, action.work
         said = {"index": action.iteration, "label": action.label, "pairs": len(action.pairs), "parts": len(work)}
@@ -118,7 +126,8 @@ class _Run:
         results = side_by_side(certify, work, 1 if action.cells == 1 else self.processes, lambda index: alike(self.scene, index))
         for (index, _), result in zip(work, results, strict=False):
             found.setdefault(index, []).append(result)
-            settled = {"index": index, "state": result.outcome.value, "seconds": result.seconds}
+            stage = None if result.stage is None else result.stage.value
+            settled = {"index": index, "state": result.outcome.value, "stage": stage, "seconds": result.seconds}
             self.tell("pairs", {"iteration": action.iteration, "pairs": [settled]})
             failures += result.outcome is not Outcome.CERTIFIED
             if failures == action.failures:
@@ -136,10 +145,15 @@ class _Run:
 
     def provenance(self, options: GrowthOptions, reason: str) -> dict[str, Any]:
         """Returns what the manifest says of how a region came about."""
+        assert self.candidate is not None, "a region is made of a certified polytope"
+        said = {}
+        if self.former is not None and self.proposal is not None:
+            said["recertified"] = self.former.document(self.scene, self.cuts, self.proposal, self.candidate.polytope)
         return {
             "options": options.to_document(),
             "versions": versions(self.scene),
             "reason": reason,
+            **said,
             "growth_curve": self.curve,
             "seeding_seconds": self.seeding_seconds,
             "pair_seconds": sum(result.seconds for found in self.results.values() for parts in found.values() for result in parts),
@@ -179,7 +193,41 @@ def grow(
     Raises:
         CirisError: no region could be certified; the code is ``not_grown`` or that of the seeding's error.
     """
-    run = _Run(scene, options.random_seed, tell, processes, deadline_s)
+    return _carried_out(_Run(scene, options.random_seed, tell, processes, deadline_s), options, deliver)
+
+
+def recertify(
+    scene: Scene,
+    data: bytes,
+    keep: Sequence[Sequence[float]] | None = None,
+    tell: Tell = _silent,
+    deadline_s: float | None = None,
+    processes: int = 1,
+    random_seed: int = 0,
+) -> Region:
+    """Makes a region of a scene from one of the scene before it changed, in this process or with so many children of it.
+
+    Args:
+        data: the proof file of the region before.
+        keep: joint positions that have to stay inside, the first of them well inside; None for the point inside that the proof names.
+        tell, deadline_s, processes: as for :func:`grow`.
+
+    Raises:
+        ProofError: the file is no region's proof, or one that does not hold.
+        SceneError: ``other_robot``.
+        CirisError: ``revoked``, when nothing is left of the region; ``not_grown``, when time was too short.
+    """
+    start = time.perf_counter()
+    old = RegionProof.from_bytes(data)
+    former = Former.of(old, digest(data), scene)
+    seed = {"C": old.C.tolist(), "d": old.d.tolist(), "q": keep or [scene.to_q(old.interior).tolist()]}
+    options = GrowthOptions.from_document({"kind": "recertify", "seed": seed, "random_seed": random_seed})
+    return _carried_out(_Run(scene, options.random_seed, tell, processes, deadline_s, start, former=former), options)
+
+
+def _carried_out(run: _Run, options: GrowthOptions, deliver: Deliver | None = None) -> Region:
+    """Carries out what the growth asks for until it ends, and returns the region."""
+    scene = run.scene
     transition, late = begin(scene, options), False
     while not isinstance(transition.action, Finish):
         failure: CirisError | None = None
@@ -193,6 +241,7 @@ def grow(
         if transition.candidate:
             assert transition.state.start is not None, "what is grown comes from a proposal"
             run.accept(transition.candidate, transition.state.start)
+        run.cuts = run.cuts if transition.state.whole is None else transition.state.whole.cuts
         late = run.passed >= 1
         if late and not isinstance(transition.action, Finish):
             outcome = Outcome.INCONCLUSIVE if run.candidate is None else Outcome.CERTIFIED
@@ -200,6 +249,8 @@ def grow(
         if deliver is not None and run.has_news and not isinstance(transition.action, Finish):
             deliver(run.make_region(options, "growing"))
     if run.candidate is None:
+        if transition.action.reason.startswith(REVOKED):
+            raise CirisError("revoked", transition.action.reason, hint="grow a region of the new scene from another seed")
         hint = "allow more time" if late else "try another seed, or look at the pair named"
         raise CirisError("not_grown", transition.action.reason, hint=hint)
     return run.make_region(options, transition.action.reason)

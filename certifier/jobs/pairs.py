@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from certifier.carry.carry import Carry
 from certifier.growth.actions import Certify
 from certifier.model import Scene
+from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import Certification
 from certifier.pair.result import PairResult
 from certifier.partition.certification import CellCertification, CutOff
@@ -20,12 +22,13 @@ Left = Callable[[int, int], list[bytes]]
 """Returns the ``subtrees`` that an iteration, by its number, has left of a pair, by its index, in the order of the parts."""
 
 
-def part_certifier(scene: Scene, action: Certify, seed: int, left: Left) -> CertifyPart:
+def part_certifier(scene: Scene, action: Certify, seed: int, left: Left, carried: Carry | None = None) -> CertifyPart:
     """Prepares what all pairs of the action share, and returns the function that certifies a part of one of them.
 
     Args:
         seed: seeds the samples.
         left: reads what the iterations from ``action.begun`` on have left.
+        carried: what the proof of a region of the scene before it changed is worth; None where there is no such region.
 
     Raises:
         RegionError: the polytope is empty or unbounded, or the centre is not inside.
@@ -37,7 +40,7 @@ def part_certifier(scene: Scene, action: Certify, seed: int, left: Left) -> Cert
         return lambda index, part: program.certify(index, every_face=index in action.hard)
     search, begun = CellCertification(scene, action.polytope, seed, action.box), action.begun
     if begun is None:
-        return lambda index, part: search.certify(index, action.cells, cut_off.get(index, CutOff.CONTACTS))
+        return _beginning(search, action, cut_off, carried or Carry({}, {}))
 
     def go_on(index: int, part: int) -> PairResult:
         last, parts = left(action.iteration - 1, index), action.parts.get(index, 1)
@@ -46,3 +49,18 @@ def part_certifier(scene: Scene, action: Certify, seed: int, left: Left) -> Cert
         return search.go_on(index, action.cells, last, part, parts, cut_off.get(index, CutOff.CONTACTS))
 
     return go_on
+
+
+def _beginning(search: CellCertification, action: Certify, cut_off: dict[int, CutOff], carried: Carry) -> CertifyPart:
+    """Returns the function that begins the partition of a pair, or takes over the proof that it has already."""
+    files: dict[int, bytes] = {}
+
+    def begin(index: int, part: int) -> PairResult:
+        if index not in carried.proofs:
+            return search.certify(index, action.cells, cut_off.get(index, CutOff.CONTACTS), carried.starts.get(index))
+        proof = carried.proofs[index]
+        if id(proof) not in files:
+            files[id(proof)] = proof.to_bytes()
+        return PairResult(Outcome.CERTIFIED, Stage.CARRIED, proof=files[id(proof)])
+
+    return begin

@@ -52,10 +52,17 @@ class SampledProposal:
         the spread between the chains, so it includes what the samples of one chain have in common. Where all samples agree there is no
         spread. Nothing smaller than one sample is seen, so the error is never said to be less than one in the number of free samples.
         """
-        free, kept = self.free.sum(axis=1), (self.free & region.contains(self.s)).sum(axis=1)
         found = {"value": None, "stderr": None, "collision_free": float(self.free.mean()), "samples": self.free.size}
-        if not free.any():
-            return found
-        value = kept.sum() / free.sum()
-        spread = np.sqrt(len(free) / (len(free) - 1) * ((kept - value * free) ** 2).sum()) / free.sum()
-        return found | {"value": float(value), "stderr": float(max(spread, 1 / free.sum()))}
+        return found | _ratio(self.free & region.contains(self.s), self.free) if self.free.any() else found
+
+    def kept(self, region: Polytope) -> dict[str, float]:
+        """Returns how much of the proposal a region keeps, whether it is free or not: ``value`` and ``stderr`` as of :meth:`share`."""
+        return _ratio(region.contains(self.s), np.ones_like(self.free))
+
+
+def _ratio(some: NDArray[np.bool_], of: NDArray[np.bool_]) -> dict[str, float]:
+    """Returns how many of the samples in ``of``, (CHAINS, EACH), are in ``some`` as well, with the standard error."""
+    kept, total = some.sum(axis=1), of.sum(axis=1)
+    value = kept.sum() / total.sum()
+    spread = np.sqrt(len(total) / (len(total) - 1) * ((kept - value * total) ** 2).sum()) / total.sum()
+    return {"value": float(value), "stderr": float(max(spread, 1 / total.sum()))}

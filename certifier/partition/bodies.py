@@ -123,6 +123,20 @@ class Bodies:
             N += 1
         return Undecided(X[:N].copy(), X[places], weights)
 
+    def held_by(self, cell: Cell, plane: Array, play: Sequence[int]) -> Separated | None:
+        """Returns the proof that a given plane separates the bodies on the polytope and a cell; None where it cannot be proved.
+
+        Args:
+            plane: (5, 1 + k), as a proof holds it that has the joints ``play`` in play, ascending. Its last row bounds the normal's length
+                on the cell, where a radius is positive.
+        """
+        own = [0, *(1 + play.index(joint) for joint in self.joints)]
+        if np.delete(plane, own, axis=1).any():
+            return None  # It moves with joints that move neither body.
+        plane = np.ascontiguousarray(plane[:, own])
+        result = self._prove(cell, plane)
+        return Separated(plane, result) if isinstance(result, tuple) else None
+
     def room(self, cell: Cell, start: Array) -> float:
         """Returns how much room a plane has on a cell: its margin by the square of the cell's turn; 0 where no plane is found.
 

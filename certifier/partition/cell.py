@@ -12,6 +12,9 @@ from certifier.model import Array
 from certifier.partition.area import Area, Inside
 from certifier.partition.tree import Node
 
+KEPT = 200
+"""A cell begins with, or inherits, at most this many points."""
+
 
 @dataclass
 class Cell:
@@ -31,6 +34,11 @@ class Cell:
     upper: Array
     points: Array
     samples: Array
+
+    @classmethod
+    def at(cls, area: Area, node: Node, lower: Array, upper: Array, samples: Array) -> Cell:
+        """Returns a cell of which no more is known than the samples in it."""
+        return cls(area, node, lower, upper, samples[:KEPT], samples)
 
     @property
     def mid(self) -> Array:

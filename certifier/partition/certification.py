@@ -26,6 +26,7 @@ from certifier.outcome import Outcome, Stage
 from certifier.pair.broad_phase import BroadPhase, Volumes
 from certifier.pair.closest import closest
 from certifier.pair.result import PairResult, Weakness
+from certifier.partition.again import try_again
 from certifier.partition.area import Area
 from certifier.partition.bodies import Bodies
 from certifier.partition.chords import chords
@@ -88,15 +89,16 @@ class CellCertification:
         self._shared = Shared(self._area)
         self._broad_phase = BroadPhase(Kinematics.of(scene), self._together)
 
-    def certify(self, index: int, cells: int, cut_off: CutOff = CutOff.CONTACTS) -> PairResult:
+    def certify(self, index: int, cells: int, cut_off: CutOff = CutOff.CONTACTS, former: PartitionProof | None = None) -> PairResult:
         """Certifies pair ``scene.pairs[index]``, alone or with others that the same proof covers.
 
         Args:
             cells: end after so many cells.
             cut_off: which points of open cells the result names, because they will be cut off.
+            former: a proof about bodies that were much like these, whose cells and planes are tried first; None where there is none.
         """
         start, pair = time.perf_counter(), self._scene.pairs[index]
-        result = self._broad_phase.find(pair) or self._begin(self._volumes(index), cells, cut_off)
+        result = self._broad_phase.find(pair) or self._begin(self._volumes(index), cells, cut_off, former)
         return replace(result, seconds=time.perf_counter() - start)
 
     def go_on(
@@ -143,11 +145,12 @@ class CellCertification:
         result = self._proved(search, volumes, root)
         return result if result.outcome is Outcome.CERTIFIED else None
 
-    def _begin(self, volumes: Volumes, cells: int, cut_off: CutOff) -> PairResult:
-        search, root = Search(self._area, self._shared, volumes), Node()
-        given = [OpenCell(root, self._area.lower, self._area.upper)]
+    def _begin(self, volumes: Volumes, cells: int, cut_off: CutOff, former: PartitionProof | None) -> PairResult:
+        area, search = self._area, Search(self._area, self._shared, volumes)
         contacts = search.scout(0)
-        report = Report(contacts=contacts) if contacts else search.run(given, cells)
+        root = Node() if former is None else try_again(area, search, volumes, former)
+        given = [OpenCell(root, area.lower, area.upper)]
+        report = Report(contacts=contacts) if contacts else search.run(root.open_cells(area.lower, area.upper), cells)
         if any(node.kind == OPEN for node in root.preorder()):
             return self._left(search, volumes, given, report, cut_off)
         return self._proved(search, volumes, root)

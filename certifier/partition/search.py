@@ -26,7 +26,7 @@ import numpy as np
 from certifier.model import Array, Volume
 from certifier.partition.area import Area
 from certifier.partition.bodies import TOUCH, Bodies, Separated, Undecided
-from certifier.partition.cell import Cell
+from certifier.partition.cell import KEPT, Cell
 from certifier.partition.chords import chords
 from certifier.partition.frames import choose_frame
 from certifier.partition.hulls import gaps
@@ -47,8 +47,6 @@ FEW_JOINTS, NARROWER = 6, np.radians(30.0)
 """Where more than FEW_JOINTS move one body against the other, a cell without a sample is cut for them until it turns less than NARROWER."""
 CUTS, LEAST_ROOM, MOST_ROOM = 3, 1e-5, 10.0
 """For coarse volumes so many joints are compared to cut a cell in; less room for a plane than LEAST_ROOM counts as that, and so on."""
-KEPT = 200
-"""A cell inherits at most this many points."""
 BEYOND = 1e-9
 """A point may lie beyond a face by this."""
 FEW = 16
@@ -81,6 +79,7 @@ class Search:
         joints: position indices of the joints in play, ascending.
         coarse: the coarse volumes that a leaf may choose, as in a proof.
         bodies: the volumes themselves.
+        volumes_of_levels: the two volumes of every level; those of level 0 are the volumes themselves.
     """
 
     def __init__(self, area: Area, shared: Shared, volumes: tuple[Volume, Volume]) -> None:
@@ -94,6 +93,7 @@ class Search:
         chosen = choices_of(volumes, self.coarse)
         self._choices = [i + (1 + len(self.coarse[0])) * j for i, j in levels]
         self.bodies = Bodies(area, self.frame, volumes)
+        self.volumes_of_levels = [chosen[choice] for choice in self._choices]
         self._levels = [self.bodies, *(shared.bodies(self.frame, chosen[choice]) for choice in self._choices[1:])]
 
     def run(self, cells: Sequence[OpenCell], most: int) -> Report:
@@ -110,7 +110,7 @@ class Search:
 
         for node, lower, upper in cells:
             inside = area.samples[((area.samples >= lower) & (area.samples <= upper)).all(axis=1)]
-            push(Cell(area, node, lower, upper, inside[:KEPT], inside))
+            push(Cell.at(area, node, lower, upper, inside))
         while heap and report.cells < most:
             cell = heapq.heappop(heap)[2]
             report.cells += 1
@@ -129,10 +129,22 @@ class Search:
                 push(half)
         return report
 
+    def settle_as(self, cell: Cell, plane: Array | None, level: int) -> None:
+        """Settles a cell with a plane that is given, if it holds for the bodies of this level, or if the cell misses the polytope.
+
+        Args:
+            plane: (5, 1 + k), as a proof holds it; None where none is given.
+        """
+        found = None if plane is None else self._levels[level].held_by(cell, plane, self.joints)
+        if found is not None:
+            self._separated(cell, level, found)
+        else:
+            self._start(cell)
+
     def scout(self, seed: int) -> list[Array]:
         """Returns contacts that a look at all of the polytope finds, (n,) each; other seeds look elsewhere."""
         area, contacts = self._area, []
-        cell = Cell(area, Node(), area.lower, area.upper, area.samples[:KEPT], area.samples)
+        cell = Cell.at(area, Node(), area.lower, area.upper, area.samples)
         rng, count = np.random.default_rng(seed), SCOUTS * AMONG // 4
         targets = np.where(rng.random((count, len(area.lower))) < 0.5, area.lower, area.upper)
         samples = area.samples[rng.permutation(len(area.samples))[:count]]

@@ -32,6 +32,10 @@ def grow(t: Trial, *options: str) -> str:
     return t.ciris("grow", PLANAR, "--local", *options)
 
 
+def again(t: Trial, *options: str) -> str:
+    return t.ciris("recertify", *options, "--scene", PLANAR)
+
+
 def beside_a_seed(t: Trial, seed: str) -> str:
     t.write(scene__yaml="", seed__yaml=seed)
     return t.ciris("grow", "scene.yaml", "--local")
@@ -278,6 +282,32 @@ COMMANDS: list[Row] = [
         "client/service.py",
         ("job_{...}", "", "{...}", "`ciris job show {...}` tells more", "a job that was cancelled while `ciris grow` followed it"),
         ("job_{...}", "", "the job is {...}", "`ciris job show {...}` tells more", "a job that ended without a word"),
+    ),
+    *rows(
+        "client/recertify.py",
+        ("option", "--deadline", "must be a number of seconds above 0, not {deadline}", "", lambda t: again(t, "x", "--deadline", "0")),
+        ("option", "REGION", "no region was named", "name one, or name its scene with --from", lambda t: again(t)),
+        (
+            "option",
+            "--q",
+            "the service keeps what the region was grown around inside",
+            "leave it out",
+            lambda t: again(t, "x", "--q", "0,0"),
+        ),
+        (
+            "option",
+            "--from",
+            "all regions of a scene need a service, which keeps what becomes of them",
+            "leave out REGION, --q, --local and --out",
+            lambda t: again(t, "x", "--from", "planar-2dof"),
+        ),
+        (
+            "no_file",
+            "REGION",
+            "{...}",
+            "--local needs the proof file of a region",
+            lambda t: again(t, "nothing.proof", "--local"),
+        ),
     ),
     *rows(
         "client/verify.py",

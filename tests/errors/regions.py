@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from certifier.carry.robot import same_bodies
 from certifier.growth.machine import begin
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
@@ -18,6 +20,7 @@ from certifier.polytopes.sampling import hit_and_run
 from certifier.seeding.options import SeedOptions
 from certifier.seeding.propose import propose
 from certifier.step.step import step
+from tests.certifier.scenes import planar_arm
 from tests.certifier.seeding.test_propose import crane
 from tests.errors.rows import Row, rows
 from tests.scenes import slider
@@ -27,6 +30,7 @@ STORED = "the document was changed or is of another version; load the scene from
 SCALED = "scale the rows of C to length 1, and leave out rows that nearly repeat others"
 PUSH = "push the faces out instead of stepping (pushes)"
 CENTER = "leave it out to have one found"
+ROBOT = "grow a region of the new scene: its joints, their limits and q* must be those of the old one"
 
 
 def seeded(**seed: Any) -> None:
@@ -39,6 +43,10 @@ def given(C: Any, d: Any, **more: Any) -> None:
 
 def grow(**options: Any) -> GrowthOptions:
     return GrowthOptions.from_document({"kind": "grow", "seed": {"q": [0.0]}, **options})
+
+
+def again(**seed: Any) -> None:
+    begin(slider(), GrowthOptions.from_document({"kind": "recertify", "seed": seed}))
 
 
 def stored(**changed: Any) -> Scene:
@@ -65,9 +73,44 @@ GROWTH = [
         ),
     ),
     *rows(
+        "certifier/growth/again.py",
+        ("polytope_missing", "polytope", "a region needs C, d and q", "give all of them", lambda t: again()),
+        (
+            "seed_wrong_length",
+            "seed.q",
+            "a configuration to keep has not {n} numbers",
+            "one for each joint",
+            lambda t: again(C=[[1.0]], d=[0.5], q=[[0.0, 0.0]]),
+        ),
+        (
+            "seed_cut_off",
+            "seed.q",
+            "a configuration to keep is not inside the region",
+            "name one that is inside",
+            lambda t: again(C=[[1.0]], d=[0.1], q=[[0.9]]),
+        ),
+    ),
+    *rows(
+        "certifier/carry/robot.py",
+        (
+            "other_robot",
+            "scene",
+            "the old scene has {n} joints that move and the new one has {n}",
+            ROBOT,
+            lambda t: same_bodies(slider(), planar_arm(2)),
+        ),
+        (
+            "other_robot",
+            "scene",
+            "{what} of joint {name} is not what it was",
+            ROBOT,
+            lambda t: same_bodies(slider(), replace(slider(), q_star=np.array([0.1]))),
+        ),
+    ),
+    *rows(
         "certifier/growth/options.py",
         ("unknown_option", "options.{name}", "there is no option {name}", "options: {...}", lambda t: grow(speed=3)),
-        ("option_value", "options.kind", "kind must be 'grow' or 'certify'", "", lambda t: grow(kind="shrink")),
+        ("option_value", "options.kind", "kind must be 'grow', 'certify' or 'recertify'", "", lambda t: grow(kind="shrink")),
         (
             "option_value",
             "options.contraction",
@@ -135,6 +178,7 @@ GROWTH = [
             lambda t: local.grow(slider(), grow(seed={"q": [0.0], "method": "limits"}), deadline_s=1e-6),
         ),
         ("not_grown", "", "{...}", "try another seed, or look at the pair named", "bodies that nearly touch at the seed"),
+        ("revoked", "", "{...}", "grow a region of the new scene from another seed", "tests/certifier/jobs/test_recertify.py"),
     ),
     *rows(
         "certifier/jobs/reference.py",
