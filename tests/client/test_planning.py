@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from certifier.model import Scene
-from client import Client
+from ciris.synchronous.client import Client
 from db.session import Database
 from tests.api.conftest import store_region
 from tests.api.test_planning import a_part
