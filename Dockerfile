@@ -11,6 +11,7 @@ COPY planner planner
 COPY workers workers
 COPY dashboard dashboard
 COPY api api
+COPY ciris ciris
 COPY client client
 RUN /venv/bin/pip install --no-cache-dir --no-deps --no-build-isolation .
 

@@ -18,10 +18,10 @@ from typing import Any
 
 import certifier
 from certifier.errors import CirisError
+from ciris.find import api_key, data_dir, running_stack
+from ciris.synchronous.client import Client
 from client import output, service
 from client.files import ProofFile, file_name
-from client.find import api_key, data_dir, running_stack
-from client.http import Client
 from client.inputs import seed_of
 from client.output import Screen
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
 from certifier.errors import CirisError
+from ciris.find import api_key, data_dir, service_url
+from ciris.synchronous.client import Client
 from client.cores import cores
-from client.find import api_key, data_dir, service_url
-from client.http import Client
 
 PACKAGES = ("drake", "python-flint", "numpy", "scipy", "numba", "fastapi", "celery", "redis", "sqlalchemy")
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from certifier.outcome import Outcome, Stage
-from client.http import Client, Document
+from ciris.answers import Document
+from ciris.synchronous.client import Client
 from client.output import Screen, plain, q_volume, seconds, share
 
 _STEPS = {"propose": "seeding", "step": "polytope step", "accept": "assembling and verifying the region"}

@@ -6,9 +6,9 @@ from argparse import Namespace
 from typing import Any
 
 from certifier.errors import CirisError
+from ciris.answers import Document
 from client import output
 from client.follow import follow
-from client.http import Document
 from client.output import Screen, print_json
 from client.service import connect
 

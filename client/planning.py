@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from certifier.errors import CirisError
+from ciris.synchronous.client import Client
 from client import output, service
-from client.http import Client
 from client.inputs import configuration
 from client.output import Screen, print_json
 from client.paths import named, path_of

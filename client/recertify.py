@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from certifier.errors import CirisError, unreadable
+from ciris.answers import Document
 from client import output, service
 from client.files import ProofFile, check_writable
-from client.http import Document
 from client.inputs import configuration
 from client.output import Screen, print_json
 

@@ -9,10 +9,12 @@ from typing import Any
 
 from certifier.errors import CirisError
 from certifier.outcome import Guarantee, Outcome
+from ciris.answers import Document
+from ciris.find import api_key, service_url
+from ciris.job import why_no_region
+from ciris.synchronous.client import Client
 from client import verdicts
-from client.find import api_key, service_url
 from client.follow import follow
-from client.http import Client, Document
 from client.inputs import PolytopeFile, is_scene_file
 from client.output import NEGATIVE, Screen
 
@@ -37,7 +39,7 @@ class Grown:
 
 
 def connect(url: str | None) -> Client:
-    """Returns a client of the service at this address, or of the one that is found (:func:`client.find.service_url`).
+    """Returns a client of the service at this address, or of the one that is found (:func:`ciris.find.service_url`).
 
     Raises:
         CirisError: no_service.
@@ -65,7 +67,7 @@ def grow(client: Client, request: Document, screen: Screen, watch: bool = False,
     if not job["ended"]:
         job = _wait(client, job["id"], screen, watch)
     if job["region"] is None:
-        raise _error(job)
+        raise why_no_region(job)
     region = client.region(job["region"])
     return Grown(region["manifest"], client.proof(job["region"]), _seconds(job), job["region"], job["reason"] or "")
 
@@ -92,7 +94,7 @@ def certify(client: Client, scene: Document, given: PolytopeFile, screen: Screen
     screen.line(f"job {job['id']}: {client.url}/jobs/{job['id']}")
     job = _wait(client, job["id"], screen, watch)
     if job["outcome"] is None or (job["error"] and job["error"]["code"] not in NEGATIVE):
-        raise _error(job)
+        raise why_no_region(job)
     matrix = client.job_pairs(job["id"])
     names = {pair["index"]: pair for pair in matrix["pairs"]}
     outcome = Outcome(job["outcome"])
@@ -113,14 +115,6 @@ def _wait(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:
         screen.line(f"job {job_id} goes on while the service runs: {client.url}/jobs/{job_id}")
         screen.line(f"come back to it with `ciris job follow {job_id[:8]}`, or end it with `ciris job cancel {job_id[:8]}`")
         raise
-
-
-def _error(job: Document) -> CirisError:
-    """Returns the error that says why an ended job has no result."""
-    if job["error"]:
-        return CirisError.from_document(job["error"])
-    reason = job["reason"] or f"the job is {job['state']}"
-    return CirisError(f"job_{job['state']}", reason, hint=f"`ciris job show {job['id'][:8]}` tells more")
 
 
 def _seconds(job: Document) -> float:

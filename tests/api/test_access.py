@@ -22,7 +22,7 @@ from api.guard import PUBLIC, _network
 from api.limits import MAX_BUCKETS, Buckets
 from certifier.errors import CirisError
 from certifier.model import Scene
-from client import Client
+from ciris.synchronous.client import Client
 from db import events, jobs, keys
 from db.keys import Scope
 from db.session import Database
@@ -342,7 +342,7 @@ def test_strangers_cannot_fill_the_memory() -> None:
 
 @pytest.mark.parametrize("value", ["", "two words", "na\u00efve"])
 def test_a_key_that_cannot_be_sent_is_refused_without_being_shown(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
-    from client.find import api_key
+    from ciris.find import api_key
 
     monkeypatch.setenv("CIRIS_API_KEY", value)
     if not value:

@@ -20,7 +20,7 @@ import httpx2
 import pytest
 import yaml
 
-from client import Client
+from ciris.synchronous.client import Client
 from db import keys, migrate
 from db.keys import Scope
 from db.session import Database

@@ -22,10 +22,10 @@ from certifier.model import Scene
 from certifier.outcome import Guarantee, Outcome, Stage
 from certifier.pair.result import PairResult
 from certifier.verify.region import verify_region
+from ciris.find import data_dir
 from client import output
 from client.cli import INTERRUPTED, _joined
 from client.files import ProofFile
-from client.find import data_dir
 from db.settings import Settings
 from tests.client.conftest import PLANAR, ROOT, Ciris, command, surroundings
 

@@ -10,7 +10,7 @@ import pytest
 
 from certifier.errors import CirisError
 from certifier.model import Scene
-from client import Client
+from ciris.synchronous.client import Client
 
 
 def test_a_problem_arrives_as_the_error_it_was(url: str, scene: Scene) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from certifier.model import Scene
-from client import Client
+from ciris.synchronous.client import Client
 from db.session import Database
 from tests.api.conftest import store_region
 from tests.api.test_planning import a_part

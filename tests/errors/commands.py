@@ -8,7 +8,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import numpy as np
 
-from client.find import NO_SERVICE
+from ciris import Space, connect
+from ciris.find import NO_SERVICE
 from tests.client.conftest import PLANAR
 from tests.errors.rows import Row, Trial, rows
 
@@ -61,6 +62,10 @@ def asked_elsewhere(t: Trial) -> str:
 def bound(t: Trial) -> str:
     np.savez(t.directory / "p.npz", C=np.array(EYE), d=np.full(4, 0.05), q_star=np.array([1.0, 1.0]))
     return certify(t, "--local", file="p.npz")
+
+
+def one_joint() -> Space:
+    return Space(("slide",), np.zeros(1), -np.ones(1), np.ones(1), np.array([False]))
 
 
 COMMANDS: list[Row] = [
@@ -151,7 +156,7 @@ COMMANDS: list[Row] = [
         "client/demo.py", ("stack_failed", "", "the service did not start", "see {log}", "a machine on which the stack does not come up")
     ),
     *rows(
-        "client/find.py",
+        "ciris/find.py",
         ("no_service", "", "no service is running here", NO_SERVICE, lambda t: t.ciris("scene", "ls")),
         (
             "api_key",
@@ -169,7 +174,34 @@ COMMANDS: list[Row] = [
         ),
     ),
     *rows(
-        "client/http.py",
+        "ciris/requests.py",
+        (
+            "points",
+            "q",
+            "the points must be given either as q or as s",
+            "",
+            lambda t: connect("http://127.0.0.1:9").contains("cell"),
+        ),
+        (
+            "points",
+            "{name}",
+            "it must be finite numbers in {...} or {axes} axes, joints last",
+            "",
+            lambda t: connect("http://127.0.0.1:9").contains("cell", 0.5),
+        ),
+    ),
+    *rows(
+        "ciris/space.py",
+        (
+            "wrong_length",
+            "{field}",
+            "it has the shape {shape}, and the last number must be {n}, one for each joint",
+            "in the order {...}",
+            lambda t: one_joint().to_s([0.1, 0.2]),
+        ),
+    ),
+    *rows(
+        "ciris/problems.py",
         (
             "unreachable",
             "",
@@ -279,7 +311,7 @@ COMMANDS: list[Row] = [
         ),
     ),
     *rows(
-        "client/service.py",
+        "ciris/job.py",
         ("job_{...}", "", "{...}", "`ciris job show {...}` tells more", "a job that was cancelled while `ciris grow` followed it"),
         ("job_{...}", "", "the job is {...}", "`ciris job show {...}` tells more", "a job that ended without a word"),
     ),

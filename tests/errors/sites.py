@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("certifier", "planner", "db", "workers", "api", "client")
+ROOMS = ("certifier", "planner", "db", "workers", "api", "ciris", "client")
 ERRORS = ("CirisError", "SceneError", "RegionError", "ProofError")
 MAKERS = {
     ("certifier/document.py", "refuse"): 0,

@@ -33,7 +33,7 @@ ABOUT_ALL = {
     "api/problems.py",
     "client/bench.py",
     "client/demo.py",
-    "client/find.py",
+    "ciris/find.py",
     "workers/pairs.py",
     "workers/turns.py",
 }

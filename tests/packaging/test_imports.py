@@ -16,10 +16,11 @@ THIRD_PARTIES = {
     "certifier.verify": {"flint", "numpy"},
     "db": {"alembic", "numpy", "pydantic", "pydantic_settings", "sqlalchemy", "structlog"},
     "planner": {"flint", "numpy", "pydrake", "scipy"},
+    "ciris": {"httpx2", "numpy"},
     "client": {"flint", "httpx2", "numpy", "pydrake", "yaml"},
     "dashboard": set(),
 }
-ROOMS = ["certifier", "db", "planner", "workers", "api", "client", "dashboard"]
+ROOMS = ["certifier", "db", "planner", "workers", "api", "ciris", "client", "dashboard"]
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +57,7 @@ import sys
 
 class Absent:
     def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] not in {"certifier", "client", "flint", "numpy", *sys.stdlib_module_names}:
+        if name.partition(".")[0] not in {"certifier", "ciris", "client", "flint", "numpy", *sys.stdlib_module_names}:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 sys.meta_path.insert(0, Absent())

@@ -7,7 +7,7 @@ import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ["certifier", "db", "planner", "workers", "api", "client", "dashboard"]
+ROOMS = ["certifier", "db", "planner", "workers", "api", "ciris", "client", "dashboard"]
 
 
 def test_a_wheel_contains_every_file_of_the_packages(tmp_path: Path) -> None:

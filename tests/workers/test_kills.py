@@ -20,7 +20,7 @@ import pytest
 import yaml
 
 from certifier.errors import CirisError
-from client.http import Client
+from ciris.synchronous.client import Client
 from tests.services import Queue, free_port, queue_server
 from tests.workers.record import check_record, region_of
 from tests.workers.service import Service, eventually, running_service

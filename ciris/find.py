@@ -27,7 +27,7 @@ def running_stack(data: Path) -> str | None:
         return None
 
 
-NO_SERVICE = "start one with `ciris up`, or name one with --url; grow --local, certify --local and scene check need none"
+NO_SERVICE = "start one with `ciris up`, or name one: --url, CIRIS_URL, or url of ciris.connect; --local and scene check need none"
 
 
 def service_url(given: str | None) -> str:

@@ -1,25 +1,24 @@
 """This client speaks to the service over HTTP. It returns the API's documents as dicts.
 
-It raises the API's problems as :class:`certifier.errors.CirisError`.
+It raises the API's problems as CirisError. It is made from the one in ``ciris.asynchronous``.
 """
 
 from __future__ import annotations
 
 import json
-import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
-from urllib.parse import quote
 
 import httpx2
 
-from certifier.errors import CirisError
-from certifier.scene.bundle import pack_bundle
+from ciris.answers import Document
+from ciris.problems import problem, segment, unreachable
+from ciris.requests import bundle, given
 
-Document = dict[str, Any]
+Rows = list[list[float]]
 Limit = float | list[float]
 
 TIMEOUT_S = 120.0
@@ -73,7 +72,7 @@ class Client:
 
     def add_scene(self, path: str | Path) -> Document:
         """Uploads a scene file with everything it refers to, and returns the scene."""
-        return self._json("POST", "/v1/scenes", files={"bundle": ("scene.zip", pack_bundle(path), "application/zip")})
+        return self._json("POST", "/v1/scenes", files={"bundle": ("scene.zip", bundle(path), "application/zip")})
 
     def scenes(self) -> list[Document]:
         """Returns every scene, newest first."""
@@ -81,31 +80,30 @@ class Client:
 
     def scene(self, name: str) -> Document:
         """Returns a scene by its id or name."""
-        return self._json("GET", f"/v1/scenes/{_segment(name)}")
+        return self._json("GET", f"/v1/scenes/{segment(name)}")
 
     def lint(self, name: str) -> Document:
         """Returns a scene's warnings, substitutions and ignored pairs."""
-        return self._json("GET", f"/v1/scenes/{_segment(name)}/lint")
+        return self._json("GET", f"/v1/scenes/{segment(name)}/lint")
 
     def scene_pairs(self, name: str) -> list[Document]:
         """Returns a scene's pairs with the forecast of their cost."""
-        return self._json("GET", f"/v1/scenes/{_segment(name)}/pairs")["pairs"]
+        return self._json("GET", f"/v1/scenes/{segment(name)}/pairs")["pairs"]
 
     def create_job(self, request: Document, idempotency_key: str | None = None) -> tuple[Document, bool]:
         """Creates a job. Returns the job and True, or the job made earlier under the same key and False."""
-        headers = {} if idempotency_key is None else {"Idempotency-Key": idempotency_key}
+        headers = given(**{"Idempotency-Key": idempotency_key})
         response = self._send("POST", "/v1/jobs", json=request, headers=headers)
         return response.json(), response.status_code == httpx2.codes.CREATED
 
     def jobs(self, *, state: str | None = None, scene: str | None = None, most: int = 50) -> list[Document]:
         """Returns the newest jobs, at most so many, in one state or of one scene where that is given."""
-        wanted: Document = {key: value for key, value in (("state", state), ("scene", scene)) if value is not None}
+        wanted = given(state=state, scene=scene)
         found: list[Document] = []
         after = None
         while len(found) < most:
-            page = self._json(
-                "GET", "/v1/jobs", params={**wanted, "limit": min(most - len(found), 200), **({"after": after} if after else {})}
-            )
+            params = {**wanted, "limit": min(most - len(found), 200), **given(after=after)}
+            page = self._json("GET", "/v1/jobs", params=params)
             found += page["jobs"]
             after = page["next"]
             if after is None:
@@ -114,19 +112,19 @@ class Client:
 
     def job(self, job_id: str) -> Document:
         """Returns a job as it is now; the first characters of its id are enough."""
-        return self._json("GET", f"/v1/jobs/{_segment(job_id)}")
+        return self._json("GET", f"/v1/jobs/{segment(job_id)}")
 
     def cancel(self, job_id: str) -> Document:
         """Asks a job to end, and returns it."""
-        return self._json("POST", f"/v1/jobs/{_segment(job_id)}/cancel")
+        return self._json("POST", f"/v1/jobs/{segment(job_id)}/cancel")
 
     def retry(self, job_id: str) -> Document:
         """Creates a new job like one that failed or was cancelled, and returns it."""
-        return self._json("POST", f"/v1/jobs/{_segment(job_id)}/retry")
+        return self._json("POST", f"/v1/jobs/{segment(job_id)}/retry")
 
     def job_pairs(self, job_id: str, iteration: int | None = None) -> Document:
         """Returns a job's pair matrix, of all iterations or of one."""
-        return self._json("GET", f"/v1/jobs/{_segment(job_id)}/pairs", params={} if iteration is None else {"iteration": iteration})
+        return self._json("GET", f"/v1/jobs/{segment(job_id)}/pairs", params=given(iteration=iteration))
 
     def events(self, job_id: str, after: int = 0) -> Iterator[Document]:
         """Yields the job's events in order until the job has ended. An interrupted stream goes on where it stopped."""
@@ -142,12 +140,12 @@ class Client:
 
     def _stream(self, job_id: str, after: int) -> Iterator[Document | None]:
         """Yields the events of one connection, and None when the job has ended."""
-        url, timeout = f"/v1/jobs/{_segment(job_id)}/events/stream", httpx2.Timeout(TIMEOUT_S, read=QUIET_S)
+        url, timeout = f"/v1/jobs/{segment(job_id)}/events/stream", httpx2.Timeout(TIMEOUT_S, read=QUIET_S)
         try:
             with self._http.stream("GET", url, headers={"Last-Event-ID": str(after)}, timeout=timeout) as response:
                 if response.is_error:
                     response.read()
-                    raise _problem(response)
+                    raise problem(response)
                 kind = ""
                 for line in response.iter_lines():
                     name, _, value = line.partition(": ")
@@ -156,7 +154,7 @@ class Client:
                     elif name == "data":
                         yield None if kind == "end" else json.loads(value)
         except httpx2.ConnectError as error:
-            raise self._unreachable(error) from None
+            raise unreachable(self.url, error) from None
 
     def regions(self, *, scene: str | None = None, job: str | None = None) -> list[Document]:
         """Returns every region, newest first, or those of one scene or job."""
@@ -164,40 +162,40 @@ class Client:
 
     def region(self, region_id: str) -> Document:
         """Returns a region with its manifest."""
-        return self._json("GET", f"/v1/regions/{_segment(region_id)}")
+        return self._json("GET", f"/v1/regions/{segment(region_id)}")
 
     def proof(self, region_id: str) -> bytes:
         """Returns a region's proof file."""
-        return self._send("GET", f"/v1/regions/{_segment(region_id)}/proof").content
+        return self._send("GET", f"/v1/regions/{segment(region_id)}/proof").content
 
     def verify(self, region_id: str) -> Document:
         """Makes the service check a region's stored proof again. Returns whether it holds, and what it proves."""
-        return self._json("POST", f"/v1/regions/{_segment(region_id)}/verify")
+        return self._json("POST", f"/v1/regions/{segment(region_id)}/verify")
 
     def pair_proof(self, job_id: str, iteration: int, pair: int) -> bytes:
         """Returns the proof of a pair's outcome in one iteration of a job, together with the scene."""
-        return self._send("GET", f"/v1/jobs/{_segment(job_id)}/pairs/{pair}/proof", params={"iteration": iteration}).content
+        return self._send("GET", f"/v1/jobs/{segment(job_id)}/pairs/{pair}/proof", params={"iteration": iteration}).content
 
     def export(self, region_id: str, format: str, name: str | None = None) -> bytes:
         """Returns a region as the bytes of a ``json``, ``npz`` or ``drake-yaml`` file, in which it has this name, or else its id."""
-        params = {"format": format, **({} if name is None else {"name": name})}
-        return self._send("GET", f"/v1/regions/{_segment(region_id)}/export", params=params).content
+        params = {"format": format, **given(name=name)}
+        return self._send("GET", f"/v1/regions/{segment(region_id)}/export", params=params).content
 
-    def contains(self, scene: str, q: list[list[float]]) -> Document:
-        """Returns which regions of a scene contain each of these configurations."""
-        return self._json("POST", "/v1/planning/contains", json={"scene": scene, "q": q})
+    def contains(self, scene: str, q: Rows | None = None, s: Rows | None = None) -> Document:
+        """Returns which regions of a scene contain each of these points."""
+        return self._json("POST", "/v1/planning/contains", json={"scene": scene, **given(q=q, s=s)})
 
     def certify_path(self, request: Document) -> Document:
         """Returns what becomes of a motion, and the proof in base 64 if the request asks for it."""
         return self._json("POST", "/v1/planning/certify-path", json=request)
 
-    def nearest(self, scene: str, q: list[list[float]]) -> Document:
-        """Returns the region of a scene that is nearest to each of these configurations, with its nearest point and distance."""
-        return self._json("POST", "/v1/planning/nearest", json={"scene": scene, "q": q})
+    def nearest(self, scene: str, q: Rows | None = None, s: Rows | None = None) -> Document:
+        """Returns the region of a scene that is nearest to each of these points, with its nearest point and distance."""
+        return self._json("POST", "/v1/planning/nearest", json={"scene": scene, **given(q=q, s=s)})
 
-    def segments(self, scene: str, q: list[list[list[float]]], space: str = "q") -> Document:
-        """Returns for each pair of configurations whether the motion between them, straight in ``q`` or ``s``, is in certified regions."""
-        return self._json("POST", "/v1/planning/segment", json={"scene": scene, "q": q, "space": space})
+    def segments(self, scene: str, q: list[Rows] | None = None, space: str = "q", s: list[Rows] | None = None) -> Document:
+        """Returns for each pair of points whether the motion between them, straight in ``q`` or ``s``, is in certified regions."""
+        return self._json("POST", "/v1/planning/segment", json={"scene": scene, "space": space, **given(q=q, s=s)})
 
     def path(self, request: Document) -> Document:
         """Returns whether a path, through waypoints or along a curve, is in certified regions."""
@@ -211,9 +209,8 @@ class Client:
         Args:
             speed, acceleration: limits, one for all joints or one for each, in rad/s and rad/s² (or m); None for the service's defaults.
         """
-        limits = {"speed": speed, "acceleration": acceleration}
-        given = {name: limit for name, limit in limits.items() if limit is not None}
-        return self._json("POST", "/v1/planning/plan", json={"scene": scene, "start": start, "goal": goal, **given})
+        asked = {"scene": scene, "start": start, "goal": goal, **given(speed=speed, acceleration=acceleration)}
+        return self._json("POST", "/v1/planning/plan", json=asked)
 
     def graph(self, scene: str) -> Document:
         """Returns which regions of a scene overlap, as far as the service has compared them."""
@@ -221,7 +218,7 @@ class Client:
 
     def _all(self, name: str, **filters: str | None) -> list[Document]:
         """Returns the entries of all pages of a list."""
-        params = {key: value for key, value in filters.items() if value is not None}
+        params = given(**filters)
         found: list[Document] = []
         while True:
             page = self._json("GET", f"/v1/{name}", params=params)
@@ -237,30 +234,7 @@ class Client:
         try:
             response = self._http.request(method, path, **options)
         except httpx2.TransportError as error:
-            raise self._unreachable(error) from None
+            raise unreachable(self.url, error) from None
         if response.is_error and response.status_code not in accepted:
-            raise _problem(response)
+            raise problem(response)
         return response
-
-    def _unreachable(self, error: Exception) -> CirisError:
-        reason = re.sub(r"^\[.*?\] ", "", str(error))  # an errno, which helps nobody
-        message = f"the service at {self.url} does not answer: {reason}"
-        return CirisError("unreachable", message, hint="is `ciris up` running there?")
-
-
-def _segment(name: str) -> str:
-    """Returns a name or an id as one segment of a URL's path.
-
-    Raises:
-        CirisError: not_found for what no name can be.
-    """
-    if not name.strip(".") or "/" in name:
-        raise CirisError("not_found", f"{name!r} is no name and no id", hint="`scene ls`, `job ls` and `region ls` of ciris list them")
-    return quote(name, safe="")
-
-
-def _problem(response: httpx2.Response) -> CirisError:
-    if response.headers.get("content-type", "").startswith("application/problem+json"):
-        problem = response.json()
-        return CirisError(problem["code"], problem["detail"], field=problem["field"], hint=problem["hint"])
-    return CirisError("not_ciris", f"{response.url} answered {response.status_code}", hint="is that the address of a ciris service?")

@@ -1,0 +1,41 @@
+"""Certified collision-free regions of robot configuration space, from Python: docs/python.md.
+
+import ciris
+
+service = ciris.connect()
+region = service.grow("my-cell", q=[0, 0.3, 0, -1.8, 0, 0.9, 0], deadline=60)
+"""
+
+from certifier.errors import CirisError
+from certifier.outcome import Guarantee, Outcome
+from ciris.answers import Containment, Coverage, Event, Graph, Motion, Nearest, Plan, Segments, Verification
+from ciris.asynchronous.service import AsyncJob, AsyncRegion, AsyncService
+from ciris.connecting import connect, connect_async
+from ciris.scene import Scene
+from ciris.space import Space
+from ciris.synchronous.service import Job, Region, Service
+
+__all__ = [
+    "AsyncJob",
+    "AsyncRegion",
+    "AsyncService",
+    "CirisError",
+    "Containment",
+    "Coverage",
+    "Event",
+    "Graph",
+    "Guarantee",
+    "Job",
+    "Motion",
+    "Nearest",
+    "Outcome",
+    "Plan",
+    "Region",
+    "Scene",
+    "Segments",
+    "Service",
+    "Space",
+    "Verification",
+    "connect",
+    "connect_async",
+]

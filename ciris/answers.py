@@ -1,0 +1,379 @@
+"""These are the service's answers, as frozen data with numpy arrays. An answer that says yes is true, and every other one is false.
+
+q are joint positions in radians or metres, and s are tangent-space coordinates (:class:`ciris.space.Space`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any, TypeVar, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from certifier.outcome import Guarantee, Outcome
+from ciris.space import Array
+
+Document = dict[str, Any]
+T = TypeVar("T", covariant=True)
+SHORT = 8
+"""So many characters of an id are shown; the service knows a job or a region by them."""
+
+
+class Answers(Sequence[T]):
+    """One answer for each point or motion of a question, in order. It is true only if every one of them is."""
+
+    def __init__(self, items: Sequence[T], version: int, regions: int) -> None:
+        self._items = tuple(items)
+        self.version = version
+        """How often a region of the scene had been added or deleted. Answers with the same version are about the same regions."""
+        self.regions = regions
+        """How many regions the scene has."""
+
+    @overload
+    def __getitem__(self, index: int) -> T: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[T]: ...
+    def __getitem__(self, index: int | slice) -> T | Sequence[T]:
+        return self._items[index]
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __iter__(self) -> Iterator[T]:
+        return iter(self._items)
+
+    def __bool__(self) -> bool:
+        return all(self._items)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({sum(map(bool, self._items))} of {len(self._items)}, about {self.regions} regions)"
+
+
+@dataclass(frozen=True)
+class Hit:
+    """A region that contains a point."""
+
+    region: str
+    """Id of the region."""
+    margin: float
+    """Distance in s from the point to the nearest face."""
+    guarantee: Guarantee
+
+
+@dataclass(frozen=True)
+class Contained:
+    """Which regions contain one point. It is true if some region does."""
+
+    inside: bool
+    regions: tuple[Hit, ...]
+    """The regions that contain the point, the one with the largest margin first."""
+    margin: float | None
+    """The largest margin, in s; None where no region contains the point."""
+
+    def __bool__(self) -> bool:
+        return self.inside
+
+
+class Containment(Answers[Contained]):
+    """Which regions contain each of k points. It is true only if every point is in some region."""
+
+    @property
+    def inside(self) -> NDArray[np.bool_]:
+        """(k,) whether some region contains the point."""
+        return np.array([point.inside for point in self])
+
+    @property
+    def margin(self) -> Array:
+        """(k,) the largest distance in s to the nearest face of a region around the point; NaN outside."""
+        return np.array([np.nan if point.margin is None else point.margin for point in self])
+
+
+@dataclass(frozen=True, eq=False)
+class Near:
+    """A region near a point, and its point that is nearest."""
+
+    region: str
+    """Id of the region."""
+    guarantee: Guarantee
+    distance: float
+    """Euclidean distance in s, 0 inside."""
+    q: Array
+    """(n,) the nearest point of the region."""
+    s: Array
+    """(n,) the same point in s."""
+
+
+class Nearest(Answers[Near | None]):
+    """The region that is nearest to each of k points; None where there is none, or where a joint is outside of its limits."""
+
+    @property
+    def distance(self) -> Array:
+        """(k,) distances in s; NaN where there is no region."""
+        return np.array([np.nan if near is None else near.distance for near in self])
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A region that contains all of a motion between two times."""
+
+    begin: float
+    end: float
+    region: str
+    """Id of the region."""
+    guarantee: Guarantee
+
+
+@dataclass(frozen=True, eq=False)
+class Uncovered:
+    """Where a motion stops being covered."""
+
+    time: float
+    """The motion is covered up to here, and not proved to be from here on."""
+    segment: int
+    """Number of the segment between two waypoints, from 0 on."""
+    q: Array
+    """(n,) the configuration there: a seed for a new region is best put a little beyond."""
+    s: Array | None
+    """(n,) the same in s; None where a joint is outside of its limits."""
+    next: Near | None
+    """The nearest region that does not contain it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """Whether every point of a motion is in certified regions, which is proved. It is true if so."""
+
+    covered: bool
+    pieces: tuple[Piece, ...]
+    """The regions that cover the motion, in order, as far as it is covered from its start on."""
+    uncovered: Uncovered | None
+    """Where the motion stops being covered; None where it is covered."""
+
+    def __bool__(self) -> bool:
+        return self.covered
+
+    def __repr__(self) -> str:
+        where = "covered" if self.uncovered is None else f"not covered from {self.uncovered.time:.6g} on"
+        return f"Coverage({where}, {len(self.pieces)} pieces)"
+
+
+class Segments(Answers[Coverage]):
+    """Whether each of k motions is in certified regions. It is true only if all are."""
+
+    @property
+    def covered(self) -> NDArray[np.bool_]:
+        """(k,) whether the motion is covered."""
+        return np.array([motion.covered for motion in self])
+
+
+@dataclass(frozen=True)
+class Node:
+    """A region in the graph of a scene."""
+
+    region: str
+    """Id of the region."""
+    guarantee: Guarantee
+    component: int
+    """Number of its component; the component with the most regions is number 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """Two regions that overlap. A motion may go from one to the other through the witness q."""
+
+    a: str
+    b: str
+    depth: float
+    """Radius of the largest ball inside of both, in s."""
+    q: Array
+    s: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """The place where a component comes nearest to another. A region that is grown at q may join them."""
+
+    a: str
+    b: str
+    distance: float
+    """In s."""
+    q: Array
+    """(n,) midway between a and b."""
+    q_a: Array
+    """(n,) a's point that is nearest to b."""
+    q_b: Array
+    """(n,) b's point that is nearest to a."""
+
+
+@dataclass(frozen=True, eq=False)
+class Graph:
+    """How the regions of a scene hang together."""
+
+    version: int
+    nodes: tuple[Node, ...]
+    edges: tuple[Edge, ...]
+    components: int
+    gaps: tuple[Gap, ...]
+
+    def __repr__(self) -> str:
+        return f"Graph({len(self.nodes)} regions, {len(self.edges)} overlaps, {self.components} components)"
+
+
+@dataclass(frozen=True, eq=False)
+class PlanGap:
+    """The place where the regions that hang together with the start of a plan come nearest to those of its goal."""
+
+    start: str
+    """Id of a region that hangs together with the start."""
+    goal: str
+    distance: float
+    """Between the two, in s."""
+    q: Array
+    """(n,) midway between the two: a seed to try."""
+    q_start: Array
+    """(n,) the point of the region ``start`` that is nearest to the other."""
+    q_goal: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A trajectory from rest to rest, or why there is none. It is true if there is one.
+
+    A trajectory is straight in q between its configurations, and every point of it is proved to be in certified regions.
+    """
+
+    found: bool
+    q: Array
+    """(k, n) configurations; without a row where there is no trajectory."""
+    t: Array
+    """(k,) seconds, when the robot is there."""
+    pieces: tuple[Piece, ...]
+    """The regions that contain the trajectory, in order, with begin and end in seconds."""
+    length: float | None
+    """In q, in radians (and metres)."""
+    duration: float | None
+    """In seconds."""
+    guarantee: Guarantee | None
+    complete: bool
+    """Whether every pair of regions has been compared."""
+    reason: str | None
+    """Why there is no trajectory: start_uncovered, goal_uncovered, disconnected or not_proved."""
+    nearest: Near | None
+    """The region that is nearest to the end that no region contains."""
+    gap: PlanGap | None
+    """Where the regions of the two ends come nearest to each other."""
+    uncovered: Uncovered | None
+    """Where the last trajectory that was tried is not proved to be covered."""
+
+    def __bool__(self) -> bool:
+        return self.found
+
+    def __repr__(self) -> str:
+        if not self.found:
+            return f"Plan({self.reason})"
+        return f"Plan({len(self.q)} configurations, {self.length:.4g} long, {self.duration:.4g} s, {len(self.pieces)} pieces)"
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A place on a motion."""
+
+    piece: int
+    """The piece from waypoint ``piece`` to the next one, from 0 on."""
+    time: float
+    """Which part of the piece is behind, from 0 to 1."""
+    q: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Contact(Place):
+    """Where a motion first could not be certified."""
+
+    a: str
+    b: str
+    distance: float
+    """How far the padded bodies are apart there, in metres; 0 where they overlap."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What has become of a motion. It is true if all of it is certified, that is, proved to be free of collision."""
+
+    outcome: Outcome
+    guarantee: Guarantee
+    margin: float | None
+    """A lower bound of all padded distances as far as it is certified, in metres."""
+    tube: float | None
+    """Joint positions that are off by this much, in radians or metres, are certified as well."""
+    certified_to: Place | None
+    """Up to where every pair is proved to be apart; None where nothing is proved."""
+    stop: Contact | None
+    """The first contact, or where bodies come too close; None for a motion that is certified."""
+    seconds: float
+    proof: bytes | None = field(repr=False)
+    """The proof file; None where it was not asked for."""
+
+    def __bool__(self) -> bool:
+        return self.outcome is Outcome.CERTIFIED
+
+    def __repr__(self) -> str:
+        where = "" if self.stop is None else f": {self.stop.a} and {self.stop.b}"
+        return f"Motion({self.outcome.value}{where})"
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Whether a region's stored proof holds, and what it proves. It is true if the proof holds."""
+
+    holds: bool
+    statement: tuple[str, ...]
+    """What was proved, in plain words, line by line."""
+    guarantee: Guarantee
+    error: Document | None
+    """Why the proof does not hold: code, message, field, hint; None when it holds."""
+    seconds: float
+
+    def __bool__(self) -> bool:
+        return self.holds
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened to a job."""
+
+    seq: int
+    kind: str
+    """One of job, iteration, pairs, step, region, lost."""
+    data: Document
+    created_at: datetime | None = None
+
+
+@dataclass(frozen=True)
+class QVolume:
+    """How large a region is in joint positions."""
+
+    value: float
+    stderr: float
+    """Standard error of ``value``, which is found by sampling."""
+    unit: str
+    """Such as ``rad^7``."""
+    box_side: float | None
+    """Degrees: a box with this side in every joint has this volume; None where a joint slides."""
+
+    def __float__(self) -> float:
+        return self.value
+
+
+@dataclass(frozen=True)
+class Share:
+    """How much of the proposal that a region was grown from the region keeps, by volume in q."""
+
+    value: float | None
+    """Part of the proposal's collision-free configurations that the region contains; None where no sample is free."""
+    stderr: float | None
+    collision_free: float
+    """Part of the proposal's samples that is free of collision."""
+    samples: int

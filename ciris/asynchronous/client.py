@@ -1,0 +1,240 @@
+"""This client speaks to the service over HTTP. It returns the API's documents as dicts.
+
+It raises the API's problems as CirisError. The module of this name in ``ciris.synchronous`` is made from this one.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import httpx2
+
+from ciris.answers import Document
+from ciris.problems import problem, segment, unreachable
+from ciris.requests import bundle, given
+
+Rows = list[list[float]]
+Limit = float | list[float]
+
+TIMEOUT_S = 120.0
+QUIET_S = 60.0
+"""When a stream says nothing for this many seconds, not even a ping, the client opens it again."""
+
+PATIENCE = 5
+"""The client repeats a request at most this often when the service answers that it was asked too often."""
+
+
+class _Patient(httpx2.AsyncHTTPTransport):
+    """Waits as long as the service demands when it was asked too often, then repeats the request, a few times."""
+
+    async def handle_async_request(self, request: httpx2.Request) -> httpx2.Response:
+        for _ in range(PATIENCE):
+            response = await super().handle_async_request(request)
+            wait = response.headers.get("retry-after", "")
+            if response.status_code != httpx2.codes.TOO_MANY_REQUESTS or not wait.isdigit():
+                return response
+            await response.aclose()
+            await asyncio.sleep(int(wait))
+        return await super().handle_async_request(request)
+
+
+class AsyncClient:
+    """A client is a connection to the service at ``url``. Every method may raise CirisError: what the service said, or ``unreachable``.
+
+    Args:
+        key: an API key, for a service that asks for one.
+    """
+
+    def __init__(self, url: str, key: str | None = None) -> None:
+        self.url = url.rstrip("/")
+        headers = {} if key is None else {"Authorization": f"Bearer {key}"}
+        transport = _Patient(trust_env=False)
+        self._http = httpx2.AsyncClient(base_url=self.url, headers=headers, timeout=TIMEOUT_S, trust_env=False, transport=transport)
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+        await self.aclose()
+
+    async def aclose(self) -> None:
+        """Closes the connections."""
+        await self._http.aclose()
+
+    async def ready(self) -> Document:
+        """Returns whether the service can do its work: ``ready`` and ``checks``."""
+        return (await self._send("GET", "/readyz", accepted=(503,))).json()
+
+    async def add_scene(self, path: str | Path) -> Document:
+        """Uploads a scene file with everything it refers to, and returns the scene."""
+        return await self._json("POST", "/v1/scenes", files={"bundle": ("scene.zip", bundle(path), "application/zip")})
+
+    async def scenes(self) -> list[Document]:
+        """Returns every scene, newest first."""
+        return await self._all("scenes")
+
+    async def scene(self, name: str) -> Document:
+        """Returns a scene by its id or name."""
+        return await self._json("GET", f"/v1/scenes/{segment(name)}")
+
+    async def lint(self, name: str) -> Document:
+        """Returns a scene's warnings, substitutions and ignored pairs."""
+        return await self._json("GET", f"/v1/scenes/{segment(name)}/lint")
+
+    async def scene_pairs(self, name: str) -> list[Document]:
+        """Returns a scene's pairs with the forecast of their cost."""
+        return (await self._json("GET", f"/v1/scenes/{segment(name)}/pairs"))["pairs"]
+
+    async def create_job(self, request: Document, idempotency_key: str | None = None) -> tuple[Document, bool]:
+        """Creates a job. Returns the job and True, or the job made earlier under the same key and False."""
+        headers = given(**{"Idempotency-Key": idempotency_key})
+        response = await self._send("POST", "/v1/jobs", json=request, headers=headers)
+        return response.json(), response.status_code == httpx2.codes.CREATED
+
+    async def jobs(self, *, state: str | None = None, scene: str | None = None, most: int = 50) -> list[Document]:
+        """Returns the newest jobs, at most so many, in one state or of one scene where that is given."""
+        wanted = given(state=state, scene=scene)
+        found: list[Document] = []
+        after = None
+        while len(found) < most:
+            params = {**wanted, "limit": min(most - len(found), 200), **given(after=after)}
+            page = await self._json("GET", "/v1/jobs", params=params)
+            found += page["jobs"]
+            after = page["next"]
+            if after is None:
+                break
+        return found
+
+    async def job(self, job_id: str) -> Document:
+        """Returns a job as it is now; the first characters of its id are enough."""
+        return await self._json("GET", f"/v1/jobs/{segment(job_id)}")
+
+    async def cancel(self, job_id: str) -> Document:
+        """Asks a job to end, and returns it."""
+        return await self._json("POST", f"/v1/jobs/{segment(job_id)}/cancel")
+
+    async def retry(self, job_id: str) -> Document:
+        """Creates a new job like one that failed or was cancelled, and returns it."""
+        return await self._json("POST", f"/v1/jobs/{segment(job_id)}/retry")
+
+    async def job_pairs(self, job_id: str, iteration: int | None = None) -> Document:
+        """Returns a job's pair matrix, of all iterations or of one."""
+        return await self._json("GET", f"/v1/jobs/{segment(job_id)}/pairs", params=given(iteration=iteration))
+
+    async def events(self, job_id: str, after: int = 0) -> AsyncIterator[Document]:
+        """Yields the job's events in order until the job has ended. An interrupted stream goes on where it stopped."""
+        while True:
+            try:
+                async for event in self._stream(job_id, after):
+                    if event is None:
+                        return
+                    after = event["seq"]
+                    yield event
+            except (httpx2.ReadTimeout, httpx2.RemoteProtocolError, httpx2.ReadError):
+                await self.job(job_id)
+
+    async def _stream(self, job_id: str, after: int) -> AsyncIterator[Document | None]:
+        """Yields the events of one connection, and None when the job has ended."""
+        url, timeout = f"/v1/jobs/{segment(job_id)}/events/stream", httpx2.Timeout(TIMEOUT_S, read=QUIET_S)
+        try:
+            async with self._http.stream("GET", url, headers={"Last-Event-ID": str(after)}, timeout=timeout) as response:
+                if response.is_error:
+                    await response.aread()
+                    raise problem(response)
+                kind = ""
+                async for line in response.aiter_lines():
+                    name, _, value = line.partition(": ")
+                    if name == "event":
+                        kind = value
+                    elif name == "data":
+                        yield None if kind == "end" else json.loads(value)
+        except httpx2.ConnectError as error:
+            raise unreachable(self.url, error) from None
+
+    async def regions(self, *, scene: str | None = None, job: str | None = None) -> list[Document]:
+        """Returns every region, newest first, or those of one scene or job."""
+        return await self._all("regions", scene=scene, job=job)
+
+    async def region(self, region_id: str) -> Document:
+        """Returns a region with its manifest."""
+        return await self._json("GET", f"/v1/regions/{segment(region_id)}")
+
+    async def proof(self, region_id: str) -> bytes:
+        """Returns a region's proof file."""
+        return (await self._send("GET", f"/v1/regions/{segment(region_id)}/proof")).content
+
+    async def verify(self, region_id: str) -> Document:
+        """Makes the service check a region's stored proof again. Returns whether it holds, and what it proves."""
+        return await self._json("POST", f"/v1/regions/{segment(region_id)}/verify")
+
+    async def pair_proof(self, job_id: str, iteration: int, pair: int) -> bytes:
+        """Returns the proof of a pair's outcome in one iteration of a job, together with the scene."""
+        return (await self._send("GET", f"/v1/jobs/{segment(job_id)}/pairs/{pair}/proof", params={"iteration": iteration})).content
+
+    async def export(self, region_id: str, format: str, name: str | None = None) -> bytes:
+        """Returns a region as the bytes of a ``json``, ``npz`` or ``drake-yaml`` file, in which it has this name, or else its id."""
+        params = {"format": format, **given(name=name)}
+        return (await self._send("GET", f"/v1/regions/{segment(region_id)}/export", params=params)).content
+
+    async def contains(self, scene: str, q: Rows | None = None, s: Rows | None = None) -> Document:
+        """Returns which regions of a scene contain each of these points."""
+        return await self._json("POST", "/v1/planning/contains", json={"scene": scene, **given(q=q, s=s)})
+
+    async def certify_path(self, request: Document) -> Document:
+        """Returns what becomes of a motion, and the proof in base 64 if the request asks for it."""
+        return await self._json("POST", "/v1/planning/certify-path", json=request)
+
+    async def nearest(self, scene: str, q: Rows | None = None, s: Rows | None = None) -> Document:
+        """Returns the region of a scene that is nearest to each of these points, with its nearest point and distance."""
+        return await self._json("POST", "/v1/planning/nearest", json={"scene": scene, **given(q=q, s=s)})
+
+    async def segments(self, scene: str, q: list[Rows] | None = None, space: str = "q", s: list[Rows] | None = None) -> Document:
+        """Returns for each pair of points whether the motion between them, straight in ``q`` or ``s``, is in certified regions."""
+        return await self._json("POST", "/v1/planning/segment", json={"scene": scene, "space": space, **given(q=q, s=s)})
+
+    async def path(self, request: Document) -> Document:
+        """Returns whether a path, through waypoints or along a curve, is in certified regions."""
+        return await self._json("POST", "/v1/planning/path", json=request)
+
+    async def plan(
+        self, scene: str, start: list[float] | str, goal: list[float] | str, speed: Limit | None = None, acceleration: Limit | None = None
+    ) -> Document:
+        """Returns a trajectory through certified regions from one configuration, or any of a region with this id, to another; or why not.
+
+        Args:
+            speed, acceleration: limits, one for all joints or one for each, in rad/s and rad/s² (or m); None for the service's defaults.
+        """
+        asked = {"scene": scene, "start": start, "goal": goal, **given(speed=speed, acceleration=acceleration)}
+        return await self._json("POST", "/v1/planning/plan", json=asked)
+
+    async def graph(self, scene: str) -> Document:
+        """Returns which regions of a scene overlap, as far as the service has compared them."""
+        return await self._json("GET", "/v1/planning/graph", params={"scene": scene})
+
+    async def _all(self, name: str, **filters: str | None) -> list[Document]:
+        """Returns the entries of all pages of a list."""
+        params = given(**filters)
+        found: list[Document] = []
+        while True:
+            page = await self._json("GET", f"/v1/{name}", params=params)
+            found += page[name]
+            if page["next"] is None:
+                return found
+            params["after"] = page["next"]
+
+    async def _json(self, method: str, path: str, **options: Any) -> Any:
+        return (await self._send(method, path, **options)).json()
+
+    async def _send(self, method: str, path: str, accepted: tuple[int, ...] = (), **options: Any) -> httpx2.Response:
+        try:
+            response = await self._http.request(method, path, **options)
+        except httpx2.TransportError as error:
+            raise unreachable(self.url, error) from None
+        if response.is_error and response.status_code not in accepted:
+            raise problem(response)
+        return response

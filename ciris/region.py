@@ -1,0 +1,99 @@
+"""A certified region as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from certifier.outcome import Guarantee
+from ciris.answers import SHORT, Document, QVolume, Share
+from ciris.reading import read
+from ciris.space import Array, Space
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RegionData:
+    """A polytope {s : C s <= d} in which the robot collides nowhere, which is proved. It has n joints and m faces."""
+
+    id: str
+    scene: str
+    """Id of the scene."""
+    scene_name: str
+    job: str
+    """Id of the job that made the region."""
+    guarantee: Guarantee
+    C: Array
+    """(m, n) in s, one row a face, the joint limits among them."""
+    d: Array
+    """(m,)"""
+    center: Array
+    """(n,) a point inside, in s."""
+    space: Space
+    """What the coordinates s mean."""
+    q_volume: QVolume | None
+    """How large the region is in joint positions."""
+    share: Share | None
+    """How much of the proposal it keeps; None for a region that was not grown."""
+    created_at: datetime
+    manifest: Document
+    """Everything else that is known of it: docs/architecture.md, "Manifest"."""
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the n joints, in the order of q."""
+        return self.space.joints
+
+    @property
+    def q_star(self) -> Array:
+        """(n,) the joint positions at which s is 0."""
+        return self.space.q_star
+
+    def to_s(self, q: ArrayLike) -> Array:
+        """Returns the tangent-space coordinates of joint positions, (..., n) -> (..., n)."""
+        return self.space.to_s(q)
+
+    def to_q(self, s: ArrayLike) -> Array:
+        """Returns the joint positions of tangent-space coordinates, (..., n) -> (..., n)."""
+        return self.space.to_q(s)
+
+    def contains(self, q: ArrayLike) -> NDArray[np.bool_]:
+        """Returns whether the region contains joint positions, (..., n) -> (...), as far as floating point can tell.
+
+        Positions are taken literally: one that is a turn away is outside of the limits, and so of the region.
+
+        Raises:
+            RegionError: wrong_length.
+        """
+        positions = self.space.points(q, "q")
+        within = ((self.space.q_lower <= positions) & (positions <= self.space.q_upper)).all(axis=-1)
+        return np.asarray(within & (self.to_s(positions) @ self.C.T <= self.d).all(axis=-1))
+
+    def __repr__(self) -> str:
+        size = f", {self.q_volume.value:.3g} {self.q_volume.unit}" if self.q_volume else ""
+        return f"Region({self.id[:SHORT]} of {self.scene_name}: {len(self.joints)} joints, {len(self.d)} faces{size}, {self.guarantee})"
+
+
+def region_fields(document: Document) -> dict[str, Any]:
+    """Returns the fields of a region that ``GET /v1/regions/{region}`` describes."""
+    manifest = document["manifest"]
+    given = manifest["space"]
+    q_star, lower, upper = (np.array(given[name], dtype=float) for name in ("q_star", "q_lower", "q_upper"))
+    return {
+        "id": document["id"],
+        "scene": document["scene"],
+        "scene_name": manifest["scene"]["name"],
+        "job": document["job"],
+        "guarantee": Guarantee(document["guarantee"]),
+        "C": np.array(manifest["halfspace_normals"], dtype=float),
+        "d": np.array(manifest["halfspace_offsets"], dtype=float),
+        "center": np.array(manifest["interior_point"], dtype=float),
+        "space": Space(tuple(given["joints"]), q_star, lower, upper, np.array(given["revolute"], dtype=bool)),
+        "q_volume": document["q_volume"] and read(QVolume, document["q_volume"]),
+        "share": document["share"] and read(Share, document["share"]),
+        "created_at": datetime.fromisoformat(document["created_at"]),
+        "manifest": manifest,
+    }

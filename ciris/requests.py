@@ -1,0 +1,94 @@
+"""These functions make of what an engineer has, such as arrays, what the service takes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from certifier.errors import RegionError
+from ciris.answers import Document
+
+Straight = Literal["q", "s"]
+
+
+class GrowOptions(TypedDict, total=False):
+    """What may be said of how a region grows. What is left out has the service's default."""
+
+    contain: ArrayLike
+    """(n,) or (k, n), more configurations that the region must contain, such as where it meets another region."""
+    method: Literal["iris_np2", "iris_zo", "limits", "box"]
+    """How the first polytope is found: by Drake's IRIS, from the joint limits, or as a box around q."""
+    deadline: float
+    """Seconds after which the job ends, with the best region by then."""
+    contraction: Literal["whole", "targeted", "uniform"]
+    """``whole`` keeps the first polytope and certifies it cell by cell; the others shrink it until every pair has one plane."""
+    cells: int
+    """For ``whole``: what is open after so many cells of a pair, in a stage, is cut off."""
+    pushes: int
+    """How often the faces are pushed out after the contractions."""
+    max_rounds: int
+    """Most rounds of the polytope step."""
+    random_seed: int
+    """Seed of every random choice."""
+    priority: int
+    """From -3 to 3; each step up doubles the job's share of the work."""
+
+
+_IN_OPTIONS = ("contraction", "cells", "pushes", "max_rounds", "random_seed")
+
+
+def grow_request(scene: str, q: ArrayLike, options: GrowOptions) -> Document:
+    """Returns the request of a job that grows a region around q, (n,)."""
+    given = dict(options)
+    seed: Document = {"q": np.asarray(q, dtype=float).tolist()}
+    if "contain" in options:
+        seed["contain"] = np.atleast_2d(np.asarray(options["contain"], dtype=float)).tolist()
+    if "method" in given:
+        seed["method"] = given["method"]
+    request = {"kind": "grow", "scene": scene, "seed": seed, "options": {name: given[name] for name in _IN_OPTIONS if name in given}}
+    names = (("deadline", "deadline_seconds"), ("priority", "priority"))
+    return request | {field: given[name] for name, field in names if name in given}
+
+
+def given(**values: Any) -> Document:
+    """Returns the values that are not None, by name."""
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def plain(value: ArrayLike | str | None) -> Any:
+    """Returns an array, or what numpy makes one of, as nested lists; a text, such as an id, and None as they are."""
+    return value if value is None or isinstance(value, str) else np.asarray(value, dtype=float).tolist()
+
+
+def straight(space: Straight | None, s: ArrayLike | None) -> str:
+    """Returns in which coordinates a motion is straight: in those that it is given in, unless ``space`` says otherwise."""
+    return space or ("q" if s is None else "s")
+
+
+def points(axes: int, **values: ArrayLike | None) -> Document:
+    """Returns points as nested lists of so many axes, by the name under which they were given; the first axis may be missing.
+
+    Raises:
+        RegionError: points.
+    """
+    found = {name: np.asarray(value, dtype=float) for name, value in values.items() if value is not None}
+    if len(found) != 1:
+        raise RegionError("points", "the points must be given either as q or as s", field="q")
+    ((name, array),) = found.items()
+    if array.ndim not in (axes - 1, axes) or not np.isfinite(array).all():
+        raise RegionError("points", f"it must be finite numbers in {axes - 1} or {axes} axes, joints last", field=name)
+    return {name: (array if array.ndim == axes else array[None]).tolist()}
+
+
+def bundle(path: str | Path) -> bytes:
+    """Packs a scene file. What it takes, PyYAML and python-flint, is loaded here, so that asking needs neither.
+
+    Raises:
+        SceneError: as :func:`certifier.scene.bundle.pack_bundle`.
+    """
+    from certifier.scene.bundle import pack_bundle
+
+    return pack_bundle(path)

@@ -1,0 +1,58 @@
+"""A space says what the coordinates s of a scene or a region mean: which joints there are, and q*."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from certifier.errors import RegionError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """The joints of a scene, in position order, and the tangent-space coordinates s about q*."""
+
+    joints: tuple[str, ...]
+    """Names of the n joints that have a position."""
+    q_star: Array
+    """(n,) the joint positions at which s is 0, in radians or metres."""
+    q_lower: Array
+    """(n,) lower limits, in radians or metres; for a joint that turns without end, the begin of the window that the scene covers."""
+    q_upper: Array
+    """(n,) upper limits."""
+    revolute: NDArray[np.bool_]
+    """(n,) True where s = tan((q - q*) / 2), False where s = q - q*."""
+
+    def to_s(self, q: ArrayLike) -> Array:
+        """Returns the tangent-space coordinates of joint positions, (..., n) -> (..., n).
+
+        Raises:
+            RegionError: wrong_length.
+        """
+        delta = self.points(q, "q") - self.q_star
+        return np.where(self.revolute, np.tan(delta / 2), delta)
+
+    def to_q(self, s: ArrayLike) -> Array:
+        """Returns the joint positions of tangent-space coordinates, (..., n) -> (..., n).
+
+        Raises:
+            RegionError: wrong_length.
+        """
+        given = self.points(s, "s")
+        return self.q_star + np.where(self.revolute, 2 * np.arctan(given), given)
+
+    def points(self, values: ArrayLike, field: str) -> Array:
+        """Returns points as an array, (..., n).
+
+        Raises:
+            RegionError: wrong_length.
+        """
+        array, n = np.asarray(values, dtype=float), len(self.joints)
+        if array.shape[-1:] != (n,):
+            message = f"it has the shape {array.shape}, and the last number must be {n}, one for each joint"
+            raise RegionError("wrong_length", message, field=field, hint=f"in the order {', '.join(self.joints)}")
+        return array

@@ -1,0 +1,1 @@
+"""This package waits for the service without blocking: every method is a coroutine."""

@@ -1,0 +1,269 @@
+"""What engineers import: the service, its jobs and its regions. It is made from the one in ``ciris.asynchronous``."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Literal, Self, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ciris.answers import Contained, Containment, Coverage, Document, Event, Graph, Motion, Near, Nearest, Plan, Segments, Verification
+from ciris.job import JobData, why_no_region
+from ciris.reading import read
+from ciris.region import RegionData, region_fields
+from ciris.requests import GrowOptions, Straight, given, grow_request, plain, points, straight
+from ciris.scene import Scene, scene_name
+from ciris.synchronous.client import Client
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Region(RegionData):
+    """A certified region of the service."""
+
+    _client: Client = field(kw_only=True)
+
+    def proof(self) -> bytes:
+        """Returns the proof file, which ``ciris verify`` checks on any machine."""
+        return self._client.proof(self.id)
+
+    def verify(self) -> Verification:
+        """Makes the service check the stored proof again."""
+        return read(Verification, self._client.verify(self.id))
+
+    def export(self, format: Literal["json", "npz", "drake-yaml"], name: str | None = None) -> bytes:
+        """Returns the region as the bytes of a file, in which it has this name, or else its id."""
+        return self._client.export(self.id, format, name)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Job(JobData):
+    """A job of the service. It stays as it was; :meth:`refresh` and :meth:`wait` return it as it is later."""
+
+    _service: Service = field(kw_only=True)
+
+    def refresh(self) -> Job:
+        """Returns the job as it is now."""
+        return self._service.job(self.id)
+
+    def follow(self) -> Iterator[Event]:
+        """Yields what happens, from the job's first event on, until the job has ended."""
+        for event in self._service.client.events(self.id):
+            yield read(Event, event)
+
+    def wait(self) -> Job:
+        """Waits until the job has ended, and returns it."""
+        for _ in self.follow():
+            pass
+        return self.refresh()
+
+    def result(self) -> Region:
+        """Waits until the job has ended, and returns its last certified region.
+
+        Raises:
+            CirisError: why there is none.
+        """
+        document = self._service.client.job(self.wait().id)
+        if document["region"] is None:
+            raise why_no_region(document)
+        return self._service.region(document["region"])
+
+    def cancel(self) -> Job:
+        """Asks the job to end; regions that it has certified remain."""
+        self._service.client.cancel(self.id)
+        return self.refresh()
+
+    def retry(self) -> Job:
+        """Creates a new job like this one, which failed or was cancelled, and returns it."""
+        return self._service.job((self._service.client.retry(self.id))["id"])
+
+
+class Service:
+    """The ciris service. :func:`ciris.connect` finds it.
+
+    A scene is named by its name, its id or a :class:`ciris.Scene`. Joint positions q are (n,) or, where several may be asked about, (k, n).
+    Every method may raise CirisError: what the service said, with the field that is meant, or ``unreachable``.
+
+    Attributes:
+        client: the same service, with its answers as the API's documents.
+    """
+
+    def __init__(self, client: Client) -> None:
+        self.client = client
+        self._known: dict[str, Region] = {}
+
+    def __repr__(self) -> str:
+        return f"Service({self.client.url!r})"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes the connections."""
+        self.client.close()
+
+    def add_scene(self, path: str | Path) -> Scene:
+        """Uploads a scene file with everything it refers to. It needs PyYAML and python-flint, which ``ciris[client]`` installs."""
+        return self.scene((self.client.add_scene(path))["id"])
+
+    def scenes(self) -> list[Scene]:
+        """Returns every scene, newest first."""
+        return [self.scene(document["id"]) for document in self.client.scenes()]
+
+    def scene(self, name: str) -> Scene:
+        """Returns a scene by its name or id."""
+        return Scene.of(self.client.scene(name))
+
+    def warnings(self, scene: str | Scene) -> list[str]:
+        """Returns what to know about a scene before trusting a certificate for it, in sentences."""
+        found: list[str] = (self.client.lint(scene_name(scene)))["warnings"]
+        return found
+
+    def grow(self, scene: str | Scene, q: ArrayLike, **options: Unpack[GrowOptions]) -> Region:
+        """Grows a certified region around q, (n,), and waits for it. The job goes on if the wait is interrupted.
+
+        Raises:
+            CirisError: why there is no region, such as ``seed_in_collision``.
+        """
+        job = self.submit_grow(scene, q, **options)
+        return job.result()
+
+    def submit_grow(self, scene: str | Scene, q: ArrayLike, **options: Unpack[GrowOptions]) -> Job:
+        """Creates a job that grows a certified region around q, (n,), and returns it at once."""
+        return self._job((self.client.create_job(grow_request(scene_name(scene), q, options)))[0])
+
+    def submit_certify(self, scene: str | Scene, C: ArrayLike, d: ArrayLike, cells: int = 1) -> Job:
+        """Creates a job that certifies the polytope {s : C s <= d} within the joint limits, C (m, n), d (m,), and returns it at once.
+
+        Args:
+            cells: so many cells of the polytope are looked at for each pair, each with a plane of its own.
+        """
+        polytope = {"C": np.asarray(C, dtype=float).tolist(), "d": np.asarray(d, dtype=float).tolist()}
+        request = {"kind": "certify", "scene": scene_name(scene), "polytope": polytope, "cells": cells}
+        return self._job((self.client.create_job(request))[0])
+
+    def job(self, job_id: str) -> Job:
+        """Returns a job as it is now; the first characters of its id are enough."""
+        return self._job(self.client.job(job_id))
+
+    def jobs(self, scene: str | Scene | None = None, *, state: str | None = None, most: int = 50) -> list[Job]:
+        """Returns the newest jobs, at most so many, of one scene or in one state where that is given."""
+        named = None if scene is None else scene_name(scene)
+        return [self._job(document) for document in self.client.jobs(scene=named, state=state, most=most)]
+
+    def regions(self, scene: str | Scene | None = None) -> list[Region]:
+        """Returns every region of a scene, or of all scenes, newest first. Regions that were fetched before are not fetched again."""
+        named = None if scene is None else scene_name(scene)
+        listed = [document["id"] for document in self.client.regions(scene=named)]
+        return [self._known[name] if name in self._known else self.region(name) for name in listed]
+
+    def region(self, region_id: str) -> Region:
+        """Returns a region; the first characters of its id are enough."""
+        region = Region(**region_fields(self.client.region(region_id)), _client=self.client)
+        self._known[region.id] = region
+        return region
+
+    def contains(self, scene: str | Scene, q: ArrayLike | None = None, *, s: ArrayLike | None = None) -> Containment:
+        """Returns which regions of a scene contain each point, given as q or as s, (n,) or (k, n)."""
+        answer = self.client.contains(scene_name(scene), **points(2, q=q, s=s))
+        return Containment([read(Contained, point) for point in answer["points"]], answer["version"], answer["regions"])
+
+    def nearest(self, scene: str | Scene, q: ArrayLike | None = None, *, s: ArrayLike | None = None) -> Nearest:
+        """Returns the region of a scene that is nearest to each point, given as q or as s, (n,) or (k, n)."""
+        answer = self.client.nearest(scene_name(scene), **points(2, q=q, s=s))
+        found = [point["nearest"] and read(Near, point["nearest"]) for point in answer["points"]]
+        return Nearest(found, answer["version"], answer["regions"])
+
+    def segments(
+        self, scene: str | Scene, q: ArrayLike | None = None, *, s: ArrayLike | None = None, space: Straight | None = None
+    ) -> Segments:
+        """Returns whether each motion from one point to another is in certified regions: the edges of a roadmap, asked about together.
+
+        Args:
+            q: (2, n) or (k, 2, n), begin and end of each motion, or else ``s``.
+            space: in which the motion is straight; default: in which it is given.
+        """
+        answer = self.client.segments(scene_name(scene), **points(3, q=q, s=s), space=straight(space, s))
+        return Segments([read(Coverage, motion) for motion in answer["segments"]], answer["version"], answer["regions"])
+
+    def path(
+        self,
+        scene: str | Scene,
+        q: ArrayLike | None = None,
+        *,
+        s: ArrayLike | None = None,
+        space: Straight | None = None,
+        times: Sequence[float] | None = None,
+    ) -> Coverage:
+        """Returns whether every point of a path is in certified regions, which is proved, and in which.
+
+        Args:
+            q: (k, n), the waypoints, or else ``s``.
+            space: in which the path is straight between them; default: in which they are given.
+            times: (k,) when the path is at each waypoint; the answer is in these. Default: 0, 1, 2 ...
+        """
+        when = None if times is None else np.asarray(times, dtype=float).tolist()
+        asked = {"scene": scene_name(scene), **points(2, q=q, s=s), "space": straight(space, s), **given(times=when)}
+        return read(Coverage, self.client.path(asked))
+
+    def plan(
+        self,
+        scene: str | Scene,
+        start: ArrayLike | str,
+        goal: ArrayLike | str,
+        *,
+        speed: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+    ) -> Plan:
+        """Plans a trajectory through certified regions, from rest to rest, or says why there is none.
+
+        Args:
+            start, goal: joint positions (n,), or the id of a region, for any point of it.
+            speed, acceleration: limits in rad/s and rad/s² (or m), one for all joints or one for each; default: those of the service.
+        """
+        begin, end, fastest, hardest = map(plain, (start, goal, speed, acceleration))
+        while True:
+            answer = self.client.plan(scene_name(scene), begin, end, fastest, hardest)
+            if answer["complete"] or answer["reason"] != "disconnected":
+                return read(Plan, answer)
+
+    def certify_path(
+        self,
+        scene: str | Scene,
+        q: ArrayLike | None = None,
+        *,
+        s: ArrayLike | None = None,
+        space: Straight | None = None,
+        tube: bool = False,
+        prove: bool = False,
+    ) -> Motion:
+        """Certifies a motion itself, without any region, or finds its first contact.
+
+        Args:
+            q: (k, n), the waypoints, or else ``s``.
+            space: in which the motion is straight between them; default: in which they are given.
+            tube: whether to look for the largest certified tube about the motion.
+            prove: whether to return the proof file as well.
+        """
+        asked = {"scene": scene_name(scene), **points(2, q=q, s=s), **given(space=space), "tube": tube, "prove": prove}
+        document = self.client.certify_path(asked)
+        proof = document["proof"] and base64.b64decode(document["proof"])
+        return read(Motion, {**document, "proof": proof})
+
+    def graph(self, scene: str | Scene) -> Graph:
+        """Returns which regions of a scene overlap, once the service has compared them all."""
+        while True:
+            answer = self.client.graph(scene_name(scene))
+            if answer["complete"]:
+                return read(Graph, answer)
+
+    def _job(self, document: Document) -> Job:
+        fields = read(JobData, {**document, "region_id": document["region"]})
+        return Job(**vars(fields), _service=self)
