@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
 
+from api.schemas.covers import CoverRequestOptions
 from api.schemas.jobs import PolytopeBody, Seed, WebhookRequest
 from certifier.carry.robot import same_bodies
 from certifier.errors import CirisError, RegionError
@@ -15,6 +17,7 @@ from certifier.model import Array, Scene
 from certifier.seeding.limits import check_limits
 from certifier.seeding.options import SeedOptions
 from db.settings import settings
+from planner.cover.options import MOST_JOINTS, CoverOptions
 from planner.membership import to_s
 from workers.addresses import is_public
 
@@ -35,6 +38,21 @@ def seed(scene: Scene, body: Seed) -> SeedOptions:
         _length(scene, options.q, "seed.q", "seed_wrong_length")
         check_limits(scene, options.q, "seed.q")
     return options
+
+
+def cover(scene: Scene, body: CoverRequestOptions) -> CoverOptions:
+    """Returns the options of a cover. It refuses configurations of the wrong length, or outside the joint limits.
+
+    Raises:
+        RegionError: seed_wrong_length, seed_outside_limits, seed_outside_window, or as CoverOptions.from_document; the field says where.
+    """
+    given = {f"options.{name}[{i}]": q for name in ("seeds", "connect") for i, q in enumerate(getattr(body, name))}
+    given |= {f"options.paths[{i}][{j}]": q for i, path in enumerate(body.paths) for j, q in enumerate(path)}
+    for field, q in given.items():
+        _length(scene, q, field, "seed_wrong_length")
+        check_limits(scene, q, field)
+    options = CoverOptions.from_document(body.model_dump())
+    return options if options.stages is not None or scene.n <= MOST_JOINTS else replace(options, stages=1)
 
 
 def polytope(scene: Scene, body: PolytopeBody) -> None:

@@ -11,7 +11,7 @@ from db import overlaps
 from db.overlaps import Overlap
 from db.session import Database
 from planner.library import Library
-from planner.overlap import beside, components, gap, overlap
+from planner.overlap import compare, components, gap
 
 COMPARE_SECONDS = 5.0
 """One request compares regions for about so long."""
@@ -57,23 +57,14 @@ def _compare(db: Database, scene_id: str, library: Library, until: float) -> boo
     with db.read() as session:
         known = overlaps.numbers(session, scene_id)
     rows = [(row, *known[region_id]) for row, region_id in enumerate(library.ids) if region_id in known]
-    for row, number, linked in rows:
-        if linked >= number - 1:
-            continue
-        found, reached = [], number - 1
-        number_of = {other: its for other, its, _ in rows if linked < its < number}
-        for other in beside(library, row, list(number_of)):
-            if time.monotonic() > until:
-                reached = number_of[other] - 1
-                break
-            common = overlap(library, other, row)
-            if common is not None:
-                found.append(Overlap(library.ids[other], library.ids[row], common.depth, common.witness.tolist()))
+    complete = True
+    for compared in compare(library, rows, until):
+        later = library.ids[compared.row]
+        found = [Overlap(library.ids[other], later, common.depth, common.witness.tolist()) for other, common in compared.found]
         with db.write() as session:
-            overlaps.save(session, scene_id, library.ids[row], reached, found)
-        if reached < number - 1:
-            return False
-    return True
+            overlaps.save(session, scene_id, later, compared.reached, found)
+        complete = compared.complete
+    return complete
 
 
 def _gaps(library: Library, scene: Scene, parts: list[list[int]]) -> list[Gap]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from dataclasses import dataclass, field
+from functools import partial
 from threading import Lock
 from typing import Annotated
 
@@ -11,12 +12,10 @@ from fastapi import Depends, Request
 
 from db import regions
 from db.session import Database
-from planner.library import Library
+from planner.library import Library, renewed
 
 MOST = 8
 """The regions of so many scenes are kept, those that were asked about last."""
-AT_ONCE = 200
-"""So many regions are read from the database at once."""
 
 
 @dataclass
@@ -51,16 +50,8 @@ def _is_current(database: Database, scene_id: str, library: Library) -> bool:
 
 
 def _changed(database: Database, scene_id: str, library: Library) -> Library:
-    """Returns the library with the regions that the scene has now. Only those that are new are read."""
-    known = set(library.ids)
     with database.read() as session:
-        version, ids = regions.roll(session, scene_id)
-        new = [region_id for region_id in ids if region_id not in known]
-        read = [regions.polytopes(session, new[begin : begin + AT_ONCE]) for begin in range(0, len(new), AT_ONCE)]
-    added = [region for part in read for region in part]
-    if len(added) < len(new):
-        return library  # a region was deleted in between: the version is another one by now
-    return library.changed(version, ids, added)
+        return renewed(library, partial(regions.roll, session, scene_id), partial(regions.polytopes, session))
 
 
 async def _libraries(request: Request) -> Libraries:

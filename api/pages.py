@@ -24,7 +24,7 @@ from api.schemas.jobs import GrowthPoint, Iteration, Job, PairCell, PairMatrix
 from api.schemas.scenes import PairInfo
 from certifier.verify.decimals import at_least_mm, at_most_mm
 from db.session import Database
-from db.states import PairState
+from db.states import JobKind, PairState
 
 _ROOT = Path(dashboard.__file__).parent
 _CHART = (600, 150)
@@ -133,6 +133,7 @@ def _job(db: Database, job_id: str) -> dict[str, Any]:
     curve = jobs.get_job_growth(job_id, db).points
     return {
         "job": job,
+        "cover": jobs.get_job_cover(job_id, db) if job.kind is JobKind.COVER else None,
         "elapsed": elapsed(job),
         "scene": scenes.get_scene(job.scene, db),
         "iterations": matrix.iterations,

@@ -17,11 +17,15 @@ from starlette.exceptions import HTTPException
 
 from certifier.errors import CirisError
 from db.session import UNAVAILABLE
+from db.states import JobKind
 
 MEDIA_TYPE = "application/problem+json"
 
 _STATUS_OF_CODE = {
-    **dict.fromkeys(("scene_not_found", "job_not_found", "region_not_found", "proof_not_found", "webhook_not_found"), HTTPStatus.NOT_FOUND),
+    **dict.fromkeys(
+        ("scene_not_found", "job_not_found", "region_not_found", "proof_not_found", "webhook_not_found", "cover_not_found"),
+        HTTPStatus.NOT_FOUND,
+    ),
     "idempotency_conflict": HTTPStatus.CONFLICT,
     "job_not_retryable": HTTPStatus.CONFLICT,
     "ambiguous_id": HTTPStatus.CONFLICT,
@@ -158,7 +162,7 @@ _EXPLANATIONS: dict[type, Callable[[Any], Problem]] = {
 def _field(loc: Sequence[str | int]) -> str:
     """Returns the name of a field as the client wrote it: ``("body", "grow", "seed", "q", 3)`` -> ``"seed.q[3]"``."""
     parts = list(loc[1:])
-    if loc[0] == "body" and parts and parts[0] in ("grow", "certify", "recertify"):
+    if loc[0] == "body" and parts and parts[0] in set(JobKind):
         del parts[0]
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".")
 

@@ -14,6 +14,7 @@ from benchmarks import (
     agreement,
     catalogue,
     compare,
+    cover,
     growth,
     models,
     path,
@@ -72,6 +73,16 @@ def _growth(args: Namespace, screen: Screen) -> dict[str, Any]:
     return document
 
 
+def _cover(args: Namespace, screen: Screen) -> dict[str, Any]:
+    more = {
+        name: value
+        for name in ("cells", "stages", "at_once", "region_seconds", "random_seed")
+        if (value := getattr(args, name)) is not None
+    }
+    ways = args.way or [cover.CIRIS]
+    return cover.cover(args.case, ways, args.processes, args.deadline, args.data, args.verify, screen.line, **more)
+
+
 _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "pairs": _pairs,
     "scene": _scene,
@@ -81,6 +92,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "scaling": lambda args, screen: scaling.curves(args.against is not None, screen.line),
     "service": lambda args, screen: service.beside_local(args.example, args.processes, args.turns, screen.line),
     "store": lambda args, screen: store.store(args.postgresql, store.COUNTS, screen.line),
+    "cover": _cover,
     "robots": lambda args, screen: robots.robots(args.robots, args.deadline, screen.line),
     "recertify": lambda args, screen: recertify.changes(args.scenes, args.limit, screen.line),
     "query": lambda args, screen: query.query(args.regions, screen.line),
@@ -121,6 +133,20 @@ def _parser() -> ArgumentParser:
     moved.add_argument("--motions", type=_count, default=20, metavar="N", help="so many motions of each length; default 20")
     kinds.add_parser("agreement", parents=[as_json], help="compare verdicts on hundreds of pairs with Drake's")
     kinds.add_parser("scaling", parents=[against], help="measure how the cost grows with obstacles, joints and faces")
+    covered = kinds.add_parser("cover", parents=[as_json], help="measure how much regions cover over the seconds")
+    covered.add_argument("case", choices=list(cover.CASES))
+    covered.add_argument(
+        "--way", action="append", choices=[cover.CIRIS, cover.DRAKE], help="drake: IRIS regions without certificates; default ciris"
+    )
+    covered.add_argument("--deadline", type=float, metavar="SECONDS", help="default: the case's")
+    covered.add_argument("--processes", type=_count, default=2, metavar="N", help="number of solving processes; default 2")
+    covered.add_argument("--data", type=Path, metavar="DIR", help="keep the service's data in this new directory; default: remove it")
+    covered.add_argument("--verify", action="store_true", help="have the service check the proof of every region once more")
+    covered.add_argument("--cells", type=_count, metavar="N", help="instead of the cover's default")
+    covered.add_argument("--stages", type=_count, metavar="N", help="instead of the cover's default")
+    covered.add_argument("--at-once", type=_count, metavar="N", help="instead of the cover's default")
+    covered.add_argument("--region-seconds", type=float, metavar="SECONDS", help="instead of the cover's default")
+    covered.add_argument("--random-seed", type=int, metavar="N", help="instead of the cover's default")
     surveyed = kinds.add_parser("survey", parents=[as_json], help="certify every pair of every scene on every region")
     surveyed.add_argument("scenes", nargs="*", metavar="SCENE", default=list(catalogue.SCENES), help="default: all")
     surveyed.add_argument("--most", type=float, default=5.0, metavar="SECONDS", help="leave pairs with a longer forecast out; default 5")

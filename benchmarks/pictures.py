@@ -77,8 +77,8 @@ class Panel:
         )
 
     def frame(self) -> str:
-        size = f'width="{_number(self.right - self.left)}" height="{_number(self.bottom - self.top)}"'
-        return f'<rect class="frame" x="{_number(self.left)}" y="{_number(self.top)}" {size}/>'
+        size = f'width="{number(self.right - self.left)}" height="{number(self.bottom - self.top)}"'
+        return f'<rect class="frame" x="{number(self.left)}" y="{number(self.top)}" {size}/>'
 
 
 def grown() -> dict[str, Any]:
@@ -96,10 +96,10 @@ def polytope(region: dict[str, Any]) -> Polytope:
 def picture(region: dict[str, Any]) -> str:
     """Returns the region as SVG: the arm at a few of its configurations, and the region among the configurations that collide."""
     scene = catalogue.scene(EXAMPLE)
-    kinematics, corners, seed = Kinematics.of(scene), _corners(polytope(region)), np.array(region["seed"])
+    kinematics, corners, seed = Kinematics.of(scene), corners_of(polytope(region)), np.array(region["seed"])
     configurations = _shown(corners, seed)
     workspace = Panel(30, TOP, SIDE / 2, (-0.9, -1.0), (1.1, 1.0))
-    tangent = Panel(470, TOP, SIDE / float(scene.s_upper[1] - scene.s_lower[1]), _pair(scene.s_lower), _pair(scene.s_upper))
+    tangent = Panel(470, TOP, SIDE / float(scene.s_upper[1] - scene.s_lower[1]), pair(scene.s_lower), pair(scene.s_upper))
     size = f'width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}"'
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" {size} role="img">',
@@ -116,21 +116,21 @@ def picture(region: dict[str, Any]) -> str:
 
 def _workspace(panel: Panel, kinematics: Kinematics, configurations: Array) -> Iterator[str]:
     scene = kinematics.scene
-    yield f'<text class="title" x="{_number(panel.left)}" y="30">What the robot does</text>'
-    yield f'<text class="small" x="{_number(panel.left)}" y="48">the arm from above at four configurations; the square is 2 m wide</text>'
+    yield f'<text class="title" x="{number(panel.left)}" y="30">What the robot does</text>'
+    yield f'<text class="small" x="{number(panel.left)}" y="48">the arm from above at four configurations; the square is 2 m wide</text>'
     yield panel.frame()
     for name in OBSTACLES:
         geometry = _geometry(scene, name)
         points = panel(_flat(kinematics, geometry, configurations[:1])[0])
         if geometry.radius:
-            yield f'<circle class="{name}" {_at(points[0])} r="{_number(panel.scale * geometry.radius)}"/>'
+            yield f'<circle class="{name}" {_at(points[0])} r="{number(panel.scale * geometry.radius)}"/>'
         else:
-            yield f'<polygon class="{name}" points="{_points(points[ConvexHull(points).vertices])}"/>'
+            yield f'<polygon class="{name}" points="{listed(points[ConvexHull(points).vertices])}"/>'
     links = _links(scene)
     for s in configurations[::-1, None]:
         for link in links:
             points = panel(_flat(kinematics, link, s)[0])
-            yield f'<polygon class="arm" points="{_points(points[ConvexHull(points).vertices])}"/>'
+            yield f'<polygon class="arm" points="{listed(points[ConvexHull(points).vertices])}"/>'
         for link in links:
             (joint,) = panel(kinematics.points(WORLD, link.body, np.zeros((1, 3)), s)[0, :, :2])
             yield f'<circle class="joint" {_at(joint)} r="3.5"/>'
@@ -139,41 +139,45 @@ def _workspace(panel: Panel, kinematics: Kinematics, configurations: Array) -> I
 
 
 def _tangent(panel: Panel, kinematics: Kinematics, corners: Array, configurations: Array) -> Iterator[str]:
-    scene = kinematics.scene
-    yield f'<text class="title" x="{_number(panel.left)}" y="30">What is proved: all of the blue polytope is free</text>'
-    yield from _axes(panel, scene)
-    axes = [np.linspace(low, high, count) for low, high, count in zip(panel.lower, panel.upper, GRID, strict=True)]
-    s = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    steps = (np.array(panel.upper) - panel.lower) / (np.array(GRID) - 1)
-    for name in OBSTACLES:
-        loops = outlines(clearance(kinematics, name, s).reshape(GRID))
-        path = "".join(f"M{_points(panel(panel.lower + steps * loop))}Z" for loop in loops)
-        yield f'<path class="{name} colliding" d="{path}"/>'
-    yield f'<polygon class="region" points="{_points(panel(corners))}"/>'
+    yield f'<text class="title" x="{number(panel.left)}" y="30">What is proved: all of the blue polytope is free</text>'
+    yield from axes(panel, kinematics.scene)
+    yield from colliding(panel, kinematics)
+    yield f'<polygon class="region" points="{listed(panel(corners))}"/>'
     yield panel.frame()
     for i, (x, y) in enumerate(panel(configurations)):
         yield f'<circle class="{"dot" if i else "seed"}" {_at((x, y))} r="{3 if i else 5}"/>'
         yield _letter(i, x + 14, y)
 
 
-def _axes(panel: Panel, scene: Scene) -> Iterator[str]:
+def colliding(panel: Panel, kinematics: Kinematics) -> Iterator[str]:
+    """Draws the configurations in which the arm touches an obstacle, obstacle by obstacle."""
+    along = [np.linspace(low, high, count) for low, high, count in zip(panel.lower, panel.upper, GRID, strict=True)]
+    s = np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, 2)
+    steps = (np.array(panel.upper) - panel.lower) / (np.array(GRID) - 1)
+    for name in OBSTACLES:
+        loops = outlines(clearance(kinematics, name, s).reshape(GRID))
+        path = "".join(f"M{listed(panel(panel.lower + steps * loop))}Z" for loop in loops)
+        yield f'<path class="{name} colliding" d="{path}"/>'
+
+
+def axes(panel: Panel, scene: Scene) -> Iterator[str]:
     """Draws the ticks: s below and on the left, q above and on the right."""
     for value in range(-3, 4):
         x, y = panel(np.array([[value, value]]))[0]
-        yield f'<line class="grid" x1="{_number(x)}" y1="{_number(panel.top)}" x2="{_number(x)}" y2="{_number(panel.bottom)}"/>'
-        yield f'<text class="small middle" x="{_number(x)}" y="{_number(panel.bottom + 15)}">{_signed(value)}</text>'
+        yield f'<line class="grid" x1="{number(x)}" y1="{number(panel.top)}" x2="{number(x)}" y2="{number(panel.bottom)}"/>'
+        yield f'<text class="small middle" x="{number(x)}" y="{number(panel.bottom + 15)}">{_signed(value)}</text>'
         if panel.top < y < panel.bottom:
-            yield f'<line class="grid" x1="{_number(panel.left)}" y1="{_number(y)}" x2="{_number(panel.right)}" y2="{_number(y)}"/>'
-            yield f'<text class="small end" x="{_number(panel.left - 6)}" y="{_number(y + 4)}">{_signed(value)}</text>'
+            yield f'<line class="grid" x1="{number(panel.left)}" y1="{number(y)}" x2="{number(panel.right)}" y2="{number(y)}"/>'
+            yield f'<text class="small end" x="{number(panel.left - 6)}" y="{number(y + 4)}">{_signed(value)}</text>'
     for turn in TURNS:
         x, y = panel(scene.to_s(np.radians([turn, turn]))[None])[0]
-        yield f'<text class="small middle" x="{_number(x)}" y="{_number(panel.top - 6)}">{_signed(turn)}°</text>'
-        yield f'<text class="small" x="{_number(panel.right + 6)}" y="{_number(y + 4)}">{_signed(turn)}°</text>'
+        yield f'<text class="small middle" x="{number(x)}" y="{number(panel.top - 6)}">{_signed(turn)}°</text>'
+        yield f'<text class="small" x="{number(panel.right + 6)}" y="{number(y + 4)}">{_signed(turn)}°</text>'
     middle, across = (panel.left + panel.right) / 2, (panel.top + panel.bottom) / 2
-    yield f'<text class="small middle" x="{_number(middle)}" y="{_number(panel.top - 24)}">angle of the shoulder, q₁</text>'
-    yield f'<text class="middle" x="{_number(middle)}" y="{_number(panel.bottom + 34)}">s₁ = tan(q₁/2)</text>'
+    yield f'<text class="small middle" x="{number(middle)}" y="{number(panel.top - 24)}">angle of the shoulder, q₁</text>'
+    yield f'<text class="middle" x="{number(middle)}" y="{number(panel.bottom + 34)}">s₁ = tan(q₁/2)</text>'
     for x, text, kind in ((panel.left - 28, "s₂ = tan(q₂/2)", "middle"), (panel.right + 48, "angle of the elbow, q₂", "small middle")):
-        place = f'transform="translate({_number(x)} {_number(across)}) rotate(-90)"'
+        place = f'transform="translate({number(x)} {number(across)}) rotate(-90)"'
         yield f'<text class="{kind}" {place}>{text}</text>'
 
 
@@ -191,10 +195,10 @@ def _legend() -> Iterator[str]:
 
 def _letter(index: int, x: float, y: float) -> str:
     """Draws the name of a configuration, with its middle at (x, y)."""
-    return f'<text class="letter halo" x="{_number(x)}" y="{_number(y + 5)}">{"ABCD"[index]}</text>'
+    return f'<text class="letter halo" x="{number(x)}" y="{number(y + 5)}">{"ABCD"[index]}</text>'
 
 
-def _corners(region: Polytope) -> Array:
+def corners_of(region: Polytope) -> Array:
     """Returns the corners (k, 2) of a polytope in the plane, in order around it."""
     rows = [
         np.linalg.solve(region.C[[i, j]], region.d[[i, j]])
@@ -260,23 +264,25 @@ def _geometry(scene: Scene, obstacle: str) -> Geometry:
     return scene.geometry(f"obstacles/body/{obstacle}")
 
 
-def _pair(values: Array) -> tuple[float, float]:
+def pair(values: Array) -> tuple[float, float]:
+    """Returns an array (2,) as a pair."""
     return float(values[0]), float(values[1])
 
 
-def _points(points: Array) -> str:
-    return " ".join(f"{_number(x)},{_number(y)}" for x, y in points)
+def listed(points: Array) -> str:
+    """Writes pixels (k, 2) as SVG lists them."""
+    return " ".join(f"{number(x)},{number(y)}" for x, y in points)
 
 
 def _at(point: Sequence[float]) -> str:
-    return f'cx="{_number(point[0])}" cy="{_number(point[1])}"'
+    return f'cx="{number(point[0])}" cy="{number(point[1])}"'
 
 
 def _signed(value: int) -> str:
     return str(value).replace("-", "&#8722;")
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
     """Writes a number with two decimals, which hides what differs from machine to machine."""
     return f"{value:.2f}".rstrip("0").rstrip(".")
 

@@ -9,11 +9,13 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import growth, scaling
+from benchmarks import cover, growth, scaling
 from benchmarks.catalogue import ROOT
 
 PAGE, FIGURES = ROOT / "docs/benchmarks.md", ROOT / "docs/benchmarks"
 
+COVER_ROWS = 16
+"""A cover is told in about so many rows."""
 LINE = 100
 """A line of docs has at most this many characters, unless it is a line of a table."""
 
@@ -291,6 +293,22 @@ def _plan(document: Document) -> list[str]:
     return [about, _table(header, rows), lengths]
 
 
+def _cover(document: Document) -> list[str]:
+    """Returns a table of the coverage over the seconds, with as many rows as one reads, and what the regions have come to."""
+    header = ["way", "seconds", "covered %", "regions", "components", "% of it in the largest", "component of each to connect"]
+    rows, said = [], []
+    for way, run in document["runs"].items():
+        shown = cover.table(way, run)
+        rows += [*shown[:: max(len(shown) // COVER_ROWS, 1)][:-1], *shown[-1:]]
+        extra = "" if "proofs_hold" not in run else f" The verifier has accepted the proofs of {run['proofs_hold']} regions once more."
+        said.append(f"{way}: {run['reason']}. {run['without_region']} of {run['begun']} seeds gave no region.{extra}")
+        if run.get("colliding"):
+            mean, largest = (100 * run["colliding"][which] for which in ("mean", "largest"))
+            said.append(f"In its regions {mean:.2g} % of the samples collide, in one of them {largest:.2g} %.")
+    title = f"{document['case']}, {document['processes']} processes, until {document['deadline_seconds']:g} s."
+    return [title, _table(header, rows), *said]
+
+
 def _counts(counts: dict[str, int]) -> str:
     return ", ".join(f"{number} {_plain(name)}" for name, number in sorted(counts.items(), key=lambda item: -item[1]))
 
@@ -356,4 +374,5 @@ _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "query": _query,
     "plan": _plan,
     "recertify": _recertify,
+    "cover": _cover,
 }

@@ -29,7 +29,9 @@ SERVICE, LOCAL = "service", "--local"
 
 
 @dataclass(frozen=True)
-class _Service:
+class Service:
+    """A service that runs: its process, and its address."""
+
     pid: int
     url: str
 
@@ -44,7 +46,7 @@ def beside_local(name: str, processes: int, turns: int, progress: Progress) -> d
         CirisError: the service does not start, a command fails, or the two come to different regions.
     """
     rows: list[dict[str, Any]] = []
-    with tempfile.TemporaryDirectory() as directory, _running(Path(directory), processes) as service:
+    with tempfile.TemporaryDirectory() as directory, running(Path(directory) / "data", processes) as service:
         for turn in range(turns):
             for way in (SERVICE, LOCAL) if turn % 2 == 0 else (LOCAL, SERVICE):
                 rows.append({"turn": turn, "way": way, **_grown(name, way, service, Path(directory), processes)})
@@ -69,7 +71,7 @@ def _more(rows: list[dict[str, Any]], what: str) -> dict[str, Any]:
     return {"medians": medians, "share": statistics.median(shares), "each": shares}
 
 
-def _grown(name: str, way: str, service: _Service, directory: Path, processes: int) -> dict[str, Any]:
+def _grown(name: str, way: str, service: Service, directory: Path, processes: int) -> dict[str, Any]:
     """Runs one command. Returns its seconds, those besides seeding and pairs, and the processor time of the command and the service."""
     proof = directory / "proof"
     proof.unlink(missing_ok=True)
@@ -101,18 +103,18 @@ def _grown(name: str, way: str, service: _Service, directory: Path, processes: i
 
 
 @contextmanager
-def _running(directory: Path, processes: int) -> Iterator[_Service]:
-    """Runs a separate service with a separate database while the block runs."""
+def running(data: Path, processes: int) -> Iterator[Service]:
+    """Runs a separate service while the block runs, with its data in a directory of its own."""
     own = {"CIRIS_SOLVE_PROCESSES": str(processes)}
     environment = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")} | own
-    command = [*CIRIS, "up", "--data", str(directory / "data"), "--port", "0"]
+    command = [*CIRIS, "up", "--data", str(data), "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
         assert process.stdout is not None
         try:
             said = process.stdout.readline()
             if "http" not in said:
                 raise CirisError("service_failed", "the service did not start", hint="try `ciris up`")
-            yield _Service(process.pid, said.split()[-1])
+            yield Service(process.pid, said.split()[-1])
         finally:
             process.send_signal(signal.SIGINT)
 

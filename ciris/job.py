@@ -16,7 +16,7 @@ class JobData:
 
     id: str
     kind: str
-    """``grow`` or ``certify``."""
+    """``grow``, ``recertify``, ``certify`` or ``cover``."""
     scene: str
     """Id of the scene."""
     state: str

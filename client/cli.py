@@ -40,6 +40,11 @@ OPTIONS = {
     "goal": "--to",
     "speed": "--speed",
     "acceleration": "--acceleration",
+    "options.coverage": "--coverage",
+    "options.regions": "--regions",
+    "options.at_once": "--at-once",
+    "options.region_seconds": "--region-seconds",
+    "options.connect": "--connect",
 }
 """The fields of a request, and the options that people type for them."""
 
@@ -128,7 +133,7 @@ def _joined(arguments: Sequence[str]) -> list[str]:
     """Joins ``--q -0.5,1`` to ``--q=-0.5,1``, because argparse takes a list that begins with a minus for an option."""
     joined: list[str] = []
     for argument in arguments:
-        if joined and joined[-1] in ("--q", "--contain", "--from", "--to") and re.match(r"-[\d.]", argument):
+        if joined and joined[-1] in ("--q", "--contain", "--connect", "--seed", "--from", "--to") and re.match(r"-[\d.]", argument):
             joined[-1] = f"{joined[-1]}={argument}"
         else:
             joined.append(argument)
@@ -254,6 +259,49 @@ def _parser() -> argparse.ArgumentParser:
     again.add_argument("--local", action="store_true", help="certify in this process, without a service")
     again.set_defaults(run="client.recertify:recertify")
 
+    cover = verbs.add_parser(
+        "cover",
+        parents=[remote, json],
+        help="grow regions until they cover the free space, or connect configurations",
+        epilog="Example: ciris cover examples/planar_2dof/scene.yaml --coverage 0.95 --connected --deadline 60. "
+        "The exit status is 0 if all goals are reached. Regions that the scene has already count.",
+    )
+    cover.add_argument("scene", metavar="SCENE")
+    cover.add_argument(
+        "--connect",
+        metavar='"0,0.3,..."',
+        action="append",
+        default=[],
+        help="joint positions that shall end in one component; give it two times or more",
+    )
+    cover.add_argument(
+        "--seed", metavar='"0,0.3,..."', action="append", default=[], help="joint positions that get a region first; may be repeated"
+    )
+    cover.add_argument(
+        "--path",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="a motion that shall be covered: npz, JSON, YAML or CSV with q (K x n), straight from waypoint to waypoint; may be repeated",
+    )
+    cover.add_argument(
+        "--coverage", type=float, metavar="SHARE", help="goal: this share of the free configurations; default: 0.95 without another goal"
+    )
+    cover.add_argument("--connected", action="store_true", help="goal: all regions of the scene hang together")
+    cover.add_argument("--regions", type=int, metavar="N", help="begin N regions at most; default 1000")
+    cover.add_argument("--at-once", type=int, metavar="N", help="grow N regions at the same time; default 2")
+    cover.add_argument("--region-seconds", type=float, metavar="SECONDS", help="end each region after so long; default: none")
+    cover.add_argument("--cells", type=int, metavar="N", help="what is open after N cells of a pair in a stage is cut off")
+    cover.add_argument(
+        "--stages",
+        type=int,
+        metavar="N",
+        help="end each region after N stages; default: 1 for robots with more than 4 joints, else no limit",
+    )
+    cover.add_argument("--deadline", type=float, metavar="SECONDS", help="end after so long with the regions by then; default: none")
+    cover.add_argument("--random-seed", type=int, help="seed of every random choice; default 0")
+    cover.set_defaults(run="client.cover:cover")
+
     certify = verbs.add_parser("certify", parents=[remote, json], help="certify a given polytope: one outcome for each pair")
     certify.add_argument("scene", metavar="SCENE")
     certify.add_argument(
@@ -360,7 +408,7 @@ def _parser() -> argparse.ArgumentParser:
 
     bench = verbs.add_parser("bench", help="measure ciris, and Drake beside it if asked; see ciris bench BENCHMARK --help")
     kinds = ["pairs", "scene", "growth", "path", "agreement", "scaling", "service", "store", "survey", "robots", "query", "plan"]
-    bench.add_argument("benchmark", choices=[*kinds, "recertify", "docs"])
+    bench.add_argument("benchmark", choices=[*kinds, "cover", "recertify", "docs"])
     bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...")
     bench.set_defaults(run="client.bench:bench")
 

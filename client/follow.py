@@ -10,6 +10,8 @@ from ciris.synchronous.client import Client
 from client.output import Screen, plain, q_volume, seconds, share
 
 _STEPS = {"propose": "seeding", "step": "polytope step", "accept": "assembling and verifying the region"}
+_LOOK = "scout"
+"""The step of a cover whose findings are told instead of it."""
 
 
 class Teller:
@@ -35,6 +37,8 @@ class Teller:
         self._screen.status(f"job {data['state']}")
 
     def _tell_step(self, data: dict[str, Any]) -> None:
+        if data["kind"] == _LOOK:
+            return
         name = _STEPS.get(data["kind"], data["kind"])
         if data.get("seconds") is None:
             self._screen.status(f"{name} ...")
@@ -60,6 +64,20 @@ class Teller:
                 self._screen.line(f"  {self._done}/{self._total} {text} ({seconds(pair['seconds'])})")
             state = f"iteration {data['iteration']}: {self._done} of {self._total} {self._what} settled{self._kept}, {text}"
             self._screen.status(state, self._done / self._total)
+
+    def _tell_cover(self, data: dict[str, Any]) -> None:
+        grows = ", ".join(data["growing"])
+        state = f"{share(data['coverage'])} covered by {data['regions']} regions in {len(data['components'])} components"
+        self._screen.status(f"{state}{f'; growing {grows}' if grows else ''}", data["coverage"]["value"])
+        self._kept = state
+
+    def _tell_child(self, data: dict[str, Any]) -> None:
+        name = f"region {data['number']} (job {data['job'][:8]})"
+        if "purpose" in data:
+            self._screen.status(f"{self._kept}; growing {name} for {data['purpose']}")
+        else:
+            came = f"certified region {data['region_id'][:8]}" if data["region_id"] else f"no region: {data['reason']}"
+            self._screen.line(f"{name}: {came}; before it, {self._kept or 'nothing was covered'}")
 
     def _tell_note(self, data: dict[str, Any]) -> None:
         self._screen.status(data["text"], data["part"])

@@ -80,6 +80,20 @@ def grow_many(client: Client, requests: Sequence[Document], screen: Screen, watc
     return [_wait(client, job, screen, watch) for job in jobs]
 
 
+def cover(client: Client, request: Document, screen: Screen) -> Document:
+    """Makes the service cover a scene, and waits for it. Returns the ended job.
+
+    Raises:
+        CirisError: what went wrong.
+    """
+    job, _ = client.create_job(request)
+    screen.line(f"job {job['id']}: {client.url}/jobs/{job['id']}")
+    job = _wait(client, job["id"], screen, False)
+    if job["outcome"] is None or (job["error"] and job["error"]["code"] not in NEGATIVE):
+        raise why_no_region(job)
+    return job
+
+
 def certify(client: Client, scene: Document, given: PolytopeFile, screen: Screen, watch: bool = False, cells: int = 1) -> Document:
     """Makes the service certify a polytope, and returns the document of ``ciris certify --json``.
 

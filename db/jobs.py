@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 from uuid import uuid4
 
 from sqlalchemy import ColumnElement, and_, exists, func, or_, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
 from certifier.errors import CirisError
 from db import events, leases, pages, webhooks
@@ -16,7 +17,7 @@ from db.models import GrowthRow, JobRow, StepRow
 from db.pages import Page
 from db.session import insert_new
 from db.settings import settings
-from db.states import JOB, STEP, JobState, StepKind, transition, unfinished
+from db.states import JOB, STEP, JobKind, JobState, StepKind, transition, unfinished
 from db.types import utcnow
 
 
@@ -33,6 +34,8 @@ def create(
     priority: int = 0,
     retry_of: str | None = None,
     attempt: int = 1,
+    parent_id: str | None = None,
+    number: int | None = None,
 ) -> tuple[JobRow, bool]:
     """Creates a queued job and returns it with True, or returns the job made under the same idempotency key with False.
 
@@ -55,9 +58,12 @@ def create(
         "priority": priority,
         "retry_of": retry_of,
         "attempt": attempt,
+        "parent_id": parent_id,
+        "number": number,
     }
     if insert_new(session, JobRow, [new]):
-        _check_quota(session, key_id)
+        if parent_id is None:
+            _check_quota(session, key_id)
         job = lock(session, job_id)
         events.emit(session, job, "job", {"state": job.state})
         return job, True
@@ -73,12 +79,13 @@ def create(
 
 
 def _check_quota(session: Session, key_id: str | None) -> None:
-    """Refuses the job just added when its API key has too many unfinished jobs.
+    """Refuses the job just added when its API key has too many unfinished jobs, those of a cover not counted.
 
     Several requests at the same moment may each count as the last job that fits, so a key can exceed its limit a little.
     """
     limit = settings().max_jobs_per_key
-    unfinished_jobs = session.scalar(select(func.count()).where(_of_key(key_id), JobRow.state.in_(unfinished(JOB)))) or 0
+    counted = (_of_key(key_id), JobRow.state.in_(unfinished(JOB)), JobRow.parent_id.is_(None))
+    unfinished_jobs = session.scalar(select(func.count()).where(*counted)) or 0
     if unfinished_jobs > limit:
         message = f"{limit} jobs that have not ended are the most at a time"
         raise CirisError("quota_exceeded", message, hint="wait for some to end, cancel some, or have CIRIS_MAX_JOBS_PER_KEY raised")
@@ -149,17 +156,23 @@ def page(
     state: str | None = None,
     kind: str | None = None,
     scene_id: str | None = None,
+    parent_id: str | None = None,
     after: str | None = None,
     limit: int = 50,
 ) -> Page[JobRow]:
-    """Returns one page of the jobs that match the filters.
+    """Returns one page of the jobs that match the filters: of those that somebody asked for, or of those of a cover, ``parent_id``.
 
     Raises:
         CirisError: cursor.
     """
     filters = {JobRow.state: state, JobRow.kind: kind, JobRow.scene_id: scene_id}
     query = select(JobRow).where(*(column == value for column, value in filters.items() if value is not None))
-    return pages.page(session, JobRow, query, after, limit)
+    return pages.page(session, JobRow, query.where(JobRow.parent_id.is_not_distinct_from(parent_id)), after, limit)
+
+
+def children(session: Session, job_id: str) -> Sequence[JobRow]:
+    """Returns the jobs that grow regions for a cover, or have, in order."""
+    return session.scalars(select(JobRow).where(JobRow.parent_id == job_id).order_by(JobRow.number)).all()
 
 
 def cancel(session: Session, job_id: str) -> JobRow:
@@ -186,6 +199,14 @@ def keep_growth(session: Session, job: JobRow, document: dict[str, Any]) -> None
     session.merge(GrowthRow(job_id=job.id, document=document))
 
 
+def next_turn(job: JobRow, action: dict[str, Any]) -> None:
+    """Says what the job waits for from now on, which ends the turn of its coordinator. The caller holds the job's lock."""
+    job.turn += 1
+    job.action = action
+    job.coordinator = job.coordinator_until = None
+    job.coordinator_attempts = 0
+
+
 def start(session: Session, job: JobRow, served: float = 0.0) -> None:
     """Moves a queued job to running. The caller holds its lock.
 
@@ -199,9 +220,10 @@ def start(session: Session, job: JobRow, served: float = 0.0) -> None:
 def charge(session: Session, job: JobRow, seconds: float) -> None:
     """Counts seconds of work as done for the job. Each API key has the same share of the workers.
 
-    The running jobs of a key divide that share in proportion to 2^priority.
+    The running jobs of a key divide that share in proportion to 2^priority. A cover leaves its part to its regions.
     """
-    running = session.scalars(select(JobRow.priority).where(_of_key(job.key_id), JobRow.state == JobState.RUNNING))
+    at_work = (_of_key(job.key_id), JobRow.state == JobState.RUNNING, JobRow.kind != JobKind.COVER)
+    running = session.scalars(select(JobRow.priority).where(*at_work))
     job.served += seconds * sum(2.0 ** (priority - job.priority) for priority in running)
 
 
@@ -223,10 +245,12 @@ def is_coordinated(job: JobRow, now: datetime) -> bool:
 def awaiting_coordination(session: Session, now: datetime) -> list[str]:
     """Returns the ids of the unfinished jobs for which a coordination is due and that nobody coordinates.
 
-    A coordination is due when the job is being cancelled, when its deadline has passed, or when it waits for no pair and no step.
+    A coordination is due when the job is being cancelled, when its deadline has passed, or when it waits for no pair, no step and no child.
     """
     no_pair = and_(JobRow.open_pairs == 0, JobRow.running_pairs == 0)
     step = exists().where(StepRow.job_id == JobRow.id, StepRow.state.in_(unfinished(STEP)), StepRow.kind != StepKind.ACCEPT)
-    due = or_(JobRow.state == JobState.CANCELLING, JobRow.deadline_at <= now, no_pair & ~step)
+    other = aliased(JobRow)
+    child = exists().where(other.parent_id == JobRow.id, other.state.in_(unfinished(JOB)))
+    due = or_(JobRow.state == JobState.CANCELLING, JobRow.deadline_at <= now, no_pair & ~step & ~child)
     rows = session.scalars(select(JobRow).where(JobRow.state.in_(unfinished(JOB)), due).order_by(JobRow.created_at))
     return [job.id for job in rows if not is_coordinated(job, now)]

@@ -80,10 +80,10 @@ class ApiKeyRow(Base):
 
 
 class JobRow(Base):
-    """A job is one request to grow a region or to certify a polytope."""
+    """A job is one request to grow a region, to certify a polytope, or to cover a scene; or a region that the last one has grown."""
 
     __tablename__ = "jobs"
-    __table_args__ = (Index(None, "state"), Index(None, "created_at", "id"))
+    __table_args__ = (Index(None, "state"), Index(None, "created_at", "id"), UniqueConstraint("parent_id", "number"))
     transitions: ClassVar[states.Table] = states.JOB
 
     id: Mapped[str] = mapped_column(String(36), primary_key=True)
@@ -98,7 +98,7 @@ class JobRow(Base):
     error: Mapped[Document | None]
     """What CirisError.to_document() returned, when the job failed."""
     options: Mapped[Document]
-    """What certifier.growth.options.GrowthOptions.to_document() returned."""
+    """What certifier.growth.options.GrowthOptions.to_document() returned; for a cover, planner.cover.options.CoverOptions.to_document()."""
     action: Mapped[Document | None] = mapped_column(deferred=True)
     """The action that the job waits for: its kind, the iteration of a certification, the outcome and reason of an end.
 
@@ -116,6 +116,10 @@ class JobRow(Base):
     retry_of: Mapped[str | None] = mapped_column(ForeignKey("jobs.id"))
     attempt: Mapped[int] = mapped_column(default=1)
     """1, or one more than the attempt of ``retry_of``."""
+    parent_id: Mapped[str | None] = mapped_column(ForeignKey("jobs.id"))
+    """The cover that the job grows a region for; None where somebody asked for the job."""
+    number: Mapped[int | None]
+    """Its number among the regions that the cover has begun; None where somebody asked for the job."""
     open_pairs: Mapped[int] = mapped_column(default=0)
     """How many of the job's pairs are open. Whoever moves a pair counts it here, so that nobody has to count the rows."""
     running_pairs: Mapped[int] = mapped_column(default=0)
@@ -125,7 +129,7 @@ class JobRow(Base):
     region_id: Mapped[str | None] = mapped_column(String(36))
     """Id of the last region accepted."""
     accept_after: Mapped[datetime] = mapped_column(default=utcnow)
-    """No region is accepted before this time, so that accepting leaves most of the workers' time to the growth (db.steps)."""
+    """No region is accepted before this time, unless growing has ended: accepting leaves most of the time to growing."""
     event_seq: Mapped[int] = mapped_column(default=0)
     """``seq`` of the last event."""
     turn: Mapped[int] = mapped_column(default=0)
@@ -143,7 +147,7 @@ class JobRow(Base):
 
 
 class GrowthRow(Base):
-    """This row holds what the growth of a job knows.
+    """This row holds what the growth of a job knows, or what a cover knows.
 
     It is as long as the scene has pairs, and SQLite writes the whole of a row anew. So it has a table of its own, because every claim
     changes the row of its job.
@@ -153,7 +157,7 @@ class GrowthRow(Base):
 
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
     document: Mapped[Document]
-    """What certifier.growth.state.GrowthState.to_document() returned after the last transition."""
+    """What certifier.growth.state.GrowthState.to_document() returned after the last transition; or CoverState of planner.cover.state."""
 
 
 class IterationRow(Base):
@@ -246,7 +250,7 @@ class SubtreesRow(Base):
 
 
 class StepRow(Leased, Base):
-    """A step is a piece of a job that is not a pair: seeding, the polytope step, or accepting a region."""
+    """A step is a piece of a job that is not a pair: seeding, the polytope step, accepting a region, or a look at what is covered."""
 
     __tablename__ = "steps"
     __table_args__ = (UniqueConstraint("job_id", "turn", "kind"), Index(None, "state", "lease_until"), Index(None, "job_id", "state"))

@@ -81,6 +81,12 @@ def of_job(session: Session, job_id: str) -> Sequence[RegionRow]:
     return session.scalars(select(RegionRow).where(RegionRow.job_id == job_id).order_by(RegionRow.iteration).options(*_UNREAD)).all()
 
 
+def of_cover(session: Session, job_id: str) -> Sequence[RegionRow]:
+    """Returns the regions that a cover has grown, in order, without their manifests and arrays."""
+    query = select(RegionRow).join(JobRow, JobRow.id == RegionRow.job_id).where(JobRow.parent_id == job_id)
+    return session.scalars(query.order_by(RegionRow.number).options(*_UNREAD)).all()
+
+
 def version(session: Session, scene_id: str) -> int:
     """Returns how often a region of this scene was added or deleted."""
     return session.scalar(select(LibraryRow.version).where(LibraryRow.scene_id == scene_id)) or 0

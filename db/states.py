@@ -25,7 +25,7 @@ class JobState(StrEnum):
     CANCELLING = "cancelling"
     """Someone asked to cancel the job; its work is being stopped."""
     SUCCEEDED = "succeeded"
-    """The job has its answer: a certified region (grow, recertify), or a verdict for the polytope (certify)."""
+    """The job has its answer: a certified region (grow, recertify), a verdict for the polytope (certify), or what it covers (cover)."""
     FAILED = "failed"
     """The job ended without an answer; ``error`` says why. Regions certified before remain."""
     CANCELLED = "cancelled"
@@ -39,6 +39,8 @@ class JobKind(StrEnum):
     """The job finds one verdict for each pair on a given polytope."""
     RECERTIFY = "recertify"
     """The job makes a region of a scene from a region of the scene before it changed."""
+    COVER = "cover"
+    """The job has regions grown, by grow jobs that are its children, until they cover the scene or connect configurations."""
 
 
 class PairState(StrEnum):
@@ -82,6 +84,8 @@ class StepKind(StrEnum):
     """The polytope step (12) of the alternation."""
     ACCEPT = "accept"
     """The step assembles, verifies and stores the region of a certified polytope."""
+    SCOUT = "scout"
+    """The step looks at how much of a scene is covered, and where its next regions are best grown."""
 
 
 class IterationState(StrEnum):

@@ -1,4 +1,4 @@
-"""Steps are the pieces of a job that are not pairs: seeding, the polytope step, accepting a region."""
+"""Steps are the pieces of a job that are not pairs: seeding, the polytope step, accepting a region, a look at what is covered."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from certifier.model import Array, Polytope, StoredRegion
 from planner.boxes import BoxGrid
 from planner.rows import Rows
+
+AT_ONCE = 200
+"""So many regions are read at once."""
 
 
 class Library:
@@ -94,6 +97,23 @@ class Library:
         norms = np.linalg.norm(faces[:, :-1], axis=1)
         library._faces, library._norms = self._faces.plus(faces), self._norms.plus(np.where(norms > 0, norms, 1.0))
         return library
+
+
+def renewed(library: Library, roll: Callable[[], tuple[int, list[str]]], read: Callable[[Sequence[str]], list[StoredRegion]]) -> Library:
+    """Returns the library with the regions that the scene has now. Only those that are new are read.
+
+    Args:
+        roll: returns the version of the scene's regions and their ids, in the order of their numbers.
+        read: returns the regions with these ids; those that are gone are left out.
+
+    Returns:
+        The library as it is where a region was deleted in between: then the version is another one by now.
+    """
+    version, ids = roll()
+    known = set(library.ids)
+    new = [region_id for region_id in ids if region_id not in known]
+    added = [region for begin in range(0, len(new), AT_ONCE) for region in read(new[begin : begin + AT_ONCE])]
+    return library if len(added) < len(new) else library.changed(version, ids, added)
 
 
 def _sorted(region: StoredRegion) -> Array:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,23 @@ class Overlap:
 
     depth: float
     witness: Array
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Says which regions of lower numbers a region overlaps.
+
+    Attributes:
+        row: the region's number in the library.
+        reached: all regions of numbers in the scene up to this one were looked at.
+        found: numbers in the library of those that it overlaps, and how.
+        complete: whether these were all regions of lower numbers.
+    """
+
+    row: int
+    reached: int
+    found: tuple[tuple[int, Overlap], ...]
+    complete: bool
 
 
 def beside(library: Library, region: int, others: Sequence[int]) -> list[int]:
@@ -63,6 +81,34 @@ def overlap(library: Library, a: int, b: int) -> Overlap | None:
     if found.x is None or found.x[-1] <= FLAT:
         return None
     return Overlap(float(found.x[-1]), found.x[:-1])
+
+
+def compare(library: Library, linked: Sequence[tuple[int, int, int]], until: float) -> Iterator[Compared]:
+    """Compares regions that were not compared yet, until the time is over.
+
+    Args:
+        linked: for regions of the library by their numbers in the scene, ascending: row in the library, number in the scene, and as far as
+            which number the overlaps with those of lower numbers are known.
+        until: the time by ``time.monotonic()`` at which to stop.
+
+    Yields:
+        What was found for each region, as far as there was time.
+    """
+    for row, number, known in linked:
+        if known >= number - 1:
+            continue
+        found, reached = [], number - 1
+        number_of = {other: its for other, its, _ in linked if known < its < number}
+        for other in beside(library, row, list(number_of)):
+            if time.monotonic() > until:
+                reached = number_of[other] - 1
+                break
+            common = overlap(library, other, row)
+            if common is not None:
+                found.append((other, common))
+        yield Compared(row, reached, tuple(found), complete=reached == number - 1)
+        if reached < number - 1:
+            return
 
 
 def components(count: int, edges: Sequence[tuple[int, int]]) -> list[list[int]]:

@@ -1,4 +1,7 @@
-"""This module does a claimed step: seeding, the polytope step, or accepting a region. The worker may die halfway without harm."""
+"""This module does a claimed step: seeding, the polytope step, accepting a region, or a look for a cover.
+
+The worker may die halfway without harm.
+"""
 
 from __future__ import annotations
 
@@ -33,6 +36,7 @@ from workers.app import send_work
 from workers.failures import IN_LOG, LOST, ON_LOSS
 from workers.former import former_of
 from workers.scenes import load_scene
+from workers.scouting import scout
 from workers.transaction import persistently
 
 log = logging.getLogger(__name__)
@@ -91,6 +95,8 @@ def _do(claim: steps.Claim) -> Done:
             return _step(scene, claim)
         case StepKind.ACCEPT:
             return _accept(scene, claim)
+        case StepKind.SCOUT:
+            return Done(scout(scene, claim.scene_id, claim.job_id))
 
 
 def _propose(scene: Scene, claim: steps.Claim) -> Done:

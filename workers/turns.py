@@ -23,13 +23,13 @@ from certifier.pair.forecast import PairCost, forecast
 from certifier.pair.result import Weakness
 from db import jobs, leases, pairs, steps, subtrees, work
 from db.models import IterationRow, JobRow
-from db.session import database
 from db.settings import settings
-from db.states import JOB, STEP, IterationState, JobState, StepKind, StepState, unfinished
+from db.states import JOB, STEP, IterationState, JobKind, JobState, StepKind, StepState, unfinished
 from db.types import utcnow
-from workers import admission
+from planner.cover import state as cover
+from workers import admission, covers
 from workers.actions import certify_action
-from workers.app import send_work
+from workers.app import send_coordinate, send_work
 from workers.coordinator import ending, next_transition, step_report
 from workers.failures import IN_LOG
 from workers.scenes import load_scene
@@ -46,12 +46,13 @@ class Turn:
     """Holds what a coordinator starts from."""
 
     job_id: str
+    kind: str
     number: int
     scene_id: str
     options: dict[str, Any]
     deadline_at: datetime | None
     growth: dict[str, Any] | None
-    report: Report | None
+    report: Report | cover.Report | None
 
 
 def coordinate(job_id: str) -> None:
@@ -71,7 +72,10 @@ def coordinate(job_id: str) -> None:
         goes_on = persistently(decision)
 
 
-def _decide(turn: Turn) -> Transition:
+def _decide(turn: Turn) -> Transition | cover.Transition:
+    if turn.kind == JobKind.COVER:
+        return covers.next_transition(turn.options, turn.growth, turn.report)
+    assert not isinstance(turn.report, cover.Scouted | cover.Ended | cover.Late), "only covers are told these"
     if turn.growth is None:
         left = None if turn.deadline_at is None else (turn.deadline_at - utcnow()).total_seconds()
         if not GrowthOptions.from_document(turn.options).by_cells:  # the forecast is about the program (11)
@@ -92,28 +96,31 @@ def _begin(job_id: str) -> Turn | None:
             return None
         now = utcnow()
         if job.state == JobState.CANCELLING:
-            _finish_growth(session, job, Finish(Outcome.INCONCLUSIVE, "cancelled"))
-        elif job.deadline_at is not None and job.deadline_at <= now:
+            _finish_growth(session, job, Finish(Outcome.INCONCLUSIVE, "cancelled"), afterwards)
+        elif job.deadline_at is not None and job.deadline_at <= now and job.kind != JobKind.COVER:
             outcome = Outcome.CERTIFIED if steps.accepted(session, job_id) else Outcome.INCONCLUSIVE
-            _finish_growth(session, job, Finish(outcome, "the deadline was reached"))
+            _finish_growth(session, job, Finish(outcome, "the deadline was reached"), afterwards)
         if job.coordinator_attempts >= settings().max_attempts:
             problem = "the coordinator died or hung each time it decided about this job"
             job.error = CirisError("coordination_failed", problem, hint=IN_LOG).to_document()
-            _finish_growth(session, job, Finish(Outcome.ERROR, "the coordinator failed"))
+            _finish_growth(session, job, Finish(Outcome.ERROR, "the coordinator failed"), afterwards)
         if job.action is not None and job.action["kind"] == "finish":
             _finish(session, job, afterwards)
             return None
-        report = None if job.action is None else _report(session, job)
+        growth = jobs.growth(session, job_id)
+        report = None if job.action is None else _report(session, job, growth)
         if jobs.is_coordinated(job, now) or (job.action is not None and report is None):
             return None
         job.coordinator, job.coordinator_until = leases.this_worker(), now + timedelta(seconds=COORDINATION_SECONDS)
         job.coordinator_attempts += 1
-        return Turn(job_id, job.turn, job.scene_id, job.options, job.deadline_at, jobs.growth(session, job_id), report)
+        return Turn(job_id, job.kind, job.turn, job.scene_id, job.options, job.deadline_at, growth, report)
 
 
-def _report(session: Session, job: JobRow) -> Report | None:
+def _report(session: Session, job: JobRow, growth: dict[str, Any] | None) -> Report | cover.Report | None:
     """Returns the report on the job's present action; None while the action is unfinished."""
     action = job.action or {}
+    if job.kind == JobKind.COVER:
+        return covers.report(session, job, growth or {})
     if action["kind"] == Certify.kind:
         iteration = session.get_one(IterationRow, (job.id, action["iteration"]))
         return None if iteration.state == IterationState.RUNNING else _outcomes(session, job, iteration)
@@ -133,7 +140,7 @@ def _outcomes(session: Session, job: JobRow, iteration: IterationRow) -> Outcome
     return Outcomes.of_parts(action, reached, passed)
 
 
-def _save(turn: Turn, transition: Transition) -> bool:
+def _save(turn: Turn, transition: Transition | cover.Transition) -> bool:
     """Saves a transition and the work it asks for, unless the job has moved on.
 
     It returns True when something may have to be decided before any work is done.
@@ -144,6 +151,8 @@ def _save(turn: Turn, transition: Transition) -> bool:
             return True
         if job.state == JobState.QUEUED:
             jobs.start(session, job, work.served_by_now(session))
+        if isinstance(transition, cover.Transition):
+            return covers.save(session, job, transition, turn.report, afterwards)
         if isinstance(turn.report, Outcomes):
             pairs.forget_weaknesses(session, job.id, turn.report.action.iteration)
         _advance(job, transition.action)
@@ -162,14 +171,12 @@ def _save(turn: Turn, transition: Transition) -> bool:
 
 
 def _advance(job: JobRow, action: Propose | Certify | Step | Finish) -> None:
-    job.turn += 1
-    job.action = {"kind": action.kind}
+    document: dict[str, Any] = {"kind": action.kind}
     if isinstance(action, Certify):
-        job.action["iteration"] = action.iteration
+        document["iteration"] = action.iteration
     elif isinstance(action, Finish):
-        job.action |= {"outcome": action.outcome.value, "reason": action.reason}
-    job.coordinator = job.coordinator_until = None
-    job.coordinator_attempts = 0
+        document |= {"outcome": action.outcome.value, "reason": action.reason}
+    jobs.next_turn(job, document)
 
 
 def _add_step(session: Session, job: JobRow, kind: StepKind, work_on: dict[str, Any], afterwards: Afterwards) -> None:
@@ -220,15 +227,15 @@ def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: A
 
 def _give_up(turn: Turn, error: CirisError) -> bool:
     """Ends the job's growth with this error. It returns True, because the end of the job is to be decided next."""
-    with database().write() as session:
+    with writing() as (session, afterwards):
         job = jobs.lock(session, turn.job_id)
         if job.turn == turn.number and job.state in (JobState.QUEUED, JobState.RUNNING):
             job.error = error.to_document()
-            _finish_growth(session, job, Finish(Outcome.ERROR, error.message))
+            _finish_growth(session, job, Finish(Outcome.ERROR, error.message), afterwards)
     return True
 
 
-def _finish_growth(session: Session, job: JobRow, finish: Finish) -> None:
+def _finish_growth(session: Session, job: JobRow, finish: Finish, afterwards: Afterwards) -> None:
     """Stops the job's work, but lets certified regions still be accepted. It does nothing when the growth has finished already."""
     if job.action is not None and job.action["kind"] == "finish":
         return
@@ -236,11 +243,14 @@ def _finish_growth(session: Session, job: JobRow, finish: Finish) -> None:
     pairs.skip(session, job)
     steps.skip(session, job.id)
     pairs.skip_iterations(session, job.id)
+    covers.stop(session, job, afterwards)
     _advance(job, finish)
 
 
 def _finish(session: Session, job: JobRow, afterwards: Afterwards) -> None:
-    """Ends the job once its last region has been accepted or refused."""
+    """Ends the job once its last region has been accepted or refused, and no region grows for it any more."""
+    if covers.grows(session, job):
+        return
     rows = steps.of_job(session, job.id)
     if any(step.state in unfinished(STEP) for step in rows):
         if job.accept_after > utcnow():
@@ -250,6 +260,8 @@ def _finish(session: Session, job: JobRow, afterwards: Afterwards) -> None:
     refused = next((step.report for step in rows if step.kind == StepKind.ACCEPT and step.state == StepState.FAILED), None)
     failed = next((step.report for step in reversed(rows) if step.state == StepState.FAILED), None)
     subtrees.drop(session, job.id)
+    if job.parent_id is not None:
+        afterwards.append(partial(send_coordinate, job.parent_id))
     assert job.action is not None, "whoever finishes a job has found its last action"
     finish = Finish(Outcome(job.action["outcome"]), job.action["reason"])
     if job.state == JobState.CANCELLING:

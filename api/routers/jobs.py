@@ -20,8 +20,10 @@ from api.access import READ, SUBMIT, Db, Submitter
 from api.announce import Announcements
 from api.reading import ReadingRoute
 from api.schemas.common import MAX_INT, Cursor
+from api.schemas.covers import Cover, CoverRegion
 from api.schemas.jobs import (
     CertifyRequest,
+    CoverRequest,
     GrowRequest,
     GrowthCurve,
     GrowthPoint,
@@ -38,13 +40,16 @@ from api.schemas.jobs import (
 from api.schemas.scenes import PairInfo
 from certifier.errors import CirisError
 from certifier.model import Scene
-from certifier.outcome import Stage
+from certifier.outcome import Outcome, Stage
 from certifier.proof.container import with_scene
 from db import jobs, pairs, proofs, regions, scenes, webhooks
 from db.models import IterationRow, PairRow
 from db.session import Database
 from db.states import IterationState, JobKind, JobState, PairState
 from db.types import utcnow
+from planner.cover.options import CoverOptions
+from planner.cover.result import said
+from planner.cover.state import CoverState
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ], route_class=ReadingRoute)
 
@@ -63,7 +68,7 @@ def create_job(
     announcements: Announcements,
     idempotency_key: Annotated[str | None, Header(min_length=1, max_length=200)] = None,
 ) -> Job:
-    """Starts a job that grows a region, certifies a polytope, or makes a region of a changed scene from one of the scene before.
+    """Starts a job that grows a region, certifies a polytope, certifies a region of the scene before it changed again, or covers a scene.
 
     A repetition of the request with the same Idempotency-Key returns the same job. Another request with that key is refused (409).
     """
@@ -95,8 +100,10 @@ def create_job(
     return Job.of(job)
 
 
-def _options(body: GrowRequest | CertifyRequest, scene: Scene) -> dict[str, Any]:
-    """Returns the document of certifier.growth.options.GrowthOptions that the request asks for, its numbers checked against the scene."""
+def _options(body: GrowRequest | CertifyRequest | CoverRequest, scene: Scene) -> dict[str, Any]:
+    """Returns the document of GrowthOptions, or of CoverOptions, that the request asks for, its numbers checked against the scene."""
+    if isinstance(body, CoverRequest):
+        return checks.cover(scene, body.options).to_document()
     if isinstance(body, GrowRequest):
         return {"kind": "grow", "seed": checks.seed(scene, body.seed).to_document(), **body.options.model_dump()}
     checks.polytope(scene, body.polytope)
@@ -124,13 +131,15 @@ def list_jobs(
     state: JobState | None = None,
     kind: JobKind | None = None,
     scene: str | None = None,
+    parent: Annotated[str | None, Query(max_length=64, description="List the jobs that grow the regions of this cover.")] = None,
     after: Cursor = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
 ) -> JobPage:
-    """Lists the jobs, newest first."""
+    """Lists the jobs that were asked for, newest first; or those that a cover has made for its regions."""
     with db.read() as session:
         scene_id = scenes.find(session, scene) if scene else None
-        page = jobs.page(session, state=state, kind=kind, scene_id=scene_id, after=after, limit=limit)
+        parent_id = jobs.get(session, parent).id if parent else None
+        page = jobs.page(session, state=state, kind=kind, scene_id=scene_id, parent_id=parent_id, after=after, limit=limit)
     return JobPage(jobs=[Job.of(row) for row in page.rows], next=page.next)
 
 
@@ -164,6 +173,32 @@ def retry_job(job_id: str, caller: Submitter, db: Db, response: Response, backgr
     background.add_task(announcements.announce, job.id)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return Job.of(job)
+
+
+@router.get("/{job_id}/cover")
+def get_job_cover(job_id: str, db: Db) -> Cover:
+    """Returns what a cover has come to: how much is covered, how it hangs together, and which regions it has grown."""
+    with db.read() as session:
+        job = jobs.get(session, job_id)
+        if job.kind != JobKind.COVER:
+            message = f"the job {job.id} is no cover, but a {job.kind} job"
+            raise CirisError("cover_not_found", message, field="job", hint="its own page and /v1/jobs/{id} describe it")
+        growth, children = jobs.growth(session, job.id), jobs.children(session, job.id)
+        made = regions.of_cover(session, job.id)
+    known = {} if growth is None else said(CoverState.from_document(growth, CoverOptions.from_document(job.options))) or {}
+    names = ("coverage", "components", "largest", "connected", "connect", "seeds", "paths", "missing", "obstacles")
+    return Cover(
+        state=JobState(job.state),
+        outcome=None if job.outcome is None else Outcome(job.outcome),
+        reason=job.reason,
+        seconds=None if job.started_at is None else ((job.finished_at or utcnow()) - job.started_at).total_seconds(),
+        regions=[region.id for region in made],
+        grown=[
+            CoverRegion(job=child.id, number=child.number or 0, state=JobState(child.state), region=child.region_id, reason=child.reason)
+            for child in children
+        ],
+        **{name: known.get(name) for name in names},
+    )
 
 
 @router.get("/{job_id}/webhook")

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector
+from api.schemas.covers import CoverRequestOptions
 from api.schemas.scenes import PairInfo
 from certifier.growth.options import LARGEST_TOLERANCE, MOST_CELLS, WHOLE_NUMBERS, GrowthOptions
 from certifier.model import MAX_NAME
@@ -41,6 +42,10 @@ class GrowOptions(Request):
         int | None,
         _whole("cells", f"For `whole`: what is open after so many cells of a pair, in a stage, is cut off. Default: {MOST_CELLS}."),
     ] = DEFAULTS.cells
+    stages: Annotated[
+        int | None,
+        _whole("stages", "For `whole`: growth ends after so many stages. Default: it ends when a stage gains little."),
+    ] = DEFAULTS.stages
     contractions: Annotated[
         int | None,
         _whole(
@@ -194,7 +199,18 @@ class RecertifyRequest(JobRequest):
     random_seed: RandomSeed = 0
 
 
-NewJob = Annotated[GrowRequest | CertifyRequest | RecertifyRequest, Field(discriminator="kind")]
+class CoverRequest(JobRequest):
+    """Asks for regions, one after another, until they cover the scene or connect configurations."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"kind": "cover", "scene": "planar-2dof", "deadline_seconds": 60, "options": {"coverage": 0.95}}]}
+    )
+
+    kind: Literal["cover"]
+    options: CoverRequestOptions = Field(default_factory=CoverRequestOptions)
+
+
+NewJob = Annotated[GrowRequest | CertifyRequest | RecertifyRequest | CoverRequest, Field(discriminator="kind")]
 
 
 class Job(BaseModel):
@@ -212,6 +228,7 @@ class Job(BaseModel):
     region: str | None = Field(description="Id of the last certified region.")
     retry_of: str | None
     attempt: int
+    parent: str | None = Field(description="Id of the cover that the job grows a region for; null where somebody asked for the job.")
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None
@@ -233,6 +250,7 @@ class Job(BaseModel):
             region=row.region_id,
             retry_of=row.retry_of,
             attempt=row.attempt,
+            parent=row.parent_id,
             created_at=row.created_at,
             started_at=row.started_at,
             finished_at=row.finished_at,
@@ -265,7 +283,7 @@ class Event(BaseModel):
     """Describes something that happened to a job."""
 
     seq: int = Field(description="Number of the event within the job: 1, 2, 3 ... It is the event's id in the stream.")
-    kind: str = Field(description="One of job, iteration, pairs, step, region, lost.")
+    kind: str = Field(description="One of job, iteration, pairs, step, region, lost; of a cover also cover and child.")
     data: Document
     created_at: datetime
 

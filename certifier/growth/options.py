@@ -30,6 +30,7 @@ WHOLE_NUMBERS = {
     "max_rounds": (0, 1000),
     "backoff": (0, 20),
     "cells": (1, 10_000_000),
+    "stages": (1, 100),
     "random_seed": (0, 2**63 - 1),
 }
 """Maps an option to its least and its greatest value."""
@@ -52,6 +53,8 @@ class GrowthOptions:
             joint limits are the proposal, None is ``targeted``: much may collide in them, or much more be free.
         cells: so many cells of each pair are looked at. Of ``grow`` it is in every stage, what is open then is cut off, and None is
             MOST_CELLS; of ``certify``, 1 and None give the program (11) of the papers.
+        stages: of ``whole``, growth ends after so many stages, each of which comes to a larger region than the one before; None: when a
+            stage gains little.
         contractions: how many targeted contractions of the proposal are tried; each is given up when it is smaller than the best so far.
             None, for this and for ``pushes`` and ``max_rounds``, takes the default that pays: see EFFORT.
         bisection_steps: certifications spent on uniform contraction after the two ends are known.
@@ -66,6 +69,7 @@ class GrowthOptions:
     seed: dict[str, Any] = field(default_factory=dict)
     contraction: Literal["whole", "targeted", "uniform"] | None = None
     cells: int | None = None
+    stages: int | None = None
     contractions: int | None = None
     bisection_steps: int = 6
     pushes: int | None = None
@@ -107,7 +111,7 @@ class GrowthOptions:
             raise RegionError("option_value", "contraction must be 'whole', 'targeted' or 'uniform'", field="options.contraction")
         for name, (least, greatest) in WHOLE_NUMBERS.items():
             value = getattr(options, name)
-            if name in ("cells", *EFFORT[0][1]) and value is None:
+            if name in ("cells", "stages", *EFFORT[0][1]) and value is None:
                 continue
             if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= greatest:
                 raise RegionError("option_value", f"{name} must be an integer from {least} to {greatest}", field=f"options.{name}")

@@ -116,6 +116,7 @@ class Whole:
         spent: pair index -> how many cells were looked at.
         cuts: pair index -> in how many rounds something was cut off for it; pairs for which nothing was are left out.
         since, passed: the shares of the time until the deadline that had passed when this stage began, and now; 0 without a deadline.
+        stage: the number of the stage, from 1 on.
     """
 
     reach: float
@@ -130,6 +131,7 @@ class Whole:
     cuts: dict[int, int] = field(default_factory=dict)
     since: float = 0.0
     passed: float = 0.0
+    stage: int = 1
 
 
 @dataclass(frozen=True, eq=False)

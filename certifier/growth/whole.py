@@ -80,7 +80,7 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     kept = _kept(scene, start, best.polytope)
     if state.options.kind == "recertify":
         return Transition(state, Finish(Outcome.CERTIFIED, f"certified; {100 * kept:.3g} % of the region is kept"))
-    if kept == 1 or (whole.reach > 1 and kept < whole.kept + GAIN):
+    if kept == 1 or whole.stage == state.options.stages or (whole.reach > 1 and kept < whole.kept + GAIN):
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
     reach = FAR if whole.reach >= 1 else FARTHEST if whole.passed <= SOON else FARTHER
     return begin_stage(scene, state, reach, pushed(scene, best.polytope, start.seed, reach, start.rows), kept, whole.passed)
@@ -89,7 +89,8 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
 def begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float = 0.0, passed: float = 0.0) -> Transition:
     """Asks to certify all pairs on a polytope; what was proved on the one of the stage before says nothing about it."""
     box = Box.around(*bounds(polytope))
-    return _next(scene, replace(state, whole=Whole(reach, kept, polytope, box.mid, box.half, since=passed, passed=passed)))
+    stage = 1 if state.whole is None else state.whole.stage + 1
+    return _next(scene, replace(state, whole=Whole(reach, kept, polytope, box.mid, box.half, since=passed, passed=passed, stage=stage)))
 
 
 def in_words(scene: Scene, s: Array) -> str:

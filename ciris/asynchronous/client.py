@@ -96,9 +96,11 @@ class AsyncClient:
         response = await self._send("POST", "/v1/jobs", json=request, headers=headers)
         return response.json(), response.status_code == httpx2.codes.CREATED
 
-    async def jobs(self, *, state: str | None = None, scene: str | None = None, most: int = 50) -> list[Document]:
-        """Returns the newest jobs, at most so many, in one state or of one scene where that is given."""
-        wanted = given(state=state, scene=scene)
+    async def jobs(
+        self, *, state: str | None = None, scene: str | None = None, parent: str | None = None, most: int = 50
+    ) -> list[Document]:
+        """Returns the newest jobs, at most so many, in one state, of one scene, or of one cover where that is given."""
+        wanted = given(state=state, scene=scene, parent=parent)
         found: list[Document] = []
         after = None
         while len(found) < most:
@@ -121,6 +123,10 @@ class AsyncClient:
     async def retry(self, job_id: str) -> Document:
         """Creates a new job like one that failed or was cancelled, and returns it."""
         return await self._json("POST", f"/v1/jobs/{segment(job_id)}/retry")
+
+    async def cover(self, job_id: str) -> Document:
+        """Returns what a cover has come to."""
+        return await self._json("GET", f"/v1/jobs/{segment(job_id)}/cover")
 
     async def job_pairs(self, job_id: str, iteration: int | None = None) -> Document:
         """Returns a job's pair matrix, of all iterations or of one."""

@@ -34,6 +34,7 @@ OPERATIONS = {
     "get_job_pairs": "GET /v1/jobs/{job_id}/pairs",
     "download_pair_proof": "GET /v1/jobs/{job_id}/pairs/{pair}/proof",
     "get_job_growth": "GET /v1/jobs/{job_id}/growth",
+    "get_job_cover": "GET /v1/jobs/{job_id}/cover",
     "get_job_webhook": "GET /v1/jobs/{job_id}/webhook",
     "list_job_events": "GET /v1/jobs/{job_id}/events",
     "stream_job_events": "GET /v1/jobs/{job_id}/events/stream",

@@ -188,7 +188,7 @@ def test_regions_are_compared_once_and_for_a_few_seconds_at_a_time(
     def again(*_: object) -> None:
         raise AssertionError("this pair was compared before")
 
-    monkeypatch.setattr(graph, "overlap", again)
+    monkeypatch.setattr("planner.overlap.overlap", again)
     assert len(client.get("/v1/planning/graph?scene=slider").json()["edges"]) == 6
 
 

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from benchmarks import catalogue, growth, pictures, report
+from benchmarks import catalogue, cover, cover_picture, growth, pictures, report
 from benchmarks.outline import outlines
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD
@@ -27,6 +27,12 @@ def test_the_region_is_certified() -> None:
     scene = catalogue.scene(pictures.EXAMPLE)
     certification = Certification(scene, pictures.polytope(REGION))
     assert {certification.certify(index).outcome for index in range(len(scene.pairs))} == {Outcome.CERTIFIED}
+
+
+def test_the_picture_of_a_cover_is_that_of_its_regions() -> None:
+    covered = json.loads(cover_picture.REGIONS.read_text(encoding="utf-8"))
+    assert cover_picture.picture(covered) == cover_picture.PICTURE.read_text(encoding="utf-8")
+    assert covered["coverage"]["value"] >= cover.CASES[cover_picture.EXAMPLE].options["coverage"]
 
 
 def test_what_is_drawn_as_colliding_collides() -> None:

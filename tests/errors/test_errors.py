@@ -11,6 +11,7 @@ from certifier.errors import CirisError
 from client.verify import REFUSED
 from tests.errors.bundles import BUNDLES
 from tests.errors.commands import COMMANDS
+from tests.errors.covers import COVERS
 from tests.errors.motions import MOTIONS
 from tests.errors.proofs import PROOFS
 from tests.errors.regions import REGIONS
@@ -19,7 +20,7 @@ from tests.errors.scenes import SCENES
 from tests.errors.service import SERVICE
 from tests.errors.sites import Site, sites
 
-TABLE = [*SCENES, *BUNDLES, *REGIONS, *MOTIONS, *SERVICE, *COMMANDS, *PROOFS]
+TABLE = [*SCENES, *BUNDLES, *REGIONS, *MOTIONS, *COVERS, *SERVICE, *COMMANDS, *PROOFS]
 
 DEMANDS = re.compile(r"\bmust\b|\bat most\b|\bonly\b")
 """Words of a message that says by itself what has to be."""

@@ -123,6 +123,18 @@ def test_where_bodies_touch_is_cut_off_and_what_holds_is_not_asked_for_again():
     assert end.outcome is Outcome.CERTIFIED
 
 
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_growth_ends_after_so_many_stages(count):
+    corner = np.array([[0.4, 0.8], [0.8, 0.4]])
+
+    def verdict(index, action):
+        return (Outcome.REFUTED, weak(corner)) if (index, action.iteration) == (1, 1) else (Outcome.CERTIFIED, None)
+
+    made, accepted, end = drive(verdict, options(stages=count))
+    assert len(stages(made)) == len(accepted) == count
+    assert (end.outcome, end.reason) == (Outcome.CERTIFIED, "certified")
+
+
 def test_faces_move_out_stage_by_stage_as_far_as_the_proposal():
     """A face in the second stage cuts off much too much; the stages after it win that back."""
     corner = np.array([[0.4, 0.8], [0.8, 0.4]])

@@ -1,0 +1,103 @@
+"""These models describe covers: jobs that have regions grown until a scene is covered, or configurations are connected."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, Field
+
+from api.schemas.common import Real, Request, Vector
+from certifier.outcome import Outcome
+from db.states import JobState
+from planner.cover.options import ENOUGH, MOST_GIVEN, MOST_JOINTS, WHOLE_NUMBERS, CoverOptions
+
+DEFAULTS = CoverOptions()
+Given = Annotated[list[Vector], Field(max_length=MOST_GIVEN)]
+
+
+def _whole(option: str, description: str) -> Any:
+    """Returns the field of an option that is a whole number within its bounds."""
+    least, greatest = WHOLE_NUMBERS[option]
+    return Field(ge=least, le=greatest, description=description)
+
+
+class CoverRequestOptions(Request):
+    """Says what a cover shall reach, where it begins, and how much effort a region is worth."""
+
+    seeds: Given = Field(default_factory=list, description="Configurations (joint positions) that get regions first.")
+    connect: Given = Field(
+        default_factory=list, description="Configurations that each get a region, and that shall end in one connected component."
+    )
+    paths: Annotated[list[Annotated[list[Vector], Field(min_length=2, max_length=MOST_GIVEN)]], Field(max_length=MOST_GIVEN)] = Field(
+        default_factory=list,
+        description="Demonstrations: the motions, straight in joint positions from waypoint to waypoint, that shall be covered.",
+    )
+    coverage: Annotated[
+        Real | None,
+        Field(
+            gt=0,
+            le=1,
+            description="Goal: this share of the collision-free configurations, uniform in joint positions within the limits, is in "
+            f"regions. Default: {ENOUGH} where nothing else is asked for, else no goal.",
+        ),
+    ] = None
+    connected: Annotated[bool, Field(description="Goal: all regions of the scene hang together.")] = False
+    regions: Annotated[int, _whole("regions", "At most so many regions are begun.")] = DEFAULTS.regions
+    at_once: Annotated[int, _whole("at_once", "So many regions grow at the same time.")] = DEFAULTS.at_once
+    region_seconds: Annotated[
+        Real | None, Field(gt=0, le=30 * 86400, description="A region ends after so long, with what there is of it.")
+    ] = None
+    cells: Annotated[int, _whole("cells", "What is open after so many cells of a pair, in a stage of a region, is cut off.")] = (
+        DEFAULTS.cells
+    )
+    stages: Annotated[
+        int | None,
+        _whole(
+            "stages",
+            "Each region ends after so many stages. Default: 1 for robots with more than "
+            f"{MOST_JOINTS} joints, which gives more coverage a second; else a region ends when a stage gains little.",
+        ),
+    ] = None
+    random_seed: Annotated[int, _whole("random_seed", "Seed of every random choice.")] = DEFAULTS.random_seed
+
+
+class Coverage(BaseModel):
+    """Says how much of the collision-free configurations is in regions. It is estimated from samples, and proves nothing."""
+
+    value: float
+    stderr: float = Field(description="Standard error of the value.")
+    samples: int = Field(description="Number of collision-free configurations that were drawn, uniform in joint positions.")
+
+
+class CoverRegion(BaseModel):
+    """Describes a region that a cover has begun."""
+
+    job: str = Field(description="Id of the job that grows it.")
+    number: int
+    state: JobState
+    region: str | None = Field(description="Id of the last certified region of that job.")
+    reason: str | None = Field(description="A sentence that says why growing ended.")
+
+
+class Cover(BaseModel):
+    """Describes what a cover has come to. All but ``regions`` is as of its last look at the scene, and null before the first."""
+
+    state: JobState
+    outcome: Outcome | None
+    reason: str | None = Field(description="A sentence that says why the cover ended, and which goals it has not reached.")
+    seconds: float | None = Field(description="Seconds from the job's start to its end, or until now.")
+    regions: list[str] = Field(description="Ids of the certified regions that the cover has grown.")
+    grown: list[CoverRegion] = Field(description="The regions that it has begun.")
+    coverage: Coverage | None
+    components: list[int] | None = Field(
+        description="Number of regions of each connected component of the scene's regions, the component that covers most first."
+    )
+    largest: float | None = Field(description="Share of what is covered that is in the first component.")
+    connected: bool | None = Field(description="Whether all regions of the scene are in one component.")
+    connect: list[int | None] | None = Field(
+        description="For each configuration to connect the component, from 0 on, whose region contains it; null where none does."
+    )
+    seeds: list[bool] | None = Field(description="For each given seed whether a region contains it.")
+    paths: list[float] | None = Field(description="For each given path which part of it is covered from its start on, from 0 to 1.")
+    missing: list[str] | None = Field(description="The goals that are not reached, in words.")
+    obstacles: list[str] | None = Field(description="What could not be gone on with, in words.")

@@ -1,0 +1,152 @@
+"""This module measures how regions come to cover a scene: the service's certified ones, and Drake's IRIS regions without certificates.
+
+Each case is a cover of an example, with its goals and its deadline. The service runs separately, with a data directory that may be kept.
+IRIS goes by the same rules for its seeds, in as many processes and for as long; its regions count as they are proposed.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from benchmarks import catalogue, iris_cover, measure
+from benchmarks.measure import Progress
+from benchmarks.service import running
+from ciris.synchronous.client import Client
+
+CIRIS, DRAKE = "ciris", "drake"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A cover to measure: the example, what is asked for, and the seconds until its deadline."""
+
+    example: str
+    deadline_s: float
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+SHELF = {
+    "above": [-0.34, 0.66, 0.29, -0.28, 0.88, 0.22, -0.97],
+    "left": [0.75, 1.2, 0.02, -0.39, -1.53, 0.56, 0.96],
+    "right": [-0.97, 1.12, 0.85, -0.5, 0.8, 0.31, -1.57],
+    "in the upper shelf": [-0.05, 0.44, 0.02, -1.01, -1.61, 0.11, -1.06],
+    "in the lower shelf": [-0.31, 0.68, 0.22, -1.44, 0.67, -0.84, 0.54],
+}
+"""Free configurations of iiwa_shelf whose hand is above, beside and in the shelves."""
+CASES = {
+    "planar_2dof": Case("planar_2dof", 120, {"coverage": 0.95, "connected": True}),
+    "arm_3dof": Case("arm_3dof", 300, {"coverage": 0.85, "connected": True}),
+    "ur3e_bin": Case("ur3e_bin", 600, {"coverage": 0.99, "connected": True}),
+    "iiwa_shelf": Case("iiwa_shelf", 600, {"connect": list(SHELF.values())}),
+}
+
+
+def cover(
+    name: str, ways: list[str], processes: int, deadline_s: float | None, data: Path | None, verify: bool, progress: Progress, **more: Any
+) -> dict[str, Any]:
+    """Covers a case's example in these ways, and returns the document of ``ciris bench cover``.
+
+    Args:
+        data: directory that keeps the service's data; None for one that is removed.
+        verify: whether the service checks the proof of every region once more, after the cover.
+        more: options of the cover besides the case's.
+
+    Raises:
+        CirisError: the service does not start, or refuses the cover.
+    """
+    case = CASES[name]
+    options, seconds = {**case.options, **more}, deadline_s or case.deadline_s
+    runs = {}
+    if CIRIS in ways:
+        runs[CIRIS] = _certified(case, options, processes, seconds, data, verify, progress)
+    if DRAKE in ways:
+        scene = catalogue.scene(case.example)
+        runs[DRAKE] = iris_cover.cover(scene, options, processes, seconds, lambda point: progress(_line(DRAKE, point)))
+    return {
+        "benchmark": "cover",
+        "machine": measure.machine(),
+        "case": name,
+        "scene": case.example,
+        "options": options,
+        "deadline_seconds": seconds,
+        "processes": processes,
+        "runs": runs,
+    }
+
+
+@contextmanager
+def _directory(data: Path | None) -> Iterator[Path]:
+    if data is not None:
+        yield data.absolute()
+        return
+    with tempfile.TemporaryDirectory() as directory:
+        yield Path(directory) / "data"
+
+
+def _certified(
+    case: Case, options: dict[str, Any], processes: int, seconds: float, data: Path | None, verify: bool, progress: Progress
+) -> dict[str, Any]:
+    """Has a service of its own cover the example."""
+    with _directory(data) as directory, running(directory, processes) as service, Client(service.url) as client:
+        found, points = covered(client, case, options, seconds, progress)
+        holding = [client.verify(region)["holds"] for region in found["regions"]] if verify else []
+        return {
+            "points": points,
+            "reason": found["reason"],
+            "seconds": found["seconds"],
+            "coverage": found["coverage"],
+            "regions": len(found["regions"]),
+            "components": found["components"],
+            "connect": found["connect"],
+            "begun": len(found["grown"]),
+            "without_region": sum(grown["region"] is None for grown in found["grown"]),
+            **({"proofs_hold": sum(holding)} if verify else {}),
+        }
+
+
+def covered(
+    client: Client, case: Case, options: dict[str, Any], seconds: float, progress: Progress
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Has a service cover the example. Returns what it has come to, and the looks at the scene on the way."""
+    scene = client.add_scene(catalogue.FILES[case.example])
+    request = {"kind": "cover", "scene": scene["id"], "options": options, "deadline_seconds": seconds}
+    job, _ = client.create_job(request)
+    begun, points = _time(job["created_at"]), []
+    for event in client.events(job["id"]):
+        if event["kind"] == "cover":
+            points.append(iris_cover.point((_time(event["created_at"]) - begun).total_seconds(), event["data"]))
+            progress(_line(CIRIS, points[-1]))
+    return client.cover(job["id"]), points
+
+
+def table(way: str, run: dict[str, Any]) -> list[tuple[str, ...]]:
+    """Returns the rows of a table about one way: coverage over the seconds, and how the regions hang together."""
+    return [
+        (
+            way,
+            f"{point['seconds']:.1f}",
+            f"{100 * point['coverage']:.1f} ± {100 * point['stderr']:.1f}",
+            str(point["regions"]),
+            str(len(point["components"])),
+            f"{100 * point['largest']:.1f}",
+            " ".join("-" if part is None else str(part) for part in point["connect"]),
+        )
+        for point in run["points"]
+    ]
+
+
+def _line(way: str, point: dict[str, Any]) -> str:
+    return (
+        f"{way} {point['seconds']:.1f} s: {100 * point['coverage']:.1f} +- {100 * point['stderr']:.1f} % covered by {point['regions']} "
+        f"regions in {len(point['components'])} components, {100 * point['largest']:.1f} % of it in the largest; connect {point['connect']}"
+    )
+
+
+def _time(text: str) -> datetime:
+    return datetime.fromisoformat(text)

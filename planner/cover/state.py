@@ -1,0 +1,218 @@
+"""What a cover remembers, asks for and is told: plain data, which goes into the database as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from enum import StrEnum
+from typing import Any, Self
+
+from planner.cover.options import CoverOptions, Q
+
+
+class Purpose(StrEnum):
+    """The purpose says why a region is grown."""
+
+    SEED = "seed"
+    """It is around a given seed."""
+    CONNECT = "connect"
+    """It is around a configuration that shall be connected."""
+    PATH = "path"
+    """It covers the first part of a given path that is not covered."""
+    JOIN = "join"
+    """It leads from the component of the first configuration to connect towards that of another one."""
+    LINK = "link"
+    """It leads from the largest component of the regions towards another one."""
+    COVER = "cover"
+    """It covers free configurations that are in no region."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A region to grow.
+
+    Attributes:
+        q: (n,) its seed, joint positions.
+        purpose: why it is grown.
+        about: number of the seed, of the configuration to connect or of the path that it is about; what it joins; 0 else.
+        contain: (n,) each, joint positions that it has to contain besides.
+    """
+
+    q: Q
+    purpose: Purpose
+    about: int = 0
+    contain: tuple[Q, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Returns what it is about, as a text."""
+        return self.purpose.value if self.purpose is Purpose.COVER else f"{self.purpose}[{self.about}]"
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> Self:
+        contain = tuple(tuple(q) for q in document["contain"])
+        return cls(tuple(document["q"]), Purpose(document["purpose"]), document["about"], contain)
+
+
+@dataclass(frozen=True)
+class Scouted:
+    """A report: how much of the scene is covered, how its regions hang together, and where it is best to go on.
+
+    Attributes:
+        version: version of the library that it is about.
+        regions: how many regions the scene has.
+        samples: how many collision-free configurations were tested.
+        covered: how many of them are in regions.
+        components: how many regions each connected component has, the largest component by samples first.
+        largest: how many of the covered samples are in the first component.
+        seeds: for each given seed whether a region contains it.
+        connect: for each configuration to connect the component that contains it, None where no region does.
+        paths: which part of each path is covered from its start on, from 0 to 1.
+        proposals: regions to grow next, the best first.
+        obstacles: what cannot be gone on with, and why, in words.
+    """
+
+    version: int = 0
+    regions: int = 0
+    samples: int = 0
+    covered: int = 0
+    components: tuple[int, ...] = ()
+    largest: int = 0
+    seeds: tuple[bool, ...] = ()
+    connect: tuple[int | None, ...] = ()
+    paths: tuple[float, ...] = ()
+    proposals: tuple[Task, ...] = ()
+    obstacles: tuple[str, ...] = ()
+
+    @property
+    def coverage(self) -> float:
+        """Returns the share of the samples that are covered."""
+        return self.covered / self.samples if self.samples else 0.0
+
+    @property
+    def stderr(self) -> float:
+        """Returns the standard error of the coverage; it is never said to be less than that of one sample."""
+        if not self.samples:
+            return 1.0
+        return max(math.sqrt(self.coverage * (1 - self.coverage) / self.samples), 1 / self.samples)
+
+    @property
+    def joined(self) -> bool:
+        """Returns whether the configurations to connect are in one component."""
+        return None not in self.connect and len(set(self.connect)) <= 1
+
+    def to_document(self) -> dict[str, Any]:
+        """Returns the report as JSON-able data."""
+        return asdict(self)
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> Self:
+        """Does the inverse of :meth:`to_document`."""
+        lists = {name: tuple(document[name]) for name in ("components", "seeds", "connect", "paths", "obstacles")}
+        return cls(**{**document, **lists, "proposals": tuple(Task.from_document(task) for task in document["proposals"])})
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A report: these regions are not growing any more. It maps their numbers to why there is no region; None where there is one."""
+
+    regions: Mapping[int, str | None]
+
+
+@dataclass(frozen=True)
+class Late:
+    """A report: the deadline was reached."""
+
+
+Report = Scouted | Ended | Late
+
+
+@dataclass(frozen=True)
+class Scout:
+    """An action: look at what is covered, and for what is next."""
+
+    kind = "scout"
+
+
+@dataclass(frozen=True)
+class Watch:
+    """An action: begin to grow these regions, by number, and wait until one of all that grow has ended.
+
+    Attributes:
+        begin: number of the region -> what to grow.
+        stop: True ends all that grow.
+    """
+
+    kind = "watch"
+    begin: Mapping[int, Task] = field(default_factory=dict)
+    stop: bool = False
+
+
+@dataclass(frozen=True)
+class Finish:
+    """An action: end the cover.
+
+    Attributes:
+        reached: whether all goals are reached.
+        reason: a sentence that says why it ends.
+        fruitless: whether it can show nothing: no goal is reached, and it could not go on.
+    """
+
+    kind = "finish"
+    reached: bool
+    reason: str
+    fruitless: bool = False
+
+
+Action = Scout | Watch | Finish
+
+
+@dataclass(frozen=True)
+class CoverState:
+    """What a cover remembers between two decisions.
+
+    Attributes:
+        options: what was asked for.
+        begun: how many regions were begun.
+        growing: number of a region that grows -> what it is.
+        last: the last look at the scene; None before the first.
+        failed: key of a task -> how often no region came of it in a row.
+        why: key of a task -> why no region came of it the last time.
+        idle: how many regions in a row changed nothing that the scouts count.
+        looks: how many scouts were sent.
+        fruitless: how many looks in a row found nothing to grow while nothing grew.
+        closing: why the cover ends, once that is decided.
+    """
+
+    options: CoverOptions
+    begun: int = 0
+    growing: Mapping[int, Task] = field(default_factory=dict)
+    last: Scouted | None = None
+    failed: Mapping[str, int] = field(default_factory=dict)
+    why: Mapping[str, str] = field(default_factory=dict)
+    idle: int = 0
+    looks: int = 0
+    fruitless: int = 0
+    closing: str | None = None
+
+    def to_document(self) -> dict[str, Any]:
+        """Returns the state as JSON-able data, without the options."""
+        document = asdict(replace(self, growing={}))
+        del document["options"]
+        return document | {"growing": {str(number): asdict(task) for number, task in self.growing.items()}}
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any], options: CoverOptions) -> Self:
+        """Does the inverse of :meth:`to_document`."""
+        growing = {int(number): Task.from_document(task) for number, task in document["growing"].items()}
+        last = None if document["last"] is None else Scouted.from_document(document["last"])
+        return cls(options, **{**document, "growing": growing, "last": last})
+
+
+@dataclass(frozen=True)
+class Transition:
+    """What a cover remembers from now on, and what is to be done."""
+
+    state: CoverState
+    action: Action

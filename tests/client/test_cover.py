@@ -1,0 +1,77 @@
+"""``ciris cover`` as people type it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from certifier.model import Scene
+from client.follow import Teller
+from client.output import Screen
+from db import jobs
+from db.session import Database
+from planner.cover.options import CoverOptions
+from tests.client.conftest import Ciris
+
+COVERAGE = {"value": 0.5, "stderr": 0.01, "samples": 100}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        (["--coverage", "2"], "--coverage: "),
+        (["--regions", "0"], "--regions: "),
+        (["--connect", "0"], "--connect: at least two configurations can be connected, and one was given"),
+        (["--connect", "0", "--connect", "-0.2,1"], "options.connect[1]: 2 numbers were given; slider has 1 joints"),
+        (["--seed", "5"], "options.seeds[0][0]: joint model/slide is at 5, not between its limits -1 and 1"),
+        (["--seed", "x"], "--seed[0]: 'x' is not a finite number"),
+        (["--deadline", "0"], "--deadline: must be a number of seconds above 0, not 0"),
+        (["--path", "none.csv"], "--path: there is no file none.csv"),
+    ],
+)
+def test_what_makes_no_sense_is_bad_input(ciris: Ciris, url: str, scene: Scene, arguments: list[str], error: str) -> None:
+    done = ciris("cover", "slider", *arguments, CIRIS_URL=url)
+    assert done.status == 2
+    assert done.error.startswith(error)
+
+
+def test_its_options_become_those_of_the_job(ciris: Ciris, url: str, scene: Scene, database: Database, tmp_path: Path) -> None:
+    """Nobody works on the job, so it is cancelled by the time the command looks at it."""
+    (tmp_path / "path.csv").write_text("0\n0.1\n")
+    given = ["--connect", "0", "--connect", "-0.2", "--seed", "-0.1", "--path", str(tmp_path / "path.csv"), "--coverage", "0.8"]
+
+    def end() -> None:
+        made: list[str] = []
+        while not made:
+            time.sleep(0.1)
+            with database.write() as session:
+                made = [jobs.cancel(session, job.id).id for job in jobs.page(session).rows]
+
+    ending = threading.Thread(target=end, daemon=True)
+    ending.start()
+    done = ciris("cover", "slider", *given, "--connected", "--at-once", "3", "--stages", "2", CIRIS_URL=url)
+    ending.join()
+    assert done.status == 2
+    assert done.stderr.splitlines()[-1].startswith("error: cancelled before it started")
+    with database.read() as session:
+        (job,) = jobs.page(session).rows
+    options = CoverOptions.from_document(job.options)
+    assert (options.connect, options.seeds, options.paths) == (((0.0,), (-0.2,)), ((-0.1,),), (((0.0,), (0.1,)),))
+    assert (options.coverage, options.connected, options.at_once, options.stages) == (0.8, True, 3, 2)
+
+
+def test_its_events_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    teller = Teller(Screen(), [], watch=False)
+    known = {"coverage": COVERAGE, "regions": 3, "components": [2, 1], "growing": ["cover"]}
+    child = {"job": "0123456789", "number": 4}
+    teller.tell({"kind": "cover", "data": known})
+    teller.tell({"kind": "child", "data": child | {"purpose": "join[1]", "state": "queued"}})
+    teller.tell({"kind": "child", "data": child | {"state": "succeeded", "region_id": "abcdefghij", "reason": "certified"}})
+    teller.tell({"kind": "child", "data": child | {"state": "failed", "region_id": None, "reason": "they touch"}})
+    assert capsys.readouterr().err.splitlines() == [
+        "region 4 (job 01234567): certified region abcdefgh; before it, 50 +- 1 % covered by 3 regions in 2 components",
+        "region 4 (job 01234567): no region: they touch; before it, 50 +- 1 % covered by 3 regions in 2 components",
+    ]
