@@ -149,3 +149,13 @@ def _nearest(polytope: dict[str, Array], ends: tuple[Array, Array]) -> NDArray[n
     for s in (ends[0], (ends[0] + ends[1]) / 2, ends[1]):
         chosen[np.argsort(polytope["d"] - polytope["C"] @ s)[: NEAREST * len(s)]] = True
     return chosen
+
+
+def warm_up() -> None:
+    """Loads what the first curve needs, by making one around a corner."""
+    eye = np.eye(2)
+    corridors = [{"C": np.concatenate([eye, -eye]), "d": np.array(d)} for d in ([1.0, 0.2, 0.0, 0.0], [1.0, 1.0, -0.8, 0.0])]
+    ends = {"start": np.array([0.1, 0.1]), "goal": np.array([0.9, 0.9])}
+    arm = {"q_star": np.zeros(2), "revolute": np.ones(2, dtype=bool), "speed": np.ones(2), "acceleration": np.ones(2)}
+    route = {"regions": [0, 1], "via": np.array([[0.9, 0.1]])}
+    optimised({"polytopes": corridors, "routes": [route], **ends, **arm, "steps": 24, "spacing": 0.05})
