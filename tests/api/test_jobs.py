@@ -10,6 +10,7 @@ from fastapi.testclient import TestClient
 
 from api.app import create_app
 from api.schemas.jobs import GrowOptions, Seed
+from certifier.growth.machine import begin
 from certifier.growth.options import GrowthOptions
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
@@ -17,9 +18,10 @@ from certifier.pair.result import PairResult
 from certifier.partition.certification import CellCertification
 from certifier.seeding.options import SeedOptions
 from certifier.verify.file import verify_file
-from db import jobs, pairs
+from db import jobs, pairs, scenes
 from db.session import Database
 from tests.api.conftest import BASE_URL, PROBLEM
+from tests.scenes import slider
 from workers.app import CONTROL, waiting
 
 GROW: dict[str, Any] = {"kind": "grow", "scene": "slider", "seed": {"q": [0.1]}}
@@ -271,3 +273,27 @@ def test_the_schema_has_the_options_of_the_certifier() -> None:
     ours, theirs = GrowOptions().model_dump(), GrowthOptions().to_document()
     assert ours == {name: value for name, value in theirs.items() if name not in ("kind", "seed")}
     assert set(Seed.model_fields) == {field.name for field in fields(SeedOptions)}
+
+
+def test_a_region_of_another_scene_is_certified_again_with_its_seed_inside(client: TestClient, database: Database, region: str) -> None:
+    changed = replace(slider(posts=3), name="changed")
+    with database.write() as session:
+        scenes.add(session, changed)
+    answer = client.post("/v1/jobs", json={"kind": "recertify", "scene": "changed", "region": region[:8]})
+    assert answer.status_code == 201, answer.text
+    job = answer.json()
+    assert (job["kind"], job["scene"]) == ("recertify", changed.hash[:16])
+    options = GrowthOptions.from_document(job["options"])
+    assert (options.seed["region"], options.seed["q"], options.by_cells) == (region, [[0.0]], True)
+    transition = begin(changed, options)
+    assert transition.state.start is not None
+    assert transition.action.kind == "certify"
+
+
+def test_a_region_is_not_certified_again_for_another_robot(client: TestClient, database: Database, region: str) -> None:
+    with database.write() as session:
+        scenes.add(session, replace(slider(), name="other", q_star=np.array([0.1])))
+    refused = client.post("/v1/jobs", json={"kind": "recertify", "scene": "other", "region": region})
+    assert (refused.status_code, refused.json()["code"], refused.json()["field"]) == (422, "other_robot", "scene")
+    missing = client.post("/v1/jobs", json={"kind": "recertify", "scene": "other", "region": "nothing"})
+    assert (missing.status_code, missing.json()["code"]) == (404, "region_not_found")
