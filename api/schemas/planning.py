@@ -126,7 +126,7 @@ class PathRequest(_Motion):
     )
     bezier: Bezier | None = Field(None, max_length=MAX_SEGMENTS, description=BEZIER)
     knots: Knots | None = Field(None, description=KNOTS)
-    control_points: ControlPoints | None = Field(None, description=CONTROL_POINTS)
+    control_points: ControlPoints | None = Field(None, max_length=MAX_SEGMENTS, description=CONTROL_POINTS)
     times: list[Real] | None = Field(
         None,
         min_length=2,
