@@ -1,0 +1,41 @@
+"""docs/python.md: all its code, as one program, and Drake's planner on the regions that the program leaves, against a real service."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from tests.client.conftest import ROOT, surroundings
+from tests.docs.test_quickstart import BLOCK, service
+
+CHECK = """
+assert waypoints[0].tolist() == [0.1, 0.05] and waypoints[-1].tolist() == [1.0, -1.5]
+assert all(service.certify_path(scene, segment) for segment in pairwise(waypoints))
+"""
+
+
+def test_every_program_of_the_page_works_as_it_stands(tmp_path: Path) -> None:
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = surroundings(CIRIS_DATA_DIR=str(tmp_path / "data"), PATH=path)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    page = (ROOT / "docs" / "python.md").read_text()
+
+    def run(*arguments: str) -> str:
+        command = [sys.executable, *arguments]
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=500, check=False)
+        assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
+        return done.stdout
+
+    program = "\n".join(text for language, text in BLOCK.findall(page) if language == "python")
+    (by_drake,) = re.findall(r"^    python (examples/planner_gcs\.py .*)$", page, re.MULTILINE)
+    with service(environment, tmp_path):
+        said = run("-c", f"{program}\n{CHECK}")
+        waypoints = run(*by_drake.split()).splitlines()
+    assert re.search(r"^Region\(\w{8} of planar-2dof: 2 joints, \d+ faces, .* rad\^2, exact\)$", said, re.MULTILINE)
+    assert "[ True False]" in said
+    assert np.allclose([np.fromstring(waypoints[0], sep=","), np.fromstring(waypoints[-1], sep=",")], [[0.1, 0.05], [0.2, 0.1]])
