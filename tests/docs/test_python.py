@@ -38,4 +38,4 @@ def test_every_program_of_the_page_works_as_it_stands(tmp_path: Path) -> None:
         waypoints = run(*by_drake.split()).splitlines()
     assert re.search(r"^Region\(\w{8} of planar-2dof: 2 joints, \d+ faces, .* rad\^2, exact\)$", said, re.MULTILINE)
     assert "[ True False]" in said
-    assert np.allclose([np.fromstring(waypoints[0], sep=","), np.fromstring(waypoints[-1], sep=",")], [[0.1, 0.05], [-0.1, 0]])
+    assert np.allclose([np.fromstring(waypoints[0], sep=","), np.fromstring(waypoints[-1], sep=",")], [[0.1, 0.05], [0.2, 0.1]])
