@@ -393,6 +393,10 @@ def _parser() -> argparse.ArgumentParser:
     plan.add_argument("--to", dest="goal", metavar='"0,0.3,..."', required=True, help=f"where it ends: {of_end}")
     plan.add_argument("--speed", help="largest speed in rad/s or m/s, one for all joints or one for each; default 1")
     plan.add_argument("--acceleration", help="largest acceleration in rad/s² or m/s², one for all joints or one for each; default 2")
+    plan.add_argument(
+        "--grow", action="store_true", help="if there is none, have regions grown until the two ends are connected, and plan again"
+    )
+    plan.add_argument("--deadline", type=float, metavar="SECONDS", help="with --grow: stop growing after so long; default: none")
     plan.set_defaults(run="client.planning:plan")
 
     path = verbs.add_parser("path", parents=[remote, json], help="say whether every point of a path is in certified regions")

@@ -17,6 +17,8 @@ from client.output import Screen, print_json
 from client.paths import named, path_of
 
 OK, NO = 0, 1
+GROWABLE = {"start_uncovered", "goal_uncovered", "disconnected"}
+"""For these reasons there may be a trajectory once more regions have been grown."""
 REGION = re.compile(r"[0-9a-f]{4,8}|[0-9a-f]{8}-[0-9a-f-]*")
 """An id of a region, or its beginning."""
 
@@ -40,6 +42,9 @@ def plan(args: Namespace) -> int:
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)["id"]
         answer = _planned(client, scene, ends, limits)
+        if args.grow and answer["reason"] in GROWABLE:
+            _grow_between(client, scene, ends, args.deadline)
+            answer = _planned(client, scene, ends, limits)
     if args.json:
         print_json(answer)
     elif answer["found"]:
@@ -109,6 +114,15 @@ def _planned(client: Client, scene: str, ends: Sequence[Any], limits: Sequence[A
         answer = client.plan(scene, *ends, *limits)
     screen.clear()
     return answer
+
+
+def _grow_between(client: Client, scene: str, ends: Sequence[Any], deadline: float | None) -> None:
+    """Has the service grow regions until both ends are in one component, or until it cannot go on."""
+    names = [name for name, end in zip(("--from", "--to"), ends, strict=True) if isinstance(end, str)]
+    if names:
+        raise CirisError("option", "regions grow between configurations, not regions", field=names[0], hint="give joint positions")
+    request: dict[str, Any] = {"kind": "cover", "scene": scene, "options": {"connect": ends}}
+    service.cover(client, request if deadline is None else {**request, "deadline_seconds": deadline}, Screen())
 
 
 def _end(text: str, field: str) -> list[float] | str:

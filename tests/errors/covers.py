@@ -42,6 +42,11 @@ def in_s(t: Trial) -> str:
     return t.ciris("cover", "slider", "--path", path)
 
 
+def from_a_region(t: Trial) -> str:
+    region = t.request.getfixturevalue("region")
+    return t.ciris("plan", "slider", "--from", region, "--to", "0.9", "--grow")
+
+
 COVERS: list[Row] = [
     *rows(
         "planner/cover/options.py",
@@ -94,6 +99,10 @@ COVERS: list[Row] = [
             "its own page and /v1/jobs/{{id}} describe it",
             not_a_cover,
         ),
+    ),
+    *rows(
+        "client/planning.py",
+        ("option", "--from", "regions grow between configurations, not regions", "give joint positions", from_a_region),
     ),
     *rows(
         "client/cover.py",
