@@ -352,6 +352,48 @@ class Event:
 
 
 @dataclass(frozen=True)
+class FreeCoverage:
+    """How much of the collision-free configurations is in regions. It is estimated from samples, and proves nothing."""
+
+    value: float
+    stderr: float
+    samples: int
+
+    def __float__(self) -> float:
+        return self.value
+
+
+@dataclass(frozen=True)
+class Cover:
+    """What a cover has come to. It is true if it has reached all of its goals."""
+
+    outcome: Outcome | None
+    reason: str | None
+    """A sentence that says why it ended, and which goals it has not reached."""
+    seconds: float | None
+    regions: tuple[str, ...]
+    """Ids of the regions that it has grown."""
+    coverage: FreeCoverage | None
+    components: tuple[int, ...] | None
+    """How many regions each connected component of the scene has, the one that covers most first."""
+    connected: bool | None
+    """Whether all regions of the scene are in one component."""
+    connect: tuple[int | None, ...] | None
+    """For each configuration to connect the component that it is in; None where it is in no region."""
+    missing: tuple[str, ...] | None
+    """The goals that are not reached, in words."""
+    obstacles: tuple[str, ...] | None
+    """What could not be gone on with, in words."""
+
+    def __bool__(self) -> bool:
+        return self.outcome is Outcome.CERTIFIED
+
+    def __repr__(self) -> str:
+        covered = "nothing known" if self.coverage is None else f"{100 * self.coverage.value:.3g} % covered"
+        return f"Cover({covered}, {len(self.regions)} regions, {self.reason})"
+
+
+@dataclass(frozen=True)
 class QVolume:
     """How large a region is in joint positions."""
 

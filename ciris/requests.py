@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, TypedDict
 
@@ -37,6 +38,38 @@ class GrowOptions(TypedDict, total=False):
     """From -3 to 3; each step up doubles the job's share of the work."""
 
 
+class CoverOptions(TypedDict, total=False):
+    """What may be said of a cover. What is left out has the service's default."""
+
+    coverage: float
+    """Goal: this share of the collision-free configurations is in regions. Default: 0.95 where nothing else is asked for."""
+    connected: bool
+    """Goal: all regions of the scene hang together."""
+    connect: ArrayLike
+    """(k, n), k >= 2: goal: these configurations are in one connected component."""
+    paths: Sequence[ArrayLike]
+    """(k, n) each: goal: these motions, straight in q from waypoint to waypoint, are covered."""
+    seeds: ArrayLike
+    """(k, n), configurations that get regions first."""
+    regions: int
+    """At most so many regions are begun."""
+    at_once: int
+    """So many regions grow at the same time."""
+    region_seconds: float
+    """Each region ends after so long, with what there is of it."""
+    cells: int
+    """What is open after so many cells of a pair, in a stage of a region, is cut off."""
+    stages: int
+    """Each region ends after so many stages."""
+    random_seed: int
+    """Seed of every random choice."""
+    deadline: float
+    """Seconds after which the cover ends, with the regions by then."""
+    priority: int
+    """From -3 to 3; each step up doubles the job's share of the work."""
+
+
+_IN_JOB = (("deadline", "deadline_seconds"), ("priority", "priority"))
 _IN_OPTIONS = ("contraction", "cells", "pushes", "max_rounds", "random_seed")
 
 
@@ -49,8 +82,20 @@ def grow_request(scene: str, q: ArrayLike, options: GrowOptions) -> Document:
     if "method" in given:
         seed["method"] = given["method"]
     request = {"kind": "grow", "scene": scene, "seed": seed, "options": {name: given[name] for name in _IN_OPTIONS if name in given}}
-    names = (("deadline", "deadline_seconds"), ("priority", "priority"))
-    return request | {field: given[name] for name, field in names if name in given}
+    return request | {field: given[name] for name, field in _IN_JOB if name in given}
+
+
+def cover_request(scene: str, options: CoverOptions) -> Document:
+    """Returns the request of a job that covers a scene."""
+    given = dict(options)
+    asked = {name: value for name, value in given.items() if name not in dict(_IN_JOB)}
+    for name in ("connect", "seeds"):
+        if name in given:
+            asked[name] = np.atleast_2d(np.asarray(given[name], dtype=float)).tolist()
+    if "paths" in options:
+        asked["paths"] = [np.asarray(path, dtype=float).tolist() for path in options["paths"]]
+    request = {"kind": "cover", "scene": scene, "options": asked}
+    return request | {field: given[name] for name, field in _IN_JOB if name in given}
 
 
 def given(**values: Any) -> Document:

@@ -12,11 +12,26 @@ from typing import Literal, Self, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ciris.answers import Contained, Containment, Coverage, Document, Event, Graph, Motion, Near, Nearest, Plan, Segments, Verification
+from certifier.errors import CirisError
+from ciris.answers import (
+    Contained,
+    Containment,
+    Cover,
+    Coverage,
+    Document,
+    Event,
+    Graph,
+    Motion,
+    Near,
+    Nearest,
+    Plan,
+    Segments,
+    Verification,
+)
 from ciris.job import JobData, why_no_region
 from ciris.reading import read
 from ciris.region import RegionData, region_fields
-from ciris.requests import GrowOptions, Straight, given, grow_request, plain, points, straight
+from ciris.requests import CoverOptions, GrowOptions, Straight, cover_request, given, grow_request, plain, points, straight
 from ciris.scene import Scene, scene_name
 from ciris.synchronous.client import Client
 
@@ -138,6 +153,37 @@ class Service:
     def submit_grow(self, scene: str | Scene, q: ArrayLike, **options: Unpack[GrowOptions]) -> Job:
         """Creates a job that grows a certified region around q, (n,), and returns it at once."""
         return self._job((self.client.create_job(grow_request(scene_name(scene), q, options)))[0])
+
+    def cover(self, scene: str | Scene, **options: Unpack[CoverOptions]) -> Cover:
+        """Has regions grown until they cover a scene or connect configurations, and waits for that. The job goes on if it is interrupted.
+
+        Raises:
+            CirisError: what was refused, or ``not_covered`` where no region came of it.
+        """
+        job = self.submit_cover(scene, **options).wait()
+        found = read(Cover, self.client.cover(job.id))
+        if not found.regions and job.error:
+            raise CirisError.from_document(job.error)
+        return found
+
+    def submit_cover(self, scene: str | Scene, **options: Unpack[CoverOptions]) -> Job:
+        """Creates a job that covers a scene, and returns it at once. Its regions are there as soon as each is certified."""
+        return self._job((self.client.create_job(cover_request(scene_name(scene), options)))[0])
+
+    def recertify(self, region: str | Region, scene: str | Scene, deadline: float | None = None) -> Region:
+        """Makes a region of a changed scene from one of the scene before, and waits for it.
+
+        Raises:
+            CirisError: ``revoked``, where nothing is left of it; ``other_robot``.
+        """
+        job = self.submit_recertify(region, scene, deadline)
+        return job.result()
+
+    def submit_recertify(self, region: str | Region, scene: str | Scene, deadline: float | None = None) -> Job:
+        """Creates a job that makes a region of a changed scene from one of the scene before, and returns it at once."""
+        old = region if isinstance(region, str) else region.id
+        request = {"kind": "recertify", "scene": scene_name(scene), "region": old, **given(deadline_seconds=deadline)}
+        return self._job((self.client.create_job(request))[0])
 
     def submit_certify(self, scene: str | Scene, C: ArrayLike, d: ArrayLike, cells: int = 1) -> Job:
         """Creates a job that certifies the polytope {s : C s <= d} within the joint limits, C (m, n), d (m,), and returns it at once.
