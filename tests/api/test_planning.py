@@ -15,6 +15,7 @@ from certifier.model import Scene
 from certifier.pair.certification import Certification
 from db import overlaps
 from db.session import Database
+from planner import overlap
 from tests.api.conftest import BASE_URL, store_region
 from tests.certifier.scenes import accepted
 from tests.db.builders import a_running_job, add_region
@@ -198,7 +199,8 @@ def test_comparing_goes_on_where_it_stopped(client: TestClient, scene: Scene, da
         for i in range(4):
             add_region(session, job, -0.1 * i, 0.5)
     seconds = iter(range(1000))
-    monkeypatch.setattr(graph, "time", SimpleNamespace(monotonic=lambda: next(seconds)))
+    for module in (graph, overlap):
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: next(seconds)))
     monkeypatch.setattr(graph, "COMPARE_SECONDS", 1.0)
     counts = []
     for _ in range(20):
