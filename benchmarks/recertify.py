@@ -78,16 +78,16 @@ def changes(names: list[str], limit: float, progress: Progress) -> dict[str, Any
 
 def _row(name: str, change: str, first: Region, q: list[float], limit: float, progress: Progress) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="ciris-") as folder:
-        path = _changed(name, CHANGES[name][change], Path(folder) / name)
+        path = changed(name, CHANGES[name][change], Path(folder) / name)
         scene = load_scene(path)
         row: dict[str, Any] = {"example": name, "change": change, "before": _volume(first)}
         begun = time.perf_counter()
         try:
             again = recertify(scene, first.proof, [q], processes=cores())
-            row |= _again(path, scene, again, time.perf_counter() - begun)
-            row["anew"] = _anew(scene, q, limit, _volume(again))
         except CirisError as error:
             row |= {"seconds": time.perf_counter() - begun, "error": str(error)}
+        else:
+            row |= _again(path, scene, again, time.perf_counter() - begun) | _anew(scene, q, limit, _volume(again))
     progress(f"{name}, {change}: {row}")
     return row
 
@@ -114,15 +114,22 @@ def _again(path: Path, scene: Scene, again: Region, seconds: float) -> dict[str,
 
 
 def _anew(scene: Scene, q: list[float], limit: float, volume: float) -> dict[str, Any]:
-    """Grows a region of the changed scene, and says when it was as large as this, None if never, and how large it was in the end."""
+    """Grows a region of the changed scene, and says when it was as large as this, None if never, and how large it was in the end.
+
+    Where there is none, it says why.
+    """
     found: list[tuple[float, float]] = []
     begun = time.perf_counter()
 
     def had(region: Region) -> None:
         found.append((time.perf_counter() - begun, _volume(region)))
 
-    had(grow(scene, _grown(q), deadline_s=limit, processes=cores(), deliver=had))
-    return {"seconds": found[-1][0], "volume": found[-1][1], "as_large": next((when for when, size in found if size >= volume), None)}
+    try:
+        had(grow(scene, _grown(q), deadline_s=limit, processes=cores(), deliver=had))
+    except CirisError as error:
+        return {"anew": None, "anew_error": str(error)}
+    as_large = next((when for when, size in found if size >= volume), None)
+    return {"anew": {"seconds": found[-1][0], "volume": found[-1][1], "as_large": as_large}}
 
 
 def _grown(q: list[float]) -> GrowthOptions:
@@ -134,7 +141,7 @@ def _volume(region: Region) -> float:
     return float(region.manifest["q_volume"]["value"])
 
 
-def _changed(name: str, edit: Edit, folder: Path) -> Path:
+def changed(name: str, edit: Edit, folder: Path) -> Path:
     """Writes an example with a change into a folder, and returns its scene file."""
     shutil.copytree(EXAMPLES / name, folder)
     (folder / "post.sdf").write_text(POST, encoding="utf-8")

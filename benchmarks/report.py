@@ -353,10 +353,11 @@ def _recertify(document: Document) -> list[str]:
             rows.append([row["example"], row["change"], seconds(row["seconds"]), *["-"] * 8, row["error"]])
             continue
         anew, counts = row["anew"], [str(row[what]) for what in ("carried", "proved", "cut")]
-        soon = "never" if anew["as_large"] is None else seconds(anew["as_large"])
+        soon = "never" if anew is None or anew["as_large"] is None else seconds(anew["as_large"])
         kept = [seconds(row["seconds"]), seconds(row["verify_seconds"]), f"{100 * row['kept']['value']:.3g} %", *counts]
         found = "found" if row["contact"] else "none"
-        rows.append([row["example"], row["change"], *kept, found, soon, seconds(anew["seconds"]), f"{anew['volume'] / row['volume']:.2f}"])
+        size = ["-", "none"] if anew is None else [seconds(anew["seconds"]), f"{anew['volume'] / row['volume']:.2f}"]
+        rows.append([row["example"], row["change"], *kept, found, soon, *size])
     return [_table(header, rows)]
 
 

@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import agreement, catalogue, compare, growth, path, plan, query, report, service, store, survey
+from benchmarks import agreement, catalogue, compare, growth, path, plan, query, recertify, report, service, store, survey
 from benchmarks.compare import Verdict, verdict
+from certifier.carry.robot import same_bodies
 from certifier.errors import CirisError
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD
 from certifier.outcome import Outcome
 from certifier.pair.closest import closest
+from certifier.scene import load_scene
 from certifier.verify.scene import check_scene
 from tests.services import Postgres
 
@@ -257,3 +259,12 @@ def test_two_arms_of_seven_joints_make_one_of_fourteen() -> None:
     left, right = (of_two.points(WORLD, f"{arm}/link_7", np.zeros((1, 3)), s) for arm in ("left", "right"))
     assert (left + right) / 2 == pytest.approx(hand)
     assert (right - left)[0, 0] == pytest.approx([0, path.APART, 0])
+
+
+@pytest.mark.parametrize(("name", "change"), [(name, change) for name in recertify.SCENES for change in recertify.CHANGES[name]])
+def test_a_scene_changes_in_the_manner_that_is_measured(tmp_path: Path, name: str, change: str) -> None:
+    before, after = catalogue.scene(name), load_scene(recertify.changed(name, recertify.CHANGES[name][change], tmp_path / name))
+    assert before.hash != after.hash
+    assert (len(after.pairs) > len(before.pairs)) == ("added" in change)
+    assert (len(after.pairs) < len(before.pairs)) == ("taken away" in change)
+    assert set(same_bodies(before, after)) >= {joint.child for joint in before.moving}
