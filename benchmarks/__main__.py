@@ -96,7 +96,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "robots": lambda args, screen: robots.robots(args.robots, args.deadline, screen.line),
     "recertify": lambda args, screen: recertify.changes(args.scenes, args.limit, screen.line),
     "query": lambda args, screen: query.query(args.regions, screen.line),
-    "plan": lambda args, screen: plan.trajectories(args.scene, args.regions, args.url, args.queries, screen.line),
+    "plan": lambda args, screen: plan.trajectories(args.scene, args.regions, args.url, args.queries, screen.line, args.free),
     "survey": lambda args, screen: survey.survey(args.scenes, args.most, screen.line, args.cells),
 }
 
@@ -172,6 +172,7 @@ def _parser() -> ArgumentParser:
         "--regions", type=Path, action="append", default=[], metavar="PATH", help="a proof, a manifest or a polytope, or a folder of them"
     )
     planned.add_argument("--url", help="the service that has the regions, where no --regions are given; default: the one that is found")
+    planned.add_argument("--free", action="store_true", help="plan between any free configurations, in regions or not")
     planned.add_argument("--queries", type=_count, default=plan.QUERIES, metavar="N", help=f"so many trajectories; default {plan.QUERIES}")
     changed = kinds.add_parser("recertify", parents=[as_json], help="certify regions again whose scenes have changed, and grow them anew")
     changed.add_argument(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from certifier.proof.region import RegionProof
 from certifier.scene import load_scene
 from client import service
 from client.inputs import is_scene_file, polytope_file
+from planner.cover.ground import free_samples
 from planner.library import Library
 from planner.overlap import beside, components, overlap
 from planner.trajectory.plan import Answer, Limits, Trajectory, plan
@@ -41,12 +43,13 @@ DENSE = 20
 """Whether a path collides is asked of so many configurations for each that RRT-Connect looks at."""
 
 
-def trajectories(name: str, files: list[Path], url: str | None, queries: int, progress: Progress) -> dict[str, Any]:
-    """Plans between random configurations of the regions. Returns the document of ``ciris bench plan``.
+def trajectories(name: str, files: list[Path], url: str | None, queries: int, progress: Progress, free: bool = False) -> dict[str, Any]:
+    """Plans between random configurations. Returns the document of ``ciris bench plan``.
 
     Args:
         name: an example, or a scene file.
         files: regions as manifests, proofs or polytopes, or folders of such; none for those of the service at ``url``.
+        free: whether the configurations are uniform among all that are free of collision, in regions or not; else each is in a region.
 
     Raises:
         CirisError: no_regions, or what is wrong with a file, the scene or the service.
@@ -61,7 +64,7 @@ def trajectories(name: str, files: list[Path], url: str | None, queries: int, pr
     compared = time.perf_counter() - start
     progress(f"{len(library)} regions, {len(links.ends)} overlaps")
     rival, rng = RRTConnect(scene), np.random.default_rng(0)
-    points = _points(library, scene, 2 * queries + 2, rng)
+    points = _free(scene, 2 * queries + 2, rng) if free else _points(library, scene, 2 * queries + 2, rng)
     _planned(library, scene, links, points[-2], points[-1])  # loads Drake
     rows = []
     for i, (a, b) in enumerate(zip(points[:queries], points[queries:-2], strict=True)):
@@ -80,7 +83,8 @@ def trajectories(name: str, files: list[Path], url: str | None, queries: int, pr
         "components": len(parts),
         "compare_seconds": compared,
         "queries": queries,
-        "connected": sum(row["outcome"] != "Apart" for row in rows),
+        "free": free,
+        "connected": sum(row["outcome"] not in ("Apart", "Outside") for row in rows),
         "plan": _summary([row["plan"] for row in rows]),
         "rrt": {**_summary([row["rrt"] for row in rows]), "resolution": RESOLUTION, "limit_seconds": RRT_SECONDS},
         "both": len(both),
@@ -144,6 +148,10 @@ def _points(library: Library, scene: Scene, count: int, rng: np.random.Generator
         drawn = uniform_in_q(library.polytope(region), scene.revolute, chains=len(mine), each=1, seed=region)
         points[mine] = scene.to_q(drawn[:, 0])
     return points
+
+
+def _free(scene: Scene, count: int, rng: np.random.Generator) -> Array:
+    return scene.to_q(free_samples(scene, partial(in_collision, scene), count, rng))
 
 
 def _links(library: Library, scene: Scene) -> Links:

@@ -283,10 +283,11 @@ def _plan(document: Document) -> list[str]:
         length = f"{side['length']['p50']:.2f}" if side["length"] else "-"
         times = [f"{side['seconds'][which]:.3f}" for which in ("p50", "p99")]
         rows.append([name, f"{side['found']} of {document['queries']}", *times, length, str(side["collide"])])
+    ends = "any free configurations" if document["free"] else "random configurations of the regions"
     about = (
         f"{document['scene']}: {document['joints']} joints, {document['regions']} regions with {document['faces']} faces, "
-        f"{document['overlaps']} overlaps, {document['components']} components; the two ends were connected "
-        f"{document['connected']} of {document['queries']} times."
+        f"{document['overlaps']} overlaps, {document['components']} components. The questions are between {ends}; "
+        f"these were connected {document['connected']} of {document['queries']} times."
     )
     ratio = document["length_ratio"]
     lengths = f"Our length over theirs, {document['both']} paths: median {ratio['p50']:.2f}." if ratio else "No question has two paths."

@@ -221,6 +221,10 @@ def test_trajectories_are_planned_beside_a_planner_that_samples(library_of_boxes
         assert (row["plan"]["length"] is None) is (row["outcome"] == "Apart")
         assert row["plan"]["length"] is None or row["plan"]["length"] >= row["straight"] * (1 - 1e-9)
     assert "RRT-Connect with shortcuts" in report.text(document)
+    anywhere = bench("plan", "planar_2dof", "--regions", str(library_of_boxes), "--queries", "12", "--free")
+    assert {row["outcome"] for row in anywhere["rows"]} >= {"Outside"}
+    assert anywhere["connected"] == anywhere["plan"]["found"]
+    assert "between any free configurations" in report.text(anywhere)
 
 
 def test_a_path_that_collides_between_its_ends_is_seen() -> None:
