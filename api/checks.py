@@ -17,7 +17,7 @@ from certifier.model import Array, Scene
 from certifier.seeding.limits import check_limits
 from certifier.seeding.options import SeedOptions
 from db.settings import settings
-from planner.cover.options import MOST_JOINTS, CoverOptions
+from planner.cover.options import MOST_JOINTS, STAGES, CoverOptions
 from planner.membership import to_s
 from workers.addresses import is_public
 
@@ -52,7 +52,7 @@ def cover(scene: Scene, body: CoverRequestOptions) -> CoverOptions:
         _length(scene, q, field, "seed_wrong_length")
         check_limits(scene, q, field)
     options = CoverOptions.from_document(body.model_dump())
-    return options if options.stages is not None or scene.n <= MOST_JOINTS else replace(options, stages=1)
+    return options if options.stages is not None or scene.n <= MOST_JOINTS else replace(options, stages=STAGES)
 
 
 def polytope(scene: Scene, body: PolytopeBody) -> None:

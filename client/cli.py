@@ -296,7 +296,7 @@ def _parser() -> argparse.ArgumentParser:
         "--stages",
         type=int,
         metavar="N",
-        help="end each region after N stages; default: 1 for robots with more than 4 joints, else no limit",
+        help="end each region after N stages; default: 2 for robots with more than 4 joints, else no limit",
     )
     cover.add_argument("--deadline", type=float, metavar="SECONDS", help="end after so long with the regions by then; default: none")
     cover.add_argument("--random-seed", type=int, help="seed of every random choice; default 0")

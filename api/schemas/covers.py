@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field
 from api.schemas.common import Real, Request, Vector
 from certifier.outcome import Outcome
 from db.states import JobState
-from planner.cover.options import ENOUGH, MOST_GIVEN, MOST_JOINTS, WHOLE_NUMBERS, CoverOptions
+from planner.cover.options import ENOUGH, MOST_GIVEN, MOST_JOINTS, STAGES, WHOLE_NUMBERS, CoverOptions
 
 DEFAULTS = CoverOptions()
 Given = Annotated[list[Vector], Field(max_length=MOST_GIVEN)]
@@ -54,8 +54,8 @@ class CoverRequestOptions(Request):
         int | None,
         _whole(
             "stages",
-            "Each region ends after so many stages. Default: 1 for robots with more than "
-            f"{MOST_JOINTS} joints, which gives more coverage a second; else a region ends when a stage gains little.",
+            f"Each region ends after so many stages. Default: {STAGES} for robots with more than {MOST_JOINTS} joints; else a region ends "
+            "when a stage gains little. One stage gives the first regions sooner, and less coverage in the end.",
         ),
     ] = None
     random_seed: Annotated[int, _whole("random_seed", "Seed of every random choice.")] = DEFAULTS.random_seed

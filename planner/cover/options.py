@@ -15,7 +15,8 @@ WHOLE_NUMBERS = {"regions": (1, 100_000), "at_once": (1, 64), "cells": (1, 10_00
 MOST_GIVEN = 1000
 """So many configurations may be given in each of the lists."""
 MOST_JOINTS = 4
-"""For robots with more joints a region is left after its first stage, unless somebody asks for more."""
+STAGES = 2
+"""For robots with more joints than that a region is left after so many stages, unless somebody asks for more."""
 ENOUGH = 0.95
 """The coverage that is asked for where nothing else is."""
 
