@@ -11,9 +11,12 @@ import numpy as np
 
 from api.schemas.covers import CoverRequestOptions
 from api.schemas.jobs import PolytopeBody, Seed, WebhookRequest
+from api.schemas.motions import GivenMotion
 from certifier.carry.robot import same_bodies
 from certifier.errors import CirisError, RegionError
 from certifier.model import Array, Scene
+from certifier.motion.given import motion_of
+from certifier.proof.motion import Space
 from certifier.seeding.limits import check_limits
 from certifier.seeding.options import SeedOptions
 from db.settings import settings
@@ -76,6 +79,17 @@ def polytope(scene: Scene, body: PolytopeBody) -> None:
                 field="polytope.center",
                 hint="leave it out to have one found",
             )
+
+
+def motion(scene: Scene, body: GivenMotion) -> dict[str, Any]:
+    """Returns the motion of a request as certifier.motion.given.motion_of takes it, with ``space`` where it was given, and ``tube``.
+
+    Raises:
+        RegionError: as motion_of; the field names the place.
+    """
+    document = body.model_dump(mode="json", include=set(GivenMotion.model_fields), exclude_none=True)
+    motion_of(scene, document, Space(body.space) if body.space else None)
+    return document
 
 
 def same_robot(old: Scene, new: Scene) -> None:

@@ -23,7 +23,15 @@ MEDIA_TYPE = "application/problem+json"
 
 _STATUS_OF_CODE = {
     **dict.fromkeys(
-        ("scene_not_found", "job_not_found", "region_not_found", "proof_not_found", "webhook_not_found", "cover_not_found"),
+        (
+            "scene_not_found",
+            "job_not_found",
+            "region_not_found",
+            "proof_not_found",
+            "webhook_not_found",
+            "cover_not_found",
+            "motion_not_found",
+        ),
         HTTPStatus.NOT_FOUND,
     ),
     "idempotency_conflict": HTTPStatus.CONFLICT,

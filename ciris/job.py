@@ -16,13 +16,13 @@ class JobData:
 
     id: str
     kind: str
-    """``grow``, ``recertify``, ``certify`` or ``cover``."""
+    """``grow``, ``recertify``, ``certify``, ``certify-path`` or ``cover``."""
     scene: str
     """Id of the scene."""
     state: str
     """``queued``, ``running``, ``succeeded``, ``failed``, ``cancelled`` and others."""
     outcome: Outcome | None
-    """Of the polytope asked for; None before the job has ended."""
+    """Of the polytope or the motion asked for; None before the job has ended."""
     reason: str | None
     """A sentence that says why the job ended."""
     error: Document | None

@@ -332,6 +332,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     motion.add_argument("--tube", action="store_true", help="look for the largest certified tube about the motion")
     motion.add_argument("--local", action="store_true", help="certify in this process, without a service")
+    motion.add_argument("--job", action="store_true", help="have it done by a job of the service, for a motion that takes minutes")
+    motion.add_argument("--deadline", type=float, metavar="SECONDS", help="with --job: end after so long without a verdict; default: none")
     motion.add_argument("--out", metavar="FILE", help="new file for the proof; default: none")
     motion.set_defaults(run="client.motion:certify_path")
 

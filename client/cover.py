@@ -31,7 +31,7 @@ def cover(args: Namespace) -> int:
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
         request = {"kind": "cover", "scene": scene["id"], "options": options}
-        job = service.cover(client, request if args.deadline is None else {**request, "deadline_seconds": args.deadline}, screen)
+        job = service.run(client, request if args.deadline is None else {**request, "deadline_seconds": args.deadline}, screen)
         found = client.cover(job["id"])
     if args.json:
         print_json({"job": job["id"], "scene": scene["name"], **found})

@@ -9,7 +9,7 @@ from ciris.answers import Document
 from ciris.synchronous.client import Client
 from client.output import Screen, plain, q_volume, seconds, share
 
-_STEPS = {"propose": "seeding", "step": "polytope step", "accept": "assembling and verifying the region"}
+_STEPS = {"propose": "seeding", "step": "polytope step", "accept": "assembling and verifying the region", "motion": "certifying the motion"}
 _LOOK = "scout"
 """The step of a cover whose findings are told instead of it."""
 

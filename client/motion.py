@@ -10,10 +10,12 @@ from typing import Any
 from certifier.errors import CirisError
 from certifier.proof.motion import Space
 from certifier.verify.decimals import at_least_mm, rounded_down
+from ciris.answers import Document
+from ciris.synchronous.client import Client
 from client import output, service
 from client.files import ProofFile, check_writable
 from client.local import load
-from client.output import print_json
+from client.output import Screen, print_json
 from client.paths import PathFile, named, path_of
 
 OK, NO = 0, 1
@@ -25,6 +27,10 @@ def certify_path(args: Namespace) -> int:
     Raises:
         CirisError: the motion, its file or the scene cannot be used, or there is no service.
     """
+    if args.job and args.local:
+        raise CirisError("option", "a job needs a service", field="--job", hint="leave out --local")
+    if args.deadline is not None and not (args.job and 0 < args.deadline < math.inf):
+        raise CirisError("option", f"must be a number of seconds above 0 for a --job, not {args.deadline:g}", field="--deadline")
     path = path_of(args)
     kept = None
     if args.out is not None:
@@ -58,9 +64,18 @@ def _by_service(args: Namespace, path: PathFile) -> tuple[dict[str, Any], bytes 
     """Returns the document of the service's verdict, and the proof where it was asked for and there is one."""
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)["id"]
-        asked = {"space": args.space, "tube": args.tube, "prove": args.out is not None}
-        document = client.certify_path({"scene": scene, **path.document(), **asked})
+        asked = {"scene": scene, **path.document(), "space": args.space, "tube": args.tube}
+        if args.job:
+            return _by_job(client, {**asked, "kind": "certify-path", "deadline_seconds": args.deadline}, args.out is not None)
+        document = client.certify_path({**asked, "prove": args.out is not None})
     return document, None if document["proof"] is None else base64.b64decode(document["proof"])
+
+
+def _by_job(client: Client, request: Document, prove: bool) -> tuple[dict[str, Any], bytes | None]:
+    """Does as :func:`_by_service` by a job, which may take as long as it needs."""
+    job = service.run(client, request, Screen())["id"]
+    document = client.motion(job)
+    return document, client.motion_proof(job) if prove and document["proof"] else None
 
 
 def _timed(document: dict[str, Any], path: PathFile) -> dict[str, Any]:

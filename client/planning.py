@@ -122,7 +122,7 @@ def _grow_between(client: Client, scene: str, ends: Sequence[Any], deadline: flo
     if names:
         raise CirisError("option", "regions grow between configurations, not regions", field=names[0], hint="give joint positions")
     request: dict[str, Any] = {"kind": "cover", "scene": scene, "options": {"connect": ends}}
-    service.cover(client, request if deadline is None else {**request, "deadline_seconds": deadline}, Screen())
+    service.run(client, request if deadline is None else {**request, "deadline_seconds": deadline}, Screen())
 
 
 def _end(text: str, field: str) -> list[float] | str:

@@ -80,8 +80,8 @@ def grow_many(client: Client, requests: Sequence[Document], screen: Screen, watc
     return [_wait(client, job, screen, watch) for job in jobs]
 
 
-def cover(client: Client, request: Document, screen: Screen) -> Document:
-    """Makes the service cover a scene, and waits for it. Returns the ended job.
+def run(client: Client, request: Document, screen: Screen) -> Document:
+    """Makes the service cover a scene or certify a motion, and waits for it. Returns the ended job.
 
     Raises:
         CirisError: what went wrong.

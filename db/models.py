@@ -80,7 +80,7 @@ class ApiKeyRow(Base):
 
 
 class JobRow(Base):
-    """A job is one request to grow a region, to certify a polytope, or to cover a scene; or a region that the last one has grown."""
+    """A job is one request to grow a region, to certify a polytope or a motion, or to cover a scene; or a region of a cover."""
 
     __tablename__ = "jobs"
     __table_args__ = (Index(None, "state"), Index(None, "created_at", "id"), UniqueConstraint("parent_id", "number"))
@@ -98,7 +98,8 @@ class JobRow(Base):
     error: Mapped[Document | None]
     """What CirisError.to_document() returned, when the job failed."""
     options: Mapped[Document]
-    """What certifier.growth.options.GrowthOptions.to_document() returned; for a cover, planner.cover.options.CoverOptions.to_document()."""
+    """What certifier.growth.options.GrowthOptions.to_document() returned; for a cover, planner.cover.options.CoverOptions.to_document();
+    for a motion, what certifier.motion.given.motion_of() takes, with ``space`` where it was given, and ``tube``."""
     action: Mapped[Document | None] = mapped_column(deferred=True)
     """The action that the job waits for: its kind, the iteration of a certification, the outcome and reason of an end.
 
@@ -250,7 +251,7 @@ class SubtreesRow(Base):
 
 
 class StepRow(Leased, Base):
-    """A step is a piece of a job that is not a pair: seeding, the polytope step, accepting a region, or a look at what is covered."""
+    """A step is a piece of a job that is no pair: seeding, the polytope step, accepting a region, a look at what is covered, a motion."""
 
     __tablename__ = "steps"
     __table_args__ = (UniqueConstraint("job_id", "turn", "kind"), Index(None, "state", "lease_until"), Index(None, "job_id", "state"))

@@ -14,9 +14,14 @@ from db.session import insert_new
 
 def put(session: Session, files: Collection[bytes]) -> dict[bytes, str]:
     """Stores proofs that are not stored yet, and returns the digest of each."""
-    digests = {data: hashlib.sha256(data).hexdigest() for data in files}
+    digests = {data: digest(data) for data in files}
     insert_new(session, ProofRow, [{"digest": digest, "data": data} for data, digest in digests.items()])
     return digests
+
+
+def digest(data: bytes) -> str:
+    """Returns the digest under which a proof is stored."""
+    return hashlib.sha256(data).hexdigest()
 
 
 def get(session: Session, digest: str) -> bytes:

@@ -25,7 +25,8 @@ class JobState(StrEnum):
     CANCELLING = "cancelling"
     """Someone asked to cancel the job; its work is being stopped."""
     SUCCEEDED = "succeeded"
-    """The job has its answer: a certified region (grow, recertify), a verdict for the polytope (certify), or what it covers (cover)."""
+    """The job has its answer: a certified region (grow, recertify), a verdict for the polytope (certify) or the motion
+    (certify-path), or what it covers (cover)."""
     FAILED = "failed"
     """The job ended without an answer; ``error`` says why. Regions certified before remain."""
     CANCELLED = "cancelled"
@@ -39,6 +40,8 @@ class JobKind(StrEnum):
     """The job finds one verdict for each pair on a given polytope."""
     RECERTIFY = "recertify"
     """The job makes a region of a scene from a region of the scene before it changed."""
+    CERTIFY_PATH = "certify-path"
+    """The job certifies a motion, or finds its first contact."""
     COVER = "cover"
     """The job has regions grown, by grow jobs that are its children, until they cover the scene or connect configurations."""
 
@@ -86,6 +89,8 @@ class StepKind(StrEnum):
     """The step assembles, verifies and stores the region of a certified polytope."""
     SCOUT = "scout"
     """The step looks at how much of a scene is covered, and where its next regions are best grown."""
+    MOTION = "motion"
+    """The step certifies a motion; ``report`` has the verdict, and the digest of its proof."""
 
 
 class IterationState(StrEnum):

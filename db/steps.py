@@ -1,4 +1,4 @@
-"""Steps are the pieces of a job that are not pairs: seeding, the polytope step, accepting a region, a look at what is covered."""
+"""Steps are the pieces of a job that are not pairs: seeding, the polytope step, accepting a region, a look at what is covered, a motion."""
 
 from __future__ import annotations
 
@@ -87,6 +87,12 @@ def of_turn(session: Session, job: JobRow, kind: StepKind) -> StepRow | None:
 def of_job(session: Session, job_id: str) -> Sequence[StepRow]:
     """Returns the job's steps, in order."""
     return session.scalars(select(StepRow).where(StepRow.job_id == job_id).order_by(StepRow.turn, StepRow.id)).all()
+
+
+def verdict(session: Session, job_id: str) -> dict[str, Any] | None:
+    """Returns the report of the job's step that has certified a motion; None while there is none, or where the step has failed."""
+    done = (StepRow.job_id == job_id, StepRow.kind == StepKind.MOTION, StepRow.state == StepState.DONE)
+    return session.scalar(select(StepRow.report).where(*done))
 
 
 def accepted(session: Session, job_id: str) -> list[StepRow]:

@@ -21,7 +21,7 @@ from db.models import JobRow, StepRow
 from db.states import JobState, StepKind, StepState
 from db.types import Utc, utcnow
 
-URGENT = (StepKind.PROPOSE, StepKind.STEP, StepKind.SCOUT)
+URGENT = (StepKind.PROPOSE, StepKind.STEP, StepKind.SCOUT, StepKind.MOTION)
 """The job waits for these steps. It does not wait for the acceptance of a region."""
 
 

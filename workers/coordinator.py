@@ -56,14 +56,15 @@ class Ending:
 def ending(kind: str, outcome: Outcome, reason: str, error: dict[str, Any] | None) -> Ending:
     """Returns how a job ends whose growth has finished.
 
-    A ``certify`` job succeeds with any verdict, a ``cover`` unless something went wrong, the others only with a certified region.
+    A ``certify`` or ``certify-path`` job succeeds with any verdict, a ``cover`` unless something went wrong, the others only with a
+    certified region.
 
     Args:
         error: what went wrong during the job, if something did.
     """
     if kind == JobKind.COVER:
         return Ending(JobState.FAILED if error else JobState.SUCCEEDED, outcome, reason, error)
-    if outcome == Outcome.CERTIFIED or (kind == JobKind.CERTIFY and outcome != Outcome.ERROR):
+    if outcome == Outcome.CERTIFIED or (kind in (JobKind.CERTIFY, JobKind.CERTIFY_PATH) and outcome != Outcome.ERROR):
         return Ending(JobState.SUCCEEDED, outcome, reason)
     code = "revoked" if reason.startswith(REVOKED) else "not_grown"
     return Ending(JobState.FAILED, outcome, reason, error or {"code": code, "message": reason, "field": None, "hint": ""})

@@ -1,10 +1,11 @@
-"""This module does a claimed step: seeding, the polytope step, accepting a region, or a look for a cover.
+"""This module does a claimed step: seeding, the polytope step, accepting a region, a look for a cover, or a motion.
 
 The worker may die halfway without harm.
 """
 
 from __future__ import annotations
 
+import base64
 import logging
 import time
 from collections.abc import Callable, Mapping
@@ -42,6 +43,7 @@ from workers.transaction import persistently
 log = logging.getLogger(__name__)
 
 SEEDING = "certifier.seeding.propose:propose_in_child"
+MOTION = "certifier.jobs.motion:certify_in_child"
 
 
 @dataclass(frozen=True)
@@ -97,13 +99,37 @@ def _do(claim: steps.Claim) -> Done:
             return _accept(scene, claim)
         case StepKind.SCOUT:
             return Done(scout(scene, claim.scene_id, claim.job_id))
+        case StepKind.MOTION:
+            return _motion(scene, claim)
 
 
 def _propose(scene: Scene, claim: steps.Claim) -> Done:
     """Seeds in a separate process. If Drake aborts that process, hangs or wants too much memory, only the step fails."""
-    limits, payload = settings(), {"scene": scene.to_document(), "seed": claim.input["seed"]}
-    timeout, memory = limits.time_limit_seconds, limits.child_memory_bytes
-    return Done(run_in_child(SEEDING, payload, timeout_s=timeout, memory_bytes=memory))
+    return Done(_in_child(SEEDING, {"scene": scene.to_document(), "seed": claim.input["seed"]}))
+
+
+def _motion(scene: Scene, claim: steps.Claim) -> Done:
+    """Certifies the motion of the job in a separate process, which also verifies the proof."""
+
+    def read() -> dict[str, Any]:
+        with database().read() as session:
+            return jobs.get(session, claim.job_id).options
+
+    found = _in_child(MOTION, {"scene": scene.to_document(), "space": None, **persistently(read), "prove": True})
+    if found["proof"] is None:
+        return Done(found)
+    proof = base64.b64decode(found["proof"])
+
+    def save(session: Session, job: JobRow) -> None:
+        proofs.put(session, [proof])
+
+    return Done({**found, "proof": proofs.digest(proof)}, save)
+
+
+def _in_child(function: str, payload: dict[str, Any]) -> dict[str, Any]:
+    limits = settings()
+    found: dict[str, Any] = run_in_child(function, payload, timeout_s=limits.time_limit_seconds, memory_bytes=limits.child_memory_bytes)
+    return found
 
 
 def _step(scene: Scene, claim: steps.Claim) -> Done:

@@ -27,7 +27,7 @@ from db.settings import settings
 from db.states import JOB, STEP, IterationState, JobKind, JobState, StepKind, StepState, unfinished
 from db.types import utcnow
 from planner.cover import state as cover
-from workers import admission, covers
+from workers import admission, covers, motions
 from workers.actions import certify_action
 from workers.app import send_coordinate, send_work
 from workers.coordinator import ending, next_transition, step_report
@@ -52,7 +52,7 @@ class Turn:
     options: dict[str, Any]
     deadline_at: datetime | None
     growth: dict[str, Any] | None
-    report: Report | cover.Report | None
+    report: Report | cover.Report | motions.Verdict | None
 
 
 def coordinate(job_id: str) -> None:
@@ -72,10 +72,13 @@ def coordinate(job_id: str) -> None:
         goes_on = persistently(decision)
 
 
-def _decide(turn: Turn) -> Transition | cover.Transition:
+def _decide(turn: Turn) -> Transition | cover.Transition | motions.Action:
     if turn.kind == JobKind.COVER:
         return covers.next_transition(turn.options, turn.growth, turn.report)
-    assert not isinstance(turn.report, cover.Scouted | cover.Ended | cover.Late), "only covers are told these"
+    if turn.kind == JobKind.CERTIFY_PATH:
+        return motions.next_action(turn.report)
+    others = "only covers and motions are told these"
+    assert not isinstance(turn.report, cover.Scouted | cover.Ended | cover.Late | motions.Verdict), others
     if turn.growth is None:
         left = None if turn.deadline_at is None else (turn.deadline_at - utcnow()).total_seconds()
         if not GrowthOptions.from_document(turn.options).by_cells:  # the forecast is about the program (11)
@@ -97,7 +100,7 @@ def _begin(job_id: str) -> Turn | None:
         now = utcnow()
         if job.state == JobState.CANCELLING:
             _finish_growth(session, job, Finish(Outcome.INCONCLUSIVE, "cancelled"), afterwards)
-        elif job.deadline_at is not None and job.deadline_at <= now and job.kind != JobKind.COVER:
+        elif _is_late(session, job, now):
             outcome = Outcome.CERTIFIED if steps.accepted(session, job_id) else Outcome.INCONCLUSIVE
             _finish_growth(session, job, Finish(outcome, "the deadline was reached"), afterwards)
         if job.coordinator_attempts >= settings().max_attempts:
@@ -116,11 +119,19 @@ def _begin(job_id: str) -> Turn | None:
         return Turn(job_id, job.kind, job.turn, job.scene_id, job.options, job.deadline_at, growth, report)
 
 
-def _report(session: Session, job: JobRow, growth: dict[str, Any] | None) -> Report | cover.Report | None:
+def _is_late(session: Session, job: JobRow, now: datetime) -> bool:
+    """Says whether the deadline ends the job. A cover ends itself, and a motion that has its verdict ends with it."""
+    passed = job.deadline_at is not None and job.deadline_at <= now
+    return passed and job.kind != JobKind.COVER and steps.verdict(session, job.id) is None
+
+
+def _report(session: Session, job: JobRow, growth: dict[str, Any] | None) -> Report | cover.Report | motions.Verdict | None:
     """Returns the report on the job's present action; None while the action is unfinished."""
     action = job.action or {}
     if job.kind == JobKind.COVER:
         return covers.report(session, job, growth or {})
+    if job.kind == JobKind.CERTIFY_PATH:
+        return motions.report(session, job)
     if action["kind"] == Certify.kind:
         iteration = session.get_one(IterationRow, (job.id, action["iteration"]))
         return None if iteration.state == IterationState.RUNNING else _outcomes(session, job, iteration)
@@ -140,7 +151,7 @@ def _outcomes(session: Session, job: JobRow, iteration: IterationRow) -> Outcome
     return Outcomes.of_parts(action, reached, passed)
 
 
-def _save(turn: Turn, transition: Transition | cover.Transition) -> bool:
+def _save(turn: Turn, transition: Transition | cover.Transition | motions.Action) -> bool:
     """Saves a transition and the work it asks for, unless the job has moved on.
 
     It returns True when something may have to be decided before any work is done.
@@ -153,6 +164,8 @@ def _save(turn: Turn, transition: Transition | cover.Transition) -> bool:
             jobs.start(session, job, work.served_by_now(session))
         if isinstance(transition, cover.Transition):
             return covers.save(session, job, transition, turn.report, afterwards)
+        if not isinstance(transition, Transition):
+            return motions.save(session, job, transition, afterwards)
         if isinstance(turn.report, Outcomes):
             pairs.forget_weaknesses(session, job.id, turn.report.action.iteration)
         _advance(job, transition.action)

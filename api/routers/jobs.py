@@ -22,6 +22,7 @@ from api.reading import ReadingRoute
 from api.schemas.common import MAX_INT, Cursor
 from api.schemas.covers import Cover, CoverRegion
 from api.schemas.jobs import (
+    CertifyPathRequest,
     CertifyRequest,
     CoverRequest,
     GrowRequest,
@@ -37,12 +38,13 @@ from api.schemas.jobs import (
     RecertifyRequest,
     Webhook,
 )
+from api.schemas.motions import JobMotion
 from api.schemas.scenes import PairInfo
 from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.proof.container import with_scene
-from db import jobs, pairs, proofs, regions, scenes, webhooks
+from db import jobs, pairs, proofs, regions, scenes, steps, webhooks
 from db.models import IterationRow, PairRow
 from db.session import Database
 from db.states import IterationState, JobKind, JobState, PairState
@@ -68,7 +70,7 @@ def create_job(
     announcements: Announcements,
     idempotency_key: Annotated[str | None, Header(min_length=1, max_length=200)] = None,
 ) -> Job:
-    """Starts a job that grows a region, certifies a polytope, certifies a region of the scene before it changed again, or covers a scene.
+    """Starts a job that grows a region, certifies a polytope or a motion, certifies a region of a changed scene again, or covers a scene.
 
     A repetition of the request with the same Idempotency-Key returns the same job. Another request with that key is refused (409).
     """
@@ -100,10 +102,12 @@ def create_job(
     return Job.of(job)
 
 
-def _options(body: GrowRequest | CertifyRequest | CoverRequest, scene: Scene) -> dict[str, Any]:
-    """Returns the document of GrowthOptions, or of CoverOptions, that the request asks for, its numbers checked against the scene."""
+def _options(body: GrowRequest | CertifyRequest | CertifyPathRequest | CoverRequest, scene: Scene) -> dict[str, Any]:
+    """Returns the document of GrowthOptions, CoverOptions or a motion that the request asks for, its numbers checked against the scene."""
     if isinstance(body, CoverRequest):
         return checks.cover(scene, body.options).to_document()
+    if isinstance(body, CertifyPathRequest):
+        return checks.motion(scene, body)
     if isinstance(body, GrowRequest):
         return {"kind": "grow", "seed": checks.seed(scene, body.seed).to_document(), **body.options.model_dump()}
     checks.polytope(scene, body.polytope)
@@ -199,6 +203,43 @@ def get_job_cover(job_id: str, db: Db) -> Cover:
         ],
         **{name: known.get(name) for name in names},
     )
+
+
+@router.get("/{job_id}/motion")
+def get_job_motion(job_id: str, db: Db) -> JobMotion:
+    """Returns what has become of the motion that a job has certified."""
+    return JobMotion.model_validate(_verdict(db, job_id)[1])
+
+
+@router.get("/{job_id}/motion/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
+def download_motion_proof(job_id: str, db: Db) -> Response:
+    """Returns the proof of the motion that a job has certified, or of its beginning, together with the scene.
+
+    `ciris verify` checks the file offline.
+    """
+    job, verdict = _verdict(db, job_id)
+    if verdict["proof"] is None:
+        raise CirisError("proof_not_found", "nothing is proved of this motion", field="job", hint="the contact is where it begins")
+    with db.read() as session:
+        data = proofs.get(session, verdict["proof"])
+    headers = {"Content-Disposition": f'attachment; filename="{job}.proof"'}
+    return Response(data, media_type="application/octet-stream", headers=headers)
+
+
+def _verdict(db: Database, job_id: str) -> tuple[str, dict[str, Any]]:
+    """Returns the id of a job, and the report of its step that has certified a motion.
+
+    Raises:
+        CirisError: motion_not_found.
+    """
+    with db.read() as session:
+        job = jobs.get(session, job_id)
+        verdict = steps.verdict(session, job.id)
+        if verdict is None:
+            message = f"the {job.kind} job {job.id} is {job.state} and has no verdict of a motion{f': {job.reason}' if job.reason else ''}"
+            hint = "a certify-path job has one when it has ended before its deadline"
+            raise CirisError("motion_not_found", message, field="job", hint=hint)
+        return job.id, verdict
 
 
 @router.get("/{job_id}/webhook")

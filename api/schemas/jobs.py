@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector
 from api.schemas.covers import CoverRequestOptions
+from api.schemas.motions import GivenMotion
 from api.schemas.scenes import PairInfo
 from certifier.growth.options import LARGEST_TOLERANCE, MOST_CELLS, WHOLE_NUMBERS, GrowthOptions
 from certifier.model import MAX_NAME
@@ -199,6 +200,16 @@ class RecertifyRequest(JobRequest):
     random_seed: RandomSeed = 0
 
 
+class CertifyPathRequest(JobRequest, GivenMotion):
+    """Asks for a proof of a motion, or for its first contact, where that takes longer than a request may."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"kind": "certify-path", "scene": "planar-2dof", "q": [[0.2, -0.4], [-0.4, 0.3]], "tube": True}]}
+    )
+
+    kind: Literal["certify-path"]
+
+
 class CoverRequest(JobRequest):
     """Asks for regions, one after another, until they cover the scene or connect configurations."""
 
@@ -210,7 +221,7 @@ class CoverRequest(JobRequest):
     options: CoverRequestOptions = Field(default_factory=CoverRequestOptions)
 
 
-NewJob = Annotated[GrowRequest | CertifyRequest | RecertifyRequest | CoverRequest, Field(discriminator="kind")]
+NewJob = Annotated[GrowRequest | CertifyRequest | RecertifyRequest | CertifyPathRequest | CoverRequest, Field(discriminator="kind")]
 
 
 class Job(BaseModel):
@@ -220,7 +231,7 @@ class Job(BaseModel):
     kind: JobKind
     scene: str = Field(description="Id of the scene.")
     state: JobState
-    outcome: Outcome | None = Field(description="Outcome for the polytope asked for; null before the job ends.")
+    outcome: Outcome | None = Field(description="Outcome for the polytope or the motion asked for; null before the job ends.")
     reason: str | None = Field(description="A sentence that says why the job ended.")
     error: Document | None = Field(description="What was wrong (code, message, field, hint) when the job failed.")
     options: Document

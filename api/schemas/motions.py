@@ -15,16 +15,9 @@ MAX_PIECES = 2000
 Waypoints = Annotated[list[Vector], Field(min_length=2, max_length=2000)]
 
 
-class MotionRequest(Request):
-    """Asks for a proof of a motion: straight between waypoints `q` or `s`, or along Bezier pieces or a B-spline."""
+class GivenMotion(Request):
+    """Gives a motion: straight between waypoints `q` or `s`, or along Bezier pieces or a B-spline."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [{"scene": "iiwa-shelf", "q": [[0, 0.3, 0, -1.8, 0, 0.9, 0], [0.4, 0.5, 0, -1.5, 0, 0.9, 0]], "tube": True}]
-        }
-    )
-
-    scene: SceneName
     q: Waypoints | None = Field(None, description="(k, n), joint positions in radians or metres, one row for each waypoint.")
     s: Waypoints | None = Field(None, description="(k, n), tangent-space coordinates s, one row for each waypoint.")
     bezier: Bezier | None = Field(None, max_length=MAX_PIECES, description=BEZIER)
@@ -36,12 +29,24 @@ class MotionRequest(Request):
         "they are; without it, joint positions.",
     )
     tube: bool = Field(False, description="Whether to look for the largest certified tube about the motion.")
-    prove: bool = Field(False, description="Whether to answer with the proof file as well.")
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
         one_curve(self.q, self.s, self.bezier, self.knots, self.control_points)
         return self
+
+
+class MotionRequest(GivenMotion):
+    """Asks for a proof of a motion: straight between waypoints `q` or `s`, or along Bezier pieces or a B-spline."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"scene": "iiwa-shelf", "q": [[0, 0.3, 0, -1.8, 0, 0.9, 0], [0.4, 0.5, 0, -1.5, 0, 0.9, 0]], "tube": True}]
+        }
+    )
+
+    scene: SceneName
+    prove: bool = Field(False, description="Whether to answer with the proof file as well.")
 
 
 class SceneReference(BaseModel):
@@ -67,7 +72,7 @@ class Contact(Place):
     distance: float = Field(description="How far the padded bodies are apart there, in metres; 0 where they overlap.")
 
 
-class MotionResponse(BaseModel):
+class MotionVerdict(BaseModel):
     """Says what has become of a motion. The proof has passed the verifier."""
 
     scene: SceneReference = Field(description="The scene that the motion is certified in.")
@@ -83,4 +88,15 @@ class MotionResponse(BaseModel):
     intervals: int = Field(description="How many planes the proof has.")
     seconds: float = Field(description="How long the search and the verification took together.")
     verify_seconds: float = Field(description="How long the verification took.")
+
+
+class MotionResponse(MotionVerdict):
+    """Says what has become of a motion, and gives the proof."""
+
     proof: str | None = Field(description="The proof file in base 64, of the motion or of its beginning; null where it was not asked for.")
+
+
+class JobMotion(MotionVerdict):
+    """Says what has become of the motion of a job, and names the proof."""
+
+    proof: str | None = Field(description="SHA-256 of the proof file, of the motion or of its beginning; null where nothing is proved.")

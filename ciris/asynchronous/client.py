@@ -128,6 +128,14 @@ class AsyncClient:
         """Returns what a cover has come to."""
         return await self._json("GET", f"/v1/jobs/{segment(job_id)}/cover")
 
+    async def motion(self, job_id: str) -> Document:
+        """Returns what has become of the motion that a job has certified."""
+        return await self._json("GET", f"/v1/jobs/{segment(job_id)}/motion")
+
+    async def motion_proof(self, job_id: str) -> bytes:
+        """Returns the proof of the motion that a job has certified, or of its beginning."""
+        return (await self._send("GET", f"/v1/jobs/{segment(job_id)}/motion/proof")).content
+
     async def job_pairs(self, job_id: str, iteration: int | None = None) -> Document:
         """Returns a job's pair matrix, of all iterations or of one."""
         return await self._json("GET", f"/v1/jobs/{segment(job_id)}/pairs", params=given(iteration=iteration))

@@ -126,6 +126,14 @@ class Client:
         """Returns what a cover has come to."""
         return self._json("GET", f"/v1/jobs/{segment(job_id)}/cover")
 
+    def motion(self, job_id: str) -> Document:
+        """Returns what has become of the motion that a job has certified."""
+        return self._json("GET", f"/v1/jobs/{segment(job_id)}/motion")
+
+    def motion_proof(self, job_id: str) -> bytes:
+        """Returns the proof of the motion that a job has certified, or of its beginning."""
+        return self._send("GET", f"/v1/jobs/{segment(job_id)}/motion/proof").content
+
     def job_pairs(self, job_id: str, iteration: int | None = None) -> Document:
         """Returns a job's pair matrix, of all iterations or of one."""
         return self._json("GET", f"/v1/jobs/{segment(job_id)}/pairs", params=given(iteration=iteration))

@@ -87,6 +87,22 @@ class Job(JobData):
             raise why_no_region(document)
         return self._service.region(document["region"])
 
+    def motion(self, prove: bool = False) -> Motion:
+        """Waits until a job of the kind ``certify-path`` has ended, and returns what has become of its motion.
+
+        Args:
+            prove: whether to return the proof file as well.
+
+        Raises:
+            CirisError: why there is no verdict.
+        """
+        client, job = self._service.client, self.wait()
+        if job.error:
+            raise CirisError.from_document(job.error)
+        document = client.motion(self.id)
+        proof = client.motion_proof(self.id) if prove and document["proof"] else None
+        return read(Motion, {**document, "proof": proof})
+
     def cancel(self) -> Job:
         """Asks the job to end; regions that it has certified remain."""
         self._service.client.cancel(self.id)
@@ -302,6 +318,24 @@ class Service:
         document = self.client.certify_path(asked)
         proof = document["proof"] and base64.b64decode(document["proof"])
         return read(Motion, {**document, "proof": proof})
+
+    def submit_certify_path(
+        self,
+        scene: str | Scene,
+        q: ArrayLike | None = None,
+        *,
+        s: ArrayLike | None = None,
+        space: Straight | None = None,
+        tube: bool = False,
+        deadline: float | None = None,
+    ) -> Job:
+        """Creates a job that certifies a motion which may take minutes, and returns it at once; its :meth:`Job.motion` waits.
+
+        Args:
+            deadline: seconds after which the job ends, without a verdict then. The others are as of :meth:`certify_path`.
+        """
+        motion = {**points(2, q=q, s=s), **given(space=space, deadline_seconds=deadline), "tube": tube}
+        return self._job((self.client.create_job({"kind": "certify-path", "scene": scene_name(scene), **motion}))[0])
 
     def graph(self, scene: str | Scene) -> Graph:
         """Returns which regions of a scene overlap, once the service has compared them all."""

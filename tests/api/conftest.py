@@ -19,12 +19,17 @@ from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import Certification
 from certifier.pair.result import PairResult
 from db import jobs, pairs, regions, scenes
+from db import session as storage
 from db.session import Database
 from db.settings import settings
+from db.types import utcnow
 from tests.certifier.scenes import accepted
 from tests.scenes import slider
 from tests.services import Queue
+from tests.workers.service import environment as surroundings
 from workers.app import celery_app
+from workers.solver import work
+from workers.turns import coordinate
 
 BASE_URL = "http://127.0.0.1:8643"
 PROBLEM = "application/problem+json"
@@ -69,6 +74,28 @@ def url(database: Database, client: TestClient) -> Iterator[str]:
     yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
     server.should_exit = True
     thread.join()
+
+
+@pytest.fixture
+def worker(client: TestClient, sqlite_url: str, queue: Queue) -> Iterator[None]:
+    """A thread that does what jobs ask for, as the workers do."""
+    done = threading.Event()
+
+    def serve() -> None:
+        while not done.wait(0.02):
+            with storage.database().read() as session:
+                due = jobs.awaiting_coordination(session, utcnow())
+            for job_id in due:
+                coordinate(job_id)
+            while piece := work():
+                coordinate(piece.job_id)
+
+    with surroundings(CIRIS_DATABASE_URL=sqlite_url, CIRIS_REDIS_URL=queue.url):
+        thread = threading.Thread(target=serve)
+        thread.start()
+        yield
+        done.set()
+        thread.join()
 
 
 @pytest.fixture

@@ -19,6 +19,7 @@ from db.session import Database
 from tests.certifier.motions import swing
 
 ROUTE = "/v1/planning/certify-path"
+JOB = {"kind": "certify-path", "scene": "slider"}
 
 
 def test_a_motion_is_certified_with_its_proof(client: TestClient, scene: Scene) -> None:
@@ -60,6 +61,19 @@ def test_a_curve_is_certified_as_by_a_plain_call(client: TestClient, scene: Scen
     assert {name: found[name] for name in ("margin", "intervals")} == {name: expected[name] for name in ("margin", "intervals")}
 
 
+def test_a_job_keeps_the_motion_as_it_was_given_and_a_retry_copies_it(client: TestClient, scene: Scene, database: Database) -> None:
+    motion = {"knots": [0, 0, 0, 1, 5, 5, 5], "control_points": [[0.1], [-0.3], [0.3], [0.0]], "space": "s"}
+    answer = client.post("/v1/jobs", json=JOB | motion | {"deadline_seconds": 60})
+    job = answer.json()
+    assert (answer.status_code, job["kind"], job["state"], job["options"]) == (201, "certify-path", "queued", motion | {"tube": False})
+    waits = client.get(f"/v1/jobs/{job['id']}/motion")
+    assert (waits.status_code, waits.json()["code"]) == (404, "motion_not_found")
+    assert client.post(f"/v1/jobs/{job['id']}/cancel").json()["state"] == "cancelled"
+    again = client.post(f"/v1/jobs/{job['id']}/retry").json()
+    assert (again["kind"], again["options"], again["retry_of"]) == (job["kind"], job["options"], job["id"])
+
+
+@pytest.mark.parametrize("route", [ROUTE, "/v1/jobs"])
 @pytest.mark.parametrize(
     ("body", "code", "field"),
     [
@@ -81,9 +95,9 @@ def test_a_curve_is_certified_as_by_a_plain_call(client: TestClient, scene: Scen
     ],
 )
 def test_what_is_no_motion_is_refused_with_its_place(
-    client: TestClient, scene: Scene, body: dict[str, object], code: str, field: str
+    client: TestClient, scene: Scene, route: str, body: dict[str, object], code: str, field: str
 ) -> None:
-    answer = client.post(ROUTE, json={"scene": "slider"} | body)
+    answer = client.post(route, json=(JOB if route == "/v1/jobs" else {"scene": "slider"}) | body)
     assert (answer.status_code, answer.json()["code"], answer.json()["field"]) == (422, code, field)
 
 

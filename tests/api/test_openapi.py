@@ -35,6 +35,8 @@ OPERATIONS = {
     "download_pair_proof": "GET /v1/jobs/{job_id}/pairs/{pair}/proof",
     "get_job_growth": "GET /v1/jobs/{job_id}/growth",
     "get_job_cover": "GET /v1/jobs/{job_id}/cover",
+    "get_job_motion": "GET /v1/jobs/{job_id}/motion",
+    "download_motion_proof": "GET /v1/jobs/{job_id}/motion/proof",
     "get_job_webhook": "GET /v1/jobs/{job_id}/webhook",
     "list_job_events": "GET /v1/jobs/{job_id}/events",
     "stream_job_events": "GET /v1/jobs/{job_id}/events/stream",
@@ -83,7 +85,7 @@ def test_every_operation_is_described_and_answers_errors_with_problems(client: T
 
 def test_the_examples_are_accepted_by_the_schemas(client: TestClient) -> None:
     schemas = client.get("/openapi.json").json()["components"]["schemas"]
-    for name in ("GrowRequest", "CertifyRequest"):
+    for name in ("GrowRequest", "CertifyRequest", "CertifyPathRequest"):
         for example in schemas[name]["examples"]:
             TypeAdapter(NewJob).validate_python(example)
     for model in (ContainsRequest, NearestRequest, SegmentRequest, PathRequest, PlanRequest):
@@ -103,6 +105,7 @@ def test_the_examples_work_on_the_scenes_that_they_name(client: TestClient, data
     for name, path, status in (
         ("GrowRequest", "/v1/jobs", 201),
         ("CertifyRequest", "/v1/jobs", 201),
+        ("CertifyPathRequest", "/v1/jobs", 201),
         ("ContainsRequest", "/v1/planning/contains", 200),
         ("MotionRequest", "/v1/planning/certify-path", 200),
         ("NearestRequest", "/v1/planning/nearest", 200),

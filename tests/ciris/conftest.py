@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 import ciris
-from tests.api.conftest import certified, client, database, environment, region, scene, url
+from tests.api.conftest import certified, client, database, environment, region, scene, url, worker
 
-__all__ = ["certified", "client", "database", "environment", "region", "scene", "url"]
+__all__ = ["certified", "client", "database", "environment", "region", "scene", "url", "worker"]
 
 
 class Awaited:

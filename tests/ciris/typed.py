@@ -29,6 +29,8 @@ def plan() -> None:
         assert_type(service.path("my-cell", np.zeros((3, 2))), ciris.Coverage)
         assert_type(service.graph("my-cell"), ciris.Graph)
         assert_type(service.certify_path("my-cell", np.zeros((3, 2))).proof, bytes | None)
+        moving = assert_type(service.submit_certify_path("my-cell", np.zeros((3, 2)), deadline=60), ciris.Job)
+        assert_type(moving.motion(prove=True), ciris.Motion)
         for near in service.nearest("my-cell", [0.0, 0.1]):
             if near is not None:
                 assert_type(near.q, NDArray[np.float64])

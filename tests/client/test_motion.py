@@ -49,6 +49,25 @@ def test_the_service_answers_as_well(ciris: Ciris, url: str, scene: Scene, tmp_p
     assert refused.error.startswith("--q[1][0]: joint ")
 
 
+def test_a_job_prints_what_the_service_says_at_once(ciris: Ciris, url: str, worker: None, scene: Scene, tmp_path: Path) -> None:
+    proof, motion = tmp_path / "motion.proof", ("certify-path", "slider", "--q", "0.1", "--q", "-0.3", "--tube", "--url", url)
+    done = ciris(*motion, "--job", "--deadline", "600", "--out", proof)
+    assert done.status == 0, done.stderr
+    assert "certified, guarantee exact" in done.stdout
+    assert "certifying the motion: done after" in done.stderr
+    assert ciris("verify", proof).status == 0
+    at_once, by_job = ciris(*motion, "--json").json, ciris(*motion, "--job", "--json").json
+    for document in (at_once, by_job):
+        assert document.pop("seconds") >= document.pop("verify_seconds") > 0
+    assert by_job == at_once
+    (job, *_) = ciris("job", "ls", "--json", "--url", url).json
+    shown = ciris("job", "show", job["id"], "--url", url).stdout
+    assert "certify-path" in shown
+    assert "every pair is certified all along the motion" in shown
+    refused = ciris("certify-path", "slider", "--q", "0.1", "--q", "99", "--job", "--url", url)
+    assert refused.error.startswith("--q[1][0]: joint ")
+
+
 def test_a_curve_is_certified_here_and_by_the_service(ciris: Ciris, url: str, scene: Scene, tmp_path: Path) -> None:
     path, proof = tmp_path / "curve.json", tmp_path / "motion.proof"
     path.write_text(json.dumps({"knots": [0, 0, 0, 0, 2, 3, 3, 3, 3], "control_points": [[0.1], [-0.2], [-0.3], [0.2], [0.0]]}))
@@ -77,6 +96,9 @@ def test_a_curve_is_certified_here_and_by_the_service(ciris: Ciris, url: str, sc
         (["--q", "0,0", "--q", "0", "--local"], "different numbers of joints"),
         (["--q", "0,0", "--q", "0,x", "--local"], "--q 1[1]: 'x' is not a finite number"),
         (["--q", "0,0", "--q", "0,99", "--local"], "--q[1][1]: joint "),
+        (["--q", "0,0", "--q", "0,0.1", "--local", "--job"], "--job: a job needs a service"),
+        (["--q", "0,0", "--q", "0,0.1", "--deadline", "9"], "--deadline: must be a number of seconds above 0 for a --job"),
+        (["--q", "0,0", "--q", "0,0.1", "--job", "--deadline", "0"], "--deadline: must be a number of seconds above 0 for a --job"),
         (["--q", "0,0", "--q", "0,0.1"], "ciris up"),
         (["--path", "nothing.npz", "--local"], "there is no file nothing.npz"),
     ],

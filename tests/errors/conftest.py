@@ -1,5 +1,5 @@
 """The fixtures with which errors are provoked: the service, and the command."""
 
-from tests.client.conftest import certified, ciris, client, database, environment, region, scene, url
+from tests.client.conftest import certified, ciris, client, database, environment, region, scene, url, worker
 
-__all__ = ["certified", "ciris", "client", "database", "environment", "region", "scene", "url"]
+__all__ = ["certified", "ciris", "client", "database", "environment", "region", "scene", "url", "worker"]

@@ -7,9 +7,12 @@ from dataclasses import replace
 from certifier.motion.given import given, motion_of
 from certifier.motion.splines import curve
 from certifier.proof.motion import Space
+from db import scenes
+from tests.certifier.motions import swing
 from tests.client.conftest import PLANAR
 from tests.errors.rows import Row, Trial, rows
 from tests.scenes import slider
+from tests.workers.service import eventually
 
 SHAPE = "give two or more, with {n} numbers each, in the scene's order of joints"
 FILE = "give q or s, one row of numbers for each waypoint, and perhaps t; or bezier, or knots and control_points"
@@ -22,6 +25,25 @@ def planned(t: Trial, *options: str) -> str:
 def from_file(t: Trial, name: str, content: str) -> str:
     (t.directory / name).write_text(content)
     return planned(t, "--path", name, "--local")
+
+
+def not_a_motion(t: Trial) -> None:
+    t.request.getfixturevalue("scene")
+    client = t.request.getfixturevalue("client")
+    job = client.post("/v1/jobs", json={"kind": "grow", "scene": "slider", "seed": {"q": [0.0]}}).json()["id"]
+    t.ask("GET", f"/v1/jobs/{job}/motion")
+
+
+def unproved(t: Trial) -> None:
+    """Asks for the proof of a motion that begins in contact."""
+    database, client = t.request.getfixturevalue("database"), t.request.getfixturevalue("client")
+    scene = swing(-0.01)
+    with database.write() as session:
+        scenes.add(session, scene)
+    job = client.post("/v1/jobs", json={"kind": "certify-path", "scene": scene.name, "q": [[0.0], [0.5]]}).json()["id"]
+    t.request.getfixturevalue("worker")
+    eventually(lambda: client.get(f"/v1/jobs/{job}").json()["ended"], "the job ends")
+    t.ask("GET", f"/v1/jobs/{job}/motion/proof")
 
 
 MOTIONS: list[Row] = [
@@ -136,6 +158,28 @@ MOTIONS: list[Row] = [
             "{...} is no number of at most {most}",
             "",
             lambda t: curve({"bezier": [[[0.0], [float("inf")]]]}),
+        ),
+    ),
+    *rows(
+        "api/routers/jobs.py",
+        (
+            "motion_not_found",
+            "job",
+            "the {kind} job {id} is {state} and has no verdict of a motion{...}",
+            "a certify-path job has one when it has ended before its deadline",
+            not_a_motion,
+        ),
+        ("proof_not_found", "job", "nothing is proved of this motion", "the contact is where it begins", unproved),
+    ),
+    *rows(
+        "client/motion.py",
+        ("option", "--job", "a job needs a service", "leave out --local", lambda t: planned(t, "--q", "0,0", "--local", "--job")),
+        (
+            "option",
+            "--deadline",
+            "must be a number of seconds above 0 for a --job, not {deadline}",
+            "",
+            lambda t: planned(t, "--q", "0,0", "--deadline", "60"),
         ),
     ),
     *rows(

@@ -35,6 +35,9 @@ def test_the_report_of_a_step_is_what_it_found_or_its_error() -> None:
         ("certify", Outcome.REFUTED, JobState.SUCCEEDED),
         ("certify", Outcome.NOT_CERTIFIABLE, JobState.SUCCEEDED),
         ("certify", Outcome.ERROR, JobState.FAILED),
+        ("certify-path", Outcome.CERTIFIED, JobState.SUCCEEDED),
+        ("certify-path", Outcome.TOO_CLOSE, JobState.SUCCEEDED),
+        ("certify-path", Outcome.ERROR, JobState.FAILED),
     ],
 )
 def test_how_a_job_ends(kind: str, outcome: Outcome, state: JobState) -> None:
