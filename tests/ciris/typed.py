@@ -29,6 +29,9 @@ def plan() -> None:
         assert_type(service.path("my-cell", np.zeros((3, 2))), ciris.Coverage)
         assert_type(service.graph("my-cell"), ciris.Graph)
         assert_type(service.certify_path("my-cell", np.zeros((3, 2))).proof, bytes | None)
+        assert_type(service.plan("my-cell", [0.0, 0.1], "1f9b2a7c").q, NDArray[np.float64])
+        assert_type(service.cover("my-cell", connect=np.zeros((2, 2)), deadline=60), ciris.Cover)
+        assert_type(service.recertify(region, scene), ciris.Region)
         moving = assert_type(service.submit_certify_path("my-cell", np.zeros((3, 2)), deadline=60), ciris.Job)
         assert_type(moving.motion(prove=True), ciris.Motion)
         for near in service.nearest("my-cell", [0.0, 0.1]):
