@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from certifier.outcome import Guarantee
 from ciris.answers import SHORT, Document, QVolume, Share
 from ciris.reading import read
-from ciris.space import Array, Space
+from ciris.space import Array, InSpace, Space
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RegionData:
+class RegionData(InSpace):
     """A polytope {s : C s <= d} in which the robot collides nowhere, which is proved. It has n joints and m faces."""
 
     id: str
@@ -41,24 +41,6 @@ class RegionData:
     created_at: datetime
     manifest: Document
     """Everything else that is known of it: docs/architecture.md, "Manifest"."""
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Names of the n joints, in the order of q."""
-        return self.space.joints
-
-    @property
-    def q_star(self) -> Array:
-        """(n,) the joint positions at which s is 0."""
-        return self.space.q_star
-
-    def to_s(self, q: ArrayLike) -> Array:
-        """Returns the tangent-space coordinates of joint positions, (..., n) -> (..., n)."""
-        return self.space.to_s(q)
-
-    def to_q(self, s: ArrayLike) -> Array:
-        """Returns the joint positions of tangent-space coordinates, (..., n) -> (..., n)."""
-        return self.space.to_q(s)
 
     def contains(self, q: ArrayLike) -> NDArray[np.bool_]:
         """Returns whether the region contains joint positions, (..., n) -> (...), as far as floating point can tell.

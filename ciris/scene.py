@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ciris.answers import Document
-from ciris.space import Array, Space
+from ciris.space import InSpace, Space
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Scene:
+class Scene(InSpace):
     """A robot and what stands around it, as the service knows them."""
 
     id: str
@@ -28,24 +27,6 @@ class Scene:
     """Number of the warnings; ``service.warnings(scene)`` returns them."""
     padding: float
     """Metres added around every geometry of every pair."""
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Names of the n joints, in the order of q."""
-        return self.space.joints
-
-    @property
-    def q_star(self) -> Array:
-        """(n,) the joint positions at which s is 0."""
-        return self.space.q_star
-
-    def to_s(self, q: ArrayLike) -> Array:
-        """Returns the tangent-space coordinates of joint positions, (..., n) -> (..., n)."""
-        return self.space.to_s(q)
-
-    def to_q(self, s: ArrayLike) -> Array:
-        """Returns the joint positions of tangent-space coordinates, (..., n) -> (..., n)."""
-        return self.space.to_q(s)
 
     def __repr__(self) -> str:
         return f"Scene({self.name!r}, {self.id}: {len(self.joints)} joints, {self.geometries} geometries, {self.pairs} pairs)"

@@ -56,3 +56,27 @@ class Space:
             message = f"it has the shape {array.shape}, and the last number must be {n}, one for each joint"
             raise RegionError("wrong_length", message, field=field, hint=f"in the order {', '.join(self.joints)}")
         return array
+
+
+class InSpace:
+    """What lies in a space has its joints, and converts as it does."""
+
+    space: Space
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the n joints, in the order of q."""
+        return self.space.joints
+
+    @property
+    def q_star(self) -> Array:
+        """(n,) the joint positions at which s is 0."""
+        return self.space.q_star
+
+    def to_s(self, q: ArrayLike) -> Array:
+        """Returns the tangent-space coordinates of joint positions, (..., n) -> (..., n)."""
+        return self.space.to_s(q)
+
+    def to_q(self, s: ArrayLike) -> Array:
+        """Returns the joint positions of tangent-space coordinates, (..., n) -> (..., n)."""
+        return self.space.to_q(s)
