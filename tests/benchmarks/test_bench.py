@@ -122,7 +122,7 @@ def test_the_service_is_measured_beside_local() -> None:
 
 def test_runs_that_come_to_different_regions_are_no_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
     volumes = iter([0.5, 0.6])
-    monkeypatch.setattr(service, "_running", lambda *_: nullcontext())
+    monkeypatch.setattr(service, "running", lambda *_: nullcontext())
     monkeypatch.setattr(service, "_line", str)
     monkeypatch.setattr(service, "_grown", lambda *_: {"seconds": 1.0, "ellipsoid": next(volumes)})
     with pytest.raises(CirisError, match="different regions"):

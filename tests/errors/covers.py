@@ -43,8 +43,8 @@ def in_s(t: Trial) -> str:
 
 
 def from_a_region(t: Trial) -> str:
-    region = t.request.getfixturevalue("region")
-    return t.ciris("plan", "slider", "--from", region, "--to", "0.9", "--grow")
+    url, region = (t.request.getfixturevalue(name) for name in ("url", "region"))
+    return t.ciris("plan", "slider", "--from", region, "--to", "0.9", "--grow", CIRIS_URL=url)
 
 
 COVERS: list[Row] = [

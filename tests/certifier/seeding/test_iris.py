@@ -19,7 +19,7 @@ from pydrake.planning import IrisParameterizationFunction
 from certifier.model import Geometry, Joint, JointKind, Pair, Scene
 from certifier.outcome import Guarantee
 from certifier.scene.drake_model import build_diagram
-from certifier.seeding.iris import _checker, _listening, iris
+from certifier.seeding.iris import _listening, checker, iris
 from certifier.seeding.options import Method, SeedOptions
 
 
@@ -46,8 +46,8 @@ def chains(draw):
 def test_drakes_s_is_the_scenes(scene, data):
     """The scene's own formulas are the oracle, for the positions and for their derivatives."""
     s = np.array([data.draw(st.floats(lower, upper)) for lower, upper in zip(scene.s_lower, scene.s_upper, strict=True)])
-    checker = _checker(scene)
-    kinematics = RationalForwardKinematics(checker.plant())
+    robot = checker(scene)
+    kinematics = RationalForwardKinematics(robot.plant())
     parameterization = IrisParameterizationFunction(kinematics, scene.q_star)
     assert np.allclose(parameterization.get_parameterization_double()(s), scene.to_q(s), rtol=0, atol=1e-12)
     assert np.allclose(kinematics.ComputeSValue(scene.to_q(s), scene.q_star), s, rtol=1e-9, atol=1e-9)
@@ -60,9 +60,9 @@ def test_drake_numbers_s_by_bodies():
     scene = posts(1)
     assert scene.bodies.index("cart") > scene.bodies.index("arm")
     s = np.array([0.5, 0.3])
-    diagram, checker = build_diagram(scene), _checker(scene)
+    diagram, robot = build_diagram(scene), checker(scene)
     assert not np.allclose(RationalForwardKinematics(diagram.plant()).ComputeQValue(s, scene.q_star), scene.to_q(s), atol=0.1)
-    assert np.allclose(RationalForwardKinematics(checker.plant()).ComputeQValue(s, scene.q_star), scene.to_q(s))
+    assert np.allclose(RationalForwardKinematics(robot.plant()).ComputeQValue(s, scene.q_star), scene.to_q(s))
 
 
 def posts(count):
