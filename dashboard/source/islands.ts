@@ -3,6 +3,7 @@ import type { ComponentType } from "preact";
 
 const ISLANDS: Record<string, () => Promise<ComponentType<any>>> = {
   scene: async () => (await import("./scene/scene")).SceneIsland,
+  region: async () => (await import("./region/region")).RegionIsland,
 };
 
 export function startIslands(root: ParentNode): void {
