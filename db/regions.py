@@ -7,7 +7,7 @@ from typing import Any
 from uuid import uuid4
 
 import numpy as np
-from sqlalchemy import Select, select, update
+from sqlalchemy import Select, func, select, update
 from sqlalchemy.orm import Session, defer
 
 from certifier.errors import CirisError
@@ -85,6 +85,12 @@ def of_cover(session: Session, job_id: str) -> Sequence[RegionRow]:
     """Returns the regions that a cover has grown, in order, without their manifests and arrays."""
     query = select(RegionRow).join(JobRow, JobRow.id == RegionRow.job_id).where(JobRow.parent_id == job_id)
     return session.scalars(query.order_by(RegionRow.number).options(*_UNREAD)).all()
+
+
+def counts(session: Session, scene_ids: Sequence[str]) -> dict[str, int]:
+    """Returns scene id -> number of its regions, for each of these scenes."""
+    counted = select(RegionRow.scene_id, func.count().label("number")).where(RegionRow.scene_id.in_(scene_ids)).group_by(RegionRow.scene_id)
+    return dict.fromkeys(scene_ids, 0) | {row.scene_id: row.number for row in session.execute(counted)}
 
 
 def version(session: Session, scene_id: str) -> int:

@@ -2,7 +2,7 @@
 import type { ComponentType } from "preact";
 
 const ISLANDS: Record<string, () => Promise<ComponentType<any>>> = {
-  scene: async () => (await import("./scene/scene")).SceneIsland,
+  library: async () => (await import("./library/library")).LibraryIsland,
   region: async () => (await import("./region/region")).RegionIsland,
 };
 

@@ -1,4 +1,5 @@
 // One slider for each joint, with a field for the number: degrees where the joint turns, metres where it slides.
+import { useRef, useState } from "preact/hooks";
 import { shortNames, shown } from "./kinematics";
 
 interface Props {
@@ -19,11 +20,14 @@ const DEGREE = Math.PI / 180;
 
 export function Sliders({ names, units, lower, upper, q, onChange, allowed, marked = [] }: Props) {
   const short = shortNames(names);
+  const latest = useRef(q);
+  latest.current = q;
   const set = (index: number, text: string): void => {
     const value = Number(text) * (units[index] === "rad" ? DEGREE : 1);
     if (text === "" || !Number.isFinite(value)) return;
     const [low, high] = allowed?.[index] ?? [lower[index]!, upper[index]!];
-    onChange(q.map((old, i) => (i === index ? Math.min(Math.max(value, low), high) : old)));
+    latest.current = latest.current.map((old, i) => (i === index ? Math.min(Math.max(value, low), high) : old));
+    onChange(latest.current);
   };
   return (
     <div class="sliders">
@@ -39,13 +43,23 @@ export function Sliders({ names, units, lower, upper, q, onChange, allowed, mark
               {allowed && <span class="allowed" aria-hidden="true" style={band(allowed[i]!, lower[i]!, upper[i]!)} />}
               <input type="range" {...range} value={q[i]! / scale} aria-label={`${name}, ${unit}`} onInput={(event) => set(i, event.currentTarget.value)} />
             </span>
-            <input type="number" {...range} value={(q[i]! / scale).toFixed(digits)} aria-label={`${name}, ${unit}, as a number`} onChange={(event) => set(i, event.currentTarget.value)} />
+            <NumberField range={range} text={(q[i]! / scale).toFixed(digits)} label={`${name}, ${unit}, as a number`} onEnter={(text) => set(i, text)} />
             <span class="unit" aria-hidden="true">{units[i] === "rad" ? "°" : "m"}</span>
           </div>
         );
       })}
     </div>
   );
+}
+
+/** A field for a number. What is being typed stays until it is entered, whatever is drawn meanwhile. */
+function NumberField({ range, text, label, onEnter }: { range: { min: number; max: number; step: string }; text: string; label: string; onEnter: (text: string) => void }) {
+  const [draft, setDraft] = useState<string | null>(null);
+  const enter = (typed: string): void => {
+    setDraft(null);
+    onEnter(typed);
+  };
+  return <input type="number" {...range} value={draft ?? text} aria-label={label} onInput={(event) => setDraft(event.currentTarget.value)} onChange={(event) => enter(event.currentTarget.value)} />;
 }
 
 /** Where the allowed part of a slider's track is drawn. */
