@@ -14,12 +14,13 @@ from api import guard, login, pages, problems
 from api.access import Keyring
 from api.access_log import AccessLog
 from api.announce import Announcer
+from api.cells import OutlinesKept
 from api.children import AT_ONCE, ChildLimiter
 from api.libraries import Libraries
 from api.links import LinksKept
 from api.metrics import Requests
 from api.reading import READERS
-from api.routers import events, jobs, motions, planning, plans, regions, scenes, service
+from api.routers import cells, events, jobs, motions, planning, plans, regions, scenes, service
 from certifier.scene.bundle import expect_bundles
 from db.session import CONNECTIONS, Database, database
 from db.settings import LOOPBACK_NAMES, settings
@@ -52,6 +53,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.children = ChildLimiter()
     app.state.libraries = Libraries()
     app.state.links = LinksKept()
+    app.state.outlines = OutlinesKept()
     app.state.announcer = Announcer()
     app.add_middleware(
         guard.Guard,
@@ -62,7 +64,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     )
     app.add_middleware(AccessLog, requests=app.state.requests)
     problems.install(app, pages.render_problem)
-    for module in (scenes, jobs, events, regions, planning, plans, motions, service):
+    for module in (scenes, jobs, events, regions, cells, planning, plans, motions, service):
         app.include_router(module.router)
     app.include_router(login.router)
     pages.install(app)
