@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from sqlalchemy import delete, insert, select, update
+from sqlalchemy import delete, func, insert, select, update
 from sqlalchemy.orm import Session
 
-from db.models import SubtreesRow
+from db.models import IterationRow, PairRow, SubtreesRow
+from db.states import PairState
 
 
 def keep(session: Session, job_id: str, iteration: int, left: Mapping[tuple[int, int], tuple[bytes, bytes | None]]) -> None:
@@ -50,7 +51,13 @@ def drop(session: Session, job_id: str, but: Collection[int] = ()) -> None:
 
 
 def end(session: Session, job_id: str) -> None:
-    """Deletes what later iterations would go on with, and keeps the outlines. The job has ended, and the caller holds its lock."""
+    """Deletes what later iterations would go on with, and keeps the outlines of pairs that are not certified.
+
+    The job has ended, and the caller holds its lock.
+    """
     mine = SubtreesRow.job_id == job_id
-    session.execute(delete(SubtreesRow).where(mine, SubtreesRow.outline.is_(None)))
+    last = select(func.max(IterationRow.index)).where(IterationRow.job_id == job_id).scalar_subquery()
+    open_still = (PairRow.job_id == job_id, PairRow.iteration == last, PairRow.state != PairState.CERTIFIED)
+    failed = select(PairRow.pair_index).where(*open_still)
+    session.execute(delete(SubtreesRow).where(mine, SubtreesRow.pair_index.not_in(failed) | SubtreesRow.outline.is_(None)))
     session.execute(update(SubtreesRow).where(mine).values(data=b""))

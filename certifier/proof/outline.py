@@ -65,7 +65,8 @@ class Tree(NamedTuple):
         """Returns the trees one by one."""
         waiting = np.cumsum(np.where(self.nodes >= 0, 1, -1))
         lowest = np.minimum.accumulate(np.concatenate([[0], waiting]))
-        return self._cut_at(np.flatnonzero(lowest[1:] < lowest[:-1])[:-1] + 1)
+        ends = np.flatnonzero(lowest[1:] < lowest[:-1]) + 1
+        return self._cut_at(ends)[:-1]
 
     def grafted(self, below: Sequence[Tree]) -> Tree:
         """Returns the trees with others in the places of the open nodes; there is one for each, in order."""
@@ -235,8 +236,8 @@ def outlines(data: bytes, scene: Scene) -> list[ProofOutline]:
 
 
 def _is_outline(name: str) -> bool:
-    kind, *_, last = name.split("/")
-    return last in {"ground": ("mid", "half"), "volume": ("vertices", "radius"), "proof": Tree._fields}.get(kind, ())
+    *folder, last = name.split("/")
+    return last in {"ground": ("mid", "half"), "volume": ("vertices", "radius"), "proof": Tree._fields}.get(folder[0] if folder else "", ())
 
 
 def _silhouette(scene: Scene, arrays: dict[str, np.ndarray], i: int, header: dict[str, Any]) -> Silhouette:

@@ -373,7 +373,7 @@ REQUESTS = [
         (
             "pair_not_found",
             "pair",
-            "there is no pair {index}: {scene.name} has {...} pairs, numbered from 0",
+            "there is no pair {index}: {name} has {...} pairs, numbered from 0",
             "/v1/scenes/{id}/pairs lists them",
             lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/9/cells"),
         ),
