@@ -22,7 +22,7 @@ from db import jobs, pairs, proofs, regions, scenes, steps, subtrees
 from db.leases import this_worker
 from db.models import JobRow, SubtreesRow
 from db.session import Database
-from db.states import PairState, StepKind
+from db.states import PairState, StepKind, StepState
 from db.types import utcnow
 from tests.certifier.scenes import ball, box, planar_arm
 from tests.scenes import slider
@@ -304,6 +304,22 @@ def test_a_job_that_ended_before_it_had_pairs_says_why(database: Database, job: 
         jobs.finish(session, jobs.lock(session, job.id), jobs.JobState.FAILED, reason="a and b overlap", outcome="error", error=error)
     (found,) = ask(f"jobs/{job.id}/obstacles")["obstacles"]
     assert (found["pair"], found["text"], found["q"]) == (None, "a and b overlap by 0.1 m", [0.0])
+
+
+@pytest.mark.parametrize(("distance", "how"), [(0.0, "touch"), (0.002, "are only 0.002 m apart")])
+def test_the_first_contact_of_a_motion_is_its_obstacle(database: Database, job: JobRow, ask: Ask, distance: float, how: str) -> None:
+    stop = {"a": "model/cart/ball", "b": "world/post1", "distance": distance, "q": [0.5], "piece": 0, "time": 0.2}
+    with database.write() as session:
+        row = jobs.lock(session, job.id)
+        row.kind = "certify-path"
+        steps.add(session, row, StepKind.MOTION, {})
+        claim = steps.claim(session, row, [StepKind.MOTION], lease_seconds=60)
+        assert claim is not None
+        steps.save(session, claim, StepState.DONE, {"stop": stop}, 0.1)
+    (found,) = ask(f"jobs/{job.id}/obstacles")["obstacles"]
+    assert (found["pair"], found["q"]) == (1, [0.5])
+    said = f"model/cart/ball and world/post1 {how} at the configuration named, the first on the motion that could not be certified."
+    assert found["text"] == said
 
 
 def test_steps_and_decisions_have_workers_too(database: Database, job: JobRow, ask: Ask) -> None:
