@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 from uuid import uuid4
 
@@ -79,6 +79,12 @@ def page(
 def of_job(session: Session, job_id: str) -> Sequence[RegionRow]:
     """Returns the job's regions, in the order of their iterations, without their manifests and arrays."""
     return session.scalars(select(RegionRow).where(RegionRow.job_id == job_id).order_by(RegionRow.iteration).options(*_UNREAD)).all()
+
+
+def shares(session: Session, region_ids: Collection[str]) -> dict[str, float | None]:
+    """Returns id -> the share of the proposal that the region keeps, for these regions; None where it has none."""
+    rows = session.execute(select(RegionRow.id, RegionRow.share).where(RegionRow.id.in_(region_ids))) if region_ids else ()
+    return {region_id: None if share is None else share["value"] for region_id, share in rows}
 
 
 def of_cover(session: Session, job_id: str) -> Sequence[RegionRow]:
