@@ -57,6 +57,7 @@ export function Slice(props: Props) {
   const fixed = q.map((value, i) => (i === x || i === y ? null : value)).join();
   const asked = `${scene} ${x} ${y} ${fixed} ${regions?.join()}`;
   useEffect(() => {
+    if (x === y) return; // a scene of one joint
     const stop = new AbortController();
     const timer = setTimeout(() => {
       const body = { scene, q, x: space.joints[x], y: space.joints[y], size: SIZE, ...(regions && { regions }) };
