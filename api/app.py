@@ -10,16 +10,20 @@ from anyio import to_thread
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
-from api import guard, login, pages, problems
+from api import guard, login, problems
 from api.access import Keyring
 from api.access_log import AccessLog
 from api.announce import Announcer
+from api.cells import OutlinesKept
 from api.children import AT_ONCE, ChildLimiter
+from api.drawing import Maps
 from api.libraries import Libraries
 from api.links import LinksKept
 from api.metrics import Requests
+from api.pages import site
+from api.pages.rendering import render_problem
 from api.reading import READERS
-from api.routers import events, jobs, motions, planning, plans, regions, scenes, service
+from api.routers import cells, drawing, events, jobs, motions, planning, plans, regions, scenes, service
 from certifier.scene.bundle import expect_bundles
 from db.session import CONNECTIONS, Database, database
 from db.settings import LOOPBACK_NAMES, settings
@@ -52,20 +56,22 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.children = ChildLimiter()
     app.state.libraries = Libraries()
     app.state.links = LinksKept()
+    app.state.maps = Maps()
+    app.state.outlines = OutlinesKept()
     app.state.announcer = Announcer()
     app.add_middleware(
         guard.Guard,
         keyring=Keyring(app.state.database, open_without_keys=settings().loopback),
         hosts=LOOPBACK_NAMES if settings().loopback else None,
         rate=settings().requests_per_second,
-        respond=partial(problems.respond, pages.render_problem),
+        respond=partial(problems.respond, render_problem),
     )
     app.add_middleware(AccessLog, requests=app.state.requests)
-    problems.install(app, pages.render_problem)
-    for module in (scenes, jobs, events, regions, planning, plans, motions, service):
+    problems.install(app, render_problem)
+    for module in (scenes, jobs, events, regions, cells, planning, plans, drawing, motions, service):
         app.include_router(module.router)
     app.include_router(login.router)
-    pages.install(app)
+    site.install(app)
     app.openapi = partial(problems.describe, app)  # type: ignore[method-assign]
     return app
 

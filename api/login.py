@@ -10,7 +10,7 @@ from fastapi import APIRouter, Form, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
 
 from api.access import COOKIE, Db
-from api.pages import page
+from api.pages.rendering import page
 from db import keys
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)

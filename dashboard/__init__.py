@@ -1,1 +1,1 @@
-"""The dashboard is made of templates and static files; api/pages.py serves them."""
+"""The dashboard is made of templates, and of static files that dashboard/source/ is built into; api/pages/ serves them."""

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 
-from api import checks
+from api import checks, obstacles
 from api.access import READ, SUBMIT, Db, Submitter
 from api.announce import Announcements
 from api.reading import ReadingRoute
@@ -39,15 +39,16 @@ from api.schemas.jobs import (
     Webhook,
 )
 from api.schemas.motions import JobMotion
+from api.schemas.progress import JobWorkers, Obstacles, Work, Worker
 from api.schemas.scenes import PairInfo
 from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.proof.container import with_scene
-from db import jobs, pairs, proofs, regions, scenes, steps, webhooks
-from db.models import IterationRow, PairRow
+from db import jobs, leases, pairs, proofs, regions, scenes, steps, webhooks
+from db.models import IterationRow, JobRow, PairRow, StepRow
 from db.session import Database
-from db.states import IterationState, JobKind, JobState, PairState
+from db.states import IterationState, JobKind, JobState, PairState, StepKind
 from db.types import utcnow
 from planner.cover.options import CoverOptions
 from planner.cover.result import said
@@ -99,7 +100,14 @@ def create_job(
     else:
         response.status_code = status.HTTP_200_OK
     response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return Job.of(job)
+    return _described(db, [job])[0]
+
+
+def _described(db: Database, rows: Sequence[JobRow]) -> list[Job]:
+    """Describes jobs with the shares of their last regions."""
+    with db.read() as session:
+        shares = regions.shares(session, [row.region_id for row in rows if row.region_id is not None])
+    return [Job.of(row, shares.get(row.region_id or "")) for row in rows]
 
 
 def _options(body: GrowRequest | CertifyRequest | CertifyPathRequest | CoverRequest, scene: Scene) -> dict[str, Any]:
@@ -135,6 +143,7 @@ def list_jobs(
     state: JobState | None = None,
     kind: JobKind | None = None,
     scene: str | None = None,
+    ended: Annotated[bool | None, Query(description="`true` lists the jobs that have ended, `false` the others.")] = None,
     parent: Annotated[str | None, Query(max_length=64, description="List the jobs that grow the regions of this cover.")] = None,
     after: Cursor = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
@@ -143,15 +152,16 @@ def list_jobs(
     with db.read() as session:
         scene_id = scenes.find(session, scene) if scene else None
         parent_id = jobs.get(session, parent).id if parent else None
-        page = jobs.page(session, state=state, kind=kind, scene_id=scene_id, parent_id=parent_id, after=after, limit=limit)
-    return JobPage(jobs=[Job.of(row) for row in page.rows], next=page.next)
+        page = jobs.page(session, state=state, kind=kind, scene_id=scene_id, ended=ended, parent_id=parent_id, after=after, limit=limit)
+    return JobPage(jobs=_described(db, page.rows), next=page.next)
 
 
 @router.get("/{job_id}")
 def get_job(job_id: str, db: Db) -> Job:
     """Returns one job as it is now."""
     with db.read() as session:
-        return Job.of(jobs.get(session, job_id))
+        job = jobs.get(session, job_id)
+    return _described(db, [job])[0]
 
 
 @router.post("/{job_id}/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
@@ -163,7 +173,7 @@ def cancel_job(job_id: str, db: Db, background: BackgroundTasks, announcements: 
     with db.write() as session:
         job = jobs.cancel(session, job_id)
     background.add_task(announcements.announce, job.id)
-    return Job.of(job)
+    return _described(db, [job])[0]
 
 
 @router.post("/{job_id}/retry", status_code=status.HTTP_201_CREATED)
@@ -176,7 +186,7 @@ def retry_job(job_id: str, caller: Submitter, db: Db, response: Response, backgr
         job = jobs.retry(session, job_id, caller.key_id)
     background.add_task(announcements.announce, job.id)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return Job.of(job)
+    return _described(db, [job])[0]
 
 
 @router.get("/{job_id}/cover")
@@ -316,6 +326,58 @@ def _cell(scene: Scene, parts: Sequence[PairRow]) -> PairCell:
         witness_q=None if row.witness_s is None else scene.to_q(row.witness_s).tolist(),
         proof=row.proof_digest,
     )
+
+
+@router.get("/{job_id}/workers")
+def get_job_workers(job_id: str, db: Db) -> JobWorkers:
+    """Returns which processes hold which work of a job at this moment."""
+    with db.read() as session:
+        job = jobs.get(session, job_id)
+        held, begun = leases.of_job(session, PairRow, job.id), leases.of_job(session, StepRow, job.id)
+    return JobWorkers(workers=[*_certifying(held), *(_doing(step) for step in begun), *_deciding(job)])
+
+
+def _certifying(rows: Sequence[PairRow]) -> list[Worker]:
+    """Describes the processes that hold pairs, each with all pairs that it has claimed together."""
+    claims: dict[str | None, list[PairRow]] = {}
+    for row in rows:
+        claims.setdefault(row.lease_token, []).append(row)
+    return [
+        Worker(
+            process=held[0].worker or "",
+            work=Work.PAIRS,
+            iteration=held[0].iteration,
+            pairs=sorted({row.pair_index for row in held}),
+            until=held[0].lease_until,
+        )
+        for held in claims.values()
+    ]
+
+
+def _doing(step: StepRow) -> Worker:
+    work = Work.SEED if step.kind == StepKind.PROPOSE else Work(step.kind)
+    return Worker(process=step.worker or "", work=work, iteration=None, pairs=[], until=step.lease_until)
+
+
+def _deciding(job: JobRow) -> list[Worker]:
+    if job.coordinator is None or not jobs.is_coordinated(job, utcnow()):
+        return []
+    return [Worker(process=job.coordinator, work=Work.DECIDE, iteration=None, pairs=[], until=job.coordinator_until)]
+
+
+@router.get("/{job_id}/obstacles")
+def get_job_obstacles(
+    job_id: str, db: Db, limit: Annotated[int, Query(ge=1, le=1000, description="Return so many obstacles at most, the worst.")] = 100
+) -> Obstacles:
+    """Returns what holds the region of a job back, or has cut it, in words, worst first: each with the pair and a configuration.
+
+    The job may run or have ended. The pairs for which most was cut off come first; where a job has ended without a region, those that it
+    could not certify. Of a job that an earlier version has begun, no more may be known than how often something was cut off for a pair.
+    """
+    with db.read() as session:
+        job = jobs.get(session, job_id)
+    found = obstacles.of_job(db, scenes.load(db, job.scene_id), job)
+    return Obstacles(obstacles=found[:limit], total=len(found))
 
 
 @router.get("/{job_id}/growth")

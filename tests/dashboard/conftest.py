@@ -1,5 +1,73 @@
-"""The service's fixtures."""
+"""The service's fixtures, a real browser, and axe, which looks for what keeps people out."""
 
-from tests.api.conftest import certified, client, database, environment, region, scene, url
+from __future__ import annotations
 
-__all__ = ["certified", "client", "database", "environment", "region", "scene", "url"]
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.api.conftest import certified, client, database, environment, planar, planar_region, region, scene, url
+
+__all__ = [
+    "barriers",
+    "browser",
+    "certified",
+    "client",
+    "database",
+    "environment",
+    "page",
+    "planar",
+    "planar_region",
+    "region",
+    "scene",
+    "url",
+]
+
+INSTALLED = Path(sys.prefix) / "browser"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """The Chromium that ``requirements/install test`` installs, the same on every machine, or the one that CHROMIUM_BIN names."""
+    from playwright.sync_api import sync_playwright
+
+    installed = INSTALLED / "chromium"
+    chromium = os.environ.get("CHROMIUM_BIN", installed)
+    if chromium == installed and not installed.exists():
+        pytest.skip(f"no Chromium at {installed}: requirements/install test says why; CHROMIUM_BIN may name another one")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(browser: Any, url: str) -> Iterator[Any]:
+    """A page that must not complain, nor ask anybody but the service; closed before the service is."""
+    context = browser.new_context()
+    page = context.new_page()
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("request", lambda request: None if request.url.startswith("http://127.0.0.1:") else complaints.append(request.url))
+    yield page
+    context.close()
+    assert complaints == []
+
+
+@pytest.fixture(scope="session")
+def barriers() -> Callable[[Any], list[str]]:
+    """Returns a function from a page to the rules of axe-core that it violates, each with the first place where it does."""
+    script = (INSTALLED / "axe.min.js").read_text()
+
+    def violations(page: Any) -> list[str]:
+        # Inserted through the debugger, which the page's security policy does not bind.
+        page.evaluate(script)
+        found = page.evaluate("axe.run()")["violations"]
+        return [f"{rule['id']}: {rule['nodes'][0]['html'][:200]}" for rule in found]
+
+    return violations

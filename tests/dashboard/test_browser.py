@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,35 +16,6 @@ from db.session import Database
 from db.states import JobState
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True}
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """The Chromium that ``requirements/install test`` installs, the same on every machine, or the one that CHROMIUM_BIN names."""
-    from playwright.sync_api import sync_playwright
-
-    installed = Path(sys.prefix) / "browser" / "chromium"
-    chromium = os.environ.get("CHROMIUM_BIN", installed)
-    if chromium == installed and not installed.exists():
-        pytest.skip(f"no Chromium at {installed}: requirements/install test says why; CHROMIUM_BIN may name another one")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium)
-        yield browser
-        browser.close()
-
-
-@pytest.fixture
-def page(browser: Any, url: str) -> Iterator[Any]:
-    """A page that must not complain, nor ask anybody but the service; closed before the service is."""
-    context = browser.new_context()
-    page = context.new_page()
-    complaints: list[str] = []
-    page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("request", lambda request: None if request.url.startswith("http://127.0.0.1:") else complaints.append(request.url))
-    yield page
-    context.close()
-    assert complaints == []
 
 
 @pytest.fixture
@@ -127,6 +95,12 @@ def test_the_proof_is_checked_again_from_the_page(page: Any, url: str, region: s
     page.get_by_role("button", name="Verify here").click()
     page.get_by_text("The proof holds:").wait_for()
     assert "guarantee: exact" in page.locator("#statement").text_content()
+
+
+@pytest.mark.parametrize("path", ["/", "/scenes/slider", "/regions/{region}", "/login"])
+def test_axe_finds_no_barrier(page: Any, url: str, region: str, barriers: Any, path: str) -> None:
+    page.goto(url + path.format(region=region))
+    assert barriers(page) == []
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -11,7 +11,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 import dashboard
-from api.pages import growth_chart, matrix_rows, progress
+from api.pages.job import growth_chart, matrix_rows, progress
 from api.schemas.jobs import GrowthPoint, Iteration, PairCell, PairMatrix
 from api.schemas.scenes import PairInfo
 from certifier.jobs.region import Region
@@ -31,7 +31,7 @@ def paths(client: TestClient, region: str) -> list[str]:
 
 
 def test_every_page_works_offline_and_under_a_strict_policy(client: TestClient, paths: list[str]) -> None:
-    for path in [*paths, "/static/ciris.css", "/static/ciris.js", "/static/icon.svg"]:
+    for path in [*paths, "/static/ciris.css", "/static/built/main.js", "/static/icon.svg"]:
         answer = client.get(path)
         assert answer.status_code == 200, path
         assert re.findall(r"(?:src|href|url)\s*[=(]\s*[\"']?(?:https?:)?//", answer.text) == [], path

@@ -82,12 +82,13 @@ def installer(tmp_path: Path) -> Installer:
 def test_the_browser_is_installed_with_its_libraries_and_fonts(installer: Installer) -> None:
     installer.add_browser()
     installer.add("fonts", {"package/ttf/Sans.ttf": b"font"})
+    installer.add("axe", {"package/axe.min.js": b"axe", "package/axe.js": b"larger"})
     done = installer.run()
     assert (done.returncode, done.stdout) == (0, "")
     assert done.stderr.startswith("installing a browser")
     place = installer.installed
     found = {str(path.relative_to(place)) for path in place.rglob("*") if path.is_file()}
-    assert found == {"chromium", "chrome", "lib/libnss3.so", "libEGL.so", "fonts/Sans.ttf", "fonts/fonts.conf", "stamp"}
+    assert found == {"chromium", "chrome", "lib/libnss3.so", "libEGL.so", "fonts/Sans.ttf", "fonts/fonts.conf", "axe.min.js", "stamp"}
     assert "another place" not in (place / "fonts/fonts.conf").read_text()
     said = subprocess.run([place / "chromium", "--a", "b c"], capture_output=True, text=True, check=True).stdout
     assert said == f"{place}/lib {place}/fonts --a b c\n"

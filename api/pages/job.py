@@ -1,70 +1,26 @@
-"""These are the dashboard's pages. They fill the templates of dashboard/ with what the functions of the JSON routes return."""
+"""This is the page of a job."""
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from http import HTTPStatus
-from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
-from fastapi import APIRouter, FastAPI, Request, Response
-from fastapi.responses import HTMLResponse, RedirectResponse
-from fastapi.staticfiles import StaticFiles
-from fastapi.templating import Jinja2Templates
+from fastapi import APIRouter, Request, Response
 
-import dashboard
-from api import problems
-from api.access import READ, Db
+from api.access import Db
+from api.pages.rendering import page
 from api.routers import jobs, regions, scenes
 from api.schemas.jobs import GrowthPoint, Iteration, Job, PairCell, PairMatrix
 from api.schemas.scenes import PairInfo
-from certifier.verify.decimals import at_least_mm, at_most_mm
+from certifier.verify.decimals import at_least_mm
 from db.session import Database
 from db.states import JobKind, PairState
 
-_ROOT = Path(dashboard.__file__).parent
 _CHART = (600, 150)
-_SECURITY = {
-    "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'; form-action 'self'",
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "same-origin",
-}
 
-router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse, dependencies=[READ])
-templates = Jinja2Templates(_ROOT / "templates")
-templates.env.filters |= {"at_least_mm": at_least_mm, "at_most_mm": at_most_mm}
-
-
-def install(app: FastAPI) -> None:
-    """Adds the pages and their static files to the application."""
-    app.include_router(router)
-    app.mount("/static", StaticFiles(directory=_ROOT / "static"), name="static")
-
-
-def render_problem(request: Request, problem: problems.Problem) -> Response:
-    """Answers a browser with an HTML page, and everybody else with problem+json.
-
-    Where a key is needed, a browser that asked for a page is sent to the page for signing in.
-    """
-    if request.url.path.startswith(("/v1/", "/static/")) or "text/html" not in request.headers.get("accept", ""):
-        return problems.as_json(problem)
-    if problem.code == "key_needed" and request.method == "GET":
-        return RedirectResponse(f"/login?next={quote(request.url.path)}", HTTPStatus.SEE_OTHER)
-    return page(request, "problem.html", {"problem": problem}, problem.status)
-
-
-@router.get("/")
-def jobs_page(request: Request, db: Db) -> Response:
-    return page(request, "jobs.html", _home(db))
-
-
-@router.get("/live")
-def jobs_live(request: Request, db: Db) -> Response:
-    return page(request, "jobs_live.html", _home(db))
+router = APIRouter()
 
 
 @router.get("/jobs/{job_id}")
@@ -75,56 +31,6 @@ def job_page(request: Request, job_id: str, db: Db) -> Response:
 @router.get("/jobs/{job_id}/live")
 def job_live(request: Request, job_id: str, db: Db) -> Response:
     return page(request, "job_live.html", _job(db, job_id))
-
-
-def _alone(known: dict[str, Any] | None) -> dict[str, Any] | None:
-    """Returns how far a joint moves while the others stay at the seed, as ranges are; None where that is not known."""
-    ends = None if known is None else known.get("through_seed")
-    return None if known is None or ends is None else {"lower": ends[0], "upper": ends[1], "unit": known["unit"]}
-
-
-@router.get("/regions/{region_id}")
-def region_page(request: Request, region_id: str, db: Db) -> Response:
-    region = regions.get_region(region_id, db)
-    # Regions that an earlier checkout stored have no ranges, and their units are not known.
-    ranges = [region.manifest.get("joint_ranges", {}).get(name) for name in region.manifest["space"]["joints"]]
-    limits = [_limits(*joint) for joint in zip(*(region.manifest["space"][name] for name in ("q_lower", "q_upper")), ranges, strict=True)]
-    alone = [_alone(known) for known in ranges]
-    context = {"region": region, "manifest": region.manifest, "ranges": ranges, "alone": alone, "limits": limits}
-    return page(request, "region.html", context)
-
-
-def _limits(lower: float, upper: float, range_: dict[str, Any] | None) -> dict[str, Any]:
-    """Returns a joint's limits, radians or metres, in the unit of its range."""
-    unit = range_["unit"] if range_ else ""
-    scale = math.degrees(1.0) if unit == "deg" else 1.0
-    return {"lower": scale * lower, "upper": scale * upper, "unit": unit}
-
-
-@router.get("/scenes/{scene_id}")
-def scene_page(request: Request, scene_id: str, db: Db) -> Response:
-    context = {
-        "scene": scenes.get_scene(scene_id, db),
-        "lint": scenes.get_scene_lint(scene_id, db),
-        "pairs": scenes.get_scene_pairs(scene_id, db).pairs,
-        "regions": regions.list_regions(db, scene=scene_id).regions,
-    }
-    return page(request, "scene.html", context)
-
-
-def page(request: Request, name: str, context: dict[str, Any], status: int = 200) -> Response:
-    """Fills in a template of the dashboard. The response's headers forbid the page to load anything from other sites."""
-    return templates.TemplateResponse(request, name, context, status_code=status, headers=_SECURITY)
-
-
-def _home(db: Database) -> dict[str, Any]:
-    known = scenes.list_scenes(db).scenes
-    return {
-        "jobs": jobs.list_jobs(db).jobs,
-        "scenes": known,
-        "scene_names": {scene.id: scene.name for scene in known},
-        "regions": regions.list_regions(db, limit=20).regions,
-    }
 
 
 def _job(db: Database, job_id: str) -> dict[str, Any]:

@@ -1,0 +1,43 @@
+"""The dashboard's templates are filled in here."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from fastapi import Request, Response
+from fastapi.responses import RedirectResponse
+from fastapi.templating import Jinja2Templates
+
+import dashboard
+from api import problems
+from certifier.verify.decimals import at_least_mm, at_most_mm
+
+ROOT = Path(dashboard.__file__).parent
+_SECURITY = {
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'; form-action 'self'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "same-origin",
+}
+
+templates = Jinja2Templates(ROOT / "templates")
+templates.env.filters |= {"at_least_mm": at_least_mm, "at_most_mm": at_most_mm}
+
+
+def page(request: Request, name: str, context: dict[str, Any], status: int = 200) -> Response:
+    """Fills in a template of the dashboard. The response's headers forbid the page to load anything from other sites."""
+    return templates.TemplateResponse(request, name, context, status_code=status, headers=_SECURITY)
+
+
+def render_problem(request: Request, problem: problems.Problem) -> Response:
+    """Answers a browser with an HTML page, and everybody else with problem+json.
+
+    Where a key is needed, a browser that asked for a page is sent to the page for signing in.
+    """
+    if request.url.path.startswith(("/v1/", "/static/")) or "text/html" not in request.headers.get("accept", ""):
+        return problems.as_json(problem)
+    if problem.code == "key_needed" and request.method == "GET":
+        return RedirectResponse(f"/login?next={quote(request.url.path)}", HTTPStatus.SEE_OTHER)
+    return page(request, "problem.html", {"problem": problem}, problem.status)

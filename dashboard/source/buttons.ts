@@ -1,0 +1,45 @@
+// Buttons with data-post ask the service to do something; times are shown as the reader's clock has them.
+import { post, said } from "./shared/api";
+import { refresh } from "./live";
+
+interface Answer {
+  id?: string;
+  holds?: boolean;
+  statement?: string[];
+  error?: { message: string };
+}
+
+export function localTimes(root: ParentNode): void {
+  for (const time of root.querySelectorAll("time")) {
+    time.textContent = new Date(time.dateTime).toLocaleString();
+    time.title = time.dateTime;
+  }
+}
+
+export function startButtons(): void {
+  document.addEventListener("click", (click) => {
+    const button = (click.target as Element).closest<HTMLButtonElement>("button[data-post]");
+    if (button) void press(button);
+  });
+}
+
+async function press(button: HTMLButtonElement): Promise<void> {
+  button.disabled = true;
+  const { post: path, follow, statement } = button.dataset;
+  try {
+    const answer = await post<Answer>(path!);
+    if (follow) location.assign(follow + answer.id);
+    else if (statement) {
+      say(document.getElementById(statement)!, answer);
+      button.disabled = false;
+    } else void refresh(document.getElementById("live")!.dataset.refresh!);
+  } catch (problem) {
+    button.textContent = said(problem);
+  }
+}
+
+function say(place: HTMLElement, answer: Answer): void {
+  const lines = answer.holds ? ["The proof holds:", ...answer.statement!] : ["The proof does not hold:", answer.error!.message];
+  place.textContent = lines.join("\n");
+  place.hidden = false;
+}

@@ -1,0 +1,19 @@
+// An island is a part of a page that is drawn in the browser: <div data-island="NAME" data-props='{...}'>. Its code is fetched where it is needed.
+import type { ComponentType } from "preact";
+
+const ISLANDS: Record<string, () => Promise<ComponentType<any>>> = {
+  library: async () => (await import("./library/library")).LibraryIsland,
+  region: async () => (await import("./region/region")).RegionIsland,
+};
+
+export function startIslands(root: ParentNode): void {
+  for (const place of root.querySelectorAll<HTMLElement>("[data-island]")) void start(place);
+}
+
+async function start(place: HTMLElement): Promise<void> {
+  const load = ISLANDS[place.dataset.island!];
+  if (!load) throw new Error(`no island is called ${place.dataset.island}`);
+  const [{ createElement, render }, component] = await Promise.all([import("preact"), load()]);
+  place.replaceChildren();
+  render(createElement(component, JSON.parse(place.dataset.props ?? "{}")), place);
+}

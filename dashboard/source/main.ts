@@ -1,0 +1,9 @@
+// Every page loads this module. It keeps times local and buttons alive, and starts what the page asks for.
+import { localTimes, startButtons } from "./buttons";
+import { startIslands } from "./islands";
+import { startLive } from "./live";
+
+localTimes(document);
+startButtons();
+startLive();
+startIslands(document);

@@ -1,0 +1,107 @@
+// Asks the service. Every answer that is no success becomes a ServiceError that says what, where and what to do.
+
+export class ServiceError extends Error {
+  constructor(
+    readonly status: number,
+    readonly code: string,
+    message: string,
+    readonly field: string | null,
+    readonly hint: string | null,
+  ) {
+    super(message);
+  }
+
+  /** All of it in one sentence or two, for people. */
+  get text(): string {
+    return [this.message, this.hint].filter(Boolean).join(". ");
+  }
+}
+
+async function answer<T>(response: Response): Promise<T> {
+  if (response.ok) return response.status === 204 ? (undefined as T) : ((await response.json()) as T);
+  if (response.status === 401) location.reload();
+  const problem = (await response.json().catch(() => ({}))) as Record<string, string | undefined>;
+  throw new ServiceError(
+    response.status,
+    problem.code ?? "unknown",
+    problem.detail ?? `the service answered ${response.status}`,
+    problem.field ?? null,
+    problem.hint ?? null,
+  );
+}
+
+export async function get<T>(path: string, signal?: AbortSignal): Promise<T> {
+  return answer<T>(await fetch(path, { headers: { Accept: "application/json" }, signal }));
+}
+
+export async function post<T>(path: string, body?: unknown, signal?: AbortSignal): Promise<T> {
+  const headers = { Accept: "application/json", "Content-Type": "application/json" };
+  return answer<T>(await fetch(path, { method: "POST", headers, body: body === undefined ? undefined : JSON.stringify(body), signal }));
+}
+
+export async function upload<T>(path: string, field: string, file: File): Promise<T> {
+  const form = new FormData();
+  form.append(field, file);
+  return answer<T>(await fetch(path, { method: "POST", headers: { Accept: "application/json" }, body: form }));
+}
+
+/** Says in a sentence what went wrong, whatever was thrown. */
+export function said(problem: unknown): string {
+  if (problem instanceof ServiceError) return problem.text;
+  return problem instanceof TypeError ? "The service does not answer." : String(problem);
+}
+
+export interface JobEvent {
+  seq: number;
+  kind: string;
+  data: Record<string, unknown>;
+  created_at: string;
+}
+
+const KINDS = ["job", "iteration", "pairs", "step", "region", "lost", "cover", "child"];
+const POLL_MS = 2000;
+
+/**
+ * Follows a job's events from `after` on: by the stream, or by asking again where the stream cannot be opened (a proxy that holds it back).
+ *
+ * @returns a function that ends it.
+ */
+export function follow(job: string, after: number, seen: (event: JobEvent) => void, connected: (is: boolean) => void, ended: () => void): () => void {
+  let last = after;
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  let stopped = false;
+  const source = new EventSource(`/v1/jobs/${job}/events/stream?after=${after}`);
+  const take = (event: JobEvent): void => {
+    if (event.seq <= last) return;
+    last = event.seq;
+    seen(event);
+  };
+  const poll = async (): Promise<void> => {
+    try {
+      const { events } = await get<{ events: JobEvent[] }>(`/v1/jobs/${job}/events?after=${last}`);
+      events.forEach(take);
+      const now = await get<{ ended: boolean }>(`/v1/jobs/${job}`);
+      connected(true);
+      if (now.ended && events.length === 0) return ended();
+    } catch {
+      connected(false);
+    }
+    if (!stopped) timer = setTimeout(() => void poll(), POLL_MS);
+  };
+  for (const kind of KINDS) source.addEventListener(kind, (message) => take(JSON.parse((message as MessageEvent<string>).data) as JobEvent));
+  source.addEventListener("end", () => {
+    source.close();
+    ended();
+  });
+  source.addEventListener("open", () => connected(true));
+  source.addEventListener("error", () => {
+    connected(false);
+    // A browser opens a stream again by itself, unless the first answer was no stream.
+    if (source.readyState === EventSource.CLOSED && timer === undefined) void poll();
+  });
+  return () => {
+    stopped = true;
+    source.close();
+    clearTimeout(timer);
+  };
+}

@@ -1,0 +1,221 @@
+// Draws a robot and its surroundings with three.js: the bodies that are certified, without the padding. It draws only when something has changed.
+import * as three from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { ConvexGeometry } from "three/examples/jsm/geometries/ConvexGeometry.js";
+import { CONTACT, LINKS, onScheme, token } from "./colours";
+import { movingBodies, poses, type GeometryModel, type Matrix, type SceneModel } from "./kinematics";
+
+const GHOST_OPACITY = 0.1;
+const MOST_GHOSTS = 300;
+const TURN = 0.12; // radians a key press
+const ZOOM = 1.15;
+
+function toVectors(rows: number[][]): three.Vector3[] {
+  return rows.map((row) => new three.Vector3(...(row as [number, number, number])));
+}
+
+function capsule(a: three.Vector3, b: three.Vector3, radius: number): three.BufferGeometry {
+  const along = b.clone().sub(a);
+  const shape = new three.CapsuleGeometry(radius, along.length(), 8, 20);
+  shape.applyQuaternion(new three.Quaternion().setFromUnitVectors(new three.Vector3(0, 1, 0), along.normalize()));
+  return shape.translate((a.x + b.x) / 2, (a.y + b.y) / 2, (a.z + b.z) / 2);
+}
+
+function rounded(vertices: three.Vector3[], radius: number): three.BufferGeometry {
+  const ball = new three.IcosahedronGeometry(radius, 2).getAttribute("position");
+  const offsets = Array.from({ length: ball.count }, (_, i) => new three.Vector3().fromBufferAttribute(ball, i));
+  return new ConvexGeometry(vertices.flatMap((vertex) => offsets.map((offset) => offset.clone().add(vertex))));
+}
+
+/** conv(vertices) + ball(radius), in the frame of its body. */
+function shapeOf({ vertices: rows, triangles, radius }: GeometryModel): three.BufferGeometry {
+  const vertices = toVectors(rows);
+  if (vertices.length === 1) return new three.SphereGeometry(radius, 24, 16).translate(...vertices[0]!.toArray());
+  if (vertices.length === 2 && radius > 0) return capsule(vertices[0]!, vertices[1]!, radius);
+  if (radius > 0) return rounded(vertices, radius);
+  const shape = new three.BufferGeometry().setFromPoints(triangles.flatMap((triangle) => triangle.map((i) => vertices[i]!)));
+  shape.computeVertexNormals();
+  return shape;
+}
+
+function toMatrix4(pose: Matrix): three.Matrix4 {
+  return new three.Matrix4().set(...(pose as Parameters<three.Matrix4["set"]>));
+}
+
+interface Drawn {
+  geometry: GeometryModel;
+  mesh: three.Mesh<three.BufferGeometry, three.MeshStandardMaterial>;
+  colour: string | null; // of a link; null at rest, where the page's own grey is used
+}
+
+export class View {
+  private readonly renderer: three.WebGLRenderer;
+  private readonly scene = new three.Scene();
+  private readonly camera = new three.PerspectiveCamera(40, 1, 0.01, 100);
+  private readonly controls: OrbitControls;
+  private readonly drawn: Drawn[];
+  private readonly posesOf: (q: number[]) => Map<string, Matrix>;
+  private readonly grid: three.GridHelper;
+  private readonly observer: ResizeObserver;
+  private readonly forgetScheme: () => void;
+  private ghosts: three.InstancedMesh[] = [];
+  private home = { position: new three.Vector3(), target: new three.Vector3() };
+  private asked = 0;
+  private touching: number[] = [];
+
+  /** Throws where the browser cannot draw with WebGL. */
+  constructor(canvas: HTMLCanvasElement, model: SceneModel) {
+    this.renderer = new three.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.posesOf = poses(model);
+    const links = movingBodies(model);
+    this.drawn = model.geometries.map((geometry) => {
+      const link = links.indexOf(geometry.body);
+      const colour = link < 0 ? null : LINKS[link % LINKS.length]!;
+      const material = new three.MeshStandardMaterial({ roughness: 0.65, metalness: 0.05, flatShading: geometry.radius === 0, side: three.DoubleSide });
+      const mesh = new three.Mesh(shapeOf(geometry), material);
+      mesh.matrixAutoUpdate = false;
+      this.scene.add(mesh);
+      return { geometry, mesh, colour };
+    });
+    this.camera.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = false;
+    this.controls.addEventListener("change", () => this.draw());
+    this.scene.add(new three.HemisphereLight("#ffffff", "#8a8f98", 1.7));
+    const sun = new three.DirectionalLight("#ffffff", 1.8);
+    sun.position.set(2, -3, 5);
+    this.scene.add(sun);
+    this.setPose(model.q_star);
+    this.grid = this.frame();
+    this.colour([]);
+    this.forgetScheme = onScheme(() => this.colour(this.touching));
+    this.observer = new ResizeObserver(() => this.resize());
+    this.observer.observe(canvas.parentElement ?? canvas);
+    this.resize();
+  }
+
+  /** Puts the camera where it sees the robot, and a grid under it. */
+  private frame(): three.GridHelper {
+    const box = new three.Box3();
+    for (const { mesh, colour } of this.drawn) if (colour !== null) box.expandByObject(mesh);
+    const sphere = box.getBoundingSphere(new three.Sphere());
+    const reach = Math.max(sphere.radius, 0.1);
+    this.home.target.copy(sphere.center);
+    this.home.position.copy(sphere.center).add(new three.Vector3(1.6, -2.4, 1.3).multiplyScalar(1.25 * reach));
+    this.camera.near = reach / 100;
+    this.camera.far = reach * 60;
+    this.reset();
+    const grid = new three.GridHelper(8 * reach, 16);
+    grid.rotateX(Math.PI / 2);
+    grid.position.set(sphere.center.x, sphere.center.y, Math.min(box.min.z, 0));
+    (grid.material as three.Material).transparent = true;
+    (grid.material as three.Material).opacity = 0.25;
+    this.scene.add(grid);
+    return grid;
+  }
+
+  /** Looks from where the view began. */
+  reset(): void {
+    this.camera.position.copy(this.home.position);
+    this.controls.target.copy(this.home.target);
+    this.controls.update();
+    this.draw();
+  }
+
+  /** Turns the camera about what it looks at, and comes nearer for zoom > 1. */
+  turn(left: number, up: number, zoom: number): void {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    const at = new three.Spherical().setFromVector3(new three.Vector3(offset.x, offset.z, -offset.y));
+    at.theta -= left;
+    at.phi = Math.min(Math.max(at.phi - up, 0.05), Math.PI - 0.05);
+    at.radius /= zoom;
+    const turned = new three.Vector3().setFromSpherical(at);
+    this.camera.position.copy(this.controls.target).add(new three.Vector3(turned.x, -turned.z, turned.y));
+    this.controls.update();
+    this.draw();
+  }
+
+  /** Answers a key: the arrows turn, + and - zoom, 0 goes back. Returns whether it did anything. */
+  key(key: string): boolean {
+    const turns: Record<string, [number, number, number]> = {
+      ArrowLeft: [-TURN, 0, 1], ArrowRight: [TURN, 0, 1], ArrowUp: [0, TURN, 1], ArrowDown: [0, -TURN, 1], "+": [0, 0, ZOOM], "=": [0, 0, ZOOM], "-": [0, 0, 1 / ZOOM],
+    };
+    if (key === "0") this.reset();
+    else if (turns[key]) this.turn(...turns[key]);
+    else return false;
+    return true;
+  }
+
+  setPose(q: number[]): void {
+    const found = this.posesOf(q);
+    for (const { geometry, mesh } of this.drawn) {
+      mesh.matrix.copy(toMatrix4(found.get(geometry.body)!));
+      mesh.matrixWorldNeedsUpdate = true;
+    }
+    this.draw();
+  }
+
+  /** Paints these geometries, by index, as what touches; all others have their own colour. */
+  colour(touching: number[]): void {
+    this.touching = touching;
+    const are = new Set(touching);
+    this.drawn.forEach(({ mesh, colour }, i) => {
+      mesh.material.color.set(are.has(i) ? CONTACT : (colour ?? token("--rest")));
+      mesh.material.emissive.set(are.has(i) ? CONTACT : "#000000");
+      mesh.material.emissiveIntensity = are.has(i) ? 0.35 : 0;
+    });
+    this.draw();
+  }
+
+  /** Draws the links faintly at each of these configurations as well; at most 300 of them. */
+  setGhosts(configurations: number[][]): void {
+    for (const ghost of this.ghosts) {
+      this.scene.remove(ghost);
+      ghost.dispose();
+      (ghost.material as three.Material).dispose();
+    }
+    const all = configurations.slice(0, MOST_GHOSTS).map((q) => this.posesOf(q));
+    this.ghosts = all.length === 0 ? [] : this.drawn.filter(({ colour }) => colour !== null).map(({ geometry, mesh, colour }) => {
+      const material = new three.MeshStandardMaterial({ color: colour!, transparent: true, opacity: GHOST_OPACITY, depthWrite: false });
+      const ghost = new three.InstancedMesh(mesh.geometry, material, all.length);
+      all.forEach((found, i) => ghost.setMatrixAt(i, toMatrix4(found.get(geometry.body)!)));
+      this.scene.add(ghost);
+      return ghost;
+    });
+    this.draw();
+  }
+
+  private resize(): void {
+    const canvas = this.renderer.domElement;
+    const { clientWidth: width, clientHeight: height } = canvas;
+    if (width === 0 || height === 0) return;
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.draw();
+  }
+
+  private draw(): void {
+    if (this.asked) return;
+    this.asked = requestAnimationFrame(() => {
+      this.asked = 0;
+      this.renderer.render(this.scene, this.camera);
+    });
+  }
+
+  dispose(): void {
+    cancelAnimationFrame(this.asked);
+    this.observer.disconnect();
+    this.forgetScheme();
+    this.setGhosts([]);
+    cancelAnimationFrame(this.asked);
+    this.controls.dispose();
+    this.grid.dispose();
+    for (const { mesh } of this.drawn) {
+      mesh.geometry.dispose();
+      mesh.material.dispose();
+    }
+    this.renderer.dispose();
+  }
+}

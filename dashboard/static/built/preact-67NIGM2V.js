@@ -1,0 +1,1 @@
+import{a,b,c,d,e,f,g,h,i,j,k,l}from"./chunk-BAYTPQX6.js";export{g as Component,f as Fragment,d as cloneElement,k as createContext,c as createElement,l as createPortal,e as createRef,c as h,j as hydrate,b as isValidElement,a as options,i as render,h as toChildArray};
