@@ -25,7 +25,7 @@ router = APIRouter(prefix="/v1/scenes", tags=["scenes"], dependencies=[READ], ro
 
 @router.post("", dependencies=[SUBMIT], status_code=status.HTTP_201_CREATED)
 async def create_scene(
-    bundle: Annotated[UploadFile, File(description="A zip that holds the scene file and every file it refers to.")],
+    bundle: Annotated[UploadFile, File(description="A zip of the directory with `scene.yaml` and every file it refers to.")],
     db: Db,
     children: Children,
     response: Response,
