@@ -217,13 +217,6 @@ COMMANDS: list[Row] = [
             lambda t: asked(t, "job", "show", ".."),
         ),
         ("{...}", "{...}", "{...}", "{...}", lambda t: asked(t, "job", "show", "nothing")),
-        (
-            "not_ciris",
-            "",
-            "{url} answered {status_code}",
-            "is that the address of a ciris service?",
-            asked_elsewhere,
-        ),
     ),
     *rows(
         "client/inputs.py",
@@ -309,11 +302,6 @@ COMMANDS: list[Row] = [
             "in order: {names}",
             lambda t: t.ciris("scene", "check", PLANAR, "--q", "0"),
         ),
-    ),
-    *rows(
-        "ciris/job.py",
-        ("job_{...}", "", "{...}", "`ciris job show {...}` tells more", "a job that was cancelled while `ciris grow` followed it"),
-        ("job_{...}", "", "the job is {...}", "`ciris job show {...}` tells more", "a job that ended without a word"),
     ),
     *rows(
         "client/recertify.py",
