@@ -14,6 +14,7 @@ from api import guard, login, problems
 from api.access import Keyring
 from api.access_log import AccessLog
 from api.announce import Announcer
+from api.cells import OutlinesKept
 from api.children import AT_ONCE, ChildLimiter
 from api.libraries import Libraries
 from api.links import LinksKept
@@ -21,7 +22,7 @@ from api.metrics import Requests
 from api.pages import site
 from api.pages.rendering import render_problem
 from api.reading import READERS
-from api.routers import events, jobs, motions, planning, plans, regions, scenes, service
+from api.routers import cells, events, jobs, motions, planning, plans, regions, scenes, service
 from certifier.scene.bundle import expect_bundles
 from db.session import CONNECTIONS, Database, database
 from db.settings import LOOPBACK_NAMES, settings
@@ -54,6 +55,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.children = ChildLimiter()
     app.state.libraries = Libraries()
     app.state.links = LinksKept()
+    app.state.outlines = OutlinesKept()
     app.state.announcer = Announcer()
     app.add_middleware(
         guard.Guard,
@@ -64,7 +66,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     )
     app.add_middleware(AccessLog, requests=app.state.requests)
     problems.install(app, render_problem)
-    for module in (scenes, jobs, events, regions, planning, plans, motions, service):
+    for module in (scenes, jobs, events, regions, cells, planning, plans, motions, service):
         app.include_router(module.router)
     app.include_router(login.router)
     site.install(app)

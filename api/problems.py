@@ -31,6 +31,8 @@ _STATUS_OF_CODE = {
             "webhook_not_found",
             "cover_not_found",
             "motion_not_found",
+            "pair_not_found",
+            "cells_not_found",
         ),
         HTTPStatus.NOT_FOUND,
     ),

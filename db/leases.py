@@ -187,6 +187,11 @@ def lost(session: Session, model: type[Row], *, by_time: bool) -> list[Lost]:
     return list(found.values())
 
 
+def of_job(session: Session, model: type[Row], job_id: str) -> Sequence[Row]:
+    """Returns the rows of a job that are held now, in their order."""
+    return session.scalars(select(model).where(model.job_id == job_id, model.state == RUNNING).order_by(model.id)).all()
+
+
 def release(session: Session, model: type[Row], lost: Lost) -> list[Row]:
     """Opens the rows of a lost lease and returns them. Whoever held them can save nothing any more."""
     ids = list(session.scalars(select(model.id).where(held(model, lost.token))))

@@ -125,6 +125,8 @@ class JobRow(Base):
     """How many of the job's pairs are open. Whoever moves a pair counts it here, so that nobody has to count the rows."""
     running_pairs: Mapped[int] = mapped_column(default=0)
     """How many of the job's pairs are running."""
+    pieces: Mapped[int | None]
+    """How many pairs, or parts of pairs, its last iteration has; None before the first one."""
     next_pair: Mapped[int] = mapped_column(default=0)
     """No open pair that has killed no process has a lower id. Claims look from here on."""
     region_id: Mapped[str | None] = mapped_column(String(36))
@@ -236,7 +238,7 @@ class PairRow(Leased, Base):
 class SubtreesRow(Base):
     """This row holds what a search over partitions has proved already of a part of a pair that is not certified. It is no proof.
 
-    A job has those of its open pairs, and none after its end.
+    A job has those of its open pairs. After its end only their outlines are left, for people to look at.
     """
 
     __tablename__ = "subtrees"
@@ -247,7 +249,9 @@ class SubtreesRow(Base):
     """The iteration whose result it is part of."""
     part: Mapped[int] = mapped_column(primary_key=True)
     data: Mapped[bytes]
-    """What certifier.pair.result.PairResult calls ``subtrees``."""
+    """What certifier.pair.result.PairResult calls ``subtrees``; empty once the job has ended."""
+    outline: Mapped[bytes | None]
+    """What certifier.pair.result.PairResult calls ``outline``; None where an earlier version has saved it."""
 
 
 class StepRow(Leased, Base):

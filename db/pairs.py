@@ -136,6 +136,7 @@ def add_iteration(
             ],
         )
         job.open_pairs += len(pairs)
+    job.pieces = len(pairs)
     counts = {"pairs": len({pair.index for pair in pairs}), "parts": len(pairs), "reused": len(reuse)}
     events.emit(session, job, "iteration", {"index": index, "label": label, "state": "running", **counts})
 
@@ -208,7 +209,8 @@ def save(session: Session, claim: Claim, results: Mapping[tuple[int, int], PairR
     for work, result in saved.items():
         digest = None if result.proof is None else digests[result.proof]
         transition(session, PairRow, state_of(result), PairRow.id == held[work], lease_until=None, proof_digest=digest, **_columns(result))
-    subtrees.keep(session, job.id, claim.iteration, {work: r.subtrees for work, r in saved.items() if r.subtrees is not None})
+    left = {work: (r.subtrees, r.outline) for work, r in saved.items() if r.subtrees is not None}
+    subtrees.keep(session, job.id, claim.iteration, left)
     job.running_pairs -= len(saved)
     job.error = next((result.error for result in saved.values() if result.error is not None), job.error)
     public = [_public(*work, result) for work, result in saved.items()]
@@ -282,6 +284,54 @@ def order(session: Session, iteration: IterationRow) -> list[int]:
 def of_iteration(session: Session, job_id: str, iteration: int) -> Sequence[PairRow]:
     """Returns the pairs of one iteration with their parts, in the order of the scene's pairs."""
     return session.scalars(_pairs(job_id, iteration).order_by(PairRow.pair_index, PairRow.part)).all()
+
+
+def lately_failed(session: Session, job_id: str) -> dict[int, list[PairRow]]:
+    """Returns pair index -> the parts of the pair where it failed last, in the last iteration or the one before, unless it is certified.
+
+    While an iteration runs, most of what is known of its pairs is from the one before.
+    """
+    last = session.scalar(select(func.max(IterationRow.index)).where(IterationRow.job_id == job_id))
+    if last is None:
+        return {}
+    reuse = session.get_one(IterationRow, (job_id, last)).reuse
+    found: dict[int, list[PairRow]] = {}
+    for iteration in (last - 1, last):
+        settled: dict[int, list[PairRow]] = {}
+        for row in session.scalars(_pairs(job_id, iteration).where(PairRow.state.not_in(UNFINISHED)).order_by(PairRow.part)):
+            settled.setdefault(row.pair_index, []).append(row)
+        for index, parts in settled.items():
+            failed = [row for row in parts if row.state in FAILED]
+            if failed:
+                found[index] = failed
+            elif iteration == last and all(row.state == PairState.CERTIFIED for row in parts):
+                found.pop(index, None)
+    return {index: parts for index, parts in found.items() if str(index) not in reuse}
+
+
+def with_pair(session: Session, job_id: str, pair: int, iteration: int | None) -> tuple[IterationRow, Sequence[PairRow]] | None:
+    """Returns the iteration that a pair's result is from, and the parts of the pair in it, in order.
+
+    Args:
+        iteration: the iteration that is asked about, in which a proof of an earlier one may serve; None for the last one.
+
+    Returns:
+        None where there is no such iteration, or where it does not have the pair.
+    """
+    last = select(func.max(IterationRow.index)).where(IterationRow.job_id == job_id)
+    found = session.get(IterationRow, (job_id, session.scalar(last) if iteration is None else iteration))
+    if found is not None and (source := found.reuse.get(str(pair))) is not None:
+        found = session.get_one(IterationRow, (job_id, source))
+    if found is None:
+        return None
+    rows = session.scalars(_pairs(job_id, found.index).where(PairRow.pair_index == pair).order_by(PairRow.part)).all()
+    return (found, rows) if rows else None
+
+
+def parts_of(session: Session, job_id: str, pair: int, iterations: Iterable[int]) -> dict[int, int]:
+    """Returns iteration -> how many parts the pair has in it, for these iterations."""
+    mine = (IterationRow.job_id == job_id, IterationRow.index.in_(list(iterations)))
+    return {index: parts.get(str(pair), 1) for index, parts in session.execute(select(IterationRow.index, IterationRow.parts).where(*mine))}
 
 
 def of_job(session: Session, job_id: str) -> Sequence[PairRow]:

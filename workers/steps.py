@@ -20,6 +20,7 @@ from structlog.contextvars import bound_contextvars
 
 from certifier.errors import CirisError
 from certifier.growth.actions import Candidate
+from certifier.growth.obstacles import Obstacle
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
 from certifier.isolation.child import run_in_child
@@ -159,6 +160,7 @@ def _accept(scene: Scene, claim: steps.Claim) -> Done:
                 seed=None if accepted["seed"] is None else np.array(accepted["seed"]),
                 ellipsoid_volume=accepted["ellipsoid_volume"],
                 proofs={int(index): iteration for index, iteration in accepted["proofs"].items()},
+                obstacles={int(index): Obstacle.from_document(one) for index, one in accepted.get("obstacles", {}).items()},
             )
             held = _proofs(session, claim.job_id, accepted["proofs"])
             return candidate, held, _provenance(session, scene, jobs.get(session, claim.job_id), proposal)

@@ -204,6 +204,7 @@ def _add_acceptance(session: Session, job: JobRow, candidate: Candidate) -> None
         "seed": None if candidate.seed is None else candidate.seed.tolist(),
         "ellipsoid_volume": candidate.ellipsoid_volume,
         "proofs": candidate.proofs,
+        "obstacles": {index: obstacle.to_document() for index, obstacle in candidate.obstacles.items()},
     }
     steps.add(session, job, StepKind.ACCEPT, work_on)
 
@@ -272,7 +273,7 @@ def _finish(session: Session, job: JobRow, afterwards: Afterwards) -> None:
         return
     refused = next((step.report for step in rows if step.kind == StepKind.ACCEPT and step.state == StepState.FAILED), None)
     failed = next((step.report for step in reversed(rows) if step.state == StepState.FAILED), None)
-    subtrees.drop(session, job.id)
+    subtrees.end(session, job.id)
     if job.parent_id is not None:
         afterwards.append(partial(send_coordinate, job.parent_id))
     assert job.action is not None, "whoever finishes a job has found its last action"

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 
-from api import checks
+from api import checks, obstacles
 from api.access import READ, SUBMIT, Db, Submitter
 from api.announce import Announcements
 from api.reading import ReadingRoute
@@ -39,15 +39,16 @@ from api.schemas.jobs import (
     Webhook,
 )
 from api.schemas.motions import JobMotion
+from api.schemas.progress import JobWorkers, Obstacles, Work, Worker
 from api.schemas.scenes import PairInfo
 from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.proof.container import with_scene
-from db import jobs, pairs, proofs, regions, scenes, steps, webhooks
-from db.models import IterationRow, PairRow
+from db import jobs, leases, pairs, proofs, regions, scenes, steps, webhooks
+from db.models import IterationRow, JobRow, PairRow, StepRow
 from db.session import Database
-from db.states import IterationState, JobKind, JobState, PairState
+from db.states import IterationState, JobKind, JobState, PairState, StepKind
 from db.types import utcnow
 from planner.cover.options import CoverOptions
 from planner.cover.result import said
@@ -316,6 +317,58 @@ def _cell(scene: Scene, parts: Sequence[PairRow]) -> PairCell:
         witness_q=None if row.witness_s is None else scene.to_q(row.witness_s).tolist(),
         proof=row.proof_digest,
     )
+
+
+@router.get("/{job_id}/workers")
+def get_job_workers(job_id: str, db: Db) -> JobWorkers:
+    """Returns which processes hold which work of a job at this moment."""
+    with db.read() as session:
+        job = jobs.get(session, job_id)
+        held, begun = leases.of_job(session, PairRow, job.id), leases.of_job(session, StepRow, job.id)
+    return JobWorkers(workers=[*_certifying(held), *(_doing(step) for step in begun), *_deciding(job)])
+
+
+def _certifying(rows: Sequence[PairRow]) -> list[Worker]:
+    """Describes the processes that hold pairs, each with all pairs that it has claimed together."""
+    claims: dict[str | None, list[PairRow]] = {}
+    for row in rows:
+        claims.setdefault(row.lease_token, []).append(row)
+    return [
+        Worker(
+            process=held[0].worker or "",
+            work=Work.PAIRS,
+            iteration=held[0].iteration,
+            pairs=sorted({row.pair_index for row in held}),
+            until=held[0].lease_until,
+        )
+        for held in claims.values()
+    ]
+
+
+def _doing(step: StepRow) -> Worker:
+    work = Work.SEED if step.kind == StepKind.PROPOSE else Work(step.kind)
+    return Worker(process=step.worker or "", work=work, iteration=None, pairs=[], until=step.lease_until)
+
+
+def _deciding(job: JobRow) -> list[Worker]:
+    if job.coordinator is None or not jobs.is_coordinated(job, utcnow()):
+        return []
+    return [Worker(process=job.coordinator, work=Work.DECIDE, iteration=None, pairs=[], until=job.coordinator_until)]
+
+
+@router.get("/{job_id}/obstacles")
+def get_job_obstacles(
+    job_id: str, db: Db, limit: Annotated[int, Query(ge=1, le=1000, description="Return so many obstacles at most, the worst.")] = 100
+) -> Obstacles:
+    """Returns what holds the region of a job back, or has cut it, in words, worst first: each with the pair and a configuration.
+
+    The job may run or have ended. The pairs for which most was cut off come first; where a job has ended without a region, those that it
+    could not certify. Of a job that an earlier version has begun, no more may be known than how often something was cut off for a pair.
+    """
+    with db.read() as session:
+        job = jobs.get(session, job_id)
+    found = obstacles.of_job(db, scenes.load(db, job.scene_id), job)
+    return Obstacles(obstacles=found[:limit], total=len(found))
 
 
 @router.get("/{job_id}/growth")

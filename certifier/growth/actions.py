@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 from certifier.errors import CirisError
+from certifier.growth.obstacles import Obstacle
 from certifier.growth.state import GrowthState
 from certifier.model import Array, Box, Polytope
 from certifier.outcome import Outcome, combine
@@ -165,6 +166,7 @@ class Candidate:
         seed: (n,) the point in s that the region was grown around; None for a given polytope.
         ellipsoid_volume: volume of the largest ellipsoid inside; None for a given polytope, which is not compared with any other.
         proofs: pair index -> iteration that holds its proof.
+        obstacles: pair index -> what was cut off for it on the way.
     """
 
     iteration: int
@@ -173,6 +175,7 @@ class Candidate:
     seed: Array | None
     ellipsoid_volume: float | None
     proofs: dict[int, int]
+    obstacles: dict[int, Obstacle] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

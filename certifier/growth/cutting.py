@@ -38,10 +38,37 @@ CLEAR, CLEARER = 0.005, 0.2
 """A face is moved away from what it cuts off, by CLEAR standard deviations and by CLEARER of the depth of what it cuts off."""
 
 
-def cut(
-    scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[tuple[int, ...], Array, float]], around: Polytope
-) -> Polytope | None:
-    """Returns the polytope with faces that cut off the points given.
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Says what has become of a polytope.
+
+    Attributes:
+        polytope: the polytope with faces that cut points off, itself where no face loses little enough; None where nothing can be cut off
+            without a point to keep.
+        made: for each corner, what its faces came to.
+    """
+
+    polytope: Polytope | None
+    made: list[Made]
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """Says what the faces of one corner came to.
+
+    Attributes:
+        faces: how many were added or moved in.
+        lost: the shares of the polytope that they cut off, added up; each was a share of what was left before it.
+        s: (n,) the point that the face was made for that lost most; None without a face.
+    """
+
+    faces: int = 0
+    lost: float = 0.0
+    s: Array | None = None
+
+
+def cut(scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[tuple[int, ...], Array, float]], around: Polytope) -> Cut:
+    """Cuts off the points given.
 
     A face of the polytope is moved in, or a new one is added, whichever cuts off more points for what it loses.
 
@@ -51,9 +78,6 @@ def cut(
         corners: for each pair that failed, the joints between its bodies, the points (w, n) to cut off, and the share of the polytope that
             its faces may lose together.
         around: a polytope of which this one is a part, the same one for all rounds; its samples are drawn once.
-
-    Returns:
-        The polytope itself where no face loses little enough; None where nothing can be cut off without a point to keep.
     """
     limits = 2 * scene.n
     samples = samples_of(scene, around)
@@ -62,9 +86,11 @@ def cut(
         samples = samples_of(scene, polytope)
     scale = np.where(samples.std(axis=0) > 0, samples.std(axis=0), 1.0)
     C, d = polytope.C, polytope.d.copy()
-    blocked = moved = False
+    blocked = False
+    made = []
     for joints, points, most in corners:
         J, left_to_lose = list(joints), most
+        losses: list[tuple[float, Array]] = []
         for _ in range(MOST_FACES):
             left = points[(points @ C.T < d).all(axis=1)]
             if not len(left):
@@ -90,12 +116,14 @@ def cut(
                 C, d = np.insert(C, len(d) - limits, best.row, axis=0), np.insert(d, len(d) - limits, best.offset)
             else:
                 d[best.replaces] = best.offset
-            moved = True
+            losses.append((loss, near[0]))
             left_to_lose -= loss
             samples = samples[samples @ best.row <= best.offset]
-    if not moved:
-        return None if blocked else polytope
-    return Polytope(C, d)
+        worst = max(losses, key=lambda lost: lost[0], default=(0.0, None))
+        made.append(Made(len(losses), sum(loss for loss, _ in losses), worst[1]))
+    if not any(one.faces for one in made):
+        return Cut(None if blocked else polytope, made)
+    return Cut(Polytope(C, d), made)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from certifier.errors import CirisError
+from certifier.growth.obstacles import Obstacle
 from certifier.growth.options import NEAR, GrowthOptions
 from certifier.model import Array, Polytope
 
@@ -144,6 +145,7 @@ class GrowthState:
         contractions, pushes, rounds: how many of each were begun.
         near: for the contraction under way: a failure nearer than this calls for a shorter range.
         reach: for the contraction or push under way: how far the faces were pushed out first.
+        obstacles: pair index -> what was cut off for it; pairs for which nothing was are left out.
     """
 
     options: GrowthOptions
@@ -160,6 +162,7 @@ class GrowthState:
     cuts: Cuts = Cuts()
     bisection: Bisection | None = None
     round: Round | None = None
+    obstacles: dict[int, Obstacle] = field(default_factory=dict)
 
     def to_document(self) -> dict[str, Any]:
         """Returns the state as JSON-able data, without the options."""
@@ -177,6 +180,7 @@ class GrowthState:
             "cuts": _document(self.cuts),
             "bisection": None if self.bisection is None else _document(self.bisection),
             "round": None if self.round is None else _document(self.round),
+            "obstacles": {str(pair): obstacle.to_document() for pair, obstacle in self.obstacles.items()},
         }
 
     @classmethod
@@ -195,6 +199,7 @@ class GrowthState:
                 "cuts": Cuts(_by_pair(cuts["holds"]), _by_pair(cuts["attempts"])),
                 "bisection": _part(Bisection, document["bisection"]),
                 "round": _part(Round, document["round"]),
+                "obstacles": {pair: Obstacle.from_document(one) for pair, one in _by_pair(document.get("obstacles", {})).items()},
             }
             return cls(options, **{**document, **parts, "suspects": tuple(document["suspects"])})
         except (KeyError, TypeError) as error:

@@ -12,6 +12,7 @@ import numpy as np
 
 from certifier.growth.actions import Outcomes, Transition
 from certifier.growth.faces import Failure, contract, measure
+from certifier.growth.obstacles import Obstacle, joined
 from certifier.growth.options import NEAR
 from certifier.growth.state import Cuts, GrowthState, Start
 from certifier.growth.trials import certify, effort, is_worth_it, joints_between
@@ -80,12 +81,15 @@ def cut(scene: Scene, state: GrowthState, start: Start, report: Outcomes) -> Tra
     """
     action, attempts = report.action, dict(state.cuts.attempts)
     certified = {i: action.iteration for i, outcome in report.outcomes.items() if outcome is Outcome.CERTIFIED}
-    found = []
+    found, stage, obstacles = [], state.contractions + state.pushes, {}
     for index in report.failures:
         weakness = report.weaknesses.get(index, Weakness.unknown(scene.n))
+        s = weakness.points[0] if len(weakness.points) else None
+        obstacles[index] = Obstacle.at(stage, s, contact=s is not None and not weakness.pull.any())
         found.append(Failure(joints_between(scene, index), weakness, attempts.get(index, 0)))
         attempts[index] = attempts.get(index, 0) + 1
     smaller = contract(scene, action.polytope, measure(action.polytope, start.keep[0]), start.keep, found, state.near)
     if smaller is None or max(attempts.values()) > MAX_ATTEMPTS or not is_worth_it(state, smaller):
         return None
-    return trim(scene, replace(state, cuts=Cuts(state.cuts.holds | certified, attempts)), start, action.label, smaller)
+    state = replace(state, cuts=Cuts(state.cuts.holds | certified, attempts), obstacles=joined(state.obstacles, obstacles))
+    return trim(scene, state, start, action.label, smaller)

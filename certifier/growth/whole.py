@@ -16,7 +16,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
-from certifier.growth.cutting import cut, samples_of
+from certifier.growth.cutting import Cut, cut, samples_of
+from certifier.growth.obstacles import Obstacle, joined
 from certifier.growth.options import MOST_CELLS
 from certifier.growth.state import GrowthState, Start, Whole
 from certifier.growth.targeted import pushed
@@ -133,7 +134,9 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     most = {i: _most_loss(state, whole, i) for i in failing}
     corners = [corner for i in failing for corner in _corners(scene, i, report.weaknesses[i], most[i])]
     around = start.rows if whole.reach >= 1 else _copy(scene, start, whole.reach)
-    smaller = cut(scene, whole.polytope, start.keep, corners, around)
+    made = cut(scene, whole.polytope, start.keep, corners, around)
+    smaller = made.polytope
+    state = replace(state, obstacles=joined(state.obstacles, _obstacles(whole.stage, failing, made)))
     final = {*action.ending} & {*action.hard}
     if smaller is whole.polytope and all(i in final and most[i] >= 1 for i in failing):
         pair = scene.pairs[failing[0]]
@@ -151,6 +154,17 @@ def _corners(scene: Scene, pair: int, weakness: Weakness, most: float) -> list[t
     """Returns what is to be cut off for a pair: its contacts, which have to go sooner or later, and other points where it fails."""
     joints, points, k = joints_between(scene, pair), weakness.points, weakness.contacts
     return [(joints, points[:k], max(most, CONTACT_LOSS)), (weakness.joints or joints, points[k:], most)]
+
+
+def _obstacles(stage: int, failing: Sequence[int], cut: Cut) -> dict[int, Obstacle]:
+    """Returns pair index -> what was cut off for it in this round; pairs without a face of their own are left out."""
+    found = {}
+    for place, index in enumerate(failing):
+        contacts, others = cut.made[2 * place : 2 * place + 2]
+        if contacts.faces or others.faces:
+            s, lost = contacts.s if contacts.faces else others.s, contacts.lost + others.lost
+            found[index] = Obstacle.at(stage, s, contact=contacts.faces > 0, faces=contacts.faces + others.faces, lost=lost)
+    return found
 
 
 def _most_loss(state: GrowthState, whole: Whole, pair: int) -> float:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from certifier.growth.actions import Candidate
+from certifier.growth.obstacles import in_manifest
 from certifier.jobs.archimedean import archimedean
 from certifier.jobs.share import SampledProposal
 from certifier.model import SCHEMA_VERSION, Array, Polytope, Scene
@@ -101,7 +102,11 @@ def certified_region(
         "padding": scene.padding,
         "archimedean": {"N": bound.N},
         "guarantee": Guarantee.EXACT.value,
-        "provenance": provenance | {"proposal": None if proposal is None else _halfspaces(proposal.polytope)},
+        "provenance": {
+            **provenance,
+            "proposal": None if proposal is None else _halfspaces(proposal.polytope),
+            "cuts": in_manifest(scene, candidate.obstacles),
+        },
     }
     return Region(manifest, data, statement)
 

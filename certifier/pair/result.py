@@ -78,6 +78,7 @@ class PairResult:
             program's contacts and a DualProof when not certifiable.
         subtrees: what a search over partitions has left of the cells that it was given, when it has not certified the pair
             (:mod:`certifier.partition.subtrees`). It is no proof of anything. Later searches go on with it.
+        outline: says which cells these are and what became of each, for people (certifier.proof.outline).
         open_cells: how many cells of these are open.
         weakness: where the certification fails, when that is known.
         error: the CirisError document of an ``error``.
@@ -91,6 +92,7 @@ class PairResult:
     witness_s: Array | None = None
     proof: bytes | None = None
     subtrees: bytes | None = None
+    outline: bytes | None = None
     open_cells: int | None = None
     weakness: Weakness | None = None
     error: dict[str, Any] | None = None

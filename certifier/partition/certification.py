@@ -34,9 +34,10 @@ from certifier.partition.hulls import approach, gaps
 from certifier.partition.search import Report, Search
 from certifier.partition.shared import Shared
 from certifier.partition.subtrees import Subtrees, dealt, open_cells, put_together
-from certifier.partition.tree import OPEN, Node, OpenCell, to_streams
+from certifier.partition.tree import Node, OpenCell, to_streams
 from certifier.polytopes.simplex import deepest
 from certifier.proof.negative import WitnessProof
+from certifier.proof.outline import OPEN, Outline, Silhouette, Tree
 from certifier.proof.partition import STREAMS, Coarse, PartitionProof, choices_of
 from certifier.verify.pair import check_ground, check_interior
 from certifier.verify.separations import gap_of_share
@@ -183,8 +184,9 @@ class CellCertification:
         found = np.array(points[:MOST_POINTS]).reshape(-1, self._scene.n)
         joints = () if bodies is search.bodies else tuple(bodies.joints)
         weakness = Weakness(found, np.zeros(self._scene.n), contacts=contacts, joints=joints)
-        subtrees = left.to_bytes(len(search.joints))
-        result = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, subtrees=subtrees, open_cells=len(cells), weakness=weakness)
+        streams = to_streams(left.roots, len(search.joints))
+        subtrees, outline = left.to_bytes(streams), self._outline(search, volumes, streams).to_bytes()
+        result = PairResult(Outcome.INCONCLUSIVE, Stage.CELLS, subtrees=subtrees, outline=outline, open_cells=len(cells), weakness=weakness)
         if report.contacts:
             return self._refuted(search, volumes, report.contacts[0], result)
         if report.narrow:
@@ -194,6 +196,15 @@ class CellCertification:
         inside = sum(((self._area.samples >= low) & (self._area.samples <= up)).all(axis=1).mean() for low, up in cells)
         detail = f"{len(cells)} cells, {100 * float(inside):.2g} % of the polytope, are open after {report.cells} cells"
         return replace(result, detail=detail)
+
+    def _outline(self, search: Search, volumes: Volumes, streams: dict[str, Array]) -> Outline:
+        """Returns the outline of what a search has left, which has these streams."""
+        first, second = (
+            tuple(Silhouette.of(volume, self._scene) for volume in (own, *coarse))
+            for own, coarse in zip(volumes, search.coarse, strict=True)
+        )
+        tree = Tree(*(streams[name] for name in Tree._fields))
+        return Outline(tuple(search.joints), self._area.lower, self._area.upper, (first, second), tree)
 
     def _refuted(self, search: Search, volumes: Volumes, s: Array, found: PairResult) -> PairResult:
         """Returns the result of a pair that touches at s, with the proof of that, which the verifier has checked."""

@@ -6,14 +6,15 @@ turn, and so on. When no cell is open, the subtrees of all rounds are put togeth
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 
-from certifier.partition.tree import OPEN, Node, OpenCell, of_streams, to_streams
+from certifier.partition.tree import Node, OpenCell, of_streams
 from certifier.proof.container import FORMAT, pack, unpack
+from certifier.proof.outline import OPEN
 from certifier.proof.partition import STREAMS
 
 KIND = "subtrees"
@@ -39,13 +40,17 @@ class Subtrees:
         """Returns what a search has left of the cells that it was given."""
         return cls([node for node, _, _ in given], [cell for node, *bounds in given for cell in node.open_cells(*bounds)], faces)
 
-    def to_bytes(self, k: int) -> bytes:
-        """Returns the subtrees as a file; their planes move with k joints."""
+    def to_bytes(self, streams: Mapping[str, np.ndarray]) -> bytes:
+        """Returns the subtrees as a file.
+
+        Args:
+            streams: what :func:`certifier.partition.tree.to_streams` makes of the roots.
+        """
         arrays = {
             "lower": np.array([lower for _, lower, _ in self.open_cells]),
             "upper": np.array([upper for _, _, upper in self.open_cells]),
             "levels": np.array([node.level for node, _, _ in self.open_cells], dtype=np.int8),
-            **to_streams(self.roots, k),
+            **streams,
         }
         return pack({"format": FORMAT, "kind": KIND, "roots": len(self.roots), "faces": self.faces}, arrays)
 

@@ -9,12 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from certifier.model import Array
+from certifier.proof.outline import OPEN
 from certifier.proof.partition import EMPTY, PLANE, STREAMS
 
 ALL = 127
 """So many levels are more than there are."""
-OPEN = -3
-"""The cell of this node is open: nothing is proved about it. The verifier accepts no such tree."""
 
 
 @dataclass(frozen=True, eq=False)

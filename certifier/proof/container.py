@@ -13,7 +13,7 @@ import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
@@ -101,6 +101,17 @@ def header_of(data: bytes) -> dict[str, Any]:
     """
     with _opened(data) as (_, header):
         return header
+
+
+def some_of(data: bytes, wanted: Callable[[str], bool]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Returns the header of a file of any kind and the arrays whose names are wanted. The others are not inflated.
+
+    Raises:
+        ProofError: this is no file of this format, or it is beyond the limits.
+    """
+    with _opened(data) as (archive, header):
+        members = ((info.filename.removesuffix(".npy"), info) for info in archive.infolist() if info.filename != HEADER)
+        return header, {name: _array(info.filename, _content(data, info)) for name, info in members if wanted(name)}
 
 
 def with_scene(data: bytes, scene: Scene) -> bytes:

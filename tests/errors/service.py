@@ -369,6 +369,23 @@ REQUESTS = [
         ("internal", "", "something went wrong in the service", "the service's log has the details", "a fault of the program"),
     ),
     *rows(
+        "api/cells.py",
+        (
+            "pair_not_found",
+            "pair",
+            "there is no pair {index}: {name} has {...} pairs, numbered from 0",
+            "/v1/scenes/{id}/pairs lists them",
+            lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/9/cells"),
+        ),
+        (
+            "cells_not_found",
+            "pair",
+            "pair {index} has no cells: {why}",
+            "/v1/jobs/{id}/pairs says what became of it",
+            lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/0/cells"),
+        ),
+    ),
+    *rows(
         "api/routers/jobs.py",
         (
             "proof_not_found",

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sqlalchemy import select, update
+from sqlalchemy import func, select, update
 from sqlalchemy.exc import OperationalError
 
 from certifier.errors import CirisError
@@ -118,11 +118,12 @@ def in_the_way() -> Scene:
     return replace(free, geometries=(cart, replace(post, vertices=np.array([[0.6, 0.0, 0.0]])), other))
 
 
-def left_of(job_id: str) -> dict[int, int]:
-    """Pair index -> the last iteration whose subtrees are kept."""
+def left_of(job_id: str, *, outlines: bool = False) -> dict[int, int]:
+    """Pair index -> the last iteration whose subtrees, or outlines, are kept."""
     with database().read() as session:
         columns = (SubtreesRow.pair_index, SubtreesRow.iteration)
-        rows = session.execute(select(*columns).where(SubtreesRow.job_id == job_id).order_by(SubtreesRow.iteration))
+        kept = SubtreesRow.outline.is_not(None) if outlines else func.length(SubtreesRow.data) > 0
+        rows = session.execute(select(*columns).where(SubtreesRow.job_id == job_id, kept).order_by(SubtreesRow.iteration))
         return {row.pair_index: row.iteration for row in rows}
 
 
@@ -151,16 +152,18 @@ def test_a_whole_job_keeps_what_its_last_round_left_and_nothing_in_the_end() -> 
     assert all((row.open_cells is None) == (row.state == "certified") for row in rows)
     work_all()
     coordinate(job_id)
-    assert (job_of(job_id).state, left_of(job_id)) == ("succeeded", {})
+    assert (job_of(job_id).state, left_of(job_id), left_of(job_id, outlines=True)) == ("succeeded", {}, {})
     check_record(job_id)
 
 
-def test_a_whole_job_that_is_cancelled_leaves_no_partition() -> None:
+def test_a_whole_job_that_is_cancelled_leaves_outlines_alone() -> None:
     job_id = begun_whole_job()
+    before = left_of(job_id, outlines=True)
+    assert before
     with database().write() as session:
         jobs.cancel(session, job_id)
     coordinate(job_id)
-    assert (job_of(job_id).state, left_of(job_id)) == ("cancelled", {})
+    assert (job_of(job_id).state, left_of(job_id), left_of(job_id, outlines=True)) == ("cancelled", {}, before)
 
 
 def test_a_whole_job_ends_at_its_deadline_with_its_best_region() -> None:

@@ -37,7 +37,7 @@ def test_what_has_to_go_goes_and_what_has_to_stay_stays(seed, kind):
     polytope = polytope_of(scene, rng)
     keep = np.concatenate([np.zeros((1, 3)), rng.uniform(-0.1, 0.1, (3, 3))])
     corners = [(joints, corner_of(scene, polytope, rng, joints, 6), 1.0) for joints in ((0, 1), ALL)]
-    smaller = cut(scene, polytope, keep, corners, polytope)
+    smaller = cut(scene, polytope, keep, corners, polytope).polytope
     assert smaller is not None
     for _, points, _ in corners:
         assert not smaller.contains(points).any()
@@ -56,7 +56,7 @@ def test_what_has_to_go_goes_and_what_has_to_stay_stays(seed, kind):
 def test_a_face_lies_in_the_joints_between_the_bodies(seed, joints):
     scene, rng = planar_arm(3), np.random.default_rng(seed)
     polytope = polytope_of(scene, rng)
-    smaller = cut(scene, polytope, np.zeros((1, 3)), [(joints, corner_of(scene, polytope, rng, joints, 4), 1.0)], polytope)
+    smaller = cut(scene, polytope, np.zeros((1, 3)), [(joints, corner_of(scene, polytope, rng, joints, 4), 1.0)], polytope).polytope
     old = len(polytope.d) - 2 * scene.n
     faces = np.concatenate([smaller.C[old : -2 * scene.n], smaller.C[:old][smaller.d[:old] < polytope.d[:old]]])
     others = [j for j in range(3) if j not in joints]
@@ -69,7 +69,7 @@ def test_contacts_along_a_face_take_no_new_face():
     polytope = scene.polytope(np.array([[1.0, 0.5, -0.3]]) / np.linalg.norm([1.0, 0.5, -0.3]), [0.4])
     samples = uniform_in_q(polytope, scene.revolute, 1000, 40, 0).reshape(-1, 3)
     sheet = samples[np.argsort(polytope.d[0] - samples @ polytope.C[0])[:40]]
-    smaller = cut(scene, polytope, np.zeros((1, 3)), [(ALL, sheet, 1.0)], polytope)
+    smaller = cut(scene, polytope, np.zeros((1, 3)), [(ALL, sheet, 1.0)], polytope).polytope
     assert len(smaller.d) == len(polytope.d)
     assert smaller.d[0] < polytope.d[0]
     assert not smaller.contains(sheet).any()
@@ -82,7 +82,7 @@ def test_a_joint_limit_gets_a_face_of_its_own_beside_it():
     polytope = scene.polytope([], [])
     upper = polytope.d[polytope.C[:, 0] > 0].max()
     end = np.column_stack([np.full(9, 0.999 * upper), np.linspace(-0.5, 0.5, 9)])
-    smaller = cut(scene, polytope, np.zeros((1, 2)), [((0,), end, 1.0)], polytope)
+    smaller = cut(scene, polytope, np.zeros((1, 2)), [((0,), end, 1.0)], polytope).polytope
     assert len(smaller.d) == len(polytope.d) + 1
     assert (smaller.d[-4:] == polytope.d).all()
     assert not smaller.contains(end).any()
@@ -93,7 +93,7 @@ def test_nothing_to_cut_off_changes_nothing():
     polytope = scene.polytope([], [])
     outside = np.full((2, 3), 100.0)
     for points in (np.zeros((0, 3)), outside):
-        same = cut(scene, polytope, np.zeros((1, 3)), [(ALL, points, 1.0)], polytope)
+        same = cut(scene, polytope, np.zeros((1, 3)), [(ALL, points, 1.0)], polytope).polytope
         assert same.C.tolist() == polytope.C.tolist()
         assert same.d.tolist() == polytope.d.tolist()
 
@@ -103,7 +103,7 @@ def test_a_point_between_those_to_keep_cannot_be_cut_off(place):
     scene = planar_arm(2)
     polytope, keep = scene.polytope([], []), np.array([[0.0, 0.0], [0.2, 0.4]])
     point = keep[0] + place * (keep[1] - keep[0])
-    smaller = cut(scene, polytope, keep, [((0, 1), point[None], 1.0)], polytope)
+    smaller = cut(scene, polytope, keep, [((0, 1), point[None], 1.0)], polytope).polytope
     if place < 1:
         assert smaller is None
     else:
@@ -115,8 +115,8 @@ def test_a_point_that_differs_from_those_to_keep_in_other_joints_alone_cannot_be
     scene = planar_arm(2)
     polytope = scene.polytope([], [])
     point = np.array([[0.0, 0.5]])
-    assert cut(scene, polytope, np.zeros((1, 2)), [((0,), point, 1.0)], polytope) is None
-    assert cut(scene, polytope, np.zeros((1, 2)), [((1,), point, 1.0)], polytope) is not None
+    assert cut(scene, polytope, np.zeros((1, 2)), [((0,), point, 1.0)], polytope).polytope is None
+    assert cut(scene, polytope, np.zeros((1, 2)), [((1,), point, 1.0)], polytope).polytope is not None
 
 
 def test_scattered_points_get_several_faces():
@@ -124,7 +124,7 @@ def test_scattered_points_get_several_faces():
     scene = planar_arm(2)
     polytope = scene.polytope([], [])
     points = 0.9 * scene.s_upper * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
-    smaller = cut(scene, polytope, np.zeros((1, 2)), [((0, 1), points, 1.0)], polytope)
+    smaller = cut(scene, polytope, np.zeros((1, 2)), [((0, 1), points, 1.0)], polytope).polytope
     assert not smaller.contains(points).any()
     assert len(smaller.d) == len(polytope.d) + 4
 
@@ -147,7 +147,7 @@ def test_less_volume_is_lost_than_by_planes_tangent_to_the_inscribed_ellipsoid()
         rng = np.random.default_rng(seed)
         polytope = polytope_of(scene, rng)
         points = corner_of(scene, polytope, rng, count=8)
-        smaller = cut(scene, polytope, np.zeros((1, 3)), [(ALL, points, 1.0)], polytope)
+        smaller = cut(scene, polytope, np.zeros((1, 3)), [(ALL, points, 1.0)], polytope).polytope
         samples = uniform_in_q(polytope, scene.revolute, 200, 20, 10_000 + seed).reshape(-1, 3)
         normal, offset = tangent(polytope, points)
         ours.append(1 - smaller.contains(samples).mean())
@@ -161,11 +161,11 @@ def test_a_face_that_loses_more_than_it_may_is_left_out_and_others_are_not():
     scene = planar_arm(2)
     polytope, keep = scene.polytope([], []), np.zeros((1, 2))
     middle, corner = np.array([[0.0, 0.05]]), polytope_corner(polytope)
-    smaller = cut(scene, polytope, keep, [((0, 1), np.concatenate([middle, corner]), 0.1)], polytope)
+    smaller = cut(scene, polytope, keep, [((0, 1), np.concatenate([middle, corner]), 0.1)], polytope).polytope
     assert smaller is not None
     assert smaller.contains(middle).all()
     assert not smaller.contains(corner).any()
-    larger = cut(scene, polytope, keep, [((0, 1), middle, 1.0)], polytope)
+    larger = cut(scene, polytope, keep, [((0, 1), middle, 1.0)], polytope).polytope
     assert larger is not None
     assert not larger.contains(middle).any()
 

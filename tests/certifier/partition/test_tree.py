@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from certifier.partition.subtrees import Subtrees, dealt, open_cells, put_together
-from certifier.partition.tree import OPEN, Node, OpenCell, Streams, joined, of_streams, to_streams
+from certifier.partition.tree import Node, OpenCell, Streams, joined, of_streams, to_streams
+from certifier.proof.outline import OPEN
 from certifier.proof.partition import EMPTY, PLANE, STREAMS
 
 N, K = 3, 2
@@ -111,7 +112,7 @@ def test_subtrees_of_rounds_in_parts_are_put_together_to_the_tree_that_was_grown
                 vars(node).update(vars(random_tree(rng, lower, upper, depth)))
                 node.level = int(rng.integers(4))
             left = Subtrees.of(mine, faces)
-            files.append(left.to_bytes(K))
+            files.append(left.to_bytes(to_streams(left.roots, K)))
             following += left.open_cells
         rounds.append(files)
         read = open_cells(files)

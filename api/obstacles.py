@@ -1,0 +1,145 @@
+"""This module says in words what holds the region of a job back: pairs that are not certified, and pairs for which something was cut off.
+
+What a verified proof says is called proved; what the search has found in floating point, or samples say, is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from api.schemas.progress import Obstacle
+from certifier.growth import obstacles as growth
+from certifier.model import Pair, Scene
+from db import jobs, pairs, steps
+from db.models import JobRow, PairRow
+from db.session import Database
+from db.states import JobKind, PairState
+from planner.cover.options import CoverOptions
+from planner.cover.result import said
+from planner.cover.state import CoverState
+
+WORST = (PairState.REFUTED, PairState.NOT_CERTIFIABLE, PairState.TOO_CLOSE, PairState.ERROR, PairState.INCONCLUSIVE)
+"""How pairs fail, the worst first."""
+
+
+def of_job(database: Database, scene: Scene, job: JobRow) -> list[Obstacle]:
+    """Returns what holds the region of a job back, worst first."""
+    with database.read() as session:
+        known = jobs.growth(session, job.id) or {}
+        failed = pairs.lately_failed(session, job.id)
+        verdict = steps.verdict(session, job.id)
+    if job.kind == JobKind.COVER:
+        found = [_in_general(text) for text in _of_cover(job, known)]
+    elif job.kind == JobKind.CERTIFY_PATH:
+        found = [] if verdict is None or verdict["stop"] is None else [_of_motion(scene, verdict["stop"])]
+    else:
+        cut = _cut(known)
+        rated = [(_rank(job, cut.get(i), failed.get(i, [])), i) for i in cut.keys() | failed.keys()]
+        found = [_of_pair(scene, i, cut.get(i), failed.get(i, [])) for _, i in sorted(rated)]
+    ended_badly = job.region_id is None and job.finished_at is not None
+    return found or ([_in_general(_said(job), _seed(job))] if ended_badly and _said(job) else [])
+
+
+def _cut(known: dict[str, Any]) -> dict[int, growth.Obstacle]:
+    """Returns pair index -> what was cut off for it, from the state of a growth, which may be of an earlier version."""
+    if "obstacles" in known:
+        return {int(pair): growth.Obstacle.from_document(one) for pair, one in known["obstacles"].items()}
+    times = (known.get("whole") or {}).get("cuts") or (known.get("cuts") or {}).get("attempts") or {}
+    return {int(pair): growth.Obstacle(stage=0, times=count) for pair, count in times.items()}
+
+
+def _rank(job: JobRow, cut: growth.Obstacle | None, failed: Sequence[PairRow]) -> tuple[bool, int, float, int]:
+    """Returns by what obstacles are ordered, the least first."""
+    state, cells = _worst(failed), sum(row.open_cells or 0 for row in failed)
+    fatal = job.region_id is None and job.finished_at is not None and state is not None
+    severity = len(WORST) if state is None else WORST.index(state)
+    lost = 0.0 if cut is None else cut.lost or 1e-6 * cut.times
+    return (False, severity, -lost, -cells) if fatal else (True, 0, -lost, 1000 * severity - cells)
+
+
+def _worst(failed: Sequence[PairRow]) -> PairState | None:
+    return min((PairState(row.state) for row in failed), key=WORST.index, default=None)
+
+
+def _of_pair(scene: Scene, index: int, cut: growth.Obstacle | None, failed: Sequence[PairRow]) -> Obstacle:
+    pair, state = scene.pairs[index], _worst(failed)
+    row = next((row for row in failed if row.state == state), None)
+    witness = None if row is None else row.witness_s
+    s = witness or (None if cut is None else cut.s)
+    sentences = [] if row is None or state is None else [_how_it_failed(pair, state, row, failed)]
+    if cut is not None:
+        sentences += _what_was_cut(pair, cut, where=witness is None and cut.s is not None)
+    return Obstacle(
+        pair=index,
+        a=pair.a,
+        b=pair.b,
+        text=" ".join(sentences),
+        q=None if s is None else scene.to_q(s).tolist(),
+        faces=None if cut is None else cut.faces,
+        lost=None if cut is None else cut.lost,
+    )
+
+
+def _how_it_failed(pair: Pair, state: PairState, row: PairRow, failed: Sequence[PairRow]) -> str:
+    names = f"{pair.a} and {pair.b}"
+    detail = f": {row.detail}" if row.detail else ""
+    match state:
+        case PairState.REFUTED:
+            return f"{names} touch at the configuration named, which is proved."
+        case PairState.NOT_CERTIFIABLE:
+            return f"It is proved that no certificate of the form of the program (11) exists for {names}; cells may certify them."
+        case PairState.TOO_CLOSE:
+            return f"{names} come too close{detail}, as floating point says."
+        case PairState.ERROR:
+            return f"{names} could not be certified{detail}."
+        case _:
+            cells = sum(part.open_cells or 0 for part in failed)
+            some = f": {cells} cell{'' if cells == 1 else 's'} are open in all" if len(failed) > 1 and cells else detail
+            return f"{names} are not certified{some}."
+
+
+def _what_was_cut(pair: Pair, cut: growth.Obstacle, *, where: bool) -> list[str]:
+    """Says what was cut off for a pair, and, if ``where``, how the pair failed at the configuration named."""
+    sentences = []
+    if where and cut.contact:
+        sentences.append(f"{pair.a} and {pair.b} touch at the configuration named, as floating point says.")
+    elif where:
+        sentences.append(f"{pair.a} and {pair.b} could not be proved apart near the configuration named.")
+    if cut.faces is None or cut.lost is None:
+        return [*sentences, f"Something was cut off for {pair.a} and {pair.b} {_times(cut.times)}."]
+    faces = "1 face was" if cut.faces == 1 else f"{cut.faces} faces were"
+    return [*sentences, f"{faces} added or moved in for this pair, and cut off {100 * cut.lost:.2g} % of the polytope, as samples say."]
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
+
+
+def _of_motion(scene: Scene, stop: dict[str, Any]) -> Obstacle:
+    pair = Pair(stop["a"], stop["b"])
+    how = "touch" if stop["distance"] <= 0 else f"are only {stop['distance']:.3g} m apart"
+    text = f"{pair.a} and {pair.b} {how} at the configuration named, the first on the motion that could not be certified."
+    index = scene.pairs.index(pair) if pair in scene.pairs else None
+    return Obstacle(pair=index, a=pair.a, b=pair.b, text=text, q=stop["q"], faces=None, lost=None)
+
+
+def _of_cover(job: JobRow, known: dict[str, Any]) -> list[str]:
+    seen = said(CoverState.from_document(known, CoverOptions.from_document(job.options))) if known else None
+    return [] if seen is None else list(seen["obstacles"])
+
+
+def _in_general(text: str, q: list[float] | None = None) -> Obstacle:
+    return Obstacle(pair=None, a=None, b=None, text=text, q=q, faces=None, lost=None)
+
+
+def _said(job: JobRow) -> str:
+    """Returns why a job has ended."""
+    return str((job.error or {}).get("message") or job.reason or "")
+
+
+def _seed(job: JobRow) -> list[float] | None:
+    """Returns the seed of a job that has ended because it collides, or is outside the limits."""
+    is_seed = str((job.error or {}).get("field")) == "seed.q"
+    q = job.options.get("seed", {}).get("q")
+    return q if is_seed and q and isinstance(q[0], int | float) else None

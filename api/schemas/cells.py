@@ -1,0 +1,123 @@
+"""These models describe how pairs are proved: by which proof, and over which cells of the polytope."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from api.schemas.scenes import PairInfo
+from db.states import PairState
+
+
+class ProofKind(StrEnum):
+    """Names the form of a pair's proof."""
+
+    PARTITION = "partition"
+    """A plane for each cell of a partition of the polytope."""
+    PROGRAM = "program"
+    """One plane, which moves with the joints, on all of the polytope."""
+
+
+class RegionPair(PairInfo):
+    """Describes the proof of one pair of a region."""
+
+    kind: ProofKind
+    cells: int = Field(description="Number of cells of the proof, the leaves of its tree; 1 for one plane on all of the polytope.")
+    margin: float | None = Field(
+        description="Certified lower bound, in metres, of the distance between the padded bodies; null where the proof bounds none."
+    )
+    shares_with: list[int] = Field(description="Indices of the other pairs that the same proof covers.")
+
+
+class RegionPairs(BaseModel):
+    """Holds the pairs of a region's scene, in the scene's order, each with the proof that the region's file has for it."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "pairs": [
+                        {
+                            "index": 0,
+                            "a": "arm/link2/box",
+                            "b": "world/post",
+                            "kind": "partition",
+                            "cells": 14,
+                            "margin": 0.0012,
+                            "shares_with": [1],
+                        }
+                    ]
+                }
+            ]
+        }
+    )
+
+    pairs: list[RegionPair]
+
+
+class CellCounts(BaseModel):
+    """Says what became of cells: how many have a plane, how many miss the polytope, and how many are open."""
+
+    plane: int = Field(description="Cells with a plane that separates the pair.")
+    empty: int = Field(description="Cells that miss the polytope.")
+    open: int = Field(description="Cells about which nothing is proved. A certified pair has none.")
+
+
+class Partition(BaseModel):
+    """Holds the cells of one pair: a binary tree of cuts that divides a box around the polytope.
+
+    The tree is a stream in preorder, the lower part of each cut first. Whoever draws it begins with the root cell, [`lower`, `upper`], and
+    cuts it at the values of `cuts`, one after the other, in the joints that `nodes` names.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "pair": {"index": 0, "a": "arm/link2/box", "b": "world/post"},
+                    "state": "certified",
+                    "certified": True,
+                    "iteration": None,
+                    "kind": "partition",
+                    "joints": [0, 1],
+                    "lower": [-0.6, -0.4],
+                    "upper": [0.6, 0.4],
+                    "q_star": [0.0, 0.0],
+                    "revolute": [True, True],
+                    "nodes": [0, -1, 1, -1, -2],
+                    "cuts": [0.05, -0.1],
+                    "choices": [0, 0],
+                    "volumes": [["arm/link2/box", "world/post"]],
+                    "counts": {"plane": 2, "empty": 1, "open": 0},
+                    "folded": [],
+                }
+            ]
+        }
+    )
+
+    pair: PairInfo
+    state: PairState = Field(description="State of the pair in `iteration`; `certified` for a pair of a region.")
+    certified: bool = Field(description="True where a verified proof says that the pair is apart in all cells, on all of the polytope.")
+    iteration: int | None = Field(description="The job's iteration that the cells are of; null for a region.")
+    kind: ProofKind
+    joints: list[int] = Field(description="Position indices of the joints in play, ascending: only these are cut.")
+    lower: list[float] = Field(description="(n,) lower corner of the root cell, in s.")
+    upper: list[float] = Field(description="(n,) upper corner of the root cell, in s.")
+    q_star: list[float] = Field(description="(n,) q*: where joint i is revolute, q_i = q*_i + 2 atan(s_i), and else q_i = q*_i + s_i.")
+    revolute: list[bool] = Field(description="(n,) true where the joint is revolute.")
+    nodes: list[int] = Field(
+        description="The tree in preorder. 0 or more: the cell is cut in the joint with this position index; its lower part comes next. "
+        "-1: a plane separates the pair in the cell. -2: the cell misses the polytope. -3: the cell is open. -4: the cell is cut further, "
+        "which this answer does not show."
+    )
+    cuts: list[float] = Field(description="Where each cut is, in s, in the order of the nodes that are 0 or more.")
+    choices: list[int] = Field(description="For each node that is -1, in order: which of `volumes` its plane separates.")
+    volumes: list[tuple[str, str]] = Field(
+        description="By choice, in words: what stands for `a` and for `b`, the geometries themselves or simpler volumes that contain them."
+    )
+    counts: CellCounts = Field(description="The leaves of the whole tree, with those that are not shown.")
+    folded: list[CellCounts] = Field(
+        description="For each node that is -4, in order: the leaves below it. Empty where the answer shows the whole tree. An answer has "
+        "at most 200000 nodes; in a larger tree, cells are folded from a depth on, the same one for all."
+    )

@@ -1,0 +1,121 @@
+"""These models say how far a job is: who works on it, and what holds its region back."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from enum import StrEnum
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class Progress(BaseModel):
+    """Says how far a job is."""
+
+    settled: int | None = Field(
+        description="Number of pieces of the job's last iteration that are settled. A piece is a pair, or a part of a pair whose open "
+        "cells are dealt to several. Null before the first iteration."
+    )
+    total: int | None = Field(description="Number of pieces of that iteration, without the pairs whose proofs of earlier ones serve.")
+    share: float | None = Field(
+        description="Share of the proposal that the job's last region keeps, by q-volume, as far as samples say; null without a region."
+    )
+
+
+class Work(StrEnum):
+    """Names what a process does for a job."""
+
+    PAIRS = "pairs"
+    """It certifies pairs, or parts of pairs."""
+    SEED = "seed"
+    """It looks for the polytope that growing begins with."""
+    STEP = "step"
+    """It moves the faces of the last region, all pairs coupled."""
+    ACCEPT = "accept"
+    """It puts the proof of a region together and verifies it."""
+    SCOUT = "scout"
+    """It looks how much a cover has covered, and where the next regions are to be grown."""
+    MOTION = "motion"
+    """It certifies a motion."""
+    DECIDE = "decide"
+    """It decides what the job does next."""
+
+
+class Worker(BaseModel):
+    """Describes a process that holds work of the job."""
+
+    process: str = Field(description="Name of the process: host, process number, and when it began, with colons between.")
+    work: Work
+    iteration: int | None = Field(description="Iteration of the pairs; null where the work is no pairs.")
+    pairs: list[int] = Field(description="Indices of the pairs that it certifies, ascending; those that are done already are left out.")
+    until: datetime | None = Field(description="Without a sign of life until then, the work is given to another process.")
+
+
+class JobWorkers(BaseModel):
+    """Lists the processes that work for a job at this moment; those that certify pairs come first."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "workers": [
+                        {
+                            "process": "solver-1.2f9a01c3:4711:8812734",
+                            "work": "pairs",
+                            "iteration": 3,
+                            "pairs": [4, 7],
+                            "until": "2026-11-23T12:00:30Z",
+                        }
+                    ]
+                }
+            ]
+        }
+    )
+
+    workers: list[Worker]
+
+
+class Obstacle(BaseModel):
+    """Says what a pair of bodies does to a region: it cut it, or it is not certified."""
+
+    pair: int | None = Field(description="Index of the pair; null for an obstacle that no pair is known for, such as a seed that collides.")
+    a: str | None
+    b: str | None
+    text: str = Field(description="What stands in the way, in a sentence. It says what is proved, and what floating point or samples say.")
+    q: list[float] | None = Field(
+        description="Joint positions at which the bodies touch, come too close, or could not be proved apart; null where none is known."
+    )
+    faces: int | None = Field(
+        description="Number of faces of the polytope that were added or moved in for this pair; null where that is not known."
+    )
+    lost: float | None = Field(
+        description="Share of the polytope, by q-volume as far as samples say, that these faces cut off; null where that is not known."
+    )
+
+
+class Obstacles(BaseModel):
+    """Lists what holds a job's region back, worst first."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "obstacles": [
+                        {
+                            "pair": 2,
+                            "a": "arm/link2/box",
+                            "b": "world/post",
+                            "text": "arm/link2/box and world/post touch at the configuration named, as floating point says. 2 faces were "
+                            "added or moved in for this pair, and cut off 12 % of the polytope, as samples say.",
+                            "q": [0.41, -0.2],
+                            "faces": 2,
+                            "lost": 0.12,
+                        }
+                    ],
+                    "total": 1,
+                }
+            ]
+        }
+    )
+
+    obstacles: list[Obstacle]
+    total: int = Field(description="Number of obstacles, of which the answer has the worst.")

@@ -1,0 +1,1 @@
+"""Pairs and cells of regions and jobs, workers and obstacles over HTTP, on regions that were really grown."""
