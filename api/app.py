@@ -16,13 +16,14 @@ from api.access_log import AccessLog
 from api.announce import Announcer
 from api.cells import OutlinesKept
 from api.children import AT_ONCE, ChildLimiter
+from api.drawing import Maps
 from api.libraries import Libraries
 from api.links import LinksKept
 from api.metrics import Requests
 from api.pages import site
 from api.pages.rendering import render_problem
 from api.reading import READERS
-from api.routers import cells, events, jobs, motions, planning, plans, regions, scenes, service
+from api.routers import cells, drawing, events, jobs, motions, planning, plans, regions, scenes, service
 from certifier.scene.bundle import expect_bundles
 from db.session import CONNECTIONS, Database, database
 from db.settings import LOOPBACK_NAMES, settings
@@ -56,6 +57,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.libraries = Libraries()
     app.state.links = LinksKept()
     app.state.outlines = OutlinesKept()
+    app.state.maps = Maps()
     app.state.announcer = Announcer()
     app.add_middleware(
         guard.Guard,
@@ -66,7 +68,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     )
     app.add_middleware(AccessLog, requests=app.state.requests)
     problems.install(app, render_problem)
-    for module in (scenes, jobs, events, regions, cells, planning, plans, motions, service):
+    for module in (scenes, jobs, events, drawing, regions, cells, planning, plans, motions, service):
         app.include_router(module.router)
     app.include_router(login.router)
     site.install(app)

@@ -9,11 +9,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response, status
 
-from api import exports
+from api import drawing, exports
 from api.access import ADMIN, READ, Db
 from api.children import Children
 from api.reading import ReadingRoute
-from api.schemas.common import Cursor
+from api.schemas.common import MAX_INT, Cursor
+from api.schemas.drawing import MAX_SAMPLES, Extreme, RegionConfigurations
 from api.schemas.regions import RegionDetail, RegionPage, RegionSummary, Verification
 from certifier.errors import CirisError
 from certifier.isolation.child import run_in_child
@@ -60,6 +61,35 @@ def get_region(region_id: str, db: Db) -> RegionDetail:
     """Returns one region with its manifest."""
     with db.read() as session:
         return RegionDetail.of(regions.get(session, region_id))
+
+
+@router.get("/{region_id}/configurations")
+async def get_region_configurations(
+    region_id: str,
+    db: Db,
+    children: Children,
+    samples: Annotated[int, Query(ge=0, le=MAX_SAMPLES, description="So many samples.")] = 100,
+    seed: Annotated[int, Query(ge=0, le=MAX_INT, description="Seed of the random choices.")] = 0,
+) -> RegionConfigurations:
+    """Returns configurations of a region: its centre, its seed, where each joint is as far as it can be, and samples."""
+    return await children.run(_configurations, db, region_id, samples, seed)
+
+
+def _configurations(db: Database, region_id: str, samples: int, seed: int) -> RegionConfigurations:
+    with db.read() as session:
+        row = regions.get(session, region_id)
+    scene, limits = scenes.load(db, row.scene_id), settings()
+    payload = {"C": row.arrays["C"], "d": row.arrays["d"], "revolute": scene.revolute, "count": samples, "seed": seed}
+    found = run_in_child(
+        "certifier.polytopes.tour:answer", payload, timeout_s=limits.verify_timeout_seconds, memory_bytes=limits.child_memory_bytes
+    )
+    ends = zip(scene.moving, drawing.units(scene), scene.to_q(found["lower"]).tolist(), scene.to_q(found["upper"]).tolist(), strict=True)
+    return RegionConfigurations(
+        center=scene.to_q(row.manifest["inscribed_ellipsoid"]["center"]).tolist(),
+        seed=row.manifest["seed"],
+        extremes=[Extreme(joint=joint.name, unit=unit, lower=lower, upper=upper) for joint, unit, lower, upper in ends],
+        samples=scene.to_q(found["samples"]).tolist(),
+    )
 
 
 @router.get("/{region_id}/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})

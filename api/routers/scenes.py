@@ -7,10 +7,12 @@ from typing import Annotated, BinaryIO
 
 from fastapi import APIRouter, File, Query, Response, UploadFile, status
 
+from api import drawing
 from api.access import READ, SUBMIT, Db
 from api.children import Children
 from api.reading import ReadingRoute
 from api.schemas.common import Cursor
+from api.schemas.drawing import SceneModel
 from api.schemas.scenes import IgnoredPair, LintReport, PairForecast, SceneDetail, ScenePage, ScenePairs, SceneSummary, Substitution
 from certifier.pair.forecast import forecast
 from certifier.scene.bundle import load_bundle
@@ -56,6 +58,14 @@ def get_scene(scene_id: str, db: Db) -> SceneDetail:
     """Returns one scene, by its id or by its name. Of several scenes with one name it returns the newest."""
     with db.read() as session:
         return SceneDetail.of(scenes.get(session, scene_id))
+
+
+@router.get("/{scene_id}/model")
+def get_scene_model(scene_id: str, db: Db) -> SceneModel:
+    """Returns the scene as it is drawn: its kinematic tree, and the convex bodies that are certified."""
+    with db.read() as session:
+        found = scenes.find(session, scene_id)
+    return drawing.model(found, scenes.load(db, found))
 
 
 @router.get("/{scene_id}/pairs")

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from certifier.kinematics import Kinematics
-from certifier.model import Array, Geometry, Pair, Scene, Volume
+from certifier.model import Array, Geometry, Scene, Volume
 from certifier.pair.closest import closest
 
 
@@ -17,20 +19,40 @@ def in_collision(scene: Scene, s: Array) -> NDArray[np.bool_]:
 
     The bodies are shown apart by a direction between them. Errors of rounding therefore make a configuration collide, never the contrary.
     """
-    kinematics = Kinematics.of(scene)
     collides = np.zeros(len(s), dtype=bool)
+    for _, (a, b), R, p in _poses(scene, s):
+        left = np.flatnonzero(~collides)
+        collides[left[_touching(a, b, R[left], p[left], 2 * scene.padding)]] = True
+    return collides
 
-    def bodies(pair: Pair) -> tuple[str, str]:
-        return scene.geometry(pair.a).body, scene.geometry(pair.b).body
 
-    for (frame, body), pairs in groupby(sorted(scene.pairs, key=bodies), key=bodies):
+def contacts(scene: Scene, s: Array) -> list[list[int]]:
+    """Returns for each of the points s, (N, n), the indices of the pairs that are not shown to be apart there, ascending."""
+    found: list[list[int]] = [[] for _ in s]
+    for index, (a, b), R, p in _poses(scene, s):
+        for point in _touching(a, b, R, p, 2 * scene.padding).tolist():
+            found[point].append(index)
+    return [sorted(pairs) for pairs in found]
+
+
+def _poses(scene: Scene, s: Array) -> Iterator[tuple[int, tuple[Geometry, Geometry], Array, Array]]:
+    """Yields each pair's index and geometries, with the poses R (N, 3, 3) and p (N, 3) of the second's body in the frame of the first's."""
+    kinematics = Kinematics.of(scene)
+    pairs = [(index, scene.geometry(pair.a), scene.geometry(pair.b)) for index, pair in enumerate(scene.pairs)]
+
+    def bodies(pair: tuple[int, Geometry, Geometry]) -> tuple[str, str]:
+        return pair[1].body, pair[2].body
+
+    for (frame, body), alike in groupby(sorted(pairs, key=bodies), key=bodies):
         X = kinematics.numerators(frame, body, s)
         R, p = X[:, :3, :3] / X[:, 3, 3, None, None], X[:, :3, 3] / X[:, 3, 3, None]
-        for pair in pairs:
-            left = np.flatnonzero(~collides)
-            touching = _touching(scene.geometry(pair.a), scene.geometry(pair.b), R[left], p[left], 2 * scene.padding)
-            collides[left[touching]] = True
-    return collides
+        for index, a, b in alike:
+            yield index, (a, b), R, p
+
+
+def answer_in_collision(payload: dict[str, Any]) -> NDArray[np.bool_]:
+    """Answers :func:`in_collision` in a child process, for ``scene``, a document, and ``s``."""
+    return in_collision(Scene.from_document(payload["scene"]), payload["s"])
 
 
 def touching(kinematics: Kinematics, volumes: tuple[Volume, Volume], s: Array) -> NDArray[np.bool_]:

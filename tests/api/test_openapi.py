@@ -24,6 +24,7 @@ OPERATIONS = {
     "create_scene": "POST /v1/scenes",
     "list_scenes": "GET /v1/scenes",
     "get_scene": "GET /v1/scenes/{scene_id}",
+    "get_scene_model": "GET /v1/scenes/{scene_id}/model",
     "get_scene_pairs": "GET /v1/scenes/{scene_id}/pairs",
     "get_scene_lint": "GET /v1/scenes/{scene_id}/lint",
     "create_job": "POST /v1/jobs",
@@ -47,6 +48,7 @@ OPERATIONS = {
     "get_region": "GET /v1/regions/{region_id}",
     "get_region_pairs": "GET /v1/regions/{region_id}/pairs",
     "get_region_cells": "GET /v1/regions/{region_id}/pairs/{pair}/cells",
+    "get_region_configurations": "GET /v1/regions/{region_id}/configurations",
     "download_region_proof": "GET /v1/regions/{region_id}/proof",
     "verify_region": "POST /v1/regions/{region_id}/verify",
     "export_region": "GET /v1/regions/{region_id}/export",
@@ -57,6 +59,8 @@ OPERATIONS = {
     "cover_segments": "POST /v1/planning/segment",
     "cover_path": "POST /v1/planning/path",
     "plan_trajectory": "POST /v1/planning/plan",
+    "find_contacts": "POST /v1/planning/contacts",
+    "slice_space": "POST /v1/planning/slice",
     "get_graph": "GET /v1/planning/graph",
     "get_health": "GET /healthz",
     "get_readiness": "GET /readyz",
@@ -117,6 +121,8 @@ def test_the_examples_work_on_the_scenes_that_they_name(client: TestClient, data
         ("SegmentRequest", "/v1/planning/segment", 200),
         ("PathRequest", "/v1/planning/path", 200),
         ("PlanRequest", "/v1/planning/plan", 200),
+        ("ContactsRequest", "/v1/planning/contacts", 200),
+        ("SliceRequest", "/v1/planning/slice", 200),
     ):
         for example in schemas[name]["examples"]:
             answer = client.post(path, json=example)

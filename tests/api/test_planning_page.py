@@ -68,7 +68,7 @@ def test_every_answer_is_as_the_page_shows_it(client: TestClient, ids: list[str]
     examples = re.findall(r"^    (POST|GET) (\S+)\n\n((?:```json\n.*?```\n\n?){1,2})", PAGE, flags=re.DOTALL | re.MULTILINE)
     named = list(dict.fromkeys(re.findall(r"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}", PAGE)))
     assert {path.partition("?")[0] for _, path, _ in examples} == {
-        f"/v1/planning/{name}" for name in ("plan", "path", "segment", "nearest", "contains", "graph")
+        f"/v1/planning/{name}" for name in ("plan", "path", "segment", "nearest", "contains", "graph", "contacts", "slice")
     }
     for method, path, blocks in examples:
         *body, shown = (json.loads(block) for block in re.findall(r"```json\n(.*?)```", blocks, flags=re.DOTALL))

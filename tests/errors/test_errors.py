@@ -12,6 +12,7 @@ from client.verify import REFUSED
 from tests.errors.bundles import BUNDLES
 from tests.errors.commands import COMMANDS
 from tests.errors.covers import COVERS
+from tests.errors.drawing import DRAWING
 from tests.errors.motions import MOTIONS
 from tests.errors.proofs import PROOFS
 from tests.errors.regions import REGIONS
@@ -20,7 +21,7 @@ from tests.errors.scenes import SCENES
 from tests.errors.service import SERVICE
 from tests.errors.sites import Site, sites
 
-TABLE = [*SCENES, *BUNDLES, *REGIONS, *MOTIONS, *COVERS, *SERVICE, *COMMANDS, *PROOFS]
+TABLE = [*SCENES, *BUNDLES, *REGIONS, *MOTIONS, *COVERS, *DRAWING, *SERVICE, *COMMANDS, *PROOFS]
 
 DEMANDS = re.compile(r"\bmust\b|\bat most\b|\bonly\b")
 """Words of a message that says by itself what has to be."""

@@ -1,0 +1,222 @@
+"""This module answers with what people look at: the robot's bodies, contacts, and slices through configuration space."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import OrderedDict
+from threading import Lock
+from typing import Annotated, Literal
+
+import numpy as np
+from fastapi import Depends, Request
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from api import checks
+from api.schemas.drawing import (
+    MAX_REGIONS,
+    Contacts,
+    DrawnGeometry,
+    DrawnJoint,
+    SceneModel,
+    SliceAxis,
+    SlicedRegion,
+    SliceRequest,
+    SliceResponse,
+)
+from certifier.errors import RegionError
+from certifier.isolation.child import run_in_child
+from certifier.model import Array, Geometry, Scene
+from certifier.pair.collisions import contacts as contacts_at
+from db.settings import settings
+from planner.library import Library
+from planner.membership import locate, to_s
+from planner.slices import outline_in_q, slice_points, slice_polygon
+
+TIMEOUT_S = 60.0
+KEPT = 64
+"""An API process keeps so many collision maps, those that were asked for last."""
+
+
+def units(scene: Scene) -> list[Literal["rad", "m"]]:
+    return ["rad" if turns else "m" for turns in scene.revolute]
+
+
+def model(scene_id: str, scene: Scene) -> SceneModel:
+    """Returns the scene as it is drawn."""
+    index = {geometry.name: i for i, geometry in enumerate(scene.geometries)}
+    return SceneModel(
+        scene=scene_id,
+        name=scene.name,
+        joints=[
+            DrawnJoint(
+                name=joint.name,
+                kind=joint.kind,
+                parent=joint.parent,
+                child=joint.child,
+                axis=joint.axis.tolist(),
+                X_PF=joint.X_PF.tolist(),
+                X_BM=joint.X_BM.tolist(),
+                index=joint.index,
+                lower=joint.lower,
+                upper=joint.upper,
+            )
+            for joint in scene.joints
+        ],
+        bodies=list(scene.bodies),
+        q_star=scene.q_star.tolist(),
+        q_lower=scene.q_lower.tolist(),
+        q_upper=scene.q_upper.tolist(),
+        units=units(scene),
+        padding=scene.padding,
+        geometries=[_drawn(geometry) for geometry in scene.geometries],
+        pairs=[(index[pair.a], index[pair.b]) for pair in scene.pairs],
+    )
+
+
+def _drawn(geometry: Geometry) -> DrawnGeometry:
+    return DrawnGeometry(
+        name=geometry.name,
+        body=geometry.body,
+        radius=geometry.radius,
+        vertices=geometry.vertices.tolist(),
+        triangles=triangles(geometry.vertices).tolist(),
+        substitution=geometry.substitution,
+    )
+
+
+def triangles(vertices: Array) -> NDArray[np.intp]:
+    """Returns the triangles (t, 3) of the hull of points (v, 3), anticlockwise seen from outside; both sides of one that is flat."""
+    if len(vertices) < 3:
+        return np.zeros((0, 3), dtype=np.intp)
+    try:
+        hull = ConvexHull(vertices)
+    except QhullError:
+        hull = ConvexHull(vertices, qhull_options="QJ")  # flat: its points are moved a little, which nobody sees
+    corners = hull.simplices.copy()
+    a, b, c = np.moveaxis(vertices[corners], 1, 0)
+    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    corners[inwards] = corners[inwards][:, ::-1]
+    return np.asarray(corners, dtype=np.intp)
+
+
+def contacts(scene: Scene, q: Array) -> list[Contacts]:
+    """Returns what touches at each of the configurations q, (k, n)."""
+    lower, upper = scene.own_limits
+    beyond = (q < lower) | (q > upper)
+    shifted = scene.in_windows(q)
+    covered = np.abs(np.where(scene.revolute, shifted - scene.q_star, 0.0)).max(axis=1) < np.pi
+    touching = iter(contacts_at(scene, scene.to_s(shifted[covered])))
+    names = [joint.name for joint in scene.moving]
+    return [
+        Contacts(pairs=next(touching) if known else None, outside=[name for name, out in zip(names, row, strict=True) if out])
+        for known, row in zip(covered.tolist(), beyond.tolist(), strict=True)
+    ]
+
+
+class Maps:
+    """Keeps collision maps: a scene never changes, so neither do they."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[tuple[str, bytes], bytes] = OrderedDict()
+        self._lock = Lock()
+
+    def collisions(self, scene: Scene, q: Array) -> NDArray[np.bool_]:
+        """Returns at which of the configurations q, (k, n), some pair is not shown to be apart. A child process computes it."""
+        key = scene.hash, hashlib.sha256(q.tobytes()).digest()
+        with self._lock:
+            bits = self._kept.get(key)
+            if bits is not None:
+                self._kept.move_to_end(key)
+        if bits is None:
+            payload = {"scene": scene.to_document(), "s": scene.to_s(q)}
+            function, memory = "certifier.pair.collisions:answer_in_collision", settings().child_memory_bytes
+            bits = np.packbits(run_in_child(function, payload, timeout_s=TIMEOUT_S, memory_bytes=memory)).tobytes()
+            with self._lock:
+                self._kept[key] = bits
+                if len(self._kept) > KEPT:
+                    self._kept.popitem(last=False)
+        return np.unpackbits(np.frombuffer(bits, dtype=np.uint8), count=len(q)).astype(bool)
+
+
+async def _maps(request: Request) -> Maps:
+    maps: Maps = request.app.state.maps
+    return maps
+
+
+KeptMaps = Annotated[Maps, Depends(_maps)]
+
+
+def sliced(scene_id: str, scene: Scene, library: Library, maps: Maps, body: SliceRequest) -> SliceResponse:
+    """Returns the slice that a request asks for.
+
+    Raises:
+        RegionError: unknown_joint, same_joint, slice_outside_limits, region_elsewhere, waypoint_outside_limits, wrong_length.
+    """
+    q = checks.point(scene, body.q, "q")
+    s = checks.in_s(scene, q[None], "q")[0]
+    q = scene.in_windows(q)
+    axes = _joint(scene, body.x, "x"), _joint(scene, body.y, "y")
+    if axes[0] == axes[1]:
+        raise RegionError("same_joint", "a slice goes through two different joints", field="y", hint="name another joint")
+    ranges = [_range(scene, axis, given, field) for axis, given, field in zip(axes, (body.x_range, body.y_range), ("x", "y"), strict=True)]
+    lower, upper = np.array(ranges).T
+    points = slice_points(q, axes, lower, upper, body.size)
+    ends = np.tile(q, (2, 1))
+    ends[:, axes] = lower, upper
+    s_lower, s_upper = scene.to_s(ends)[:, axes]
+    chosen = _chosen(library, body.regions)
+    outlines = {}
+    for region in chosen:
+        corners = slice_polygon(library.polytope(region), s, axes, s_lower, s_upper)
+        if len(corners) >= 3:
+            outlines[region] = outline_in_q(scene, corners, axes)
+    found = locate(library, to_s(scene, points))
+    certified = np.zeros(len(points), dtype=bool)
+    certified[found.point[np.isin(found.region, list(chosen))]] = True
+    # What collides is drawn as such, whatever else holds there.
+    signs = np.where(maps.collisions(scene, points), "#", np.where(certified, "o", "."))
+    described = [
+        SliceAxis(joint=scene.moving[axis].name, unit=units(scene)[axis], lower=low, upper=high)
+        for axis, low, high in zip(axes, lower.tolist(), upper.tolist(), strict=True)
+    ]
+    return SliceResponse(
+        scene=scene_id,
+        version=library.version,
+        x=described[0],
+        y=described[1],
+        size=body.size,
+        rows=["".join(row) for row in signs.reshape(body.size, body.size)],
+        regions=[SlicedRegion(region=library.ids[i], polygon=[(x, y) for x, y in outline.tolist()]) for i, outline in outlines.items()],
+    )
+
+
+def _joint(scene: Scene, name: str, field: str) -> int:
+    names = [joint.name for joint in scene.moving]
+    if name not in names:
+        raise RegionError(
+            "unknown_joint", f"no joint of {scene.name} is called {name!r}", field=field, hint=f"there are {', '.join(names)}"
+        )
+    return names.index(name)
+
+
+def _range(scene: Scene, axis: int, given: list[float] | None, field: str) -> tuple[float, float]:
+    """Returns where an axis begins and ends: what was asked for, within the joint's limits."""
+    low, high = float(scene.q_lower[axis]), float(scene.q_upper[axis])
+    if given is None:
+        return low, high
+    if given[0] >= high or given[1] <= low:
+        message = f"the range is outside of the limits of {scene.moving[axis].name}, {low:.4g} to {high:.4g}"
+        raise RegionError("slice_outside_limits", message, field=f"{field}_range", hint="choose one within them")
+    return max(low, given[0]), min(high, given[1])
+
+
+def _chosen(library: Library, asked: list[str] | None) -> range | list[int]:
+    """Returns the numbers of the regions to draw."""
+    if asked is None:
+        return range(max(0, len(library) - MAX_REGIONS), len(library))
+    for i, name in enumerate(asked):
+        if name not in library.ids:
+            hint = "`ciris region ls --scene SCENE` lists them"
+            raise RegionError("region_elsewhere", f"region {name} is not of this scene", field=f"regions[{i}]", hint=hint)
+    return [library.ids.index(name) for name in asked]

@@ -1,0 +1,40 @@
+"""A region is shown by some of its points: where each coordinate is least and greatest, and samples that are uniform in q."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from certifier.model import Array, Polytope
+from certifier.polytopes import gibbs, simplex
+from certifier.polytopes.polytope import chebyshev_center
+
+CHAINS = 25
+
+
+def extremes(polytope: Polytope) -> tuple[Array, Array]:
+    """Returns points at which each coordinate is least, and points at which it is greatest, (n, n) each, one row a coordinate.
+
+    Raises:
+        RegionError: as :func:`certifier.polytopes.polytope.chebyshev_center`.
+    """
+    n = polytope.C.shape[1]
+    points, _ = simplex.maximise(polytope.C, polytope.d, np.concatenate([-np.eye(n), np.eye(n)]), chebyshev_center(polytope)[0])
+    return points[:n], points[n:]
+
+
+def samples(polytope: Polytope, revolute: NDArray[np.bool_], count: int, seed: int) -> Array:
+    """Returns so many points of P in s, (count, n), nearly uniform in q; the same seed gives the same points."""
+    each = -(-count // CHAINS)
+    drawn: Array = gibbs.uniform_in_q(polytope, revolute, CHAINS, each, seed).swapaxes(0, 1).reshape(-1, polytope.C.shape[1])
+    return drawn[:count]
+
+
+def answer(payload: dict[str, Any]) -> dict[str, Any]:
+    """Answers both questions in a child process, for ``C``, ``d``, ``revolute``, ``count`` and ``seed``, in s."""
+    polytope = Polytope(payload["C"], payload["d"])
+    lower, upper = extremes(polytope)
+    drawn = samples(polytope, payload["revolute"], payload["count"], payload["seed"]) if payload["count"] else np.zeros((0, len(lower)))
+    return {"lower": lower, "upper": upper, "samples": drawn}
