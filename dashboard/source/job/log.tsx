@@ -1,0 +1,73 @@
+// What has happened to the job, in sentences, the newest first.
+import { useState } from "preact/hooks";
+import type { JobEvent } from "../shared/api";
+import { duration, plural } from "./outcomes";
+import type { JobStore } from "./store";
+
+const STEPS: Record<string, string> = {
+  propose: "Looking for a first polytope around the seed",
+  step: "Moving the faces of the region",
+  accept: "Putting the region's proof together and verifying it",
+  scout: "Looking at what is covered",
+};
+const KINDS: Record<string, string> = { job: "the job", iteration: "iterations", pairs: "pairs", step: "steps", region: "regions", lost: "lost work", cover: "the cover", child: "regions of the cover" };
+
+function counted(pairs: { state: string }[]): string {
+  const counts = new Map<string, number>();
+  for (const { state } of pairs) counts.set(state, (counts.get(state) ?? 0) + 1);
+  return [...counts].map(([state, count]) => `${count} ${state.replaceAll("_", " ")}`).join(", ");
+}
+
+/** Says in a sentence what has happened. */
+export function sentence({ kind, data }: JobEvent): string {
+  const text = (name: string): string => String(data[name] ?? "");
+  switch (kind) {
+    case "job":
+      return `The job is ${text("state")}${data.outcome ? ` with the outcome ${text("outcome").replaceAll("_", " ")}` : ""}${data.reason ? `: ${text("reason")}` : ""}.`;
+    case "iteration":
+      return data.state === "running"
+        ? `Iteration ${data.index} (${text("label")}) begins with ${plural(Number(data.pairs ?? 0), "pair")}${data.reused ? `; ${data.reused} more keep their proofs` : ""}.`
+        : `Iteration ${data.index} (${text("label")}) is ${text("state").replaceAll("_", " ")}.`;
+    case "pairs": {
+      const pairs = (data.pairs ?? []) as { state: string; seconds: number | null }[];
+      const spent = pairs.reduce((sum, { seconds }) => sum + (seconds ?? 0), 0);
+      return `${plural(pairs.length, "result")} in iteration ${data.iteration}: ${counted(pairs)}, after ${duration(spent)} of work.`;
+    }
+    case "step":
+      return `${STEPS[text("kind")] ?? text("kind").replaceAll("_", " ")}: ${text("state")}${data.seconds != null ? ` after ${duration(Number(data.seconds))}` : ""}.`;
+    case "region": {
+      const share = (data.share as { value: number | null } | null)?.value;
+      return `A region is certified in iteration ${data.iteration} (${text("guarantee")})${share != null ? `; it keeps ${(100 * share).toPrecision(3)} % of the proposal, as samples say` : ""}.`;
+    }
+    case "lost":
+      return `${text("worker") || "A process"} no longer works for the job${data.reason ? ` (${text("reason").replaceAll("_", " ")})` : ""}; its work is open again.`;
+    case "child":
+      return `Region ${data.number} of the cover is ${text("state")}${data.reason ? `: ${text("reason")}` : ""}.`;
+    case "cover":
+      return "What is covered has been looked at.";
+    default:
+      return kind;
+  }
+}
+
+export function Log({ store }: { store: JobStore }) {
+  const [kind, setKind] = useState("");
+  const known = store.events.filter((event) => !kind || event.kind === kind).reverse();
+  const earlier = (store.events[0]?.seq ?? 1) > 1;
+  return (
+    <section aria-labelledby="h-log">
+      <h2 id="h-log">What happened</h2>
+      <div class="tools"><label>Show <select aria-label="Show events" value={kind} onChange={(event) => setKind(event.currentTarget.value)}>
+        <option value="">everything</option>
+        {Object.entries(KINDS).map(([name, words]) => <option value={name} key={name}>{words}</option>)}
+      </select></label></div>
+      {known.length === 0 && <p class="empty">Nothing of this kind yet.</p>}
+      <ol class="scroll log" tabIndex={0} aria-label="Events, the newest first" reversed>
+        {known.slice(0, 400).map((event) => (
+          <li key={event.seq} class={event.kind}><time dateTime={event.created_at} title={event.created_at}>{new Date(event.created_at).toLocaleTimeString()}</time><span>{sentence(event)}</span></li>
+        ))}
+      </ol>
+      {earlier && <button type="button" onClick={() => void store.earlier()}>Show earlier events</button>}
+    </section>
+  );
+}

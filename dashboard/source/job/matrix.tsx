@@ -1,0 +1,195 @@
+// The pair matrix: a row for each pair, a column for each iteration, the newest first. Only what is to be seen is in the page, however
+// many pairs there are; the grid tells assistive technology how many rows and columns it has.
+import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
+import { address, go } from "./route";
+import { CERTIFIED, OUTCOMES, badness, facts, plural } from "./outcomes";
+import type { JobStore, PairName } from "./store";
+
+const ROW = 30;
+const HEAD = 30;
+const COLUMN = 36;
+const SPARE = 6;
+
+type Order = "scene" | "outcome" | "time" | "open";
+
+function short(name: string): string {
+  return name.split("/").slice(1).join("/") || name;
+}
+
+export function Matrix({ store, version }: { store: JobStore; version: number }) {
+  const [outcome, setOutcome] = useState("");
+  const [order, setOrder] = useState<Order>("scene");
+  const [search, setSearch] = useState("");
+  const rows = useMemo(() => chosen(store, outcome, order, search), [version, outcome, order, search]);
+  return (
+    <section aria-labelledby="h-pairs">
+      <h2 id="h-pairs">Pairs</h2>
+      <div class="tools">
+        <label>Show <select aria-label="Show pairs" value={outcome} onChange={(event) => setOutcome(event.currentTarget.value)}>
+          <option value="">all pairs</option>
+          <option value="not">not certified</option>
+          {Object.entries(OUTCOMES).map(([letter, one]) => <option value={letter} key={letter}>{one.words}</option>)}
+        </select></label>
+        <label>Sort by <select aria-label="Sort by" value={order} onChange={(event) => setOrder(event.currentTarget.value as Order)}>
+          <option value="scene">order in the scene</option>
+          <option value="outcome">outcome, worst first</option>
+          <option value="time">time, longest first</option>
+          <option value="open">open cells, most first</option>
+        </select></label>
+        <label>Name <input type="search" value={search} placeholder="part of a name" onInput={(event) => setSearch(event.currentTarget.value)} /></label>
+        <span class="quiet" role="status">{rows.length === store.pairs.length ? plural(rows.length, "pair") : `${rows.length} of ${plural(store.pairs.length, "pair")}`}</span>
+      </div>
+      <Legend />
+      {rows.length > 0 ? <Grid store={store} rows={rows} /> : <p class="empty">No pair is like this in the last iteration.</p>}
+    </section>
+  );
+}
+
+function Legend() {
+  return (
+    <p class="legend">
+      {Object.values(OUTCOMES).filter(({ glyph }) => glyph).map(({ name, glyph, words }) => <span class={`key ${name}`} key={name}>{glyph} {words}</span>)}
+    </p>
+  );
+}
+
+/** The pairs that are to be seen, in order. Outcomes, times and open cells are those of the last iteration. */
+function chosen(store: JobStore, outcome: string, order: Order, search: string): PairName[] {
+  const last = store.last;
+  const letter = (pair: PairName): string => last?.states[pair.index] ?? "-";
+  const text = search.trim().toLowerCase();
+  const fits = (pair: PairName): boolean =>
+    (outcome === "" || (outcome === "not" ? !CERTIFIED.includes(letter(pair)) : letter(pair) === outcome)) && `${pair.a} ${pair.b}`.toLowerCase().includes(text);
+  const found = store.pairs.filter(fits);
+  const value = (pair: PairName): number => {
+    const cell = last && store.cell(last.index, pair.index);
+    if (order === "outcome") return badness(letter(pair));
+    return -((order === "time" ? cell?.seconds : cell?.open_cells) ?? -1);
+  };
+  if (order === "scene") return found;
+  const values = new Map(found.map((pair) => [pair.index, value(pair)]));
+  return found.sort((a, b) => values.get(a.index)! - values.get(b.index)! || a.index - b.index);
+}
+
+interface Place {
+  row: number;
+  column: number;
+}
+
+function Grid({ store, rows }: { store: JobStore; rows: PairName[] }) {
+  const box = useRef<HTMLDivElement>(null);
+  const [seen, setSeen] = useState({ top: 0, left: 0, width: 800, height: 500 });
+  const [active, setActive] = useState<Place>({ row: 0, column: 0 });
+  const [shown, setShown] = useState<Place | null>(null);
+  const columns = [...store.iterations].reverse();
+  const named = Math.round(Math.min(420, Math.max(170, 0.42 * seen.width)));
+  const width = Math.max(seen.width, named + columns.length * COLUMN);
+
+  useLayoutEffect(() => {
+    const element = box.current!;
+    const look = (): void => setSeen({ top: element.scrollTop, left: element.scrollLeft, width: element.clientWidth, height: element.clientHeight });
+    look();
+    const observer = new ResizeObserver(look);
+    observer.observe(element);
+    element.addEventListener("scroll", look, { passive: true });
+    return () => {
+      observer.disconnect();
+      element.removeEventListener("scroll", look);
+    };
+  }, []);
+
+  const at = (place: Place): { pair: PairName; iteration: (typeof columns)[number] } | null => {
+    const pair = rows[place.row], iteration = columns[place.column];
+    return pair && iteration ? { pair, iteration } : null;
+  };
+  const shownAt = shown && at(shown);
+  useEffect(() => {
+    if (shownAt) store.want(shownAt.iteration.index);
+  }, [shownAt?.iteration.index]);
+
+  const move = (row: number, column: number): void => {
+    const place = { row: Math.min(Math.max(row, 0), rows.length - 1), column: Math.min(Math.max(column, 0), Math.max(columns.length - 1, 0)) };
+    setActive(place);
+    setShown(place);
+    const element = box.current!, y = place.row * ROW, x = place.column * COLUMN;
+    if (y < element.scrollTop) element.scrollTop = y;
+    else if (y + ROW > element.scrollTop + element.clientHeight - HEAD) element.scrollTop = y + ROW + HEAD - element.clientHeight;
+    if (x < element.scrollLeft) element.scrollLeft = x;
+    else if (x + COLUMN > element.scrollLeft + element.clientWidth - named) element.scrollLeft = x + COLUMN + named - element.clientWidth;
+  };
+  const page = Math.max(1, Math.floor((seen.height - HEAD) / ROW) - 1);
+  const onKeyDown = (event: KeyboardEvent): void => {
+    if (event.ctrlKey && event.key !== "Home" && event.key !== "End") return;
+    const { row, column } = active;
+    const moves: Record<string, [number, number]> = {
+      ArrowUp: [row - 1, column], ArrowDown: [row + 1, column], ArrowLeft: [row, column - 1], ArrowRight: [row, column + 1],
+      PageUp: [row - page, column], PageDown: [row + page, column],
+      Home: [event.ctrlKey ? 0 : row, 0], End: [event.ctrlKey ? rows.length - 1 : row, columns.length - 1],
+    };
+    if (moves[event.key]) move(...moves[event.key]!);
+    else if (event.key === "Enter" || event.key === " ") open(active);
+    else if (event.key === "Escape") setShown(null);
+    else return;
+    event.preventDefault();
+  };
+  const open = (place: Place): void => {
+    const found = at(place);
+    if (found) go({ pair: found.pair.index, iteration: place.column === 0 ? null : found.iteration.index });
+  };
+  const place = (event: Event): Place | null => {
+    const cell = (event.target as Element).closest<HTMLElement>("[data-column]");
+    return cell && { row: Number(cell.dataset.row), column: Number(cell.dataset.column) };
+  };
+
+  const first = Math.max(0, Math.floor(seen.top / ROW) - SPARE);
+  const after = Math.min(rows.length, Math.ceil((seen.top + seen.height) / ROW) + SPARE);
+  const from = Math.max(0, Math.floor(seen.left / COLUMN) - SPARE);
+  const to = Math.min(columns.length, Math.ceil((seen.left + seen.width - named) / COLUMN) + SPARE);
+  const inView = columns.slice(from, to);
+  const isActive = (row: number, column: number): boolean => row === active.row && column === active.column;
+  return (
+    <div class="matrix-box">
+      <div class="scroll pairs" ref={box} id="matrix" role="grid" tabIndex={0} aria-label="Pair matrix" aria-rowcount={rows.length + 1} aria-colcount={columns.length + 1}
+        aria-activedescendant={active.row >= first && active.row < after && active.column >= from && active.column < to ? `cell-${active.row}-${active.column}` : undefined}
+        aria-describedby="matrix-help" onKeyDown={onKeyDown} onFocus={() => setShown(active)} onBlur={() => setShown(null)}
+        onMouseOver={(event) => { const found = place(event); if (found) setShown(found); }} onMouseLeave={() => setShown(null)}
+        onClick={(event) => { const found = place(event); if (found) { setActive(found); open(found); } }}
+        style={{ height: `min(70vh, ${rows.length * ROW + HEAD + 18}px)` }}>
+        <div role="row" class="head" aria-rowindex={1} style={{ width: `${width}px`, height: `${HEAD}px` }}>
+          <div role="columnheader" class="name" style={{ width: `${named}px` }}>Pair</div>
+          {inView.map((one, i) => (
+            <div role="columnheader" class="cell" key={one.index} aria-colindex={from + i + 2} title={`${one.label}, ${one.faces} faces, ${one.state}`}
+              style={{ left: `${named + (from + i) * COLUMN}px` }}><span class="sr">iteration </span>{one.index}</div>
+          ))}
+        </div>
+        <div role="rowgroup" class="rows" style={{ width: `${width}px`, height: `${rows.length * ROW}px` }}>
+          {rows.slice(first, after).map((pair, i) => {
+            const row = first + i;
+            return (
+              <div role="row" class="row" key={pair.index} aria-rowindex={row + 2} style={{ top: `${row * ROW}px`, width: `${width}px` }}>
+                <div role="rowheader" class="name" style={{ width: `${named}px` }}>
+                  <a href={address({ pair: pair.index })} tabIndex={-1} title={`${pair.a} – ${pair.b}`}>{short(pair.a)} <span class="quiet">–</span> {short(pair.b)}</a>
+                </div>
+                {inView.map((one, j) => {
+                  const letter = one.states[pair.index] ?? "-", column = from + j;
+                  return (
+                    <div role="gridcell" class={`cell ${OUTCOMES[letter]!.name}${isActive(row, column) ? " active" : ""}`} key={one.index} id={`cell-${row}-${column}`}
+                      aria-colindex={column + 2} data-row={row} data-column={column} aria-label={isActive(row, column) ? facts(letter, one, store.cell(one.index, pair.index)).join("; ") : OUTCOMES[letter]!.words}
+                      style={{ left: `${named + column * COLUMN}px` }}>{OUTCOMES[letter]!.glyph}</div>
+                  );
+                })}
+              </div>
+            );
+          })}
+        </div>
+      </div>
+      {shown && shownAt && (
+        <div role="tooltip" class="tip" style={{ top: `${HEAD + (shown.row + 1) * ROW - seen.top + 4}px`, left: `${Math.max(0, Math.min(named + shown.column * COLUMN - seen.left, seen.width - 300))}px` }}>
+          <strong>{shownAt.pair.a} – {shownAt.pair.b}</strong>
+          {facts(shownAt.iteration.states[shownAt.pair.index] ?? "-", shownAt.iteration, store.cell(shownAt.iteration.index, shownAt.pair.index)).map((fact) => <div key={fact}>{fact}</div>)}
+        </div>
+      )}
+      <p class="small" id="matrix-help">The newest iteration is on the left. Arrow keys move, Enter opens the pair.</p>
+    </div>
+  );
+}
