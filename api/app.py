@@ -56,8 +56,8 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.children = ChildLimiter()
     app.state.libraries = Libraries()
     app.state.links = LinksKept()
-    app.state.outlines = OutlinesKept()
     app.state.maps = Maps()
+    app.state.outlines = OutlinesKept()
     app.state.announcer = Announcer()
     app.add_middleware(
         guard.Guard,
@@ -68,7 +68,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     )
     app.add_middleware(AccessLog, requests=app.state.requests)
     problems.install(app, render_problem)
-    for module in (scenes, jobs, events, drawing, regions, cells, planning, plans, motions, service):
+    for module in (scenes, jobs, events, regions, cells, planning, plans, drawing, motions, service):
         app.include_router(module.router)
     app.include_router(login.router)
     site.install(app)

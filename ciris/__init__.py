@@ -8,7 +8,7 @@ region = service.grow("my-cell", q=[0, 0.3, 0, -1.8, 0, 0.9, 0], deadline=60)
 
 from certifier.errors import CirisError
 from certifier.outcome import Guarantee, Outcome
-from ciris.answers import Containment, Cover, Coverage, Event, Graph, Motion, Nearest, Plan, Segments, Verification
+from ciris.answers import Containment, Cover, Coverage, Event, Graph, Motion, Nearest, Obstacle, Plan, Segments, Verification
 from ciris.asynchronous.service import AsyncJob, AsyncRegion, AsyncService
 from ciris.connecting import connect, connect_async
 from ciris.scene import Scene
@@ -29,6 +29,7 @@ __all__ = [
     "Job",
     "Motion",
     "Nearest",
+    "Obstacle",
     "Outcome",
     "Plan",
     "Region",

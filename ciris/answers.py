@@ -393,6 +393,27 @@ class Cover:
         return f"Cover({covered}, {len(self.regions)} regions, {self.reason})"
 
 
+@dataclass(frozen=True, eq=False)
+class Obstacle:
+    """What holds a region back: a pair that is not certified, or for which something was cut off."""
+
+    pair: int | None
+    """Index of the pair; None where none is known."""
+    a: str | None
+    b: str | None
+    text: str
+    """What stands in the way, in a sentence, which says what is proved and what is not."""
+    q: Array | None
+    """(n,) joint positions at which the pair touches, comes too close, or could not be proved apart."""
+    faces: int | None
+    """How many faces were added or moved in for the pair."""
+    lost: float | None
+    """Share of the polytope, by volume in q, that they cut off, as samples say."""
+
+    def __str__(self) -> str:
+        return self.text
+
+
 @dataclass(frozen=True)
 class QVolume:
     """How large a region is in joint positions."""

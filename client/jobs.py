@@ -15,6 +15,8 @@ from client.service import connect
 OK, NO = 0, 1
 SHORT = 8
 """So many characters of an id are shown in lists; the service knows a job by them."""
+WORST = 5
+"""So many obstacles of a job are shown."""
 
 
 def job_ls(args: Namespace) -> int:
@@ -43,14 +45,21 @@ def job_ls(args: Namespace) -> int:
 def job_show(args: Namespace) -> int:
     with connect(args.url) as client:
         job = client.job(args.job)
-        regions = client.regions(job=job["id"])
+        regions, obstacles = client.regions(job=job["id"]), client.obstacles(job["id"])
     if args.json:
-        print_json({**job, "regions": regions})
+        print_json({**job, "regions": regions, "obstacles": obstacles})
         return OK
     _print(job)
     for region in regions:
         print(f"  region {region['id'][:SHORT]}: {output.share(region['share'])} of the proposal, {region['faces']} faces")
+    for one in obstacles[:WORST]:
+        print(f"  {one['text']}{_at(one['q'])}")
     return OK
+
+
+def _at(q: list[float] | None) -> str:
+    """Returns a configuration that an obstacle names, as it is printed after it."""
+    return "" if q is None else f" q = ({', '.join(f'{x:.4g}' for x in q)})"
 
 
 def job_follow(args: Namespace) -> int:

@@ -156,6 +156,7 @@ def page(
     state: str | None = None,
     kind: str | None = None,
     scene_id: str | None = None,
+    ended: bool | None = None,
     parent_id: str | None = None,
     after: str | None = None,
     limit: int = 50,
@@ -167,6 +168,8 @@ def page(
     """
     filters = {JobRow.state: state, JobRow.kind: kind, JobRow.scene_id: scene_id}
     query = select(JobRow).where(*(column == value for column, value in filters.items() if value is not None))
+    if ended is not None:
+        query = query.where(JobRow.state.in_(unfinished(JOB)) != ended)
     return pages.page(session, JobRow, query.where(JobRow.parent_id.is_not_distinct_from(parent_id)), after, limit)
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 from uuid import uuid4
 
 import numpy as np
-from sqlalchemy import Select, select, update
+from sqlalchemy import Select, func, select, update
 from sqlalchemy.orm import Session, defer
 
 from certifier.errors import CirisError
@@ -81,10 +81,22 @@ def of_job(session: Session, job_id: str) -> Sequence[RegionRow]:
     return session.scalars(select(RegionRow).where(RegionRow.job_id == job_id).order_by(RegionRow.iteration).options(*_UNREAD)).all()
 
 
+def shares(session: Session, region_ids: Collection[str]) -> dict[str, float | None]:
+    """Returns id -> the share of the proposal that the region keeps, for these regions; None where it has none."""
+    rows = session.execute(select(RegionRow.id, RegionRow.share).where(RegionRow.id.in_(region_ids))) if region_ids else ()
+    return {region_id: None if share is None else share["value"] for region_id, share in rows}
+
+
 def of_cover(session: Session, job_id: str) -> Sequence[RegionRow]:
     """Returns the regions that a cover has grown, in order, without their manifests and arrays."""
     query = select(RegionRow).join(JobRow, JobRow.id == RegionRow.job_id).where(JobRow.parent_id == job_id)
     return session.scalars(query.order_by(RegionRow.number).options(*_UNREAD)).all()
+
+
+def counts(session: Session, scene_ids: Sequence[str]) -> dict[str, int]:
+    """Returns scene id -> number of its regions, for each of these scenes."""
+    counted = select(RegionRow.scene_id, func.count().label("number")).where(RegionRow.scene_id.in_(scene_ids)).group_by(RegionRow.scene_id)
+    return dict.fromkeys(scene_ids, 0) | {row.scene_id: row.number for row in session.execute(counted)}
 
 
 def version(session: Session, scene_id: str) -> int:

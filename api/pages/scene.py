@@ -1,4 +1,4 @@
-"""This is the page of a scene."""
+"""These are the list of scenes, and the page of a scene with its library of regions."""
 
 from __future__ import annotations
 
@@ -7,8 +7,18 @@ from fastapi import APIRouter, Request, Response
 from api.access import Db
 from api.pages.rendering import page
 from api.routers import regions, scenes
+from api.schemas.common import Cursor
+from db.regions import counts as region_counts
 
 router = APIRouter()
+
+
+@router.get("/scenes")
+def scenes_page(request: Request, db: Db, after: Cursor = None) -> Response:
+    found = scenes.list_scenes(db, after)
+    with db.read() as session:
+        numbers = region_counts(session, [scene.id for scene in found.scenes])
+    return page(request, "scenes.html", {"scenes": found.scenes, "next": found.next, "regions": numbers})
 
 
 @router.get("/scenes/{scene_id}")

@@ -103,7 +103,14 @@ def create_job(
     else:
         response.status_code = status.HTTP_200_OK
     response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return Job.of(job)
+    return _described(db, [job])[0]
+
+
+def _described(db: Database, rows: Sequence[JobRow]) -> list[Job]:
+    """Describes jobs with the shares of their last regions."""
+    with db.read() as session:
+        shares = regions.shares(session, [row.region_id for row in rows if row.region_id is not None])
+    return [Job.of(row, shares.get(row.region_id or "")) for row in rows]
 
 
 def _options(body: GrowRequest | CertifyRequest | CertifyPathRequest | CoverRequest, scene: Scene) -> dict[str, Any]:
@@ -139,6 +146,7 @@ def list_jobs(
     state: JobState | None = None,
     kind: JobKind | None = None,
     scene: str | None = None,
+    ended: Annotated[bool | None, Query(description="`true` lists the jobs that have ended, `false` the others.")] = None,
     parent: Annotated[str | None, Query(max_length=64, description="List the jobs that grow the regions of this cover.")] = None,
     after: Cursor = None,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
@@ -147,15 +155,16 @@ def list_jobs(
     with db.read() as session:
         scene_id = scenes.find(session, scene) if scene else None
         parent_id = jobs.get(session, parent).id if parent else None
-        page = jobs.page(session, state=state, kind=kind, scene_id=scene_id, parent_id=parent_id, after=after, limit=limit)
-    return JobPage(jobs=[Job.of(row) for row in page.rows], next=page.next)
+        page = jobs.page(session, state=state, kind=kind, scene_id=scene_id, ended=ended, parent_id=parent_id, after=after, limit=limit)
+    return JobPage(jobs=_described(db, page.rows), next=page.next)
 
 
 @router.get("/{job_id}")
 def get_job(job_id: str, db: Db) -> Job:
     """Returns one job as it is now."""
     with db.read() as session:
-        return Job.of(jobs.get(session, job_id))
+        job = jobs.get(session, job_id)
+    return _described(db, [job])[0]
 
 
 @router.post("/{job_id}/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
@@ -167,7 +176,7 @@ def cancel_job(job_id: str, db: Db, background: BackgroundTasks, announcements: 
     with db.write() as session:
         job = jobs.cancel(session, job_id)
     background.add_task(announcements.announce, job.id)
-    return Job.of(job)
+    return _described(db, [job])[0]
 
 
 @router.post("/{job_id}/retry", status_code=status.HTTP_201_CREATED)
@@ -180,7 +189,7 @@ def retry_job(job_id: str, caller: Submitter, db: Db, response: Response, backgr
         job = jobs.retry(session, job_id, caller.key_id)
     background.add_task(announcements.announce, job.id)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return Job.of(job)
+    return _described(db, [job])[0]
 
 
 @router.get("/{job_id}/cover")

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector
 from api.schemas.covers import CoverRequestOptions
 from api.schemas.motions import GivenMotion
+from api.schemas.progress import Progress
 from api.schemas.scenes import PairInfo
 from certifier.growth.options import LARGEST_TOLERANCE, MOST_CELLS, WHOLE_NUMBERS, GrowthOptions
 from certifier.model import MAX_NAME
@@ -245,9 +246,15 @@ class Job(BaseModel):
     finished_at: datetime | None
     deadline_at: datetime | None
     ended: bool
+    progress: Progress = Field(description="How far the job is in its last iteration, and what its last region has come to.")
 
     @classmethod
-    def of(cls, row: JobRow) -> Self:
+    def of(cls, row: JobRow, share: float | None) -> Self:
+        """Describes a job.
+
+        Args:
+            share: the share of the proposal that its last region keeps; None without a region, or where there is none.
+        """
         return cls(
             id=row.id,
             kind=JobKind(row.kind),
@@ -267,6 +274,9 @@ class Job(BaseModel):
             finished_at=row.finished_at,
             deadline_at=row.deadline_at,
             ended=not row.transitions[row.state],
+            progress=Progress(
+                settled=None if row.pieces is None else row.pieces - row.open_pairs - row.running_pairs, total=row.pieces, share=share
+            ),
         )
 
 

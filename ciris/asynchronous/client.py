@@ -136,6 +136,10 @@ class AsyncClient:
         """Returns the proof of the motion that a job has certified, or of its beginning."""
         return (await self._send("GET", f"/v1/jobs/{segment(job_id)}/motion/proof")).content
 
+    async def obstacles(self, job_id: str) -> list[Document]:
+        """Returns what holds the region of a job back, worst first."""
+        return (await self._json("GET", f"/v1/jobs/{segment(job_id)}/obstacles"))["obstacles"]
+
     async def job_pairs(self, job_id: str, iteration: int | None = None) -> Document:
         """Returns a job's pair matrix, of all iterations or of one."""
         return await self._json("GET", f"/v1/jobs/{segment(job_id)}/pairs", params=given(iteration=iteration))

@@ -24,6 +24,7 @@ from ciris.answers import (
     Motion,
     Near,
     Nearest,
+    Obstacle,
     Plan,
     Segments,
     Verification,
@@ -86,6 +87,10 @@ class AsyncJob(JobData):
         if document["region"] is None:
             raise why_no_region(document)
         return await self._service.region(document["region"])
+
+    async def obstacles(self) -> tuple[Obstacle, ...]:
+        """Returns what holds the job's region back, or has cut it, worst first."""
+        return tuple(read(Obstacle, one) for one in await self._service.client.obstacles(self.id))
 
     async def motion(self, prove: bool = False) -> Motion:
         """Waits until a job of the kind ``certify-path`` has ended, and returns what has become of its motion.

@@ -134,6 +134,10 @@ class Client:
         """Returns the proof of the motion that a job has certified, or of its beginning."""
         return self._send("GET", f"/v1/jobs/{segment(job_id)}/motion/proof").content
 
+    def obstacles(self, job_id: str) -> list[Document]:
+        """Returns what holds the region of a job back, worst first."""
+        return self._json("GET", f"/v1/jobs/{segment(job_id)}/obstacles")["obstacles"]
+
     def job_pairs(self, job_id: str, iteration: int | None = None) -> Document:
         """Returns a job's pair matrix, of all iterations or of one."""
         return self._json("GET", f"/v1/jobs/{segment(job_id)}/pairs", params=given(iteration=iteration))

@@ -3,7 +3,8 @@ import type { ComponentType } from "preact";
 
 const ISLANDS: Record<string, () => Promise<ComponentType<any>>> = {
   job: async () => (await import("./job/job")).JobIsland,
-  scene: async () => (await import("./scene/scene")).SceneIsland,
+  library: async () => (await import("./library/library")).LibraryIsland,
+  region: async () => (await import("./region/region")).RegionIsland,
 };
 
 export function startIslands(root: ParentNode): void {

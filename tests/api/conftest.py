@@ -23,7 +23,7 @@ from db import session as storage
 from db.session import Database
 from db.settings import settings
 from db.types import utcnow
-from tests.certifier.scenes import accepted
+from tests.certifier.scenes import accepted, cube, planar_arm
 from tests.scenes import slider
 from tests.services import Queue
 from tests.workers.service import environment as surroundings
@@ -123,6 +123,26 @@ def certified() -> Region:
 def region(database: Database, scene: Scene, certified: Region) -> str:
     """The id of a stored region, made by a job that has succeeded."""
     return store_region(database, certified)
+
+
+@pytest.fixture
+def planar(database: Database) -> Scene:
+    """A planar arm of two links beside a box, stored."""
+    scene = planar_arm(limit=1.2)
+    with database.write() as session:
+        scenes.add(session, scene)
+    return scene
+
+
+@pytest.fixture
+def planar_region(database: Database, planar: Scene) -> str:
+    """The id of a region of that arm, with a corner cut off."""
+    box = cube(planar, [-0.2, -0.1], 0.1)
+    polytope = planar.polytope([*box.C[:4], [1.0, 1.0]], [*box.d[:4], -0.2])
+    center = np.array([-0.22, -0.12])
+    results = [Certification(planar, polytope, center).certify(index) for index in range(len(planar.pairs))]
+    proofs = {index: result.proof or b"" for index, result in enumerate(results)}
+    return store_region(database, certified_region(planar, accepted(polytope, center), proofs, {"seconds": 1.0}, None))
 
 
 def store_region(database: Database, certified: Region) -> str:

@@ -104,6 +104,8 @@ def test_what_it_has_come_to_is_told(client: TestClient, scene: Scene, database:
     assert (found["components"], found["largest"], found["connected"], found["connect"]) == ([2, 1], 0.75, False, [0, 1])
     assert found["missing"] == ["the configurations to connect are in 2 components"]
     assert found["obstacles"] == ["no way"]
+    (obstacle,) = client.get(f"/v1/jobs/{cover['id']}/obstacles").json()["obstacles"]
+    assert (obstacle["pair"], obstacle["text"]) == (None, "no way")
     assert [(grown["job"], grown["number"], grown["region"]) for grown in found["grown"]] == [(child.id, 0, None)]
 
 

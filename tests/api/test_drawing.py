@@ -11,35 +11,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api import drawing
-from certifier.jobs.region import certified_region
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Scene
-from certifier.pair.certification import Certification
 from certifier.pair.collisions import in_collision
-from db import scenes
-from db.session import Database
-from tests.api.conftest import store_region
-from tests.certifier.scenes import accepted, ball, cube, planar_arm
-
-
-@pytest.fixture
-def planar(database: Database) -> Scene:
-    """A planar arm of two links beside a box, stored."""
-    scene = planar_arm(limit=1.2)
-    with database.write() as session:
-        scenes.add(session, scene)
-    return scene
-
-
-@pytest.fixture
-def held(database: Database, planar: Scene) -> str:
-    """The id of a region of that arm, with a corner cut off."""
-    box = cube(planar, [-0.2, -0.1], 0.1)
-    polytope = planar.polytope([*box.C[:4], [1.0, 1.0]], [*box.d[:4], -0.2])
-    center = np.array([-0.22, -0.12])
-    results = [Certification(planar, polytope, center).certify(index) for index in range(len(planar.pairs))]
-    proofs = {index: result.proof or b"" for index, result in enumerate(results)}
-    return store_region(database, certified_region(planar, accepted(polytope, center), proofs, {"seconds": 1.0}, None))
+from tests.certifier.scenes import ball
 
 
 def slice_of(client: TestClient, planar: Scene, **parts: Any) -> Any:
@@ -89,13 +64,13 @@ def test_contacts_say_which_joint_is_outside_of_its_limits(client: TestClient, p
     assert (far["outside"], far["pairs"]) == (["arm/joint2"], None)
 
 
-def test_a_slice_is_free_and_in_collision_where_the_arm_is(client: TestClient, planar: Scene, held: str) -> None:
+def test_a_slice_is_free_and_in_collision_where_the_arm_is(client: TestClient, planar: Scene, planar_region: str) -> None:
     answer = slice_of(client, planar)
     assert (answer["x"]["lower"], answer["x"]["upper"], answer["x"]["unit"]) == (-1.2, 1.2, "rad")
     middles = -1.2 + 2.4 * (np.arange(40) + 0.5) / 40
     q = np.array([[x, y] for y in middles for x in middles])
     collides = in_collision(planar, planar.to_s(q)).reshape(40, 40)
-    C, d = faces_of(client, held)
+    C, d = faces_of(client, planar_region)
     within = (planar.to_s(q) @ C.T <= d).all(axis=1).reshape(40, 40)
     assert within.any()
     assert not (within & collides).any()
@@ -103,9 +78,9 @@ def test_a_slice_is_free_and_in_collision_where_the_arm_is(client: TestClient, p
     assert answer["rows"] == ["".join(row) for row in expected]
 
 
-def test_the_outlines_of_a_slice_are_the_regions_in_q(client: TestClient, planar: Scene, held: str) -> None:
+def test_the_outlines_of_a_slice_are_the_regions_in_q(client: TestClient, planar: Scene, planar_region: str) -> None:
     found = slice_of(client, planar)["regions"]
-    assert [region["region"] for region in found] == [held]
+    assert [region["region"] for region in found] == [planar_region]
     outline = planar.to_s(np.array(found[0]["polygon"]))
     assert outline.min(axis=0) == pytest.approx([-0.3, -0.2])
     assert (outline.sum(axis=1) <= -0.2 + 1e-12).all()
@@ -138,10 +113,10 @@ def test_a_map_is_computed_once(client: TestClient, planar: Scene, monkeypatch: 
     assert slice_of(client, planar)["rows"] == first["rows"]
 
 
-def test_configurations_of_a_region_are_in_it_and_reach_its_ends(client: TestClient, planar: Scene, held: str) -> None:
-    answer = client.get(f"/v1/regions/{held}/configurations?samples=60").json()
-    manifest = client.get(f"/v1/regions/{held}").json()["manifest"]
-    C, d = faces_of(client, held)
+def test_configurations_of_a_region_are_in_it_and_reach_its_ends(client: TestClient, planar: Scene, planar_region: str) -> None:
+    answer = client.get(f"/v1/regions/{planar_region}/configurations?samples=60").json()
+    manifest = client.get(f"/v1/regions/{planar_region}").json()["manifest"]
+    C, d = faces_of(client, planar_region)
     assert len(answer["samples"]) == 60
     for q in [answer["center"], *answer["samples"]]:
         assert (C @ planar.to_s(q) <= d + 1e-9).all()
@@ -150,8 +125,8 @@ def test_configurations_of_a_region_are_in_it_and_reach_its_ends(client: TestCli
         for end in ("lower", "upper"):
             assert (C @ planar.to_s(extreme[end]) <= d + 1e-9).all()
             assert np.rad2deg(extreme[end][joint]) == pytest.approx(known[end], abs=1e-6)
-    assert client.get(f"/v1/regions/{held}/configurations?samples=60").json() == answer
-    assert client.get(f"/v1/regions/{held}/configurations?samples=0").json()["samples"] == []
+    assert client.get(f"/v1/regions/{planar_region}/configurations?samples=60").json() == answer
+    assert client.get(f"/v1/regions/{planar_region}/configurations?samples=0").json()["samples"] == []
 
 
 def test_the_tree_of_a_model_is_enough_to_place_the_bodies(client: TestClient, planar: Scene) -> None:

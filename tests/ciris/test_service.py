@@ -72,6 +72,18 @@ def test_regions_are_fetched_once(service: Any, region: str, database: Database)
     assert again[1].C is first[0].C
 
 
+def test_a_job_says_what_cut_its_region(service: Any, region: str, database: Database) -> None:
+    (job,) = service.jobs()
+    assert job.obstacles() == ()
+    growth = {"obstacles": {"1": {"stage": 1, "times": 1, "faces": 2, "lost": 0.125, "s": [0.25], "contact": False}}}
+    with database.write() as session:
+        jobs.keep_growth(session, jobs.get(session, job.id), growth)
+    (found,) = job.obstacles()
+    assert (found.pair, found.a, found.b, found.faces, found.lost) == (1, "model/cart/ball", "world/post1", 2, 0.125)
+    assert found.q.tolist() == [0.25]
+    assert str(found).startswith("model/cart/ball and world/post1 could not be proved apart near the configuration named.")
+
+
 def test_answers_are_true_only_if_all_of_them_are_yes(service: Any, region: str) -> None:
     assert service.contains("slider", [0.1])
     answer = service.contains("slider", [[0.1], [0.9]])

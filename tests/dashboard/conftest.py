@@ -10,9 +10,22 @@ from typing import Any
 
 import pytest
 
-from tests.api.conftest import certified, client, database, environment, region, scene, url
+from tests.api.conftest import certified, client, database, environment, planar, planar_region, region, scene, url
 
-__all__ = ["barriers", "browser", "certified", "client", "database", "environment", "page", "region", "scene", "url"]
+__all__ = [
+    "barriers",
+    "browser",
+    "certified",
+    "client",
+    "database",
+    "environment",
+    "page",
+    "planar",
+    "planar_region",
+    "region",
+    "scene",
+    "url",
+]
 
 INSTALLED = Path(sys.prefix) / "browser"
 

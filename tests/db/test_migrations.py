@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import inspect
 
-from db import jobs, migrate, overlaps, pairs, regions, scenes, work
+from db import jobs, migrate, overlaps, pairs, regions, scenes, subtrees, work
 from db.session import Database
 from db.types import utcnow
 from tests.db.builders import a_running_job, add_region, certified
@@ -109,6 +109,24 @@ def test_iterations_stored_before_there_were_cells_say_that_they_have_none(empty
     with database.read() as session:
         assert [(row.cells, row.begun, row.parts, row.ending) for row in pairs.iterations(session, job_id)] == [(1, None, {}, [])]
         assert {row.open_cells for row in pairs.of_job(session, job_id)} == {None}
+    database.close()
+
+
+def test_jobs_of_before_there_were_outlines_have_none_and_lose_those_that_are_left_alone(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.write() as session:
+        job_id = a_running_job(session, 2).id
+        subtrees.keep(session, job_id, 0, {(0, 0): (b"subtrees", b"outline"), (1, 0): (b"", b"outline of a job that has ended")})
+    database.close()
+    migrate.downgrade(empty_database_url, "0013")
+    migrate.upgrade(empty_database_url)
+    assert migrate.drift(empty_database_url) == []
+    database = Database(empty_database_url)
+    with database.read() as session:
+        assert jobs.get(session, job_id).pieces is None
+        assert [subtrees.left_of(session, job_id, pair, 0) for pair in range(2)] == [[b"subtrees"], []]
+        assert subtrees.outlines(session, job_id, 0, 0, 0) == {0: {0: None}}
     database.close()
 
 

@@ -15,8 +15,8 @@ from tests.db.builders import a_running_job
 CERTIFIED = PairResult(Outcome.CERTIFIED, Stage.CELLS, margin=0.01, proof=b"proof")
 
 
-def left(data: bytes, outcome: Outcome = Outcome.INCONCLUSIVE) -> PairResult:
-    return PairResult(outcome, Stage.CELLS, subtrees=data, open_cells=3)
+def left(data: bytes, outcome: Outcome = Outcome.INCONCLUSIVE, outline: bytes | None = None) -> PairResult:
+    return PairResult(outcome, Stage.CELLS, subtrees=data, outline=outline, open_cells=3)
 
 
 def begin(db: Database, pair_count: int = 1) -> str:
@@ -118,6 +118,24 @@ def test_dropping_leaves_the_pairs_named_and_other_jobs(db: Database) -> None:
         subtrees.drop(session, one)
     assert read(db, two, 0, 0) == [b"two"]
     assert stored(db) == (1, 0)
+
+
+def test_a_job_that_has_ended_keeps_the_outlines_of_what_it_has_not_certified(db: Database) -> None:
+    job_id, other = begin(db, 3), begin(db)
+    save(db, claim(db, other), left(b"other", outline=b"outline"))
+    save(db, claim(db, job_id), left(b"zero", outline=b"o0"), left(b"one", outline=b"o1"), left(b"old"))
+    save(db, next_round(db, job_id, 1, (2, 1, 1)), left(b"more", outline=b"p0"), left(b"rest", outline=b"p1"), CERTIFIED, left(b"older"))
+    with db.write() as session:
+        jobs.lock(session, job_id)
+        subtrees.end(session, job_id)
+    with db.read() as session:
+        rows = session.execute(select(SubtreesRow.pair_index, SubtreesRow.data).where(SubtreesRow.job_id == job_id)).all()
+        assert {*map(tuple, rows)} == {(0, b"")}
+        assert subtrees.outlines(session, job_id, 0, 0, 1) == {0: {0: b"o0"}, 1: {0: b"p0", 1: b"p1"}}
+        assert subtrees.outlines(session, job_id, 0, 1, 1) == {1: {0: b"p0", 1: b"p1"}}
+        assert subtrees.outlines(session, job_id, 1, 0, 1) == {}
+        assert pairs.parts_of(session, job_id, 0, [0, 1]) == {0: 1, 1: 2}
+    assert read(db, other, 0, 0) == [b"other"]
 
 
 def test_an_error_leaves_what_was_left_before(db: Database) -> None:

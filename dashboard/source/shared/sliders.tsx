@@ -1,5 +1,6 @@
 // One slider for each joint, with a field for the number: degrees where the joint turns, metres where it slides.
-import { shortNames } from "./kinematics";
+import { useRef, useState } from "preact/hooks";
+import { shortNames, shown } from "./kinematics";
 
 interface Props {
   names: string[];
@@ -9,17 +10,24 @@ interface Props {
   /** Joint positions, radians or metres. */
   q: number[];
   onChange: (q: number[]) => void;
+  /** Between which positions each joint may be now; the limits where it is left out. */
+  allowed?: [number, number][];
   /** Joints, by index, whose slider is marked. */
   marked?: number[];
 }
 
 const DEGREE = Math.PI / 180;
 
-export function Sliders({ names, units, lower, upper, q, onChange, marked = [] }: Props) {
+export function Sliders({ names, units, lower, upper, q, onChange, allowed, marked = [] }: Props) {
   const short = shortNames(names);
+  const latest = useRef(q);
+  latest.current = q;
   const set = (index: number, text: string): void => {
     const value = Number(text) * (units[index] === "rad" ? DEGREE : 1);
-    if (text !== "" && Number.isFinite(value)) onChange(q.map((old, i) => (i === index ? Math.min(Math.max(value, lower[i]!), upper[i]!) : old)));
+    if (text === "" || !Number.isFinite(value)) return;
+    const [low, high] = allowed?.[index] ?? [lower[index]!, upper[index]!];
+    latest.current = latest.current.map((old, i) => (i === index ? Math.min(Math.max(value, low), high) : old));
+    onChange(latest.current);
   };
   return (
     <div class="sliders">
@@ -29,14 +37,33 @@ export function Sliders({ names, units, lower, upper, q, onChange, marked = [] }
         const unit = units[i] === "rad" ? "degrees" : "metres";
         const range = { min: lower[i]! / scale, max: upper[i]! / scale, step: "any" };
         return (
-          <div class={marked.includes(i) ? "slider marked" : "slider"} key={name}>
+          <div class={marked.includes(i) ? "slider marked" : "slider"} key={name} title={allowed && `${name} may be between ${shown(allowed[i]![0], units[i]!)} and ${shown(allowed[i]![1], units[i]!)}`}>
             <span class="name" title={name}>{short[i]}</span>
-            <input type="range" {...range} value={q[i]! / scale} aria-label={`${name}, ${unit}`} onInput={(event) => set(i, event.currentTarget.value)} />
-            <input type="number" {...range} value={(q[i]! / scale).toFixed(digits)} aria-label={`${name}, ${unit}, as a number`} onChange={(event) => set(i, event.currentTarget.value)} />
+            <span class="track">
+              {allowed && <span class="allowed" aria-hidden="true" style={band(allowed[i]!, lower[i]!, upper[i]!)} />}
+              <input type="range" {...range} value={q[i]! / scale} aria-label={`${name}, ${unit}`} onInput={(event) => set(i, event.currentTarget.value)} />
+            </span>
+            <NumberField range={range} text={(q[i]! / scale).toFixed(digits)} label={`${name}, ${unit}, as a number`} onEnter={(text) => set(i, text)} />
             <span class="unit" aria-hidden="true">{units[i] === "rad" ? "°" : "m"}</span>
           </div>
         );
       })}
     </div>
   );
+}
+
+/** A field for a number. What is being typed stays until it is entered, whatever is drawn meanwhile. */
+function NumberField({ range, text, label, onEnter }: { range: { min: number; max: number; step: string }; text: string; label: string; onEnter: (text: string) => void }) {
+  const [draft, setDraft] = useState<string | null>(null);
+  const enter = (typed: string): void => {
+    setDraft(null);
+    onEnter(typed);
+  };
+  return <input type="number" {...range} value={draft ?? text} aria-label={label} onInput={(event) => setDraft(event.currentTarget.value)} onChange={(event) => enter(event.currentTarget.value)} />;
+}
+
+/** Where the allowed part of a slider's track is drawn. */
+function band([low, high]: [number, number], lower: number, upper: number): { left: string; width: string } {
+  const span = upper - lower || 1;
+  return { left: `${(100 * (low - lower)) / span}%`, width: `${Math.max((100 * (high - low)) / span, 0.5)}%` };
 }

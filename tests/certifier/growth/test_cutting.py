@@ -129,6 +129,22 @@ def test_scattered_points_get_several_faces():
     assert len(smaller.d) == len(polytope.d) + 4
 
 
+def test_what_faces_came_to_is_said_corner_by_corner():
+    scene = planar_arm(2)
+    polytope = scene.polytope([], [])
+    points = 0.9 * scene.s_upper * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
+    corners = [((0, 1), points, 1.0), ((0, 1), points, 1.0), ((0, 1), np.zeros((0, 2)), 1.0)]
+    found = cut(scene, polytope, np.zeros((1, 2)), corners, polytope)
+    first, *others = found.made
+    assert first.faces == 4
+    assert first.s.tolist() in points.tolist()
+    # Each face lost a share of what was left before it; so their sum is no less than what is gone in all, and not much more.
+    samples = uniform_in_q(polytope, scene.revolute, 1000, 20, 3).reshape(-1, 2)
+    gone = 1 - found.polytope.contains(samples).mean()
+    assert gone - 0.02 < first.lost < 1.5 * gone + 0.02
+    assert [(one.faces, one.lost, one.s) for one in others] == [(0, 0, None)] * 2, "there was nothing left to cut off"
+
+
 def tangent(polytope, points):
     """The face through the point of the inscribed ellipsoid's metric that is nearest to its centre, normal there: what cutting by the
     ellipsoid alone would take, moved so that all points are beyond it."""

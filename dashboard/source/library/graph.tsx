@@ -1,0 +1,81 @@
+// How the regions of a scene hang together: a node for each region, a line where two overlap.
+import { useMemo } from "preact/hooks";
+import { LINKS } from "../shared/colours";
+import { layout } from "./layout";
+
+export interface GraphAnswer {
+  complete: boolean;
+  components: number;
+  nodes: { region: string; guarantee: string; component: number }[];
+  edges: { a: string; b: string; depth: number; q: number[] }[];
+  gaps: { a: string; b: string; distance: number; q: number[] }[];
+}
+
+interface Props {
+  graph: GraphAnswer;
+  /** Regions that hold what is looked at, by id. */
+  holding: Set<string>;
+  /** Regions of a plan, by id. */
+  planned: Set<string>;
+  chosen: string | null;
+  onChoose: (region: string) => void;
+}
+
+const SHEET = 100;
+const PAD = 8;
+/** Shapes tell components apart for who does not see their colours: circles, squares, diamonds in turn. */
+const SHAPES = ["circle", "square", "diamond"] as const;
+
+export function Graph({ graph, holding, planned, chosen, onChoose }: Props) {
+  const index = useMemo(() => new Map(graph.nodes.map(({ region }, i) => [region, i])), [graph]);
+  const places = useMemo(
+    () =>
+      layout(graph.nodes.length, graph.edges.map(({ a, b }) => [index.get(a)!, index.get(b)!])).map(({ x, y }) => ({
+        x: PAD + (SHEET - 2 * PAD) * x,
+        y: PAD + (SHEET - 2 * PAD) * y,
+      })),
+    [graph],
+  );
+  const radius = Math.max(1.1, Math.min(3.2, 14 / Math.sqrt(graph.nodes.length)));
+  const deepest = Math.max(...graph.edges.map(({ depth }) => depth), 1e-9);
+  const text = `${graph.nodes.length} regions, ${graph.edges.length} overlaps, ${graph.components} ${graph.components === 1 ? "component" : "components"}`;
+  return (
+    <svg class="graph" viewBox={`0 0 ${SHEET} ${SHEET}`} role="group" aria-label={text}>
+      {graph.edges.map(({ a, b, depth }) => {
+        const [from, to] = [places[index.get(a)!]!, places[index.get(b)!]!];
+        const on = planned.has(a) && planned.has(b);
+        return (
+          <line class={on ? "edge planned" : "edge"} key={`${a} ${b}`} x1={from.x} y1={from.y} x2={to.x} y2={to.y} stroke-width={0.25 + 0.7 * Math.sqrt(depth / deepest)}>
+            <title>{`${a.slice(0, 8)} and ${b.slice(0, 8)} overlap by a ball of radius ${depth.toPrecision(2)} in s`}</title>
+          </line>
+        );
+      })}
+      {graph.nodes.map(({ region, component }, i) => {
+        const { x, y } = places[i]!;
+        const marks = [holding.has(region) && "holds the configuration", planned.has(region) && "on the planned way"].filter(Boolean).join(", ");
+        const shape = SHAPES[component % SHAPES.length]!;
+        const common = { fill: LINKS[component % LINKS.length], class: `node${holding.has(region) ? " holding" : ""}${planned.has(region) ? " planned" : ""}${chosen === region ? " chosen" : ""}` };
+        const label = `region ${region.slice(0, 8)}, component ${component + 1}${marks && `, ${marks}`}`;
+        return (
+          <g
+            key={region}
+            class="place"
+            tabindex={0}
+            role="button"
+            aria-label={label}
+            aria-pressed={chosen === region}
+            onClick={() => onChoose(region)}
+            onKeyDown={(event) => {
+              if (event.key !== "Enter" && event.key !== " ") return;
+              event.preventDefault();
+              onChoose(region);
+            }}
+          >
+            <title>{label}</title>
+            {shape === "circle" ? <circle cx={x} cy={y} r={radius} {...common} /> : <rect x={x - radius} y={y - radius} width={2 * radius} height={2 * radius} transform={shape === "diamond" ? `rotate(45 ${x} ${y})` : undefined} {...common} />}
+          </g>
+        );
+      })}
+    </svg>
+  );
+}

@@ -1,0 +1,136 @@
+// A scene and its library of regions: the robot, which regions hold it, how they hang together, slices, and plans.
+import { useEffect, useMemo, useState } from "preact/hooks";
+import { get, said } from "../shared/api";
+import { positions, type SceneModel } from "../shared/kinematics";
+import type { Space } from "../shared/polytope";
+import { Robot } from "../shared/robot";
+import { Slice } from "../shared/slice";
+import { Sliders } from "../shared/sliders";
+import { coverage, type Coverage } from "./coverage";
+import { Graph, type GraphAnswer } from "./graph";
+import { useMoment } from "./moment";
+import { Planning, type Plan } from "./plan";
+
+const ASK_AGAIN_MS = 1500;
+
+export function LibraryIsland({ scene }: { scene: string }) {
+  const [model, setModel] = useState<SceneModel | null>(null);
+  const [problem, setProblem] = useState<string | null>(null);
+  useEffect(() => {
+    get<SceneModel>(`/v1/scenes/${scene}/model`).then(setModel, (reason: unknown) => setProblem(said(reason)));
+  }, [scene]);
+  if (problem) return <p class="notice bad">The scene cannot be drawn: {problem}</p>;
+  if (!model) return <p class="empty">Loading the robot …</p>;
+  return <Library model={model} />;
+}
+
+function Library({ model }: { model: SceneModel }) {
+  const names = useMemo(() => positions(model), [model]);
+  const space: Space = useMemo(() => ({ joints: names, revolute: model.units.map((unit) => unit === "rad"), q_star: model.q_star, q_lower: model.q_lower, q_upper: model.q_upper }), [model]);
+  const [q, setQ] = useState(model.q_star.map((value, i) => Math.min(Math.max(value, model.q_lower[i]!), model.q_upper[i]!)));
+  const [graph, setGraph] = useState<GraphAnswer | null>(null);
+  const [graphProblem, setGraphProblem] = useState<string | null>(null);
+  const [covered, setCovered] = useState<Coverage | null>(null);
+  const [chosen, setChosen] = useState<string | null>(null);
+  const [plan, setPlan] = useState<Plan | null>(null);
+  const moment = useMoment(model.scene, q);
+
+  useEffect(() => {
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    const ask = (): void => {
+      get<GraphAnswer>(`/v1/planning/graph?scene=${model.scene}`).then(
+        (found) => {
+          setGraph(found);
+          if (!found.complete) timer = setTimeout(ask, ASK_AGAIN_MS);
+        },
+        (reason: unknown) => setGraphProblem(said(reason)),
+      );
+    };
+    ask();
+    return () => clearTimeout(timer);
+  }, [model]);
+  const some = (graph?.nodes.length ?? 0) > 0;
+  useEffect(() => {
+    if (some) void coverage(model).then(setCovered, () => setCovered(null));
+  }, [model, some]);
+
+  const choose = (region: string): void => {
+    setChosen(region);
+    void get<{ center: number[] }>(`/v1/regions/${region}/configurations?samples=0`).then(({ center }) => setQ(center), (reason: unknown) => setGraphProblem(said(reason)));
+  };
+  const touching = useMemo(() => [...new Set((moment.pairs ?? []).flatMap((pair) => model.pairs[pair] ?? []))], [moment, model]);
+  const planned = useMemo(() => new Set(plan?.pieces.map(({ region }) => region) ?? []), [plan]);
+  const holding = useMemo(() => new Set(moment.regions), [moment]);
+  const touchingNames = (moment.pairs ?? []).map((pair) => model.pairs[pair]!.map((i) => model.geometries[i]!.name).join(" and "));
+  return (
+    <div class="library">
+      <div class="views">
+        <div>
+          <Robot model={model} q={q} touching={touching} label={`The robot of ${model.name}${touching.length ? ", in collision" : ""}`} />
+          <p class="said" role="status">
+            {moment.problem ? <span class="bad">{moment.problem}</span> : moment.pairs === undefined ? "…" : touchingNames.length ? (
+              <span class="bad">In collision: {touchingNames.slice(0, 3).join("; ")}{touchingNames.length > 3 && `; and ${touchingNames.length - 3} more pairs`}.</span>
+            ) : moment.regions.length ? (
+              <span class="good">In {moment.regions.length === 1 ? "a certified region" : `${moment.regions.length} certified regions`}: {moment.regions.slice(0, 4).map((region, i) => <>{i > 0 && ", "}<a href={`/regions/${region}`} key={region}>{region.slice(0, 8)}</a></>)}. No collision, as proved.</span>
+            ) : (
+              <span>Free here, by floating point, and in no certified region{moment.nearest && <>; the nearest is <a href={`/regions/${moment.nearest.region}`}>{moment.nearest.region.slice(0, 8)}</a>, {moment.nearest.distance.toPrecision(3)} away in s</>}.</span>
+            )}
+          </p>
+        </div>
+        <Slice scene={model.scene} space={space} units={model.units} q={q} onPick={setQ} strongest={chosen} way={plan?.found ? plan.q : undefined} />
+      </div>
+      <div class="card">
+        <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />
+      </div>
+      <div class="views">
+        <section aria-labelledby="h-graph">
+          <h2 id="h-graph">How the regions hang together</h2>
+          {graphProblem && <p class="notice bad">{graphProblem}</p>}
+          {!graph ? !graphProblem && <p class="empty">Comparing the regions …</p> : !some ? (
+            <p class="empty">This scene has no region yet. <a href={`/new?scene=${model.scene}`}>Start a job</a> that grows one.</p>
+          ) : (
+            <>
+              <p>
+                <strong>{graph.nodes.length}</strong> {graph.nodes.length === 1 ? "region" : "regions"}, {graph.edges.length} {graph.edges.length === 1 ? "overlap" : "overlaps"}, <strong>{graph.components}</strong> {graph.components === 1 ? "component" : "components"}{!graph.complete && ", so far"}.{" "}
+                {covered && <>They cover <strong>{(100 * covered.value).toFixed(0)} ± {(100 * covered.stderr).toFixed(0)} %</strong> of the free configurations, by {covered.free} of {covered.samples} random ones that are free.</>}
+              </p>
+              <Graph graph={graph} holding={holding} planned={planned} chosen={chosen} onChoose={choose} />
+              <p class="quiet small">Choose a region to go to its centre. Ringed regions hold the configuration.</p>
+              <details>
+                <summary>Overlaps as a table</summary>
+                <div class="scroll tall" tabIndex={0} role="region" aria-label="Overlaps">
+                  <table>
+                    <thead><tr><th>Region</th><th>Region</th><th class="number">Depth in s</th></tr></thead>
+                    <tbody>
+                      {graph.edges.map(({ a, b, depth, q: witness }) => (
+                        <tr key={`${a} ${b}`}>
+                          <td><a href={`/regions/${a}`}><code>{a.slice(0, 8)}</code></a></td>
+                          <td><a href={`/regions/${b}`}><code>{b.slice(0, 8)}</code></a></td>
+                          <td class="number"><button type="button" class="plain" onClick={() => setQ(witness)} aria-label={`${depth.toPrecision(3)}, go to the overlap of ${a.slice(0, 8)} and ${b.slice(0, 8)}`}>{depth.toPrecision(3)}</button></td>
+                        </tr>
+                      ))}
+                    </tbody>
+                  </table>
+                </div>
+              </details>
+              {graph.gaps.length > 0 && (
+                <details>
+                  <summary>{graph.gaps.length} {graph.gaps.length === 1 ? "gap" : "gaps"} between components</summary>
+                  <ul>
+                    {graph.gaps.map((gap) => (
+                      <li key={`${gap.a} ${gap.b}`}>{gap.distance.toPrecision(3)} in s between {gap.a.slice(0, 8)} and {gap.b.slice(0, 8)}: <button type="button" class="plain" onClick={() => setQ(gap.q)}>look there</button> <a href={`/new?scene=${model.scene}&q=${gap.q.join(",")}`}>grow a region there</a></li>
+                    ))}
+                  </ul>
+                </details>
+              )}
+            </>
+          )}
+        </section>
+        <section aria-labelledby="h-plan">
+          <h2 id="h-plan">Plan</h2>
+          <Planning scene={model.scene} names={names} units={model.units} q={q} onMove={setQ} plan={plan} onPlan={setPlan} />
+        </section>
+      </div>
+    </div>
+  );
+}

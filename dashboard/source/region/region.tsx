@@ -1,0 +1,148 @@
+// A region to walk about in: the robot swept through it, sliders that stay inside, the ends of each joint, slices, cells.
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { get, said } from "../shared/api";
+import type { PairProof, Partition } from "../shared/cells";
+import { shortNames, type SceneModel } from "../shared/kinematics";
+import { contains, rooms, toQ, toS, type Faces, type Space } from "../shared/polytope";
+import { Robot } from "../shared/robot";
+import { Slice } from "../shared/slice";
+import { Sliders } from "../shared/sliders";
+
+interface RegionDetail {
+  scene: string;
+  guarantee: string;
+  manifest: { scene: { name: string }; space: Space; halfspace_normals: number[][]; halfspace_offsets: number[] };
+}
+
+interface Configurations {
+  center: number[];
+  seed: number[] | null;
+  extremes: { joint: string; unit: "rad" | "m"; lower: number[]; upper: number[] }[];
+  samples: number[][];
+}
+
+interface Loaded {
+  region: RegionDetail;
+  model: SceneModel;
+  configurations: Configurations;
+  pairs: PairProof[];
+}
+
+const SAMPLES = 150;
+const GHOSTS = 40;
+const SECONDS_EACH = 0.9;
+
+async function load(id: string): Promise<Loaded> {
+  const [region, configurations, { pairs }] = await Promise.all([
+    get<RegionDetail>(`/v1/regions/${id}`),
+    get<Configurations>(`/v1/regions/${id}/configurations?samples=${SAMPLES}`),
+    get<{ pairs: PairProof[] }>(`/v1/regions/${id}/pairs`),
+  ]);
+  return { region, configurations, pairs, model: await get<SceneModel>(`/v1/scenes/${region.scene}/model`) };
+}
+
+export function RegionIsland({ region }: { region: string }) {
+  const [loaded, setLoaded] = useState<Loaded | null>(null);
+  const [problem, setProblem] = useState<string | null>(null);
+  useEffect(() => {
+    load(region).then(setLoaded, (reason: unknown) => setProblem(said(reason)));
+  }, [region]);
+  if (problem) return <p class="notice bad">The region cannot be drawn: {problem}</p>;
+  if (!loaded) return <p class="empty">Loading the robot …</p>;
+  return <Explorer id={region} {...loaded} />;
+}
+
+function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: string }) {
+  const { space } = region.manifest;
+  const faces: Faces = useMemo(() => ({ C: region.manifest.halfspace_normals, d: region.manifest.halfspace_offsets }), [region]);
+  const [q, setQ] = useState(configurations.seed ?? configurations.center);
+  const [swept, setSwept] = useState(true);
+  const [pair, setPair] = useState<number | null>(null);
+  const [cells, setCells] = useState<Partition | null>(null);
+  const [cellsProblem, setCellsProblem] = useState<string | null>(null);
+  const [playing, setPlaying] = usePlay(space, configurations.samples, q, setQ);
+  const only = useMemo(() => [id], [id]);
+  const ghosts = useMemo(() => (swept ? configurations.samples.slice(0, GHOSTS) : []), [swept, configurations]);
+  const names = shortNames(space.joints);
+  const inside = contains(space, faces, q);
+
+  useEffect(() => {
+    setCells(null);
+    setCellsProblem(null);
+    if (pair === null) return;
+    const stop = new AbortController();
+    get<Partition>(`/v1/regions/${id}/pairs/${pair}/cells`, stop.signal).then(setCells, (reason: unknown) => {
+      if (!stop.signal.aborted) setCellsProblem(said(reason));
+    });
+    return () => stop.abort();
+  }, [id, pair]);
+
+  const go = (to: number[]): void => {
+    setPlaying(false);
+    setQ(to);
+  };
+  const most = useMemo(() => [...pairs].sort((a, b) => b.cells - a.cells), [pairs]);
+  return (
+    <section aria-labelledby="h-explore" class="explore">
+      <h2 id="h-explore">Look inside</h2>
+      <div class="toolbar">
+        <button type="button" aria-pressed={playing} onClick={() => setPlaying(!playing)}>{playing ? "Pause" : "Sweep through the region"}</button>
+        <button type="button" onClick={() => go(configurations.center)}>Centre</button>
+        {configurations.seed && <button type="button" onClick={() => go(configurations.seed!)}>Seed</button>}
+        <label><input type="checkbox" checked={swept} onChange={(event) => setSwept(event.currentTarget.checked)} /> show {GHOSTS} samples</label>
+        <span role="status" class={inside ? "inside" : "inside not"}>{inside ? "The robot is inside the region: no collision, as proved." : "The robot is outside the region: nothing is proved here."}</span>
+      </div>
+      <div class="views">
+        <Robot model={model} q={q} ghosts={ghosts} label={`The robot of ${model.name} inside the region${swept ? `, with ${GHOSTS} samples of it` : ""}`} />
+        <div>
+          <Slice scene={region.scene} space={space} units={model.units} q={q} onPick={go} regions={only} strongest={id} cells={cells} />
+          <label class="pair-choice">
+            Cells of the pair{" "}
+            <select value={pair ?? ""} onChange={(event) => setPair(event.currentTarget.value === "" ? null : Number(event.currentTarget.value))}>
+              <option value="">none</option>
+              {most.map((proof) => (
+                <option value={proof.index} key={proof.index}>{`${proof.a} – ${proof.b}: ${proof.cells} cell${proof.cells === 1 ? "" : "s"}`}</option>
+              ))}
+            </select>
+          </label>
+          {cellsProblem && <p class="notice bad">{cellsProblem}</p>}
+        </div>
+      </div>
+      <div class="joints">
+        <Sliders names={space.joints} units={model.units} lower={space.q_lower} upper={space.q_upper} allowed={inside ? rooms(space, faces, q) : undefined} q={q} onChange={go} />
+        <div class="ends" role="group" aria-label="Ends of each joint within the region">
+          {configurations.extremes.map((extreme, i) => (
+            <p key={extreme.joint}>
+              <span class="sr">{names[i]}: </span>
+              <button type="button" onClick={() => go(extreme.lower)} aria-label={`${extreme.joint} least`}>least</button>{" "}
+              <button type="button" onClick={() => go(extreme.upper)} aria-label={`${extreme.joint} greatest`}>greatest</button>
+            </p>
+          ))}
+        </div>
+      </div>
+    </section>
+  );
+}
+
+/** Moves q from sample to sample while it plays, straight in s, in which the region is convex. Who prefers less motion sees it go in steps. */
+function usePlay(space: Space, samples: number[][], q: number[], setQ: (q: number[]) => void): [boolean, (play: boolean) => void] {
+  const [playing, setPlaying] = useState(false);
+  const from = useRef(q);
+  from.current = q;
+  useEffect(() => {
+    if (!playing || samples.length === 0) return;
+    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    let [begin, began, next, frame] = [toS(space, from.current), performance.now(), 0, 0];
+    const step = (now: number): void => {
+      const part = Math.min((now - began) / 1000 / SECONDS_EACH, 1);
+      const target = toS(space, samples[next % samples.length]!);
+      const eased = still ? Math.floor(part) : part * part * (3 - 2 * part);
+      if (!still || part === 1) setQ(begin.map((value, i) => toQ(space, i, value + (target[i]! - value) * eased)));
+      if (part === 1) [begin, began, next] = [target, now, next + 1];
+      frame = requestAnimationFrame(step);
+    };
+    frame = requestAnimationFrame(step);
+    return () => cancelAnimationFrame(frame);
+  }, [playing, samples, space]);
+  return [playing, setPlaying];
+}

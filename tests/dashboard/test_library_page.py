@@ -1,0 +1,143 @@
+"""The page of a scene in a real browser: its robot, its regions and how they hang together, coverage, plans."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from certifier.jobs.region import certified_region
+from certifier.model import Scene
+from certifier.pair.certification import Certification
+from db.session import Database
+from tests.api.conftest import store_region
+from tests.certifier.scenes import accepted, cube
+
+BOXES = [((-0.2, -0.1), 0.1), ((-0.05, -0.1), 0.1), ((-0.5, -0.5), 0.05)]
+"""Centres and half widths in s of three regions: the first two overlap, the third is apart."""
+
+
+@pytest.fixture
+def regions(database: Database, planar: Scene) -> list[str]:
+    found = []
+    for center, half in BOXES:
+        polytope = cube(planar, center, half)
+        results = [Certification(planar, polytope, np.array(center)).certify(index) for index in range(len(planar.pairs))]
+        proofs = {index: result.proof or b"" for index, result in enumerate(results)}
+        found.append(store_region(database, certified_region(planar, accepted(polytope, np.array(center)), proofs, {"seconds": 1.0}, None)))
+    return found
+
+
+@pytest.fixture
+def opened(page: Any, url: str, regions: list[str]) -> Any:
+    page.goto(f"{url}/scenes/planar")
+    page.get_by_text("2 components").wait_for()
+    return page
+
+
+def degrees(center: tuple[float, ...]) -> str:
+    return ", ".join(f"{2 * np.rad2deg(np.arctan(s)):.1f}" for s in center)
+
+
+def plan(page: Any, start: str, goal: str) -> None:
+    page.get_by_label("From").fill(start)
+    page.get_by_label("To", exact=True).fill(goal)
+    page.get_by_role("button", name="Plan a trajectory").press("Enter")
+
+
+def test_the_graph_shows_what_overlaps_and_leads_into_a_region(opened: Any, regions: list[str]) -> None:
+    assert opened.locator(".graph .place").count() == 3
+    assert opened.locator(".graph .edge").count() == 1
+    node = opened.get_by_role("button", name=f"region {regions[2][:8]}")
+    node.focus()
+    node.press("Enter")
+    opened.locator(".said", has_text=f"In a certified region: {regions[2][:8]}").wait_for()
+    assert opened.locator(".node.holding").count() == 1
+    opened.get_by_text("Overlaps as a table").click()
+    opened.get_by_role("button", name="go to the overlap").click()
+    opened.get_by_text("In 2 certified regions").wait_for()
+
+
+def test_coverage_is_that_of_the_same_configurations(opened: Any, client: TestClient, planar: Scene) -> None:
+    opened.get_by_text("of the free configurations").wait_for()
+    text = opened.locator("section[aria-labelledby=h-graph] p").first.text_content()
+    value, error = (float(number) for number in text.split("They cover ")[1].split(" %")[0].split(" ± "))
+    q = np.random.default_rng(0).uniform(-1.2, 1.2, (4000, 2))
+    free = np.array([not c["pairs"] for part in np.split(q, 40) for c in contacts(client, part)])
+    inside = [point["inside"] for point in client.post("/v1/planning/contains", json={"scene": "planar", "q": q.tolist()}).json()["points"]]
+    assert abs(100 * np.mean(np.array(inside)[free]) - value) < 4 * max(error, 1)
+
+
+def contacts(client: TestClient, q: Any) -> Any:
+    return client.post("/v1/planning/contacts", json={"scene": "planar", "q": q.tolist()}).json()["contacts"]
+
+
+def test_what_touches_is_said_as_the_robot_moves(opened: Any) -> None:
+    opened.get_by_role("spinbutton", name="arm/joint1, degrees, as a number").fill("30")
+    opened.get_by_role("spinbutton", name="arm/joint2, degrees, as a number").fill("15")
+    opened.get_by_role("spinbutton", name="arm/joint2, degrees, as a number").press("Enter")
+    opened.get_by_text("In collision: arm/link2/bar and world/obstacle").wait_for()
+
+
+def test_a_plan_is_played_to_its_end_with_the_region_of_each_moment(opened: Any, regions: list[str], tmp_path: Path) -> None:
+    plan(opened, degrees((-0.28, -0.1)), degrees((0.03, -0.1)))
+    opened.get_by_text("Now in region").wait_for()
+    assert regions[0][:8] in opened.locator(".moment").text_content()
+    assert opened.locator(".edge.planned").count() == 1
+    with opened.expect_download() as download:
+        opened.get_by_role("link", name="Download").click()
+    saved = json.loads(Path(download.value.path()).read_text())
+    assert saved["found"]
+    assert saved["guarantee"] == "exact"
+    opened.get_by_label("speed").select_option("2")
+    opened.get_by_role("button", name="Play", exact=True).click()
+    opened.get_by_role("button", name="Play", exact=True).wait_for(timeout=20000)
+    assert regions[1][:8] in opened.locator(".moment").text_content()
+    assert opened.locator(".player output").text_content() == f"{saved['t'][-1]:.2f} s"
+    shown = [float(field.input_value()) for field in opened.locator(".library .sliders input[type=number]").all()]
+    assert shown == pytest.approx(np.rad2deg(saved["q"][-1]), abs=0.06)
+
+
+@pytest.mark.parametrize(
+    ("start", "goal", "words"),
+    [
+        ((-0.2, -0.1), (-0.5, -0.5), "do not overlap"),
+        ((0.5, 0.5), (-0.2, -0.1), "no region contains the start"),
+        ((-0.2, -0.1), (0.5, 0.5), "no region contains the goal"),
+    ],
+)
+def test_why_there_is_no_plan_is_said(opened: Any, start: tuple[float, ...], goal: tuple[float, ...], words: str) -> None:
+    plan(opened, degrees(start), degrees(goal))
+    assert words in opened.locator(".planning .notice").text_content()
+
+
+def test_numbers_that_make_no_sense_are_refused_where_they_are(opened: Any) -> None:
+    plan(opened, "1, 2, 3", "0, 0")
+    opened.get_by_text("Give 2 numbers for the start").wait_for()
+
+
+def test_scenes_are_listed_with_their_regions(page: Any, url: str, regions: list[str]) -> None:
+    page.goto(url)
+    page.get_by_role("link", name="Scenes", exact=True).click()
+    assert page.locator("tbody tr").first.locator("td").nth(3).text_content() == "3"
+    page.get_by_role("link", name="planar", exact=True).click()
+    page.get_by_text("How the regions hang together").wait_for()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_keeps_people_out(browser: Any, url: str, regions: list[str], barriers: Any, scheme: str) -> None:
+    context = browser.new_context(viewport={"width": 390, "height": 844}, color_scheme=scheme)
+    page = context.new_page()
+    for path in ("/scenes", "/scenes/planar"):
+        page.goto(url + path)
+        if path != "/scenes":
+            page.get_by_text("2 components").wait_for()
+            plan(page, degrees((-0.28, -0.1)), degrees((0.03, -0.1)))
+            page.get_by_text("Now in region").wait_for()
+        assert barriers(page) == []
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    context.close()

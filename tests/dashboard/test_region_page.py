@@ -1,0 +1,111 @@
+"""The page of a region in a real browser: sliders that stay inside, the ends of each joint, slices, cells, and the sweep."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from certifier.model import Array, Scene
+from certifier.pair.collisions import in_collision
+
+READY = "The robot is inside the region"
+
+
+@pytest.fixture
+def faces(client: TestClient, planar_region: str) -> tuple[Array, Array]:
+    manifest = client.get(f"/v1/regions/{planar_region}").json()["manifest"]
+    return np.array(manifest["halfspace_normals"]), np.array(manifest["halfspace_offsets"])
+
+
+@pytest.fixture
+def opened(page: Any, url: str, planar_region: str) -> Any:
+    page.goto(f"{url}/regions/{planar_region}")
+    page.get_by_text(READY).wait_for()
+    page.get_by_text("of this slice is certified").first.wait_for()
+    return page
+
+
+def shown(page: Any) -> Array:
+    """The joint positions that the fields show, in radians."""
+    return np.deg2rad([float(field.input_value()) for field in page.locator(".explore input[type=number]").all()])
+
+
+def test_sliders_stay_inside_the_region(opened: Any, planar: Scene, faces: tuple[Array, Array]) -> None:
+    C, d = faces
+    for joint in ("arm/joint1", "arm/joint2"):
+        for key in ("End", "Home"):
+            opened.get_by_role("slider", name=f"{joint}, degrees").press(key)
+            q = shown(opened)
+            slack = (d - C @ planar.to_s(q)).min()
+            assert abs(slack) < 2e-3, "it goes to the face, as far as the field says it"
+            opened.get_by_text(READY).wait_for()
+    field = opened.get_by_role("spinbutton", name="arm/joint1, degrees, as a number")
+    field.fill("60")
+    field.press("Enter")
+    assert (d - C @ planar.to_s(shown(opened))).min() > -2e-3
+
+
+def test_buttons_lead_to_the_ends_of_a_joint(opened: Any, client: TestClient, planar_region: str) -> None:
+    ends = client.get(f"/v1/regions/{planar_region}/configurations?samples=0").json()["extremes"]
+    for extreme in ends:
+        for word, end in (("least", "lower"), ("greatest", "upper")):
+            opened.get_by_role("button", name=f"{extreme['joint']} {word}").click()
+            assert shown(opened) == pytest.approx(extreme[end], abs=1e-3)
+
+
+def test_the_sweep_stays_inside_and_can_be_paused(opened: Any, planar: Scene, faces: tuple[Array, Array]) -> None:
+    C, d = faces
+    before = shown(opened)
+    opened.get_by_role("button", name="Sweep through the region").click()
+    for _ in range(8):
+        opened.wait_for_timeout(120)
+        assert (d - C @ planar.to_s(shown(opened))).min() > -2e-3
+    opened.get_by_role("button", name="Pause").click()
+    stopped = shown(opened)
+    assert np.abs(stopped - before).max() > 1e-3
+    opened.wait_for_timeout(200)
+    assert np.array_equal(shown(opened), stopped)
+
+
+def test_the_slice_is_what_samples_say_and_leads_the_robot(opened: Any, planar: Scene) -> None:
+    size = 90
+    middles = -1.2 + 2.4 * (np.arange(size) + 0.5) / size
+    q = np.array([[x, y] for y in middles for x in middles])
+    taken = round(100 * in_collision(planar, planar.to_s(q)).mean())
+    assert f"{taken} % in collision" in opened.locator(".slice figcaption").text_content()
+    canvas = opened.locator(".slice canvas")
+    box = canvas.bounding_box()
+    canvas.click(position={"x": 52 + 0.75 * (box["width"] - 62), "y": 10 + 0.25 * (box["height"] - 44)})
+    assert shown(opened) == pytest.approx([0.6, 0.6], abs=0.02)
+    opened.get_by_text("The robot is outside the region").wait_for()
+    canvas.press("ArrowLeft")
+    assert shown(opened) == pytest.approx([0.6 - 2.4 / 60, 0.6], abs=0.02)
+    across, up = opened.locator(".axes select").all()
+    across.select_option("joint2")
+    assert (across.input_value(), up.input_value()) == ("1", "0"), "the other axis swaps"
+
+
+def test_the_cells_of_a_pair_are_drawn_over_the_slice(opened: Any, planar: Scene) -> None:
+    before = opened.locator(".slice canvas").screenshot()
+    choice = opened.get_by_label("Cells of the pair")
+    with opened.expect_response(lambda response: response.url.endswith("/cells")) as answer:
+        choice.select_option(index=1)
+    cells = answer.value.json()
+    assert (cells["certified"], cells["pair"]["a"] in planar.pairs[0].a) == (True, True)
+    opened.wait_for_timeout(200)
+    assert opened.locator(".slice canvas").screenshot() != before
+    assert opened.locator(".key-map.cells").count() == 1
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_keeps_people_out(browser: Any, url: str, planar_region: str, barriers: Any, scheme: str) -> None:
+    context = browser.new_context(viewport={"width": 390, "height": 844}, color_scheme=scheme, reduced_motion="reduce")
+    page = context.new_page()
+    page.goto(f"{url}/regions/{planar_region}")
+    page.get_by_text(READY).wait_for()
+    assert barriers(page) == []
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    context.close()
