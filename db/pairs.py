@@ -335,10 +335,10 @@ def parts_of(session: Session, job_id: str, pair: int, iterations: Iterable[int]
     return {index: parts.get(str(pair), 1) for index, parts in session.execute(select(IterationRow.index, IterationRow.parts).where(*mine))}
 
 
-def of_job(session: Session, job_id: str) -> Sequence[PairRow]:
-    """Returns the job's pair matrix: every pair of every iteration with its parts, in order."""
-    order = (PairRow.iteration, PairRow.pair_index, PairRow.part)
-    return session.scalars(select(PairRow).where(PairRow.job_id == job_id).order_by(*order)).all()
+def of_job(session: Session, job_id: str, only: Collection[int] | None = None) -> Sequence[PairRow]:
+    """Returns the job's pair matrix, in order: in every iteration every pair with its parts, or those asked for."""
+    query = select(PairRow).where(PairRow.job_id == job_id).order_by(PairRow.iteration, PairRow.pair_index, PairRow.part)
+    return session.scalars(query if only is None else query.where(PairRow.pair_index.in_(only))).all()
 
 
 def states(session: Session, job_id: str, since: int) -> dict[int, dict[int, PairState]]:

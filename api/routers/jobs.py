@@ -269,17 +269,18 @@ def get_job_pairs(
     iteration: Annotated[int | None, Query(ge=0, le=MAX_INT)] = None,
     pair: Annotated[
         list[Annotated[int, Field(ge=0, le=MAX_INT)]] | None,
-        Query(max_length=200, description="Indices of the pairs wanted, with `iteration`; all pairs if left out."),
+        Query(max_length=200, description="Indices of the pairs wanted; all pairs if left out."),
     ] = None,
 ) -> PairMatrix:
-    """Returns the pair matrix: the result of every pair on the polytope of every iteration, or of the given one."""
+    """Returns the pair matrix: the result of every pair on the polytope of every iteration, or of the given ones."""
     with db.read() as session:
         job = jobs.get(session, job_id)
-        rows = pairs.of_job(session, job.id) if iteration is None else pairs.of_iteration(session, job.id, iteration, pair)
+        rows = pairs.of_job(session, job.id, pair) if iteration is None else pairs.of_iteration(session, job.id, iteration, pair)
         iterations = [row for row in pairs.iterations(session, job.id) if iteration in (None, row.index)]
     scene = scenes.load(db, job.scene_id)
+    wanted = None if pair is None else set(pair)
     return PairMatrix(
-        pairs=[PairInfo(index=index, a=one.a, b=one.b) for index, one in enumerate(scene.pairs) if pair is None or index in pair],
+        pairs=[PairInfo(index=index, a=one.a, b=one.b) for index, one in enumerate(scene.pairs) if wanted is None or index in wanted],
         iterations=[_iteration(row) for row in iterations],
         cells=[_cell(scene, list(parts)) for _, parts in itertools.groupby(rows, lambda row: (row.iteration, row.pair_index))],
     )

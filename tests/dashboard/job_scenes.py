@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -47,29 +48,34 @@ def certified() -> PairResult:
     return PairResult(Outcome.CERTIFIED, Stage.SOS, seconds=0.1, margin=0.01, proof=b"proof")
 
 
-def too_close(scene: Scene, depth: int) -> PairResult:
-    """A pair that is not certified, with cells."""
-    tree = balanced(depth)
+def too_close(scene: Scene, leaves: int) -> PairResult:
+    """A pair that is not certified, with so many cells and the configuration at which it is nearest."""
+    return replace(left_open(scene, leaves), outcome=Outcome.TOO_CLOSE, detail="0.001 m apart", witness_s=np.array([0.4]))
+
+
+def left_open(scene: Scene, leaves: int) -> PairResult:
+    """A pair that is not certified, with so many cells, of which nobody knows a configuration."""
+    tree = cut_up(leaves)
     found: dict[str, Any] = {"open_cells": tree.open, "subtrees": b"", "outline": outline(scene, 0, tree).to_bytes()}
-    return PairResult(Outcome.TOO_CLOSE, None, seconds=2.0, detail="0.001 m apart", witness_s=np.array([0.4]), **found)
+    return PairResult(Outcome.INCONCLUSIVE, None, seconds=2.0, **found)
 
 
-def balanced(depth: int) -> Tree:
-    """2 ** depth cells along the first joint between -0.6 and 0.6; the last one is open, and the first misses the polytope."""
+def cut_up(leaves: int) -> Tree:
+    """So many cells along the first joint between -0.6 and 0.6; the last one is open, and the first misses the polytope."""
     nodes: list[int] = []
     cuts: list[float] = []
 
-    def add(lower: float, upper: float, left: int) -> None:
-        if left == 0:
+    def add(lower: float, upper: float, below: int) -> None:
+        if below == 1:
             nodes.append(OPEN if upper == 0.6 else EMPTY if lower == -0.6 else PLANE)
             return
         nodes.append(0)
         cuts.append(lower + (upper - lower) * 0.45)
         middle = cuts[-1]
-        add(lower, middle, left - 1)
-        add(middle, upper, left - 1)
+        add(lower, middle, below // 2)
+        add(middle, upper, below - below // 2)
 
-    add(-0.6, 0.6, depth)
+    add(-0.6, 0.6, leaves)
     choices = np.arange(nodes.count(PLANE)) % 2 * 3
     return Tree(np.array(nodes, dtype=np.int8), np.array(cuts), choices.astype(np.int8))
 
@@ -83,8 +89,8 @@ def outline(scene: Scene, index: int, tree: Tree) -> Outline:
     return Outline((0,), np.array([-0.6]), np.array([0.6]), (sides[0], sides[1]), tree)
 
 
-def large_job(database: Database, scene: Scene, iterations: int, tree_depth: int) -> str:
-    """A running job whose last iteration has open pairs; the first pair of all has 2 ** ``tree_depth`` cells there."""
+def large_job(database: Database, scene: Scene, iterations: int, leaves: int) -> str:
+    """A running job whose last iteration has open pairs; the first pair of all has so many ``leaves`` there."""
     job_id = new_job(database, scene)
     states = [PairState.CERTIFIED] * 17 + [PairState.TOO_CLOSE, PairState.INCONCLUSIVE, PairState.REFUTED]
     arrays = {name: np.asarray(values) for name, values in SLIDE.items()}
@@ -105,5 +111,5 @@ def large_job(database: Database, scene: Scene, iterations: int, tree_depth: int
     with database.write() as session:
         job = jobs.lock(session, job_id)
         pairs.add_iteration(session, job, index=iterations, label="last", **SLIDE, pairs=new, reuse={}, hard=[], failures=None, cells=64)
-    settle(database, job_id, too_close(scene, tree_depth), batch=0)
+    settle(database, job_id, left_open(scene, leaves), batch=0)
     return job_id

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import json
 import re
 import time
 from typing import Any
@@ -9,17 +11,24 @@ from typing import Any
 import pytest
 
 from certifier.model import Scene
-from db import jobs
+from db import jobs, scenes
 from db.session import Database
 from db.states import JobState
 from tests.dashboard.job_scenes import begin, certified, large_job, new_job, settle, too_close
 from tests.scenes import slider
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True}
-FRAMES = """
-window.longest = 0;
-let last = performance.now();
-(function frame(now) { window.longest = Math.max(window.longest, now - last); last = now; requestAnimationFrame(frame); })(last);
+WATCH = """
+let frames = [], tasks = [], last = performance.now();
+requestAnimationFrame(function frame(now) { frames.push(now - last); last = now; requestAnimationFrame(frame); });
+new PerformanceObserver((list) => { for (const task of list.getEntries()) tasks.push(task.duration); }).observe({type: 'longtask'});
+window.watched = () => {
+    const sorted = frames.slice(1).sort((a, b) => a - b), at = (part) => Math.round(sorted[Math.floor(part * (sorted.length - 1))] ?? 0);
+    const found = {frames: sorted.length, median_ms: at(0.5), p95_ms: at(0.95), longest_ms: at(1),
+        long_tasks: tasks.length, task_ms: Math.max(0, ...tasks)};
+    frames = []; tasks = [];
+    return found;
+};
 """
 
 
@@ -28,8 +37,28 @@ def job_id(database: Database, scene: Scene) -> str:
     """A running job: the first of two pairs is too close and has 64 cells, the second is open."""
     job_id = new_job(database, scene)
     begin(database, scene, job_id, cells=64)
-    settle(database, job_id, too_close(scene, 6), batch=0)
+    settle(database, job_id, too_close(scene, 64), batch=0)
     return job_id
+
+
+def orange(browser: Any, png: bytes) -> int:
+    """How many pixels of a picture are of the colour that bodies in contact are painted in, in light or shade."""
+    page = browser.new_page()
+    count: int = page.evaluate(
+        """async (data) => {
+            const image = await createImageBitmap(await (await fetch('data:image/png;base64,' + data)).blob());
+            const pen = new OffscreenCanvas(image.width, image.height).getContext('2d');
+            pen.drawImage(image, 0, 0);
+            const bytes = pen.getImageData(0, 0, image.width, image.height).data;
+            let count = 0;
+            for (let i = 0; i < bytes.length; i += 4)
+                if (bytes[i] > 100 && bytes[i] > 1.8 * bytes[i + 1] && bytes[i] > 3 * bytes[i + 2]) count++;
+            return count;
+        }""",
+        base64.b64encode(png).decode(),
+    )
+    page.close()
+    return count
 
 
 def finish(database: Database, job_id: str) -> None:
@@ -45,15 +74,16 @@ def test_a_job_is_watched_to_its_end(page: Any, url: str, database: Database, jo
     settle(database, job_id, certified(), batch=0)
     page.locator(".pairs .cell.certified").wait_for()
     page.get_by_text("1 result in iteration 0: 1 certified").wait_for()
+    assert all(item.bounding_box()["height"] > 20 for item in page.locator(".log li").all()), "every event can be read"
     page.get_by_text("2 of 2 pairs settled").wait_for()
     assert page.get_by_role("heading", name="Workers").count() == 1
     finish(database, job_id)
     page.locator(".badge.succeeded").wait_for()
-    page.get_by_text("The job is succeeded with the outcome inconclusive: as asked.").wait_for()
+    page.get_by_text("The job has succeeded with the outcome inconclusive: as asked.").wait_for()
     assert page.get_by_role("heading", name="Workers").count() == 0
     assert page.get_by_role("button", name="Cancel").count() == 0
     page.get_by_label("Show events").select_option("job")
-    assert page.locator(".log li").count() == page.locator(".log li.job").count() >= 2
+    assert page.locator(".log li").count() == page.locator(".log li[data-kind=job]").count() >= 2
 
 
 def test_what_is_said_of_a_pair_is_said_on_hover_and_on_focus(page: Any, url: str, job_id: str) -> None:
@@ -154,15 +184,8 @@ def test_what_holds_the_region_back_is_said_and_drawn(page: Any, url: str, job_i
     page.get_by_role("heading", name="What holds the region back").scroll_into_view_if_needed()
     robot = page.get_by_role("img", name=re.compile(r"^The robot at slide 0\.400 m"))
     robot.wait_for()
-    painted = """canvas => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => {
-        const copy = Object.assign(document.createElement('canvas'), {width: canvas.width, height: canvas.height});
-        const pen = copy.getContext('2d');
-        const look = () => { pen.drawImage(canvas, 0, 0); const d = pen.getImageData(0, 0, copy.width, copy.height).data; let n = 0;
-            for (let i = 0; i < d.length; i += 4) if (d[i + 3] > 0 && d[i] > 120 && d[i] > 1.7 * d[i + 2]) n++; return n; };
-        canvas.parentElement.dispatchEvent(new Event('x')); done(look());
-    })))"""
-    robot.press("ArrowLeft")
-    assert robot.evaluate(painted) >= 0
+    page.wait_for_timeout(300)
+    assert orange(page.context.browser, robot.screenshot()) > 500, "the two bodies are painted"
     page.get_by_role("link", name="Open the pair").click()
     page.get_by_role("heading", name="world/post0").wait_for()
 
@@ -175,6 +198,22 @@ def test_without_a_stream_the_page_asks_again(page: Any, url: str, database: Dat
     page.locator(".pairs .cell.certified").wait_for()
     finish(database, job_id)
     page.locator(".badge.succeeded").wait_for()
+
+
+def test_a_pair_is_followed_through_the_iterations(browser: Any, url: str, database: Database, scene: Scene) -> None:
+    job_id = large_job(database, scene, 12, 16)
+    page = browser.new_page()
+    page.goto(f"{url}/jobs/{job_id}#pair=1&iteration=9")
+    strip = page.get_by_role("navigation", name="Iterations of the pair").get_by_role("link")
+    strip.first.wait_for()
+    assert strip.all_text_contents()[:4] == [
+        "12 \N{MIDDLE DOT}iteration 12: open",
+        "11 ?iteration 11: inconclusive",
+        "10 \N{ALMOST EQUAL TO}iteration 10: too close",
+        "9 \N{CHECK MARK}iteration 9: certified",
+    ]
+    page.get_by_text("Certified in iteration 9; by sos; 0.1 s; margin at least 1 mm.").wait_for()
+    page.close()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -191,41 +230,46 @@ def test_no_barriers_and_no_sideways_scrolling(browser: Any, url: str, job_id: s
     context.close()
 
 
-def test_a_large_job_does_not_lag(page: Any, url: str, database: Database, record_property: Any) -> None:
-    """2000 pairs in 50 iterations, 10^5 results, and a pair with 65 536 cells. Asserted is twice what is aimed at: others may work."""
+def test_a_large_job_does_not_lag(page: Any, url: str, database: Database) -> None:
+    """2000 pairs in 50 iterations, 10^5 results, and a pair with 10^5 cells. The longest frames and tasks are printed, tasks asserted."""
     scene = slider("large", posts=2000)
-    job_id = large_job(database, scene, 50, 16)
-    page.goto(f"{url}/scenes/{new_scene(url, page, job_id)}")
-    page.goto("about:blank")
+    with database.write() as session:
+        scenes.add(session, scene)
+    job_id = large_job(database, scene, 50, 100_000)
+    page.add_init_script(WATCH)
     begun = time.perf_counter()
     page.goto(f"{url}/jobs/{job_id}")
     page.locator(".pairs .cell").first.wait_for()
-    first = time.perf_counter() - begun
-    page.wait_for_timeout(1000)
+    figures = {"first view": {"seconds": round(time.perf_counter() - begun, 2), **page.evaluate("watched()")}}
+    page.wait_for_timeout(1500)
     assert page.locator(".pairs [role=gridcell]").count() < 2500, "only what is seen is in the page"
-    page.evaluate(FRAMES)
-    for step in range(40):
-        page.evaluate("y => document.getElementById('matrix').scrollTo(y % 7 * 40, y * 1400)", step)
+    page.evaluate("watched()")
+    for step in range(60):
+        page.evaluate("y => document.getElementById('matrix').scrollTo(y % 7 * 40, y * 90)", step)
         page.wait_for_timeout(20)
-    scrolling = page.evaluate("longest")
+    for step in range(20):
+        page.evaluate("y => document.getElementById('matrix').scrollTo(0, y * 2700)", step)
+        page.wait_for_timeout(20)
+    figures["scrolling"] = page.evaluate("watched()")
     asked: list[str] = []
     page.on("response", lambda response: asked.append(response.url) if "/v1/" in response.url else None)
-    page.evaluate("document.getElementById('matrix').scrollTo(0, 0); window.longest = 0")
-    settle(database, job_id, certified(), batch=0)
+    page.evaluate("document.getElementById('matrix').scrollTo(0, 0)")
+    for settled in range(2, 7):
+        settle(database, job_id, certified(), batch=0)
+        page.get_by_text(f"{settled} of 2000 pairs settled").wait_for()
     page.locator(".pairs .cell.certified").first.wait_for()
-    page.get_by_text("2 of 2000 pairs settled").wait_for()
-    updating = page.evaluate("longest")
+    figures["receiving five events"] = page.evaluate("watched()")
     assert not [url for url in asked if url.endswith("/pairs") or re.search(r"iteration=\d+$", url)], "only what has changed is asked for"
-    page.evaluate("window.longest = 0; location.hash = '#pair=0'")
+    page.get_by_label("Sort by").select_option("outcome")
+    page.get_by_label("Name").fill("post19")
+    page.get_by_text("111 of 2,000 pairs").wait_for()
+    figures["sorting and searching"] = page.evaluate("watched()")
+    page.evaluate("location.hash = '#pair=0'")
     page.locator(".treemap canvas").wait_for()
     page.locator(".cells tbody button").first.click()
     page.locator(".treemap .mark").wait_for()
-    opening = page.evaluate("longest")
-    figures = {"first view s": first, "scrolling ms": scrolling, "updating ms": updating, "opening 65536 cells ms": opening}
-    print({name: round(value, 3) for name, value in figures.items()})
-    assert first < 2
-    assert max(scrolling, updating) < 200
-
-
-def new_scene(url: str, page: Any, job_id: str) -> str:
-    return str(page.request.get(f"{url}/v1/jobs/{job_id}").json()["scene"])
+    page.wait_for_timeout(300)
+    figures["opening 100000 cells"] = page.evaluate("watched()")
+    print(json.dumps(figures, indent=1))
+    assert figures["first view"]["seconds"] < 3
+    assert all(figure["task_ms"] < 200 for figure in figures.values())

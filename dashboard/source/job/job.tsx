@@ -1,6 +1,6 @@
 // The page of a job, below its head: the matrix of pairs or one of them, what holds the region back, how it grew, and who works on it.
 import { useEffect, useMemo, useReducer, useState } from "preact/hooks";
-import { get } from "../shared/api";
+import { get, said } from "../shared/api";
 import type { SceneModel } from "../shared/kinematics";
 import { Growth } from "./growth";
 import { Log } from "./log";
@@ -8,12 +8,12 @@ import { Matrix } from "./matrix";
 import { Obstacles } from "./obstacles";
 import { Pair } from "./pair";
 import { useRoute } from "./route";
-import { JobStore } from "./store";
+import { JobStore, type Drawable } from "./store";
 import { Workers } from "./workers";
 
 export function JobIsland({ job, scene, ended, begun, pairs }: { job: string; scene: string; ended: boolean; begun: number; pairs: boolean }) {
   const [version, changed] = useReducer((count: number) => count + 1, 0);
-  const [model, setModel] = useState<SceneModel | null>(null);
+  const [robot, setRobot] = useState<Drawable>({ model: null, problem: null });
   const store = useMemo(() => new JobStore(job, ended, begun, () => changed(undefined)), [job]);
   const route = useRoute();
   useEffect(() => {
@@ -23,17 +23,17 @@ export function JobIsland({ job, scene, ended, begun, pairs }: { job: string; sc
   const needed = route.pair !== null || store.obstacles?.some(({ q }) => q !== null);
   useEffect(() => {
     // Without the model joints have numbers instead of names, and the robot is not drawn; what there is to read is there.
-    if (needed && !model) get<SceneModel>(`/v1/scenes/${scene}/model`).then(setModel, () => {});
+    if (needed && !robot.model) get<SceneModel>(`/v1/scenes/${scene}/model`).then((model) => setRobot({ model, problem: null }), (reason: unknown) => setRobot({ model: null, problem: said(reason) }));
   }, [needed, scene]);
   if (!store.loaded) return <p class="empty">{store.problem ?? "Loading the pairs …"}</p>;
   return (
     <>
       {store.problem && <p class="notice bad" role="alert">{store.problem}</p>}
-      {route.pair !== null ? <Pair store={store} version={version} model={model} route={{ ...route, pair: route.pair }} /> : (
+      {route.pair !== null ? <Pair store={store} version={version} robot={robot} route={{ ...route, pair: route.pair }} /> : (
         <>
           {pairs && store.iterations.length > 0 && <Matrix store={store} version={version} />}
           <Growth points={store.growth} />
-          <Obstacles obstacles={store.obstacles} model={model} />
+          <Obstacles obstacles={store.obstacles} robot={robot} />
           {!store.ended && <Workers store={store} />}
           <Log store={store} />
         </>

@@ -10,6 +10,13 @@ const STEPS: Record<string, string> = {
   accept: "Putting the region's proof together and verifying it",
   scout: "Looking at what is covered",
 };
+const STEP: Record<string, string> = { open: "waits for a worker", running: "begun" };
+const ITERATION: Record<string, string> = {
+  certified: "is certified", failed: "ends with pairs that are not certified", skipped: "was left, because the job has ended",
+};
+const IS: Record<string, string> = {
+  queued: "waits for a worker", running: "is running", cancelling: "is being cancelled", cancelled: "was cancelled", succeeded: "has succeeded", failed: "has failed",
+};
 const KINDS: Record<string, string> = { job: "the job", iteration: "iterations", pairs: "pairs", step: "steps", region: "regions", lost: "lost work", cover: "the cover", child: "regions of the cover" };
 
 function counted(pairs: { state: string }[]): string {
@@ -23,18 +30,18 @@ export function sentence({ kind, data }: JobEvent): string {
   const text = (name: string): string => String(data[name] ?? "");
   switch (kind) {
     case "job":
-      return `The job is ${text("state")}${data.outcome ? ` with the outcome ${text("outcome").replaceAll("_", " ")}` : ""}${data.reason ? `: ${text("reason")}` : ""}.`;
+      return `The job ${IS[text("state")] ?? text("state")}${data.outcome ? ` with the outcome ${text("outcome").replaceAll("_", " ")}` : ""}${data.reason ? `: ${text("reason")}` : ""}.`;
     case "iteration":
       return data.state === "running"
         ? `Iteration ${data.index} (${text("label")}) begins with ${plural(Number(data.pairs ?? 0), "pair")}${data.reused ? `; ${data.reused} more keep their proofs` : ""}.`
-        : `Iteration ${data.index} (${text("label")}) is ${text("state").replaceAll("_", " ")}.`;
+        : `Iteration ${data.index} (${text("label")}) ${ITERATION[text("state")] ?? text("state")}.`;
     case "pairs": {
       const pairs = (data.pairs ?? []) as { state: string; seconds: number | null }[];
       const spent = pairs.reduce((sum, { seconds }) => sum + (seconds ?? 0), 0);
       return `${plural(pairs.length, "result")} in iteration ${data.iteration}: ${counted(pairs)}, after ${duration(spent)} of work.`;
     }
     case "step":
-      return `${STEPS[text("kind")] ?? text("kind").replaceAll("_", " ")}: ${text("state")}${data.seconds != null ? ` after ${duration(Number(data.seconds))}` : ""}.`;
+      return `${STEPS[text("kind")] ?? text("kind").replaceAll("_", " ")}: ${STEP[text("state")] ?? text("state")}${data.seconds != null ? ` after ${duration(Number(data.seconds))}` : ""}.`;
     case "region": {
       const share = (data.share as { value: number | null } | null)?.value;
       return `A region is certified in iteration ${data.iteration} (${text("guarantee")})${share != null ? `; it keeps ${(100 * share).toPrecision(3)} % of the proposal, as samples say` : ""}.`;
@@ -64,7 +71,7 @@ export function Log({ store }: { store: JobStore }) {
       {known.length === 0 && <p class="empty">Nothing of this kind yet.</p>}
       <ol class="scroll log" tabIndex={0} aria-label="Events, the newest first" reversed>
         {known.slice(0, 400).map((event) => (
-          <li key={event.seq} class={event.kind}><time dateTime={event.created_at} title={event.created_at}>{new Date(event.created_at).toLocaleTimeString()}</time><span>{sentence(event)}</span></li>
+          <li key={event.seq} data-kind={event.kind}><time dateTime={event.created_at} title={event.created_at}>{new Date(event.created_at).toLocaleTimeString()}</time><span>{sentence(event)}</span></li>
         ))}
       </ol>
       {earlier && <button type="button" onClick={() => void store.earlier()}>Show earlier events</button>}

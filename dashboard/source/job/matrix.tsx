@@ -1,14 +1,18 @@
 // The pair matrix: a row for each pair, a column for each iteration, the newest first. Only what is to be seen is in the page, however
 // many pairs there are; the grid tells assistive technology how many rows and columns it has.
+import { Component } from "preact";
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import { address, go } from "./route";
 import { CERTIFIED, OUTCOMES, badness, facts, plural } from "./outcomes";
-import type { JobStore, PairName } from "./store";
+import type { Iteration, JobStore, PairName } from "./store";
 
-const ROW = 30;
-const HEAD = 30;
-const COLUMN = 36;
+const HEAD = 32;
 const SPARE = 6;
+/** Pixels. Narrow screens have the two names of a pair one below the other. */
+const NARROW = 560;
+const ROW = { narrow: 44, wide: 30 };
+const COLUMN = { least: 36, most: 72 };
+const NAME = { narrow: 190, least: 260, most: 470 };
 
 type Order = "scene" | "outcome" | "time" | "open";
 
@@ -39,18 +43,15 @@ export function Matrix({ store, version }: { store: JobStore; version: number })
         <label>Name <input type="search" value={search} placeholder="part of a name" onInput={(event) => setSearch(event.currentTarget.value)} /></label>
         <span class="quiet" role="status">{rows.length === store.pairs.length ? plural(rows.length, "pair") : `${rows.length} of ${plural(store.pairs.length, "pair")}`}</span>
       </div>
-      <Legend />
-      {rows.length > 0 ? <Grid store={store} rows={rows} /> : <p class="empty">No pair is like this in the last iteration.</p>}
+      <Legend iterations={store.iterations} />
+      {rows.length > 0 ? <Grid store={store} version={version} rows={rows} /> : <p class="empty">No pair is like this in the last iteration.</p>}
     </section>
   );
 }
 
-function Legend() {
-  return (
-    <p class="legend">
-      {Object.values(OUTCOMES).filter(({ glyph }) => glyph).map(({ name, glyph, words }) => <span class={`key ${name}`} key={name}>{glyph} {words}</span>)}
-    </p>
-  );
+function Legend({ iterations }: { iterations: Iteration[] }) {
+  const there = Object.entries(OUTCOMES).filter(([letter, { glyph }]) => glyph && iterations.some(({ states }) => states.includes(letter)));
+  return <p class="legend">{there.map(([, { name, glyph, words }]) => <span class={`key ${name}`} key={name}>{glyph} {words}</span>)}</p>;
 }
 
 /** The pairs that are to be seen, in order. Outcomes, times and open cells are those of the last iteration. */
@@ -76,14 +77,17 @@ interface Place {
   column: number;
 }
 
-function Grid({ store, rows }: { store: JobStore; rows: PairName[] }) {
+function Grid({ store, version, rows }: { store: JobStore; version: number; rows: PairName[] }) {
   const box = useRef<HTMLDivElement>(null);
   const [seen, setSeen] = useState({ top: 0, left: 0, width: 800, height: 500 });
   const [active, setActive] = useState<Place>({ row: 0, column: 0 });
   const [shown, setShown] = useState<Place | null>(null);
-  const columns = [...store.iterations].reverse();
-  const named = Math.round(Math.min(420, Math.max(170, 0.42 * seen.width)));
-  const width = Math.max(seen.width, named + columns.length * COLUMN);
+  const columns = useMemo(() => [...store.iterations].reverse(), [store.iterations]);
+  const narrow = seen.width < NARROW, high = narrow ? ROW.narrow : ROW.wide;
+  const least = narrow ? NAME.narrow : Math.min(NAME.most, Math.max(NAME.least, 0.4 * seen.width));
+  const wide = Math.floor(Math.min(COLUMN.most, Math.max(COLUMN.least, (seen.width - least) / Math.max(columns.length, 1))));
+  const named = Math.max(Math.round(least), seen.width - columns.length * wide);
+  const width = named + columns.length * wide;
 
   useLayoutEffect(() => {
     const element = box.current!;
@@ -111,13 +115,13 @@ function Grid({ store, rows }: { store: JobStore; rows: PairName[] }) {
     const place = { row: Math.min(Math.max(row, 0), rows.length - 1), column: Math.min(Math.max(column, 0), Math.max(columns.length - 1, 0)) };
     setActive(place);
     setShown(place);
-    const element = box.current!, y = place.row * ROW, x = place.column * COLUMN;
+    const element = box.current!, y = place.row * high, x = place.column * wide;
     if (y < element.scrollTop) element.scrollTop = y;
-    else if (y + ROW > element.scrollTop + element.clientHeight - HEAD) element.scrollTop = y + ROW + HEAD - element.clientHeight;
+    else if (y + high > element.scrollTop + element.clientHeight - HEAD) element.scrollTop = y + high + HEAD - element.clientHeight;
     if (x < element.scrollLeft) element.scrollLeft = x;
-    else if (x + COLUMN > element.scrollLeft + element.clientWidth - named) element.scrollLeft = x + COLUMN + named - element.clientWidth;
+    else if (x + wide > element.scrollLeft + element.clientWidth - named) element.scrollLeft = x + wide + named - element.clientWidth;
   };
-  const page = Math.max(1, Math.floor((seen.height - HEAD) / ROW) - 1);
+  const page = Math.max(1, Math.floor((seen.height - HEAD) / high) - 1);
   const onKeyDown = (event: KeyboardEvent): void => {
     if (event.ctrlKey && event.key !== "Home" && event.key !== "End") return;
     const { row, column } = active;
@@ -141,50 +145,40 @@ function Grid({ store, rows }: { store: JobStore; rows: PairName[] }) {
     return cell && { row: Number(cell.dataset.row), column: Number(cell.dataset.column) };
   };
 
-  const first = Math.max(0, Math.floor(seen.top / ROW) - SPARE);
-  const after = Math.min(rows.length, Math.ceil((seen.top + seen.height) / ROW) + SPARE);
-  const from = Math.max(0, Math.floor(seen.left / COLUMN) - SPARE);
-  const to = Math.min(columns.length, Math.ceil((seen.left + seen.width - named) / COLUMN) + SPARE);
-  const inView = columns.slice(from, to);
-  const isActive = (row: number, column: number): boolean => row === active.row && column === active.column;
+  const first = Math.max(0, Math.floor(seen.top / high) - SPARE);
+  const after = Math.min(rows.length, Math.ceil((seen.top + seen.height) / high) + SPARE);
+  const from = Math.max(0, Math.floor(seen.left / wide) - SPARE);
+  const to = Math.min(columns.length, Math.ceil((seen.left + seen.width - named) / wide) + SPARE);
+  const inView = active.row >= first && active.row < after && active.column >= from && active.column < to;
+  const tip = shown && {
+    top: `${HEAD + (shown.row + 1) * high - seen.top + 4}px`,
+    left: `${Math.max(0, Math.min(named + shown.column * wide - seen.left, seen.width - 300))}px`,
+  };
   return (
     <div class="matrix-box">
-      <div class="scroll pairs" ref={box} id="matrix" role="grid" tabIndex={0} aria-label="Pair matrix" aria-rowcount={rows.length + 1} aria-colcount={columns.length + 1}
-        aria-activedescendant={active.row >= first && active.row < after && active.column >= from && active.column < to ? `cell-${active.row}-${active.column}` : undefined}
+      <div class={`scroll pairs ${narrow ? "narrow" : ""}`} ref={box} id="matrix" role="grid" tabIndex={0} aria-label="Pair matrix" aria-rowcount={rows.length + 1} aria-colcount={columns.length + 1}
+        aria-activedescendant={inView ? `cell-${active.row}-${active.column}` : undefined}
         aria-describedby="matrix-help" onKeyDown={onKeyDown} onFocus={() => setShown(active)} onBlur={() => setShown(null)}
         onMouseOver={(event) => { const found = place(event); if (found) setShown(found); }} onMouseLeave={() => setShown(null)}
         onClick={(event) => { const found = place(event); if (found) { setActive(found); open(found); } }}
-        style={{ height: `min(70vh, ${rows.length * ROW + HEAD + 18}px)` }}>
+        style={{ height: `min(70vh, ${rows.length * high + HEAD + 2 + (width > seen.width ? 16 : 0)}px)` }}>
         <div role="row" class="head" aria-rowindex={1} style={{ width: `${width}px`, height: `${HEAD}px` }}>
-          <div role="columnheader" class="name" style={{ width: `${named}px` }}>Pair</div>
-          {inView.map((one, i) => (
+          <div role="columnheader" class="name" style={{ width: `${named}px` }}><span>Pair</span><span aria-hidden="true">iteration</span></div>
+          {columns.slice(from, to).map((one, i) => (
             <div role="columnheader" class="cell" key={one.index} aria-colindex={from + i + 2} title={`${one.label}, ${one.faces} faces, ${one.state}`}
-              style={{ left: `${named + (from + i) * COLUMN}px` }}><span class="sr">iteration </span>{one.index}</div>
+              style={{ left: `${named + (from + i) * wide}px`, width: `${wide}px` }}><span class="sr">iteration </span>{one.index}</div>
           ))}
         </div>
-        <div role="rowgroup" class="rows" style={{ width: `${width}px`, height: `${rows.length * ROW}px` }}>
+        <div role="rowgroup" class="rows" style={{ width: `${width}px`, height: `${rows.length * high}px` }}>
           {rows.slice(first, after).map((pair, i) => {
             const row = first + i;
-            return (
-              <div role="row" class="row" key={pair.index} aria-rowindex={row + 2} style={{ top: `${row * ROW}px`, width: `${width}px` }}>
-                <div role="rowheader" class="name" style={{ width: `${named}px` }}>
-                  <a href={address({ pair: pair.index })} tabIndex={-1} title={`${pair.a} – ${pair.b}`}>{short(pair.a)} <span class="quiet">–</span> {short(pair.b)}</a>
-                </div>
-                {inView.map((one, j) => {
-                  const letter = one.states[pair.index] ?? "-", column = from + j;
-                  return (
-                    <div role="gridcell" class={`cell ${OUTCOMES[letter]!.name}${isActive(row, column) ? " active" : ""}`} key={one.index} id={`cell-${row}-${column}`}
-                      aria-colindex={column + 2} data-row={row} data-column={column} aria-label={isActive(row, column) ? facts(letter, one, store.cell(one.index, pair.index)).join("; ") : OUTCOMES[letter]!.words}
-                      style={{ left: `${named + column * COLUMN}px` }}>{OUTCOMES[letter]!.glyph}</div>
-                  );
-                })}
-              </div>
-            );
+            return <Row key={pair.index} pair={pair} row={row} top={row * high} columns={columns} from={from} to={to} named={named} wide={wide} narrow={narrow}
+              active={row === active.row ? active.column : -1} store={store} version={version} />;
           })}
         </div>
       </div>
-      {shown && shownAt && (
-        <div role="tooltip" class="tip" style={{ top: `${HEAD + (shown.row + 1) * ROW - seen.top + 4}px`, left: `${Math.max(0, Math.min(named + shown.column * COLUMN - seen.left, seen.width - 300))}px` }}>
+      {tip && shownAt && (
+        <div role="tooltip" class="tip" style={tip}>
           <strong>{shownAt.pair.a} – {shownAt.pair.b}</strong>
           {facts(shownAt.iteration.states[shownAt.pair.index] ?? "-", shownAt.iteration, store.cell(shownAt.iteration.index, shownAt.pair.index)).map((fact) => <div key={fact}>{fact}</div>)}
         </div>
@@ -192,4 +186,46 @@ function Grid({ store, rows }: { store: JobStore; rows: PairName[] }) {
       <p class="small" id="matrix-help">The newest iteration is on the left. Arrow keys move, Enter opens the pair.</p>
     </div>
   );
+}
+
+interface RowProps {
+  pair: PairName;
+  row: number;
+  top: number;
+  columns: Iteration[];
+  /** The columns that are drawn: from this one to before that one. */
+  from: number;
+  to: number;
+  named: number;
+  wide: number;
+  narrow: boolean;
+  /** The column that has the focus; -1 where the focus is in another row. */
+  active: number;
+  store: JobStore;
+  version: number;
+}
+
+/** A row is drawn again only when something of it has changed, and not at each step of scrolling. */
+class Row extends Component<RowProps> {
+  override shouldComponentUpdate(next: RowProps): boolean {
+    return (Object.keys(next) as (keyof RowProps)[]).some((name) => next[name] !== this.props[name]);
+  }
+
+  override render({ pair, row, top, columns, from, to, named, wide, narrow, active, store }: RowProps) {
+    return (
+      <div role="row" class="row" aria-rowindex={row + 2} style={{ top: `${top}px`, width: `${named + columns.length * wide}px` }}>
+        <div role="rowheader" class="name" style={{ width: `${named}px` }}>
+          <a href={address({ pair: pair.index })} tabIndex={-1} title={`${pair.a} – ${pair.b}`}>{short(pair.a)}{narrow ? <br /> : <span class="quiet"> – </span>}{short(pair.b)}</a>
+        </div>
+        {columns.slice(from, to).map((one, i) => {
+          const letter = one.states[pair.index] ?? "-", column = from + i, { name, glyph, words } = OUTCOMES[letter]!;
+          return (
+            <div role="gridcell" class={`cell ${name}${column === active ? " active" : ""}`} key={one.index} id={`cell-${row}-${column}`} aria-colindex={column + 2}
+              data-row={row} data-column={column} aria-label={column === active ? facts(letter, one, store.cell(one.index, pair.index)).join("; ") : words}
+              style={{ left: `${named + column * wide}px`, width: `${wide}px` }}>{glyph}</div>
+          );
+        })}
+      </div>
+    );
+  }
 }

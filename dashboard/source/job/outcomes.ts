@@ -42,11 +42,13 @@ export function duration(seconds: number): string {
   return `${Math.floor(seconds / 3600)} h ${Math.floor((seconds % 3600) / 60)} min`;
 }
 
-/** A certified lower bound in millimetres, rounded down: what is said is never more than what is proved. */
+/** A certified lower bound in millimetres, to three digits and rounded down: what is said is never more than what is proved. */
 export function atLeast(metres: number): string {
-  const mm = 1000 * metres;
-  const digits = mm >= 100 ? 0 : mm >= 1 ? 1 : 4;
-  return `${(Math.floor(mm * 10 ** digits) / 10 ** digits).toFixed(digits)} mm`;
+  const [whole, parts] = metres.toFixed(100).split(".") as [string, string]; // All decimals that it has, so that nothing is rounded.
+  const mm = `${whole}${parts.slice(0, 3)}.${parts.slice(3)}`.replace(/^0+(?=\d)/, "");
+  const first = mm.search(/[1-9]/), point = mm.indexOf(".");
+  if (first < 0) return "0 mm";
+  return `${Number(mm.slice(0, Math.max(point, first + (first < point ? 4 : 3))))} mm`;
 }
 
 /** Says of a cell of the matrix all that is known: outcome, how, how long, with what margin, and where it fails. */

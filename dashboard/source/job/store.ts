@@ -1,6 +1,7 @@
 // What the page knows of the job. At first it asks for one letter per pair and iteration and for the last iteration's results; after that
 // it follows the events, and asks only for the pairs that they name.
 import { refresh, connected } from "../live";
+import type { SceneModel } from "../shared/kinematics";
 import { follow, get, said, type JobEvent } from "../shared/api";
 
 export interface PairName {
@@ -52,6 +53,12 @@ export interface Obstacle {
   b: string | null;
   text: string;
   q: number[] | null;
+}
+
+/** The robot as it is drawn, once it is there, or why it is not. */
+export interface Drawable {
+  model: SceneModel | null;
+  problem: string | null;
 }
 
 interface Matrix {

@@ -1,32 +1,5 @@
-// The partition of a pair as the service tells it, and where each of its cells is.
-
-export interface Counts {
-  plane: number;
-  empty: number;
-  open: number;
-}
-
-/** What GET …/pairs/{index}/cells returns. Lower, upper and cuts are in s: q_i = q*_i + 2 atan(s_i) where joint i turns, else q*_i + s_i. */
-export interface Partition {
-  pair: { index: number; a: string; b: string };
-  state: string;
-  certified: boolean;
-  iteration: number | null;
-  kind: "partition" | "program";
-  joints: number[];
-  lower: number[];
-  upper: number[];
-  q_star: number[];
-  revolute: boolean[];
-  nodes: number[];
-  cuts: number[];
-  choices: number[];
-  volumes: [string, string][];
-  counts: Counts;
-  folded: Counts[];
-}
-
-export const PLANE = -1, EMPTY = -2, OPEN = -3, FOLDED = -4;
+// Where each cell of a partition is, how large, and what it is.
+import { EMPTY, FOLDED, OPEN, PLANE, type Counts, type Partition } from "./cells";
 
 export interface Bounds {
   joint: number;

@@ -1,6 +1,7 @@
 // A treemap of cells: each cut divides its rectangle as it divides the cell's volume, across the longer side.
-import { token } from "../colours";
-import { EMPTY, FOLDED, OPEN, type Tree } from "./tree";
+import { EMPTY, FOLDED, OPEN } from "./cells";
+import { token } from "./colours";
+import type { Tree } from "./tree";
 
 export interface Rectangle {
   x: number;

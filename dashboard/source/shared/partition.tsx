@@ -1,12 +1,15 @@
 // The cells of a pair: a treemap to look at, and everything that it shows also as a table.
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { onScheme } from "../colours";
-import { shown } from "../kinematics";
+import type { Partition } from "./cells";
+import { onScheme } from "./colours";
+import { shown } from "./kinematics";
 import { draw, leafAt, rectangleOf, type Rectangle } from "./treemap";
-import { Tree, type Partition } from "./tree";
+import { Tree } from "./tree";
 
 const IN_TABLE = 40;
 const STEP = 3; // cuts that a step of zooming goes down or up
+
+const LEGEND = [["fine", "a plane between the bodies"], ["coarse", "a plane between simple volumes about them"], ["empty", "misses the polytope"], ["open", "open"]] as const;
 
 interface Props {
   partition: Partition;
@@ -49,28 +52,31 @@ export function Cells({ partition, joints, root: asked, cell: chosen, onZoom, on
         <button type="button" onClick={() => onZoom(0)} disabled={root === 0}>Whole partition</button>
         <span class="quiet" role="status">{root === 0 ? "The whole partition" : `A part ${tree.depth[root]} cuts deep, ${percent(tree.volume[root]!)} of the volume`}</span>
       </div>
-      <Treemap tree={tree} root={root} cell={cell} onCell={onCell} onIn={zoomIn} onOut={zoomOut} />
-      <p class="legend">
-        <span class="swatch fine" /> a plane between the bodies <span class="swatch coarse" /> a plane between simple volumes about them
-        <span class="swatch empty" /> misses the polytope <span class="swatch open" /> open
-        {partition.folded.length > 0 && <><span class="swatch folded" /> divided further, not shown</>}
-      </p>
-      <p class="small">A rectangle is as large as its cell's volume in joint space, over the joints that are cut; its place says nothing. Cells too small to see are drawn together, as open if one is.</p>
-      {cell === null ? <p class="empty">Choose a cell in the drawing or in the table to see its bounds.</p> : <Cell tree={tree} cell={cell} joints={joints} />}
-      <h3>The largest cells{root === 0 ? "" : " of this part"}</h3>
-      <div class="scroll tall" tabIndex={0} role="region" aria-label="The largest cells">
-        <table>
-          <thead><tr><th>Cell</th><th class="number">Volume</th><th class="number">Depth</th><th>What it is</th></tr></thead>
-          <tbody>
-            {largest.map((node) => (
-              <tr key={node} class={node === cell ? "chosen" : ""}>
-                <td><button type="button" class="link" onClick={() => onCell(node)} aria-pressed={node === cell}>cell {node}</button></td>
-                <td class="number">{percent(tree.volume[node]!)}</td><td class="number">{tree.depth[node]}</td><td>{tree.said(node)}</td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
+      <div class="halves">
+        <div>
+          <Treemap tree={tree} root={root} cell={cell} onCell={onCell} onIn={zoomIn} onOut={zoomOut} />
+          <p class="legend">
+            {LEGEND.map(([name, words]) => <span key={name}><span class={`swatch is-${name}`} />{words}</span>)}
+            {partition.folded.length > 0 && <span><span class="swatch is-folded" />divided further, not shown</span>}
+          </p>
+        </div>
+        <div class="scroll largest" tabIndex={0} role="region" aria-label="The largest cells">
+          <table>
+            <caption>The largest cells{root === 0 ? "" : " of this part"}</caption>
+            <thead><tr><th>Cell</th><th class="number">Volume</th><th class="number">Depth</th><th>What it is</th></tr></thead>
+            <tbody>
+              {largest.map((node) => (
+                <tr key={node} class={node === cell ? "chosen" : ""}>
+                  <td><button type="button" class="plain" onClick={() => onCell(node)} aria-pressed={node === cell}>cell {node}</button></td>
+                  <td class="number">{percent(tree.volume[node]!)}</td><td class="number">{tree.depth[node]}</td><td>{tree.said(node)}</td>
+                </tr>
+              ))}
+            </tbody>
+          </table>
+        </div>
       </div>
+      {cell === null ? <p class="empty">Choose a cell in the drawing or in the table to see its bounds.</p> : <Cell tree={tree} cell={cell} joints={joints} />}
+      <p class="small">A rectangle is as large as its cell's volume in joint space, over the joints that are cut; its place says nothing. Cells too small to see are drawn together, as open if one is.</p>
     </div>
   );
 }
