@@ -124,6 +124,7 @@ def test_pairs_are_filtered_and_sorted(page: Any, url: str, database: Database, 
 
 def test_a_pair_and_a_cell_are_opened_by_keyboard_and_left_again(page: Any, url: str, job_id: str) -> None:
     page.goto(f"{url}/jobs/{job_id}")
+    page.get_by_label("Show pairs").select_option("t")
     page.get_by_role("grid").focus()
     page.keyboard.press("Enter")
     heading = page.get_by_role("heading", name="model/cart/ball \N{EN DASH} world/post0")
@@ -152,6 +153,9 @@ def test_a_pair_and_a_cell_are_opened_by_keyboard_and_left_again(page: Any, url:
     page.get_by_text("Choose a cell").wait_for()
     page.go_back()
     page.get_by_role("grid").wait_for()
+    assert page.get_by_label("Show pairs").input_value() == "t", "the reader comes back to what he has left"
+    assert page.evaluate("document.activeElement.id") == "matrix"
+    page.get_by_role("tooltip").wait_for()
 
 
 def test_a_pair_without_cells_and_a_pair_that_is_none_say_so(browser: Any, url: str, job_id: str) -> None:
@@ -213,6 +217,16 @@ def test_a_pair_is_followed_through_the_iterations(browser: Any, url: str, datab
         "9 \N{CHECK MARK}iteration 9: certified",
     ]
     page.get_by_text("Certified in iteration 9; by sos; 0.1 s; margin at least 1 mm.").wait_for()
+    page.close()
+
+
+def test_a_service_that_does_not_answer_is_asked_again(browser: Any, url: str, job_id: str) -> None:
+    page = browser.new_page()
+    page.route("**/pairs/states*", lambda route: route.abort())
+    page.goto(f"{url}/jobs/{job_id}")
+    page.get_by_text("The service does not answer. It is asked again every few seconds.").wait_for()
+    page.unroute("**/pairs/states*")
+    page.locator(".pairs .cell.too_close").wait_for()
     page.close()
 
 

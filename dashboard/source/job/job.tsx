@@ -4,7 +4,7 @@ import { get, said } from "../shared/api";
 import type { SceneModel } from "../shared/kinematics";
 import { Growth } from "./growth";
 import { Log } from "./log";
-import { Matrix } from "./matrix";
+import { Matrix, Memory } from "./matrix";
 import { Obstacles } from "./obstacles";
 import { Pair } from "./pair";
 import { useRoute } from "./route";
@@ -15,6 +15,7 @@ export function JobIsland({ job, scene, ended, begun, pairs }: { job: string; sc
   const [version, changed] = useReducer((count: number) => count + 1, 0);
   const [robot, setRobot] = useState<Drawable>({ model: null, problem: null });
   const store = useMemo(() => new JobStore(job, ended, begun, () => changed(undefined)), [job]);
+  const memory = useMemo(() => new Memory(), []);
   const route = useRoute();
   useEffect(() => {
     void store.start();
@@ -25,13 +26,13 @@ export function JobIsland({ job, scene, ended, begun, pairs }: { job: string; sc
     // Without the model joints have numbers instead of names, and the robot is not drawn; what there is to read is there.
     if (needed && !robot.model) get<SceneModel>(`/v1/scenes/${scene}/model`).then((model) => setRobot({ model, problem: null }), (reason: unknown) => setRobot({ model: null, problem: said(reason) }));
   }, [needed, scene]);
-  if (!store.loaded) return <p class="empty">{store.problem ?? "Loading the pairs …"}</p>;
+  if (!store.loaded) return store.problem ? <p class="notice bad" role="alert">{store.problem} It is asked again every few seconds.</p> : <p class="empty">Loading the pairs …</p>;
   return (
     <>
       {store.problem && <p class="notice bad" role="alert">{store.problem}</p>}
       {route.pair !== null ? <Pair store={store} version={version} robot={robot} route={{ ...route, pair: route.pair }} /> : (
         <>
-          {pairs && store.iterations.length > 0 && <Matrix store={store} version={version} />}
+          {pairs && store.iterations.length > 0 && <Matrix store={store} version={version} memory={memory} />}
           <Growth points={store.growth} />
           <Obstacles obstacles={store.obstacles} robot={robot} />
           {!store.ended && <Workers store={store} />}

@@ -16,14 +16,32 @@ const NAME = { narrow: 190, least: 260, most: 470 };
 
 type Order = "scene" | "outcome" | "time" | "open";
 
+interface Place {
+  row: number;
+  column: number;
+}
+
+/** What the reader has chosen and where he was, kept while a pair is open instead of the matrix. */
+export class Memory {
+  outcome = "";
+  order: Order = "scene";
+  search = "";
+  active: Place = { row: 0, column: 0 };
+  top = 0;
+  left = 0;
+  /** Whether a pair was opened from the matrix, which then gets the focus again. */
+  opened = false;
+}
+
 function short(name: string): string {
   return name.split("/").slice(1).join("/") || name;
 }
 
-export function Matrix({ store, version }: { store: JobStore; version: number }) {
-  const [outcome, setOutcome] = useState("");
-  const [order, setOrder] = useState<Order>("scene");
-  const [search, setSearch] = useState("");
+export function Matrix({ store, version, memory }: { store: JobStore; version: number; memory: Memory }) {
+  const [outcome, setOutcome] = useState(memory.outcome);
+  const [order, setOrder] = useState(memory.order);
+  const [search, setSearch] = useState(memory.search);
+  Object.assign(memory, { outcome, order, search });
   const rows = useMemo(() => chosen(store, outcome, order, search), [version, outcome, order, search]);
   return (
     <section aria-labelledby="h-pairs">
@@ -44,7 +62,7 @@ export function Matrix({ store, version }: { store: JobStore; version: number })
         <span class="quiet" role="status">{rows.length === store.pairs.length ? plural(rows.length, "pair") : `${rows.length} of ${plural(store.pairs.length, "pair")}`}</span>
       </div>
       <Legend iterations={store.iterations} />
-      {rows.length > 0 ? <Grid store={store} version={version} rows={rows} /> : <p class="empty">No pair is like this in the last iteration.</p>}
+      {rows.length > 0 ? <Grid store={store} version={version} rows={rows} memory={memory} /> : <p class="empty">No pair is like this in the last iteration.</p>}
     </section>
   );
 }
@@ -72,17 +90,15 @@ function chosen(store: JobStore, outcome: string, order: Order, search: string):
   return found.sort((a, b) => values.get(a.index)! - values.get(b.index)! || a.index - b.index);
 }
 
-interface Place {
-  row: number;
-  column: number;
-}
-
-function Grid({ store, version, rows }: { store: JobStore; version: number; rows: PairName[] }) {
+function Grid({ store, version, rows, memory }: { store: JobStore; version: number; rows: PairName[]; memory: Memory }) {
   const box = useRef<HTMLDivElement>(null);
-  const [seen, setSeen] = useState({ top: 0, left: 0, width: 800, height: 500 });
-  const [active, setActive] = useState<Place>({ row: 0, column: 0 });
+  const [seen, setSeen] = useState({ top: memory.top, left: memory.left, width: 800, height: 500 });
+  const [last, setActive] = useState(memory.active);
   const [shown, setShown] = useState<Place | null>(null);
   const columns = useMemo(() => [...store.iterations].reverse(), [store.iterations]);
+  // There may be fewer rows than there were.
+  const active = { row: Math.min(last.row, rows.length - 1), column: Math.min(last.column, columns.length - 1) };
+  memory.active = active;
   const narrow = seen.width < NARROW, high = narrow ? ROW.narrow : ROW.wide;
   const least = narrow ? NAME.narrow : Math.min(NAME.most, Math.max(NAME.least, 0.4 * seen.width));
   const wide = Math.floor(Math.min(COLUMN.most, Math.max(COLUMN.least, (seen.width - least) / Math.max(columns.length, 1))));
@@ -91,8 +107,14 @@ function Grid({ store, version, rows }: { store: JobStore; version: number; rows
 
   useLayoutEffect(() => {
     const element = box.current!;
-    const look = (): void => setSeen({ top: element.scrollTop, left: element.scrollLeft, width: element.clientWidth, height: element.clientHeight });
+    const look = (): void => {
+      [memory.top, memory.left] = [element.scrollTop, element.scrollLeft];
+      setSeen({ top: memory.top, left: memory.left, width: element.clientWidth, height: element.clientHeight });
+    };
+    element.scrollTo(memory.left, memory.top);
     look();
+    if (memory.opened) element.focus();
+    memory.opened = false;
     const observer = new ResizeObserver(look);
     observer.observe(element);
     element.addEventListener("scroll", look, { passive: true });
@@ -123,6 +145,7 @@ function Grid({ store, version, rows }: { store: JobStore; version: number; rows
   };
   const page = Math.max(1, Math.floor((seen.height - HEAD) / high) - 1);
   const onKeyDown = (event: KeyboardEvent): void => {
+    if (event.altKey || event.metaKey) return;
     if (event.ctrlKey && event.key !== "Home" && event.key !== "End") return;
     const { row, column } = active;
     const moves: Record<string, [number, number]> = {
@@ -138,6 +161,7 @@ function Grid({ store, version, rows }: { store: JobStore; version: number; rows
   };
   const open = (place: Place): void => {
     const found = at(place);
+    memory.opened = found !== null;
     if (found) go({ pair: found.pair.index, iteration: place.column === 0 ? null : found.iteration.index });
   };
   const place = (event: Event): Place | null => {

@@ -68,6 +68,7 @@ interface Matrix {
 
 const SYNC_MS = 500;
 const SLOW_MS = 4000;
+const AGAIN_MS = 5000;
 const EVENTS = 100;
 const MOST_EVENTS = 2000;
 /** So many iterations are asked for before anything is shown; those before them follow. */
@@ -136,6 +137,9 @@ export class JobStore {
       await this.around();
       if (first > 0) this.iterations = [...(await this.states(0)).iterations.filter((one) => one.index < first), ...this.iterations];
     });
+    if (this.loaded) return;
+    const again = setTimeout(() => void this.start(), AGAIN_MS);
+    this.stop = () => clearTimeout(again);
   }
 
   close(): void {

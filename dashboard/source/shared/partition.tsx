@@ -30,11 +30,11 @@ export function Cells({ partition, joints, root: asked, cell: chosen, onZoom, on
   const tree = useMemo(() => new Tree(partition), [partition]);
   const root = asked < tree.size ? asked : 0;
   const cell = chosen !== null && chosen < tree.size ? chosen : null;
-  const largest = useMemo(() => tree.largest(root, IN_TABLE), [tree, root]);
+  const listed = useMemo(() => tree.foremost(root, IN_TABLE), [tree, root]);
   const { counts } = partition;
   const deeper = cell === null ? -1 : tree.path(cell).indexOf(root);
   const zoomIn = (): void => {
-    const path = tree.path(cell ?? largest[0]!), at = path.indexOf(root);
+    const path = tree.path(cell ?? listed[0]!), at = path.indexOf(root);
     onZoom(path[Math.min(at + STEP, path.length - 1)]!);
   };
   const zoomOut = (): void => onZoom(tree.path(root).at(-1 - STEP) ?? 0);
@@ -60,12 +60,12 @@ export function Cells({ partition, joints, root: asked, cell: chosen, onZoom, on
             {partition.folded.length > 0 && <span><span class="swatch is-folded" />divided further, not shown</span>}
           </p>
         </div>
-        <div class="scroll largest" tabIndex={0} role="region" aria-label="The largest cells">
+        <div class="scroll listed" tabIndex={0} role="region" aria-label="Cells">
           <table>
-            <caption>The largest cells{root === 0 ? "" : " of this part"}</caption>
+            <caption>{tree.open[root]! > 0 ? "Open cells, then the largest" : "The largest cells"}{root === 0 ? "" : " of this part"}</caption>
             <thead><tr><th>Cell</th><th class="number">Volume</th><th class="number">Depth</th><th>What it is</th></tr></thead>
             <tbody>
-              {largest.map((node) => (
+              {listed.map((node) => (
                 <tr key={node} class={node === cell ? "chosen" : ""}>
                   <td><button type="button" class="plain" onClick={() => onCell(node)} aria-pressed={node === cell}>cell {node}</button></td>
                   <td class="number">{percent(tree.volume[node]!)}</td><td class="number">{tree.depth[node]}</td><td>{tree.said(node)}</td>
@@ -117,7 +117,7 @@ function Treemap({ tree, root, cell, onCell, onIn, onOut }: { tree: Tree; root: 
   return (
     <div class="treemap">
       <canvas ref={canvas} tabIndex={0} role="img" onKeyDown={onKeyDown}
-        aria-label={`Treemap of ${tree.of.counts.plane + tree.of.counts.empty + tree.of.counts.open} cells. The table below has the largest. Arrow keys go from cell to cell, plus and minus zoom.`}
+        aria-label={`Treemap of ${tree.of.counts.plane + tree.of.counts.empty + tree.of.counts.open} cells. The table has those that are open, and the largest. Arrow keys go from cell to cell, plus and minus zoom.`}
         onClick={(event) => onCell(leafAt(tree, root, view, event.offsetX, event.offsetY))} onDblClick={onIn} />
       {mark && <div class="mark" style={{ left: `${mark.x}px`, top: `${mark.y}px`, width: `${Math.max(mark.width, 4)}px`, height: `${Math.max(mark.height, 4)}px` }} />}
     </div>

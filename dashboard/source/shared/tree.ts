@@ -107,12 +107,17 @@ export class Tree {
     return this.of.joints.map((joint) => ({ joint, lower: this.q(joint, lower[joint]!), upper: this.q(joint, upper[joint]!) }));
   }
 
-  /** The largest cells below a node, at most `most`. */
-  largest(root: number, most: number): number[] {
+  /** At most `most` cells below a node: those that are open before the others, and the largest first. */
+  foremost(root: number, most: number): number[] {
+    const open = this.largest(root, most / 2, (node) => this.open[node]! > 0);
+    return [...open, ...this.largest(root, most - open.length, (node) => this.open[node] === 0)];
+  }
+
+  private largest(root: number, most: number, counts: (node: number) => boolean): number[] {
     const before = (a: number, b: number): number => this.volume[b]! - this.volume[a]! || a - b;
     let found: number[] = [], least = -1;
     for (let node = root; node < this.end[root]!; node++) {
-      if (this.isCut(node) || this.volume[node]! <= least) continue;
+      if (this.isCut(node) || this.volume[node]! <= least || !counts(node)) continue;
       found.push(node);
       // The list is cut now and then: to sort all of a hundred thousand cells takes too long for a frame.
       if (found.length >= 8 * most) {
