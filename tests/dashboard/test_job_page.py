@@ -17,6 +17,7 @@ from db.states import JobState
 from tests.dashboard.job_scenes import begin, certified, large_job, new_job, settle, too_close
 from tests.scenes import slider
 
+DESK = {"viewport": {"width": 1280, "height": 800}}
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True}
 WATCH = """
 let frames = [], tasks = [], last = performance.now();
@@ -230,9 +231,12 @@ def test_a_service_that_does_not_answer_is_asked_again(browser: Any, url: str, j
     page.close()
 
 
+@pytest.mark.parametrize("screen", [PHONE, DESK], ids=["phone", "desk"])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_no_barriers_and_no_sideways_scrolling(browser: Any, url: str, job_id: str, barriers: Any, scheme: str) -> None:
-    context = browser.new_context(**PHONE, color_scheme=scheme, reduced_motion="reduce")
+def test_no_barriers_and_no_sideways_scrolling(
+    browser: Any, url: str, job_id: str, barriers: Any, scheme: str, screen: dict[str, Any]
+) -> None:
+    context = browser.new_context(**screen, color_scheme=scheme, reduced_motion="reduce")
     page = context.new_page()
     for fragment, there in (("", ".pairs .row"), ("#pair=0&cell=7", ".treemap .mark")):
         page.goto("about:blank")

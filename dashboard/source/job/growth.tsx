@@ -27,7 +27,7 @@ export function Growth({ points }: { points: Point[] }) {
       <h2 id="h-share">Share kept over time</h2>
       {known.length > 1 && <Curve known={known} />}
       <p class="small">{percent(last.share)} of the proposal is certified after {duration(last.seconds)}. Shares are estimated from samples; each region is certified by its own proof.</p>
-      <details id="share-table" open={known.length === 1}>
+      <details id="share-table">
         <summary>As a table</summary>
         <div class="scroll" tabIndex={0} role="region" aria-label="Share kept over time">
           <table>

@@ -11,7 +11,7 @@ import { useRoute } from "./route";
 import { JobStore, type Drawable } from "./store";
 import { Workers } from "./workers";
 
-export function JobIsland({ job, scene, ended, begun, pairs }: { job: string; scene: string; ended: boolean; begun: number; pairs: boolean }) {
+export function JobIsland({ job, kind, scene, ended, begun }: { job: string; kind: string; scene: string; ended: boolean; begun: number }) {
   const [version, changed] = useReducer((count: number) => count + 1, 0);
   const [robot, setRobot] = useState<Drawable>({ model: null, problem: null });
   const store = useMemo(() => new JobStore(job, ended, begun, () => changed(undefined)), [job]);
@@ -32,9 +32,9 @@ export function JobIsland({ job, scene, ended, begun, pairs }: { job: string; sc
       {store.problem && <p class="notice bad" role="alert">{store.problem}</p>}
       {route.pair !== null ? <Pair store={store} version={version} robot={robot} route={{ ...route, pair: route.pair }} /> : (
         <>
-          {pairs && store.iterations.length > 0 && <Matrix store={store} version={version} memory={memory} />}
+          {store.iterations.length > 0 && <Matrix store={store} version={version} memory={memory} />}
           <Growth points={store.growth} />
-          <Obstacles obstacles={store.obstacles} robot={robot} />
+          <Obstacles obstacles={store.obstacles} robot={robot} whom={{ cover: "the cover", "certify-path": "the motion" }[kind] ?? "the region"} />
           {!store.ended && <Workers store={store} />}
           <Log store={store} />
         </>

@@ -9,6 +9,7 @@ const STEPS: Record<string, string> = {
   step: "Moving the faces of the region",
   accept: "Putting the region's proof together and verifying it",
   scout: "Looking at what is covered",
+  motion: "Certifying the motion",
 };
 const STEP: Record<string, string> = { open: "waits for a worker", running: "begun" };
 const ITERATION: Record<string, string> = {
@@ -30,7 +31,7 @@ export function sentence({ kind, data }: JobEvent): string {
   const text = (name: string): string => String(data[name] ?? "");
   switch (kind) {
     case "job":
-      return `The job ${IS[text("state")] ?? text("state")}${data.outcome ? ` with the outcome ${text("outcome").replaceAll("_", " ")}` : ""}${data.reason ? `: ${text("reason")}` : ""}.`;
+      return `The job ${IS[text("state")] ?? text("state")}${data.outcome ? ` with the outcome ${text("outcome").replaceAll("_", " ")}` : ""}${data.reason && data.reason !== data.outcome ? `: ${text("reason")}` : ""}.`;
     case "iteration":
       return data.state === "running"
         ? `Iteration ${data.index} (${text("label")}) begins with ${plural(Number(data.pairs ?? 0), "pair")}${data.reused ? `; ${data.reused} more keep their proofs` : ""}.`
@@ -49,7 +50,7 @@ export function sentence({ kind, data }: JobEvent): string {
     case "lost":
       return `${text("worker") || "A process"} no longer works for the job${data.reason ? ` (${text("reason").replaceAll("_", " ")})` : ""}; its work is open again.`;
     case "child":
-      return `Region ${data.number} of the cover is ${text("state")}${data.reason ? `: ${text("reason")}` : ""}.`;
+      return `The job of region ${data.number} of the cover ${IS[text("state")] ?? text("state")}${data.reason ? `: ${text("reason")}` : ""}.`;
     case "cover":
       return "What is covered has been looked at.";
     default:

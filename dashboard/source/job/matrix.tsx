@@ -3,7 +3,7 @@
 import { Component } from "preact";
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import { address, go } from "./route";
-import { CERTIFIED, OUTCOMES, badness, facts, plural } from "./outcomes";
+import { CERTIFIED, OUTCOMES, atLeast, badness, duration, facts, plural } from "./outcomes";
 import type { Iteration, JobStore, PairName } from "./store";
 
 const HEAD = 32;
@@ -12,6 +12,8 @@ const SPARE = 6;
 const NARROW = 560;
 const ROW = { narrow: 44, wide: 30 };
 const COLUMN = { least: 36, most: 72 };
+/** Where names have so much room, the newest iteration's time and margin stand beside them. */
+const ROOMY = 620;
 const NAME = { narrow: 190, least: 260, most: 470 };
 
 type Order = "scene" | "outcome" | "time" | "open";
@@ -187,7 +189,7 @@ function Grid({ store, version, rows, memory }: { store: JobStore; version: numb
         onClick={(event) => { const found = place(event); if (found) { setActive(found); open(found); } }}
         style={{ height: `min(70vh, ${rows.length * high + HEAD + 2 + (width > seen.width ? 16 : 0)}px)` }}>
         <div role="row" class="head" aria-rowindex={1} style={{ width: `${width}px`, height: `${HEAD}px` }}>
-          <div role="columnheader" class="name" style={{ width: `${named}px` }}><span>Pair</span><span aria-hidden="true">iteration</span></div>
+          <div role="columnheader" class="name" style={{ width: `${named}px` }}><span>Pair</span><span aria-hidden="true">{named >= ROOMY ? "time and margin, " : ""}iteration</span></div>
           {columns.slice(from, to).map((one, i) => (
             <div role="columnheader" class="cell" key={one.index} aria-colindex={from + i + 2} title={`${one.label}, ${one.faces} faces, ${one.state}`}
               style={{ left: `${named + (from + i) * wide}px`, width: `${wide}px` }}><span class="sr">iteration </span>{one.index}</div>
@@ -236,10 +238,12 @@ class Row extends Component<RowProps> {
   }
 
   override render({ pair, row, top, columns, from, to, named, wide, narrow, active, store }: RowProps) {
+    const newest = named >= ROOMY && columns[0] ? store.cell(columns[0].index, pair.index) : undefined;
     return (
       <div role="row" class="row" aria-rowindex={row + 2} style={{ top: `${top}px`, width: `${named + columns.length * wide}px` }}>
         <div role="rowheader" class="name" style={{ width: `${named}px` }}>
           <a href={address({ pair: pair.index })} tabIndex={-1} title={`${pair.a} – ${pair.b}`}>{short(pair.a)}{narrow ? <br /> : <span class="quiet"> – </span>}{short(pair.b)}</a>
+          {newest && <span class="newest">{newest.seconds !== null && duration(newest.seconds)}<span>{newest.margin !== null && `≥ ${atLeast(newest.margin)}`}</span></span>}
         </div>
         {columns.slice(from, to).map((one, i) => {
           const letter = one.states[pair.index] ?? "-", column = from + i, { name, glyph, words } = OUTCOMES[letter]!;

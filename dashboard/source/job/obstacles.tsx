@@ -7,7 +7,7 @@ import type { Drawable, Obstacle } from "./store";
 
 const AT_FIRST = 5;
 
-export function Obstacles({ obstacles, robot }: { obstacles: Obstacle[] | null; robot: Drawable }) {
+export function Obstacles({ obstacles, robot, whom }: { obstacles: Obstacle[] | null; robot: Drawable; whom: string }) {
   const [all, setAll] = useState(false);
   const [chosen, setChosen] = useState<string | null>(null);
   if (obstacles === null) return null;
@@ -16,8 +16,8 @@ export function Obstacles({ obstacles, robot }: { obstacles: Obstacle[] | null; 
   const drawn = obstacles.find((one) => key(one) === chosen) ?? obstacles.find(({ q }) => q !== null);
   return (
     <section aria-labelledby="h-obstacles">
-      <h2 id="h-obstacles">What holds the region back</h2>
-      {obstacles.length === 0 ? <p class="empty">Nothing that is known.</p> : (
+      <h2 id="h-obstacles">What holds {whom} back</h2>
+      {obstacles.length === 0 ? <p class="empty">Nothing is known to hold it back.</p> : (
         <div class={drawn?.q ? "stage" : ""}>
           {drawn?.q && <Contact {...drawn} q={drawn.q} robot={robot} />}
           <div>
