@@ -41,9 +41,21 @@ class SceneRow(Base):
 
     id: Mapped[str] = mapped_column(String(64), primary_key=True)
     name: Mapped[str]
+    """The name that it was last added under. Another scene may have been added under that name since."""
     hash: Mapped[str] = mapped_column(String(64), unique=True)
     document: Mapped[Document]
     """The document that certifier.model.Scene.to_document() returns."""
+    created_at: Mapped[datetime] = mapped_column(default=utcnow)
+
+
+class SceneNameRow(Base):
+    """A version of a name. The name means the scene of its last version."""
+
+    __tablename__ = "scene_names"
+
+    name: Mapped[str] = mapped_column(primary_key=True)
+    version: Mapped[int] = mapped_column(primary_key=True)
+    scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), index=True)
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
 
 

@@ -93,6 +93,13 @@ def of_cover(session: Session, job_id: str) -> Sequence[RegionRow]:
     return session.scalars(query.order_by(RegionRow.number).options(*_UNREAD)).all()
 
 
+def grown(session: Session, cover_ids: Sequence[str]) -> dict[str, int]:
+    """Returns the id of a cover -> number of certified regions that it has grown, for each of these covers."""
+    query = select(JobRow.parent_id, func.count().label("number")).join(RegionRow, RegionRow.job_id == JobRow.id)
+    rows = session.execute(query.where(JobRow.parent_id.in_(cover_ids)).group_by(JobRow.parent_id))
+    return dict.fromkeys(cover_ids, 0) | {row.parent_id: row.number for row in rows}
+
+
 def counts(session: Session, scene_ids: Sequence[str]) -> dict[str, int]:
     """Returns scene id -> number of its regions, for each of these scenes."""
     counted = select(RegionRow.scene_id, func.count().label("number")).where(RegionRow.scene_id.in_(scene_ids)).group_by(RegionRow.scene_id)

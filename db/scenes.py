@@ -1,17 +1,18 @@
-"""Scenes never change. Each is stored once for its content hash."""
+"""Scenes never change. Each is stored once for its content hash. A name means the scene that was last added under it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
-from sqlalchemy import or_, select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from certifier.errors import SceneError, close_matches
 from certifier.model import Scene
 from db import pages
 from db.ids import expanded
-from db.models import SceneRow
+from db.models import SceneNameRow, SceneRow
 from db.pages import Page
 from db.session import Database, insert_new
 
@@ -21,17 +22,46 @@ SUGGESTED_AMONG = 1000
 
 
 def add(session: Session, scene: Scene) -> SceneRow:
-    """Returns the row of this scene. It makes the row if no scene has the same content; otherwise the first name stays."""
-    for name in (scene.hash[:ID_LENGTH], scene.hash):
-        insert_new(session, SceneRow, [{"id": name, "name": scene.name, "hash": scene.hash, "document": scene.to_document()}])
+    """Returns the row of this scene, which its name means from now on. It makes the row if no scene has the same content."""
+    for scene_id in (scene.hash[:ID_LENGTH], scene.hash):
+        insert_new(session, SceneRow, [{"id": scene_id, "name": scene.name, "hash": scene.hash, "document": scene.to_document()}])
         row = session.scalar(select(SceneRow).where(SceneRow.hash == scene.hash))
         if row is not None:
+            row.name = scene.name
+            _name(session, scene.name, row.id)
             return row
     raise AssertionError("a full hash can only be taken by the scene that has it")
 
 
+def _name(session: Session, name: str, scene_id: str) -> None:
+    """Makes the name mean this scene. Whoever is overtaken by another addition under the name comes after it."""
+    versions = select(SceneNameRow.version, SceneNameRow.scene_id).where(SceneNameRow.name == name)
+    while True:
+        last = session.execute(versions.order_by(SceneNameRow.version.desc()).limit(1)).first()
+        if last is not None and last.scene_id == scene_id:
+            return
+        if insert_new(session, SceneNameRow, [{"name": name, "version": last.version + 1 if last else 1, "scene_id": scene_id}]):
+            return
+
+
+def names(session: Session, scene_ids: Sequence[str]) -> dict[str, list[str]]:
+    """Returns scene id -> the names that mean the scene now, the last one first, for each of these scenes."""
+    last = select(SceneNameRow.name, func.max(SceneNameRow.version).label("version")).group_by(SceneNameRow.name).subquery()
+    current = (SceneNameRow.name == last.c.name) & (SceneNameRow.version == last.c.version)
+    rows = session.execute(
+        select(SceneNameRow.scene_id, SceneNameRow.name)
+        .join(last, current)
+        .where(SceneNameRow.scene_id.in_(scene_ids))
+        .order_by(SceneNameRow.created_at.desc(), SceneNameRow.name)
+    )
+    found: dict[str, list[str]] = {scene_id: [] for scene_id in scene_ids}
+    for scene_id, name in rows:
+        found[scene_id].append(name)
+    return found
+
+
 def find(session: Session, name: str) -> str:
-    """Returns the id of the scene with this id, or else of the newest scene with this name, or else the only id that begins like this.
+    """Returns the id of the scene with this id, or else of the one that the name means, or else the only id that begins like this.
 
     It does not read the scene's document, which may be long.
 
@@ -39,13 +69,13 @@ def find(session: Session, name: str) -> str:
         SceneError: scene_not_found, with the names that are most like it.
         CirisError: ambiguous_id.
     """
-    named = select(SceneRow.id).where(or_(SceneRow.id == name, SceneRow.name == name))
-    found = session.scalar(named.order_by((SceneRow.id == name).desc(), SceneRow.created_at.desc()).limit(1))
+    versions = select(SceneNameRow.scene_id).where(SceneNameRow.name == name).order_by(SceneNameRow.version.desc()).limit(1)
+    found = session.scalar(select(SceneRow.id).where(SceneRow.id == name)) or session.scalar(versions)
     if found is not None:
         return found
     longer = expanded(session, SceneRow.id, name)
     if longer == name:
-        known = session.scalars(select(SceneRow.name).order_by(SceneRow.created_at.desc()).limit(SUGGESTED_AMONG)).all()
+        known = session.scalars(select(SceneNameRow.name).order_by(SceneNameRow.created_at.desc()).limit(SUGGESTED_AMONG)).all()
         hint = close_matches(name, list(dict.fromkeys(known))) or "`ciris scene ls` lists them"
         raise SceneError("scene_not_found", f"there is no scene {name!r}", field="scene", hint=hint)
     return longer

@@ -17,7 +17,6 @@ from api.schemas.scenes import IgnoredPair, LintReport, PairForecast, SceneDetai
 from certifier.pair.forecast import forecast
 from certifier.scene.bundle import load_bundle
 from db import scenes
-from db.models import SceneRow
 from db.session import Database
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"], dependencies=[READ], route_class=ReadingRoute)
@@ -25,24 +24,26 @@ router = APIRouter(prefix="/v1/scenes", tags=["scenes"], dependencies=[READ], ro
 
 @router.post("", dependencies=[SUBMIT], status_code=status.HTTP_201_CREATED)
 async def create_scene(
-    bundle: Annotated[UploadFile, File(description="A zip that holds the scene file and every file it refers to.")],
+    bundle: Annotated[UploadFile, File(description="A zip of the directory with `scene.yaml` and every file it refers to.")],
     db: Db,
     children: Children,
     response: Response,
 ) -> SceneDetail:
     """Uploads a scene.
 
-    A separate process reads it, so a bad file cannot harm the service. The same content is the same scene.
+    A separate process reads it, so a bad file cannot harm the service. The same content is the same scene. From now on its name means this
+    scene, also where it meant another one.
     """
-    row = await children.run(_add_scene, db, bundle.file)
-    response.headers["Location"] = f"/v1/scenes/{row.id}"
-    return SceneDetail.of(row)
+    scene = await children.run(_add_scene, db, bundle.file)
+    response.headers["Location"] = f"/v1/scenes/{scene.id}"
+    return scene
 
 
-def _add_scene(db: Database, file: BinaryIO) -> SceneRow:
+def _add_scene(db: Database, file: BinaryIO) -> SceneDetail:
     scene = load_bundle(file.read())
     with db.write() as session:
-        return scenes.add(session, scene)
+        row = scenes.add(session, scene)
+        return SceneDetail.of(row, scenes.names(session, [row.id])[row.id])
 
 
 @router.get("")
@@ -50,14 +51,16 @@ def list_scenes(db: Db, after: Cursor = None, limit: Annotated[int, Query(ge=1, 
     """Lists the scenes, newest first."""
     with db.read() as session:
         page = scenes.page(session, after, limit)
-    return ScenePage(scenes=[SceneSummary.of(row) for row in page.rows], next=page.next)
+        names = scenes.names(session, [row.id for row in page.rows])
+    return ScenePage(scenes=[SceneSummary.of(row, names[row.id]) for row in page.rows], next=page.next)
 
 
 @router.get("/{scene_id}")
 def get_scene(scene_id: str, db: Db) -> SceneDetail:
-    """Returns one scene, by its id or by its name. Of several scenes with one name it returns the newest."""
+    """Returns one scene, by its id or by its name. A name means the scene that was last added under it."""
     with db.read() as session:
-        return SceneDetail.of(scenes.get(session, scene_id))
+        row = scenes.get(session, scene_id)
+        return SceneDetail.of(row, scenes.names(session, [row.id])[row.id])
 
 
 @router.get("/{scene_id}/model")

@@ -16,7 +16,11 @@ class SceneSummary(BaseModel):
     """Describes a scene in a list."""
 
     id: str
-    name: str
+    name: str = Field(description="The name that the scene was last added under.")
+    names: list[str] = Field(
+        description="The names that mean this scene now. A name means the scene that was last added under it, so a scene may have none or "
+        "several."
+    )
     hash: str = Field(description="SHA-256 of everything in the scene that a proof depends on.")
     joints: int = Field(description="Number of joint positions.")
     geometries: int
@@ -25,11 +29,12 @@ class SceneSummary(BaseModel):
     created_at: datetime
 
     @classmethod
-    def of(cls, row: SceneRow) -> Self:
+    def of(cls, row: SceneRow, names: list[str]) -> Self:
         document = row.document
         return cls(
             id=row.id,
             name=row.name,
+            names=names,
             hash=row.hash,
             joints=len(document["q_star"]),
             geometries=len(document["geometries"]),
@@ -64,7 +69,7 @@ class SceneDetail(SceneSummary):
     provenance: Document
 
     @classmethod
-    def of(cls, row: SceneRow) -> Self:
+    def of(cls, row: SceneRow, names: list[str]) -> Self:
         document = row.document
         moving = sorted((j for j in document["joints"] if j["index"] is not None), key=lambda j: j["index"])
         positions = [
@@ -72,7 +77,7 @@ class SceneDetail(SceneSummary):
             for j, centre in zip(moving, document["q_star"], strict=True)
         ]
         return cls(
-            **SceneSummary.of(row).model_dump(),
+            **SceneSummary.of(row, names).model_dump(),
             positions=positions,
             bodies=document["bodies"],
             padding=document["padding"],

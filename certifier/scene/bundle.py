@@ -1,6 +1,7 @@
 """A bundle is a scene in one file, to be sent to a service: a zip of the scene file and of everything that it refers to.
 
-``bundle.json`` names the scene file. All paths in the zip are relative to one directory that holds every file.
+``bundle.json`` names the scene file. A zip without it has one ``scene.yaml``, or one YAML file. All paths in the zip are relative to one
+directory that holds every file.
 """
 
 from __future__ import annotations

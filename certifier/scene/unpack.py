@@ -18,6 +18,10 @@ _DEPTH = 32
 _BELOW = "keep the file below the directory of the model"
 _PACK = "make bundles with `ciris scene add`"
 _CHUNK = 2**20
+_LITTER = {"__MACOSX", ".DS_Store"}
+"""A Mac puts these into every zip. They are left out."""
+SCENE_FILE = "scene.yaml"
+"""A zip without an index has its scene in this file."""
 
 
 def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
@@ -71,14 +75,24 @@ def unpack(bundle: Path, root: Path, limits: BundleLimits) -> str:
             left = limits.unpacked_bytes
             for entry in entries:
                 left -= _extract(archive, entry, root, left)
-        scene = str(json.loads((root / INDEX).read_text(encoding="utf-8"))["scene"])
+        index = root / INDEX
+        scene = str(json.loads(index.read_text(encoding="utf-8"))["scene"]) if index.is_file() else _only_scene(root)
     except SceneError:
         raise
     except Exception:  # zipfile and the decompressors raise many kinds of error
-        message = f"this is no zip with a scene file that {INDEX} names, or it cannot be unpacked"
+        message = "this is no zip of a scene, or it cannot be unpacked"
         raise SceneError("bundle_zip", message, field="bundle", hint=_PACK) from None
     _checked_name(scene)
     return scene
+
+
+def _only_scene(root: Path) -> str:
+    """Returns the path of the scene file in a zip that somebody made of a directory, which names none."""
+    found = list(root.rglob(SCENE_FILE)) or list(root.rglob("*.yaml"))
+    if len(found) != 1:
+        message = f"the zip has no {INDEX}, and {len(found) or 'no'} files that may be the scene file"
+        raise SceneError("bundle_zip", message, field="bundle", hint=f"zip a directory with one {SCENE_FILE}, or use `ciris scene add`")
+    return found[0].relative_to(root).as_posix()
 
 
 def _extract(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, root: Path, left: int) -> int:
@@ -87,6 +101,8 @@ def _extract(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, root: Path, left:
     An entry of more than ``left`` bytes is refused, whatever size it claims.
     """
     target = root / _checked_name(entry.filename)
+    if _LITTER & {*PurePosixPath(entry.filename).parts}:
+        return 0
     if entry.is_dir():
         target.mkdir(parents=True, exist_ok=True)
         return 0

@@ -1,4 +1,4 @@
-// Buttons with data-post ask the service to do something; times are shown as the reader's clock has them.
+// Buttons with data-post ask the service to do something; forms with data-submit-on-change need no button; times are shown as the reader's clock has them.
 import { post, said } from "./shared/api";
 import { refresh } from "./live";
 
@@ -21,6 +21,14 @@ export function startButtons(): void {
     const button = (click.target as Element).closest<HTMLButtonElement>("button[data-post]");
     if (button) void press(button);
   });
+  for (const form of document.querySelectorAll<HTMLFormElement>("form[data-submit-on-change]")) {
+    form.querySelector("button")!.hidden = true;
+    form.addEventListener("change", () => {
+      // What is not chosen stays out of the address.
+      const chosen = [...new FormData(form)].filter(([, value]) => value !== "").map(([name, value]) => [name, String(value)]);
+      location.assign(chosen.length ? `${form.action}?${new URLSearchParams(chosen)}` : form.action);
+    });
+  }
 }
 
 async function press(button: HTMLButtonElement): Promise<void> {

@@ -4,6 +4,7 @@ import type { ComponentType } from "preact";
 const ISLANDS: Record<string, () => Promise<ComponentType<any>>> = {
   job: async () => (await import("./job/job")).JobIsland,
   library: async () => (await import("./library/library")).LibraryIsland,
+  new: async () => (await import("./new/new")).NewIsland,
   region: async () => (await import("./region/region")).RegionIsland,
 };
 

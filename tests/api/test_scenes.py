@@ -3,7 +3,9 @@
 import io
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -11,7 +13,10 @@ from fastapi.testclient import TestClient
 from api import guard
 from certifier.model import Scene
 from certifier.scene.bundle import pack_bundle
+from db import scenes
+from db.session import Database
 from tests.api.conftest import PROBLEM
+from tests.scenes import slider
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "planar_2dof" / "scene.yaml"
 
@@ -37,6 +42,33 @@ def test_a_scene_is_uploaded_once_whatever_how_often(client: TestClient) -> None
     assert all(pair["gram_a"] == 2 ** len(pair["chain_a"]) for pair in pairs)
     lint = client.get(f"/v1/scenes/{scene['id']}/lint").json()
     assert set(lint) == {"warnings", "substitutions", "ignored"}
+
+
+def test_a_name_means_the_scene_that_was_last_added_under_it(client: TestClient, database: Database) -> None:
+    """Whoever adds a scene again makes its name mean it again; the same content has every name that it was added under."""
+    first, other = slider(posts=1), slider(posts=2)
+
+    def added(scene: Scene, name: str) -> str:
+        with database.write() as session:
+            return scenes.add(session, replace(scene, name=name)).id
+
+    def meant(name: str) -> Any:
+        return client.get(f"/v1/scenes/{name}").json()
+
+    a, b = added(first, "cell"), added(other, "cell")
+    assert meant("cell")["id"] == b
+    assert added(first, "cell") == a
+    assert meant("cell")["id"] == a
+    assert added(first, "copy") == a
+    assert (meant("copy")["id"], meant("copy")["name"]) == (a, "copy")
+    assert sorted(meant("cell")["names"]) == ["cell", "copy"]
+    assert meant(b)["names"] == []
+    assert meant(b)["name"] == "cell"
+    assert {scene["id"]: len(scene["names"]) for scene in client.get("/v1/scenes").json()["scenes"]} == {a: 2, b: 0}
+    for path in ("jobs", "regions"):
+        assert client.get(f"/v1/{path}", params={"scene": "copy"}).status_code == 200
+    plane = {"kind": "certify", "polytope": {"C": [[1.0]], "d": [0.1]}}
+    assert [client.post("/v1/jobs", json={"scene": name, **plane}).json()["scene"] for name in ("copy", "cell", b)] == [a, a, b]
 
 
 def test_a_broken_robot_file_is_a_problem_and_nothing_is_stored(client: TestClient) -> None:

@@ -46,11 +46,16 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture
-def page(browser: Any, url: str) -> Iterator[Any]:
+def complaints() -> list[str]:
+    """What the page complains of; a test that expects a complaint takes it out."""
+    return []
+
+
+@pytest.fixture
+def page(browser: Any, url: str, complaints: list[str]) -> Iterator[Any]:
     """A page that must not complain, nor ask anybody but the service; closed before the service is."""
     context = browser.new_context()
     page = context.new_page()
-    complaints: list[str] = []
     page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("request", lambda request: None if request.url.startswith("http://127.0.0.1:") else complaints.append(request.url))

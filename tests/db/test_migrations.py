@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from datetime import timedelta
+
 from sqlalchemy import inspect
 
 from db import jobs, migrate, overlaps, pairs, regions, scenes, subtrees, work
+from db.models import SceneRow
 from db.session import Database
 from db.types import utcnow
 from tests.db.builders import a_running_job, add_region, certified
@@ -156,3 +159,21 @@ def claimed(database: Database, job_id: str) -> pairs.Claim:
         claim = work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5)
     assert isinstance(claim, pairs.Claim)
     return claim
+
+
+def test_names_of_scenes_of_before_they_had_versions_mean_the_last_one(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.write() as session:
+        old, new = (scenes.add(session, slider(posts=posts)).id for posts in (1, 2))
+        session.get_one(SceneRow, old).created_at = utcnow() - timedelta(days=1)
+    database.close()
+    migrate.downgrade(empty_database_url, "0014")
+    assert "scene_names" not in tables(empty_database_url)
+    migrate.upgrade(empty_database_url)
+    assert migrate.drift(empty_database_url) == []
+    database = Database(empty_database_url)
+    with database.read() as session:
+        assert scenes.find(session, slider().name) == new
+        assert scenes.names(session, [old, new]) == {old: [], new: [slider().name]}
+    database.close()

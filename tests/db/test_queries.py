@@ -35,8 +35,9 @@ def test_a_scene_is_stored_once_and_comes_back_equal(db: Database) -> None:
         first = scenes.add(session, slider("one"))
     with db.write() as session:
         again = scenes.add(session, slider("two"))
-    assert (again.id, again.name) == (first.id, "one") == (slider().hash[:16], "one")
+    assert (again.id, again.name) == (first.id, "two") == (slider().hash[:16], "two")
     with db.read() as session:
+        assert {scenes.find(session, name) for name in ("one", "two")} == {first.id}
         assert type(slider()).from_document(scenes.get(session, "one").document).hash == slider().hash
         assert [row.id for row in scenes.page(session).rows] == [first.id]
 

@@ -104,9 +104,16 @@ BUNDLES: list[Row] = [
         (
             "bundle_zip",
             "bundle",
-            "this is no zip with a scene file that {INDEX} names, or it cannot be unpacked",
+            "this is no zip of a scene, or it cannot be unpacked",
             PACK,
             lambda t: load_bundle(b"not a zip"),
+        ),
+        (
+            "bundle_zip",
+            "bundle",
+            "the zip has no {INDEX}, and {...} files that may be the scene file",
+            "zip a directory with one {SCENE_FILE}, or use `ciris scene add`",
+            lambda t: t.unpack(("a/scene.yaml", ""), ("b/scene.yaml", "")),
         ),
         ("bundle_path", "bundle", "{filename} is not a plain file", PACK, lambda t: t.unpack(link())),
         (

@@ -2,13 +2,13 @@
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { get, said } from "../shared/api";
 import { positions, type SceneModel } from "../shared/kinematics";
+import { MomentText, touchingOf, useMoment } from "../shared/moment";
 import type { Space } from "../shared/polytope";
 import { Robot } from "../shared/robot";
 import { Slice } from "../shared/slice";
 import { Sliders } from "../shared/sliders";
 import { coverage, type Coverage } from "./coverage";
 import { Graph, type GraphAnswer } from "./graph";
-import { useMoment } from "./moment";
 import { Planning, type Plan } from "./plan";
 
 const ASK_AGAIN_MS = 1500;
@@ -58,24 +58,15 @@ function Library({ model }: { model: SceneModel }) {
     setChosen(region);
     void get<{ center: number[] }>(`/v1/regions/${region}/configurations?samples=0`).then(({ center }) => setQ(center), (reason: unknown) => setGraphProblem(said(reason)));
   };
-  const touching = useMemo(() => [...new Set((moment.pairs ?? []).flatMap((pair) => model.pairs[pair] ?? []))], [moment, model]);
+  const touching = useMemo(() => touchingOf(model, moment), [moment, model]);
   const planned = useMemo(() => new Set(plan?.pieces.map(({ region }) => region) ?? []), [plan]);
   const holding = useMemo(() => new Set(moment.regions), [moment]);
-  const touchingNames = (moment.pairs ?? []).map((pair) => model.pairs[pair]!.map((i) => model.geometries[i]!.name).join(" and "));
   return (
     <div class="library">
       <div class="views">
         <div>
           <Robot model={model} q={q} touching={touching} label={`The robot of ${model.name}${touching.length ? ", in collision" : ""}`} />
-          <p class="said" role="status">
-            {moment.problem ? <span class="bad">{moment.problem}</span> : moment.pairs === undefined ? "…" : touchingNames.length ? (
-              <span class="bad">In collision: {touchingNames.slice(0, 3).join("; ")}{touchingNames.length > 3 && `; and ${touchingNames.length - 3} more pairs`}.</span>
-            ) : moment.regions.length ? (
-              <span class="good">In {moment.regions.length === 1 ? "a certified region" : `${moment.regions.length} certified regions`}: {moment.regions.slice(0, 4).map((region, i) => <>{i > 0 && ", "}<a href={`/regions/${region}`} key={region}>{region.slice(0, 8)}</a></>)}. No collision, as proved.</span>
-            ) : (
-              <span>Free here, by floating point, and in no certified region{moment.nearest && <>; the nearest is <a href={`/regions/${moment.nearest.region}`}>{moment.nearest.region.slice(0, 8)}</a>, {moment.nearest.distance.toPrecision(3)} away in s</>}.</span>
-            )}
-          </p>
+          <MomentText model={model} moment={moment} />
         </div>
         <Slice scene={model.scene} space={space} units={model.units} q={q} onPick={setQ} strongest={chosen} way={plan?.found ? plan.q : undefined} />
       </div>

@@ -2,7 +2,7 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { post, said } from "../shared/api";
 import { LINKS } from "../shared/colours";
-import { shortNames, shown } from "../shared/kinematics";
+import { asText, shortNames, shown } from "../shared/kinematics";
 
 export interface Plan {
   found: boolean;
@@ -30,10 +30,6 @@ interface Props {
 }
 
 const DEGREE = Math.PI / 180;
-
-function asText(q: number[], units: ("rad" | "m")[]): string {
-  return q.map((value, i) => (units[i] === "rad" ? (value / DEGREE).toFixed(1) : value.toFixed(3))).join(", ");
-}
 
 /** Reads numbers in degrees and metres; null where they are not one for each joint. */
 function read(text: string, units: ("rad" | "m")[]): number[] | null {

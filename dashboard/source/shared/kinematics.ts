@@ -127,3 +127,8 @@ export function positions(model: SceneModel): string[] {
   const moving = model.joints.filter((joint) => joint.index !== null);
   return moving.sort((a, b) => a.index! - b.index!).map((joint) => joint.name);
 }
+
+/** A configuration in degrees and metres, for people. */
+export function asText(q: number[], units: ("rad" | "m")[]): string {
+  return q.map((value, i) => (units[i] === "rad" ? ((value * 180) / Math.PI).toFixed(1) : value.toFixed(3))).join(", ");
+}

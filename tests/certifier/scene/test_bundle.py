@@ -35,6 +35,14 @@ def test_a_bundle_is_the_same_scene():
     assert load_bundle(bundle).hash == parsed(path).hash
 
 
+def test_a_zip_of_a_directory_is_a_scene_too():
+    """Somebody has made it with the tools of their desktop, which may leave their own files in it."""
+    path = EXAMPLES / "ur3e_bin" / "scene.yaml"
+    files = {f"ur3e_bin/{file.name}": file.read_text() for file in path.parent.iterdir() if file.suffix in (".yaml", ".sdf", ".urdf")}
+    litter = {"__MACOSX/ur3e_bin/._scene.yaml": "\0", "ur3e_bin/.DS_Store": "\0"}
+    assert load_bundle(zipped(files | litter)).hash == parsed(path).hash
+
+
 def test_packages_and_meshes_travel_and_strangers_do_not(tmp_path):
     (tmp_path / "models" / "meshes").mkdir(parents=True)
     (tmp_path / "models" / "meshes" / "t.obj").write_text("mtllib t.mtl\n" + TETRAHEDRON)
@@ -148,7 +156,8 @@ def test_an_honest_directory_passes(tmp_path):
     ("bundle", "code"),
     [
         (b"not a zip", "bundle_zip"),
-        (zipped({"scene.yaml": SCENE}), "bundle_zip"),
+        (zipped({"arm.urdf": "<robot name='a'/>"}), "bundle_zip"),
+        (zipped({"a.yaml": SCENE, "b.yaml": SCENE}), "bundle_zip"),
         (zipped({"bundle.json": "[]"}), "bundle_zip"),
         (zipped({"bundle.json": "{"}), "bundle_zip"),
         (zipped({"bundle.json": '{"scene": 3}'}), "scene_not_found"),

@@ -1,6 +1,7 @@
 // What is known of one configuration: what touches there, which regions hold it, and which is nearest. The latest answer counts.
 import { useEffect, useState } from "preact/hooks";
-import { post, said } from "../shared/api";
+import { post, said } from "./api";
+import type { SceneModel } from "./kinematics";
 
 export interface Moment {
   /** Indices of the pairs that touch; undefined while nobody knows; empty where a joint is outside the window. */
@@ -42,4 +43,26 @@ export function useMoment(scene: string, q: number[]): Moment {
     };
   }, [scene, q.join()]);
   return moment;
+}
+
+/** The geometries that touch, by index. */
+export function touchingOf(model: SceneModel, moment: Moment): number[] {
+  return [...new Set((moment.pairs ?? []).flatMap((pair) => model.pairs[pair] ?? []))];
+}
+
+/** Says in words what is known of the configuration, and how surely. */
+export function MomentText({ model, moment }: { model: SceneModel; moment: Moment }) {
+  const { pairs, regions, nearest, problem } = moment;
+  const names = (pairs ?? []).map((pair) => model.pairs[pair]!.map((i) => model.geometries[i]!.name).join(" and "));
+  return (
+    <p class="said" role="status">
+      {problem ? <span class="bad">{problem}</span> : pairs === undefined ? "…" : names.length ? (
+        <span class="bad">In collision: {names.slice(0, 3).join("; ")}{names.length > 3 && `; and ${names.length - 3} more pairs`}.</span>
+      ) : regions.length ? (
+        <span class="good">In {regions.length === 1 ? "a certified region" : `${regions.length} certified regions`}: {regions.slice(0, 4).map((region, i) => <>{i > 0 && ", "}<a href={`/regions/${region}`} key={region}>{region.slice(0, 8)}</a></>)}. No collision, as proved.</span>
+      ) : (
+        <span>Free here, by floating point, and in no certified region{nearest && <>; the nearest is <a href={`/regions/${nearest.region}`}>{nearest.region.slice(0, 8)}</a>, {nearest.distance.toPrecision(3)} away in s</>}.</span>
+      )}
+    </p>
+  );
 }

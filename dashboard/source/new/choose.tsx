@@ -1,0 +1,72 @@
+// The scene to work on: one that is stored, or one that is uploaded now.
+import { useState } from "preact/hooks";
+import { said, upload } from "../shared/api";
+
+export interface SceneSummary {
+  id: string;
+  name: string;
+  joints: number;
+  pairs: number;
+  warnings: number;
+}
+
+interface Props {
+  scenes: SceneSummary[];
+  chosen: string | null;
+  onChoose: (id: string) => void;
+  onUpload: (scene: SceneSummary) => void;
+}
+
+export function ChooseScene({ scenes, chosen, onChoose, onUpload }: Props) {
+  const [sending, setSending] = useState<string | null>(null);
+  const [problem, setProblem] = useState<string | null>(null);
+  const [added, setAdded] = useState<SceneSummary | null>(null);
+  const send = async (file: File | undefined): Promise<void> => {
+    if (!file) return;
+    setSending(file.name);
+    setProblem(null);
+    setAdded(null);
+    try {
+      const scene = await upload<SceneSummary>("/v1/scenes", "bundle", file);
+      setAdded(scene);
+      onUpload(scene);
+    } catch (reason) {
+      setProblem(`${file.name} is no scene that can be used. ${said(reason)}`);
+    }
+    setSending(null);
+  };
+  const drop = (event: DragEvent): void => {
+    event.preventDefault();
+    void send(event.dataTransfer?.files[0]);
+  };
+  return (
+    <div class="choose card" onDragOver={(event) => event.preventDefault()} onDrop={drop}>
+      <p>
+        <label for="new-scene">Scene</label>
+        <select id="new-scene" value={chosen ?? ""} onChange={(event) => onChoose(event.currentTarget.value)} disabled={scenes.length === 0}>
+          {scenes.length === 0 && <option value="">none yet</option>}
+          {scenes.map(({ id, name, joints, pairs }) => (
+            <option value={id} key={id}>{`${name} · ${joints} joint${joints === 1 ? "" : "s"}, ${pairs} pairs · ${id.slice(0, 8)}`}</option>
+          ))}
+        </select>
+      </p>
+      <p>
+        <label for="new-upload">or upload one</label>
+        <input id="new-upload" type="file" accept=".zip,application/zip" disabled={sending !== null} aria-describedby="new-upload-says" onChange={(event) => void send(event.currentTarget.files?.[0])} />
+      </p>
+      <p class="quiet small" id="new-upload-says">
+        A zip of the directory with <code>scene.yaml</code> and every model and mesh that it refers to; drop it here. <code>ciris scene add</code> does the same from a terminal.
+      </p>
+      <div role="status">
+        {sending && <p class="notice">Reading {sending} …</p>}
+        {problem && <p class="notice bad">{problem}</p>}
+        {added && (
+          <p class="notice">
+            {added.name} is stored, with {added.joints} joints and {added.pairs} pairs.
+            {added.warnings > 0 && <> Read its <a href={`/scenes/${added.id}`}>{added.warnings} {added.warnings === 1 ? "warning" : "warnings"}</a> first.</>}
+          </p>
+        )}
+      </div>
+    </div>
+  );
+}

@@ -1,0 +1,133 @@
+// The form that starts a job: a scene, a configuration that the robot shows, and what shall be done.
+import { useEffect, useMemo, useState } from "preact/hooks";
+import { get, post, said } from "../shared/api";
+import { asText, positions, type SceneModel } from "../shared/kinematics";
+import { MomentText, touchingOf, useMoment } from "../shared/moment";
+import { Robot } from "../shared/robot";
+import { Sliders } from "../shared/sliders";
+import { ChooseScene, type SceneSummary } from "./choose";
+import { FIRST, request, type Wish } from "./request";
+import { Wishes } from "./wishes";
+
+const TRIES = 100;
+
+export function NewIsland() {
+  const asked = new URLSearchParams(location.search);
+  const [scenes, setScenes] = useState<SceneSummary[] | null>(null);
+  const [chosen, setChosen] = useState<string | null>(asked.get("scene"));
+  const [model, setModel] = useState<SceneModel | null>(null);
+  const [problem, setProblem] = useState<string | null>(null);
+
+  useEffect(() => {
+    get<{ scenes: SceneSummary[] }>("/v1/scenes?limit=1000").then(
+      (page) => {
+        setScenes(page.scenes);
+        setChosen((old) => old ?? page.scenes[0]?.id ?? null);
+      },
+      (reason: unknown) => setProblem(said(reason)),
+    );
+  }, []);
+  useEffect(() => {
+    if (chosen === null) return;
+    const stop = new AbortController();
+    setProblem(null);
+    get<SceneModel>(`/v1/scenes/${encodeURIComponent(chosen)}/model`, stop.signal).then(
+      (found) => {
+        setModel(found);
+        setChosen(found.scene);
+      },
+      (reason: unknown) => {
+        if (!stop.signal.aborted) setProblem(said(reason));
+      },
+    );
+    return () => stop.abort();
+  }, [chosen]);
+
+  if (!scenes) return <p class={problem ? "notice bad" : "empty"}>{problem ?? "Loading the scenes …"}</p>;
+  const known = model && !scenes.some(({ id }) => id === model.scene) ? [{ id: model.scene, name: model.name, joints: model.q_star.length, pairs: model.pairs.length, warnings: 0 }, ...scenes] : scenes;
+  const take = (scene: SceneSummary): void => {
+    setScenes([scene, ...scenes.filter(({ id }) => id !== scene.id)]);
+    setChosen(scene.id);
+  };
+  return (
+    <div class="new">
+      <ChooseScene scenes={known} chosen={chosen} onChoose={setChosen} onUpload={take} />
+      {problem && <p class="notice bad">{problem}</p>}
+      {model && model.scene === chosen && <Start model={model} asked={asked.get("q")} key={model.scene} />}
+    </div>
+  );
+}
+
+function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
+  const names = useMemo(() => positions(model), [model]);
+  const [q, setQ] = useState(() => within(model, read(asked, model.q_star.length) ?? model.q_star));
+  const [wish, setWish] = useState<Wish>(FIRST);
+  const [problem, setProblem] = useState<string | null>(null);
+  const [sending, setSending] = useState(false);
+  const moment = useMoment(model.scene, q);
+  const touching = useMemo(() => touchingOf(model, moment), [model, moment]);
+  const body = request(model.scene, q, wish);
+
+  useEffect(() => history.replaceState(null, "", `?scene=${model.scene}&q=${q.map((value) => Number(value.toFixed(4))).join(",")}`), [model, q.join()]);
+
+  const search = async (): Promise<void> => {
+    const drawn = Array.from({ length: TRIES }, () => model.q_lower.map((low, i) => low + (model.q_upper[i]! - low) * Math.random()));
+    try {
+      const { contacts } = await post<{ contacts: { pairs: number[] | null }[] }>("/v1/planning/contacts", { scene: model.scene, q: drawn });
+      const free = contacts.findIndex(({ pairs }) => pairs?.length === 0);
+      setProblem(free < 0 ? `None of ${TRIES} random configurations is free.` : null);
+      if (free >= 0) setQ(drawn[free]!);
+    } catch (reason) {
+      setProblem(said(reason));
+    }
+  };
+  const submit = async (event: Event): Promise<void> => {
+    event.preventDefault();
+    if (wish.kind === "grow" && moment.pairs?.length) return setProblem("The robot is in collision there, so no region can hold the configuration. Move it first.");
+    if (wish.kind === "cover" && wish.goal === "connect" && wish.marks.length < 2) return setProblem("Add at least two configurations to connect.");
+    setSending(true);
+    setProblem(null);
+    try {
+      const job = await post<{ id: string }>("/v1/jobs", body);
+      location.assign(`/jobs/${job.id}`);
+    } catch (reason) {
+      setProblem(said(reason));
+      setSending(false);
+    }
+  };
+  return (
+    <div class="stage">
+      <div>
+        <Robot model={model} q={q} touching={touching} label={`The robot of ${model.name}${touching.length ? ", in collision" : ""}`} />
+        <MomentText model={model} moment={moment} />
+        <div class="card">
+          <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />
+          <p class="toolbar">
+            <button type="button" onClick={() => setQ(within(model, model.q_star))}>Centre q*</button>
+            <button type="button" onClick={() => void search()}>Random free one</button>
+          </p>
+        </div>
+      </div>
+      <form onSubmit={(event) => void submit(event)}>
+        <Wishes wish={wish} onWish={setWish} marks={wish.marks.map((mark) => asText(mark, model.units))} onMark={() => setWish({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
+        <div role="alert">{problem && <p class="notice bad">{problem}</p>}</div>
+        <p><button type="submit" class="primary" disabled={sending}>{sending ? "Starting …" : "Start the job"}</button></p>
+        <details>
+          <summary>The same as a request</summary>
+          <p class="small quiet">Send it with <code>POST /v1/jobs</code>. Joint positions are radians and metres.</p>
+          <pre tabIndex={0}>{JSON.stringify(body, null, 1)}</pre>
+        </details>
+      </form>
+    </div>
+  );
+}
+
+function within(model: SceneModel, q: number[]): number[] {
+  return q.map((value, i) => Math.min(Math.max(value, model.q_lower[i]!), model.q_upper[i]!));
+}
+
+/** Reads joint positions from the address, radians or metres; null where they are not one for each joint. */
+function read(text: string | null, joints: number): number[] | null {
+  const numbers = text?.split(",").map(Number) ?? [];
+  return numbers.length === joints && numbers.every(Number.isFinite) ? numbers : null;
+}
