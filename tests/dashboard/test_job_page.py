@@ -228,6 +228,12 @@ def test_a_service_that_does_not_answer_is_asked_again(browser: Any, url: str, j
     page.get_by_text("The service does not answer. It is asked again every few seconds.").wait_for()
     page.unroute("**/pairs/states*")
     page.locator(".pairs .cell.too_close").wait_for()
+    page.route("**/cells", lambda route: route.abort())
+    page.evaluate("location.hash = '#pair=0'")
+    page.get_by_text("The cells could not be fetched. The service does not answer.").wait_for()
+    page.unroute("**/cells")
+    page.get_by_role("button", name="Try again").click()
+    page.locator(".treemap canvas").wait_for()
     page.close()
 
 

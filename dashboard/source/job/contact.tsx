@@ -15,6 +15,11 @@ interface Props {
 
 type Drawing = ComponentType<{ model: SceneModel; q: number[]; label: string; touching: number[] }>;
 
+function whenIdle(call: () => void): void {
+  if ("requestIdleCallback" in window) requestIdleCallback(call, { timeout: 1000 });
+  else setTimeout(call, 100);
+}
+
 /** The robot is fetched and drawn once it is to be seen: three.js is large. */
 export function Contact({ pair, a, b, q, robot: { model, problem } }: Props) {
   const place = useRef<HTMLDivElement>(null);
@@ -24,7 +29,8 @@ export function Contact({ pair, a, b, q, robot: { model, problem } }: Props) {
     const observer = new IntersectionObserver((entries) => {
       if (!entries.some((entry) => entry.isIntersecting)) return;
       observer.disconnect();
-      import("../shared/robot").then((module) => setRobot(() => module.Robot), () => setFailed("The script that draws it could not be fetched. Load the page again."));
+      // What there is to read is drawn before it.
+      whenIdle(() => void import("../shared/robot").then((module) => setRobot(() => module.Robot), () => setFailed("The script that draws it could not be fetched. Load the page again.")));
     });
     observer.observe(place.current!);
     return () => observer.disconnect();

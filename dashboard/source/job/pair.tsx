@@ -19,7 +19,8 @@ interface Props {
 export function Pair({ store, version, robot, route }: Props) {
   const heading = useRef<HTMLHeadingElement>(null);
   const [partition, setPartition] = useState<Partition | null>(null);
-  const [problem, setProblem] = useState<string | null>(null);
+  const [problem, setProblem] = useState<{ text: string; again: boolean } | null>(null);
+  const [attempt, setAttempt] = useState(0);
   const pair = store.pairs[route.pair];
   const iteration = store.iterations.find((one) => one.index === route.iteration) ?? store.last;
   const letter = iteration?.states[route.pair] ?? "-";
@@ -44,12 +45,13 @@ export function Pair({ store, version, robot, route }: Props) {
       (reason: unknown) => {
         if (abort.signal.aborted) return;
         setPartition(null);
-        setProblem(reason instanceof ServiceError && reason.code === "cells_not_found" ? `${sentence(reason.message)}.` : said(reason));
+        const without = reason instanceof ServiceError && reason.code === "cells_not_found";
+        setProblem({ text: without ? `${sentence(reason.message)}.` : said(reason), again: !without });
       },
     );
     return () => abort.abort();
     // It is asked again when the pair has got a result.
-  }, [store.job, route.pair, route.iteration, letter, cell?.open_cells]);
+  }, [store.job, route.pair, route.iteration, letter, cell?.open_cells, attempt]);
 
   if (!pair) return <p class="notice bad">There is no pair {route.pair} in this scene. <a href="#">All pairs</a></p>;
   const here = { pair: route.pair, iteration: route.iteration };
@@ -68,7 +70,9 @@ export function Pair({ store, version, robot, route }: Props) {
           {about && <p class="said">{about.text}</p>}
         </div>
       </div>
-      {problem && <p class="empty">{problem}</p>}
+      {problem && (problem.again
+        ? <p class="notice bad" role="alert">The cells could not be fetched. {problem.text} <button type="button" onClick={() => setAttempt(attempt + 1)}>Try again</button></p>
+        : <p class="empty">{problem.text}</p>)}
       {!problem && !partition && <p class="empty" role="status">Loading the cells …</p>}
       {partition && (
         <>
