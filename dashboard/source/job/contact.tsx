@@ -30,7 +30,13 @@ export function Contact({ pair, a, b, q, robot: { model, problem } }: Props) {
       if (!entries.some((entry) => entry.isIntersecting)) return;
       observer.disconnect();
       // What there is to read is drawn before it.
-      whenIdle(() => void import("../shared/robot").then((module) => setRobot(() => module.Robot), () => setFailed("The script that draws it could not be fetched. Load the page again.")));
+      whenIdle(
+        () =>
+          void import("../shared/robot").then(
+            (module) => setRobot(() => module.Robot),
+            () => setFailed("The script that draws it could not be fetched. Load the page again."),
+          ),
+      );
     });
     observer.observe(place.current!);
     return () => observer.disconnect();
@@ -42,8 +48,14 @@ export function Contact({ pair, a, b, q, robot: { model, problem } }: Props) {
   return (
     <div ref={place}>
       {why && <p class="notice bad">The robot cannot be drawn. {why}</p>}
-      {Robot && model ? <Robot model={model} q={q} touching={pair === null ? [] : model.pairs[pair]!} label={`The robot at ${where}. ${words}`} /> : !why && <p class="drawing">Loading the robot …</p>}
-      <p class="small">{words}, at {where}.</p>
+      {Robot && model ? (
+        <Robot model={model} q={q} touching={pair === null ? [] : model.pairs[pair]!} label={`The robot at ${where}. ${words}`} />
+      ) : (
+        !why && <p class="drawing">Loading the robot …</p>
+      )}
+      <p class="small">
+        {words}, at {where}.
+      </p>
     </div>
   );
 }

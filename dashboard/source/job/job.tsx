@@ -24,17 +24,38 @@ export function JobIsland({ job, kind, scene, ended, begun }: { job: string; kin
   const needed = route.pair !== null || store.obstacles?.some(({ q }) => q !== null);
   useEffect(() => {
     // Without the model joints have numbers instead of names, and the robot is not drawn; what there is to read is there.
-    if (needed && !robot.model) get<SceneModel>(`/v1/scenes/${scene}/model`).then((model) => setRobot({ model, problem: null }), (reason: unknown) => setRobot({ model: null, problem: said(reason) }));
+    if (needed && !robot.model)
+      get<SceneModel>(`/v1/scenes/${scene}/model`).then(
+        (model) => setRobot({ model, problem: null }),
+        (reason: unknown) => setRobot({ model: null, problem: said(reason) }),
+      );
   }, [needed, scene]);
-  if (!store.loaded) return store.problem ? <p class="notice bad" role="alert">{store.problem} It is asked again every few seconds.</p> : <p class="empty">Loading the pairs …</p>;
+  if (!store.loaded)
+    return store.problem ? (
+      <p class="notice bad" role="alert">
+        {store.problem} It is asked again every few seconds.
+      </p>
+    ) : (
+      <p class="empty">Loading the pairs …</p>
+    );
   return (
     <>
-      {store.problem && <p class="notice bad" role="alert">{store.problem}</p>}
-      {route.pair !== null ? <Pair store={store} version={version} robot={robot} route={{ ...route, pair: route.pair }} /> : (
+      {store.problem && (
+        <p class="notice bad" role="alert">
+          {store.problem}
+        </p>
+      )}
+      {route.pair !== null ? (
+        <Pair store={store} version={version} robot={robot} route={{ ...route, pair: route.pair }} />
+      ) : (
         <>
           {store.iterations.length > 0 && <Matrix store={store} version={version} memory={memory} />}
           <Growth points={store.growth} />
-          <Obstacles obstacles={store.obstacles} robot={robot} whom={{ cover: "the cover", "certify-path": "the motion" }[kind] ?? "the region"} />
+          <Obstacles
+            obstacles={store.obstacles}
+            robot={robot}
+            whom={{ cover: "the cover", "certify-path": "the motion" }[kind] ?? "the region"}
+          />
           {!store.ended && <Workers store={store} />}
           <Log store={store} />
         </>

@@ -49,29 +49,55 @@ export function Matrix({ store, version, memory }: { store: JobStore; version: n
     <section aria-labelledby="h-pairs">
       <h2 id="h-pairs">Pairs</h2>
       <div class="tools">
-        <label>Show <select aria-label="Show pairs" value={outcome} onChange={(event) => setOutcome(event.currentTarget.value)}>
-          <option value="">all pairs</option>
-          <option value="not">not certified</option>
-          {Object.entries(OUTCOMES).map(([letter, one]) => <option value={letter} key={letter}>{one.words}</option>)}
-        </select></label>
-        <label>Sort by <select aria-label="Sort by" value={order} onChange={(event) => setOrder(event.currentTarget.value as Order)}>
-          <option value="scene">order in the scene</option>
-          <option value="outcome">outcome, worst first</option>
-          <option value="time">time, longest first</option>
-          <option value="open">open cells, most first</option>
-        </select></label>
-        <label>Name <input type="search" value={search} placeholder="part of a name" onInput={(event) => setSearch(event.currentTarget.value)} /></label>
-        <span class="quiet" role="status">{rows.length === store.pairs.length ? plural(rows.length, "pair") : `${rows.length} of ${plural(store.pairs.length, "pair")}`}</span>
+        <label>
+          Show{" "}
+          <select aria-label="Show pairs" value={outcome} onChange={(event) => setOutcome(event.currentTarget.value)}>
+            <option value="">all pairs</option>
+            <option value="not">not certified</option>
+            {Object.entries(OUTCOMES).map(([letter, one]) => (
+              <option value={letter} key={letter}>
+                {one.words}
+              </option>
+            ))}
+          </select>
+        </label>
+        <label>
+          Sort by{" "}
+          <select aria-label="Sort by" value={order} onChange={(event) => setOrder(event.currentTarget.value as Order)}>
+            <option value="scene">order in the scene</option>
+            <option value="outcome">outcome, worst first</option>
+            <option value="time">time, longest first</option>
+            <option value="open">open cells, most first</option>
+          </select>
+        </label>
+        <label>
+          Name <input type="search" value={search} placeholder="part of a name" onInput={(event) => setSearch(event.currentTarget.value)} />
+        </label>
+        <span class="quiet" role="status">
+          {rows.length === store.pairs.length ? plural(rows.length, "pair") : `${rows.length} of ${plural(store.pairs.length, "pair")}`}
+        </span>
       </div>
       <Legend iterations={store.iterations} />
-      {rows.length > 0 ? <Grid store={store} version={version} rows={rows} memory={memory} /> : <p class="empty">No pair is like this in the last iteration.</p>}
+      {rows.length > 0 ? (
+        <Grid store={store} version={version} rows={rows} memory={memory} />
+      ) : (
+        <p class="empty">No pair is like this in the last iteration.</p>
+      )}
     </section>
   );
 }
 
 function Legend({ iterations }: { iterations: Iteration[] }) {
   const there = Object.entries(OUTCOMES).filter(([letter, { glyph }]) => glyph && iterations.some(({ states }) => states.includes(letter)));
-  return <p class="legend">{there.map(([, { name, glyph, words }]) => <span class={`key ${name}`} key={name}>{glyph} {words}</span>)}</p>;
+  return (
+    <p class="legend">
+      {there.map(([, { name, glyph, words }]) => (
+        <span class={`key ${name}`} key={name}>
+          {glyph} {words}
+        </span>
+      ))}
+    </p>
+  );
 }
 
 /** The pairs that are to be seen, in order. Outcomes, times and open cells are those of the last iteration. */
@@ -80,7 +106,8 @@ function chosen(store: JobStore, outcome: string, order: Order, search: string):
   const letter = (pair: PairName): string => last?.states[pair.index] ?? "-";
   const text = search.trim().toLowerCase();
   const fits = (pair: PairName): boolean =>
-    (outcome === "" || (outcome === "not" ? !CERTIFIED.includes(letter(pair)) : letter(pair) === outcome)) && `${pair.a} ${pair.b}`.toLowerCase().includes(text);
+    (outcome === "" || (outcome === "not" ? !CERTIFIED.includes(letter(pair)) : letter(pair) === outcome)) &&
+    `${pair.a} ${pair.b}`.toLowerCase().includes(text);
   const found = store.pairs.filter(fits);
   const value = (pair: PairName): number => {
     const cell = last && store.cell(last.index, pair.index);
@@ -101,7 +128,8 @@ function Grid({ store, version, rows, memory }: { store: JobStore; version: numb
   // There may be fewer rows than there were.
   const active = { row: Math.min(last.row, rows.length - 1), column: Math.min(last.column, columns.length - 1) };
   memory.active = active;
-  const narrow = seen.width < NARROW, high = narrow ? ROW.narrow : ROW.wide;
+  const narrow = seen.width < NARROW,
+    high = narrow ? ROW.narrow : ROW.wide;
   const least = narrow ? NAME.narrow : Math.min(NAME.most, Math.max(NAME.least, 0.4 * seen.width));
   const wide = Math.floor(Math.min(COLUMN.most, Math.max(COLUMN.least, (seen.width - least) / Math.max(columns.length, 1))));
   const named = Math.max(Math.round(least), seen.width - columns.length * wide);
@@ -127,7 +155,8 @@ function Grid({ store, version, rows, memory }: { store: JobStore; version: numb
   }, []);
 
   const at = (place: Place): { pair: PairName; iteration: (typeof columns)[number] } | null => {
-    const pair = rows[place.row], iteration = columns[place.column];
+    const pair = rows[place.row],
+      iteration = columns[place.column];
     return pair && iteration ? { pair, iteration } : null;
   };
   const shownAt = shown && at(shown);
@@ -136,10 +165,15 @@ function Grid({ store, version, rows, memory }: { store: JobStore; version: numb
   }, [shownAt?.iteration.index]);
 
   const move = (row: number, column: number): void => {
-    const place = { row: Math.min(Math.max(row, 0), rows.length - 1), column: Math.min(Math.max(column, 0), Math.max(columns.length - 1, 0)) };
+    const place = {
+      row: Math.min(Math.max(row, 0), rows.length - 1),
+      column: Math.min(Math.max(column, 0), Math.max(columns.length - 1, 0)),
+    };
     setActive(place);
     setShown(place);
-    const element = box.current!, y = place.row * high, x = place.column * wide;
+    const element = box.current!,
+      y = place.row * high,
+      x = place.column * wide;
     if (y < element.scrollTop) element.scrollTop = y;
     else if (y + high > element.scrollTop + element.clientHeight - HEAD) element.scrollTop = y + high + HEAD - element.clientHeight;
     if (x < element.scrollLeft) element.scrollLeft = x;
@@ -151,9 +185,14 @@ function Grid({ store, version, rows, memory }: { store: JobStore; version: numb
     if (event.ctrlKey && event.key !== "Home" && event.key !== "End") return;
     const { row, column } = active;
     const moves: Record<string, [number, number]> = {
-      ArrowUp: [row - 1, column], ArrowDown: [row + 1, column], ArrowLeft: [row, column - 1], ArrowRight: [row, column + 1],
-      PageUp: [row - page, column], PageDown: [row + page, column],
-      Home: [event.ctrlKey ? 0 : row, 0], End: [event.ctrlKey ? rows.length - 1 : row, columns.length - 1],
+      ArrowUp: [row - 1, column],
+      ArrowDown: [row + 1, column],
+      ArrowLeft: [row, column - 1],
+      ArrowRight: [row, column + 1],
+      PageUp: [row - page, column],
+      PageDown: [row + page, column],
+      Home: [event.ctrlKey ? 0 : row, 0],
+      End: [event.ctrlKey ? rows.length - 1 : row, columns.length - 1],
     };
     if (moves[event.key]) move(...moves[event.key]!);
     else if (event.key === "Enter" || event.key === " ") open(active);
@@ -182,34 +221,93 @@ function Grid({ store, version, rows, memory }: { store: JobStore; version: numb
   };
   return (
     <div class="matrix-box">
-      <div class={`scroll pairs ${narrow ? "narrow" : ""}`} ref={box} id="matrix" role="grid" tabIndex={0} aria-label="Pair matrix" aria-rowcount={rows.length + 1} aria-colcount={columns.length + 1}
+      <div
+        class={`scroll pairs ${narrow ? "narrow" : ""}`}
+        ref={box}
+        id="matrix"
+        role="grid"
+        tabIndex={0}
+        aria-label="Pair matrix"
+        aria-rowcount={rows.length + 1}
+        aria-colcount={columns.length + 1}
         aria-activedescendant={inView ? `cell-${active.row}-${active.column}` : undefined}
-        aria-describedby="matrix-help" onKeyDown={onKeyDown} onFocus={() => setShown(active)} onBlur={() => setShown(null)}
-        onMouseOver={(event) => { const found = place(event); if (found) setShown(found); }} onMouseLeave={() => setShown(null)}
-        onClick={(event) => { const found = place(event); if (found) { setActive(found); open(found); } }}
-        style={{ height: `min(70vh, ${rows.length * high + HEAD + 2 + (width > seen.width ? 16 : 0)}px)` }}>
+        aria-describedby="matrix-help"
+        onKeyDown={onKeyDown}
+        onFocus={() => setShown(active)}
+        onBlur={() => setShown(null)}
+        onMouseOver={(event) => {
+          const found = place(event);
+          if (found) setShown(found);
+        }}
+        onMouseLeave={() => setShown(null)}
+        onClick={(event) => {
+          const found = place(event);
+          if (found) {
+            setActive(found);
+            open(found);
+          }
+        }}
+        style={{ height: `min(70vh, ${rows.length * high + HEAD + 2 + (width > seen.width ? 16 : 0)}px)` }}
+      >
         <div role="row" class="head" aria-rowindex={1} style={{ width: `${width}px`, height: `${HEAD}px` }}>
-          <div role="columnheader" class="name" style={{ width: `${named}px` }}><span>Pair</span><span aria-hidden="true">{named >= ROOMY ? "time and margin, " : ""}iteration</span></div>
+          <div role="columnheader" class="name" style={{ width: `${named}px` }}>
+            <span>Pair</span>
+            <span aria-hidden="true">{named >= ROOMY ? "time and margin, " : ""}iteration</span>
+          </div>
           {columns.slice(from, to).map((one, i) => (
-            <div role="columnheader" class="cell" key={one.index} aria-colindex={from + i + 2} title={`${one.label}, ${one.faces} faces, ${one.state}`}
-              style={{ left: `${named + (from + i) * wide}px`, width: `${wide}px` }}><span class="sr">iteration </span>{one.index}</div>
+            <div
+              role="columnheader"
+              class="cell"
+              key={one.index}
+              aria-colindex={from + i + 2}
+              title={`${one.label}, ${one.faces} faces, ${one.state}`}
+              style={{ left: `${named + (from + i) * wide}px`, width: `${wide}px` }}
+            >
+              <span class="sr">iteration </span>
+              {one.index}
+            </div>
           ))}
         </div>
         <div role="rowgroup" class="rows" style={{ width: `${width}px`, height: `${rows.length * high}px` }}>
           {rows.slice(first, after).map((pair, i) => {
             const row = first + i;
-            return <Row key={pair.index} pair={pair} row={row} top={row * high} columns={columns} from={from} to={to} named={named} wide={wide} narrow={narrow}
-              active={row === active.row ? active.column : -1} store={store} version={version} />;
+            return (
+              <Row
+                key={pair.index}
+                pair={pair}
+                row={row}
+                top={row * high}
+                columns={columns}
+                from={from}
+                to={to}
+                named={named}
+                wide={wide}
+                narrow={narrow}
+                active={row === active.row ? active.column : -1}
+                store={store}
+                version={version}
+              />
+            );
           })}
         </div>
       </div>
       {tip && shownAt && (
         <div role="tooltip" class="tip" style={tip}>
-          <strong>{shownAt.pair.a} – {shownAt.pair.b}</strong>
-          {facts(shownAt.iteration.states[shownAt.pair.index] ?? "-", shownAt.iteration, store.cell(shownAt.iteration.index, shownAt.pair.index)).map((fact) => <div key={fact}>{fact}</div>)}
+          <strong>
+            {shownAt.pair.a} – {shownAt.pair.b}
+          </strong>
+          {facts(
+            shownAt.iteration.states[shownAt.pair.index] ?? "-",
+            shownAt.iteration,
+            store.cell(shownAt.iteration.index, shownAt.pair.index),
+          ).map((fact) => (
+            <div key={fact}>{fact}</div>
+          ))}
         </div>
       )}
-      <p class="small" id="matrix-help">The newest iteration is on the left. Arrow keys move, Enter opens the pair.</p>
+      <p class="small" id="matrix-help">
+        The newest iteration is on the left. Arrow keys move, Enter opens the pair.
+      </p>
     </div>
   );
 }
@@ -242,15 +340,36 @@ class Row extends Component<RowProps> {
     return (
       <div role="row" class="row" aria-rowindex={row + 2} style={{ top: `${top}px`, width: `${named + columns.length * wide}px` }}>
         <div role="rowheader" class="name" style={{ width: `${named}px` }}>
-          <a href={address({ pair: pair.index })} tabIndex={-1} title={`${pair.a} – ${pair.b}`}>{short(pair.a)}{narrow ? <br /> : <span class="quiet"> – </span>}{short(pair.b)}</a>
-          {newest && <span class="newest">{newest.seconds !== null && duration(newest.seconds)}<span>{newest.margin !== null && `≥ ${atLeast(newest.margin)}`}</span></span>}
+          <a href={address({ pair: pair.index })} tabIndex={-1} title={`${pair.a} – ${pair.b}`}>
+            {short(pair.a)}
+            {narrow ? <br /> : <span class="quiet"> – </span>}
+            {short(pair.b)}
+          </a>
+          {newest && (
+            <span class="newest">
+              {newest.seconds !== null && duration(newest.seconds)}
+              <span>{newest.margin !== null && `≥ ${atLeast(newest.margin)}`}</span>
+            </span>
+          )}
         </div>
         {columns.slice(from, to).map((one, i) => {
-          const letter = one.states[pair.index] ?? "-", column = from + i, { name, glyph, words } = OUTCOMES[letter]!;
+          const letter = one.states[pair.index] ?? "-",
+            column = from + i,
+            { name, glyph, words } = OUTCOMES[letter]!;
           return (
-            <div role="gridcell" class={`cell ${name}${column === active ? " active" : ""}`} key={one.index} id={`cell-${row}-${column}`} aria-colindex={column + 2}
-              data-row={row} data-column={column} aria-label={column === active ? facts(letter, one, store.cell(one.index, pair.index)).join("; ") : words}
-              style={{ left: `${named + column * wide}px`, width: `${wide}px` }}>{glyph}</div>
+            <div
+              role="gridcell"
+              class={`cell ${name}${column === active ? " active" : ""}`}
+              key={one.index}
+              id={`cell-${row}-${column}`}
+              aria-colindex={column + 2}
+              data-row={row}
+              data-column={column}
+              aria-label={column === active ? facts(letter, one, store.cell(one.index, pair.index)).join("; ") : words}
+              style={{ left: `${named + column * wide}px`, width: `${wide}px` }}
+            >
+              {glyph}
+            </div>
           );
         })}
       </div>

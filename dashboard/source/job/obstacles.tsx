@@ -17,7 +17,9 @@ export function Obstacles({ obstacles, robot, whom }: { obstacles: Obstacle[] | 
   return (
     <section aria-labelledby="h-obstacles">
       <h2 id="h-obstacles">What holds {whom} back</h2>
-      {obstacles.length === 0 ? <p class="empty">Nothing is known to hold it back.</p> : (
+      {obstacles.length === 0 ? (
+        <p class="empty">Nothing is known to hold it back.</p>
+      ) : (
         <div class={drawn?.q ? "stage" : ""}>
           {drawn?.q && <Contact {...drawn} q={drawn.q} robot={robot} />}
           <div>
@@ -26,13 +28,21 @@ export function Obstacles({ obstacles, robot, whom }: { obstacles: Obstacle[] | 
                 <li key={key(one)} class={one === drawn ? "chosen" : ""}>
                   <p>{one.text}</p>
                   <p class="links">
-                    {one.q && <button type="button" class="plain" aria-pressed={one === drawn} onClick={() => setChosen(key(one))}>Show in 3D</button>}{" "}
+                    {one.q && (
+                      <button type="button" class="plain" aria-pressed={one === drawn} onClick={() => setChosen(key(one))}>
+                        Show in 3D
+                      </button>
+                    )}{" "}
                     {one.pair !== null && <a href={address({ pair: one.pair })}>Open the pair</a>}
                   </p>
                 </li>
               ))}
             </ol>
-            {obstacles.length > inView.length && <button type="button" onClick={() => setAll(true)}>Show all {plural(obstacles.length, "obstacle")}</button>}
+            {obstacles.length > inView.length && (
+              <button type="button" onClick={() => setAll(true)}>
+                Show all {plural(obstacles.length, "obstacle")}
+              </button>
+            )}
           </div>
         </div>
       )}

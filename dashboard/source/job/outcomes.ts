@@ -46,7 +46,8 @@ export function duration(seconds: number): string {
 export function atLeast(metres: number): string {
   const [whole, parts] = metres.toFixed(100).split(".") as [string, string]; // All decimals that it has, so that nothing is rounded.
   const mm = `${whole}${parts.slice(0, 3)}.${parts.slice(3)}`.replace(/^0+(?=\d)/, "");
-  const first = mm.search(/[1-9]/), point = mm.indexOf(".");
+  const first = mm.search(/[1-9]/),
+    point = mm.indexOf(".");
   if (first < 0) return "0 mm";
   return `${Number(mm.slice(0, Math.max(point, first + (first < point ? 4 : 3))))} mm`;
 }
@@ -61,7 +62,8 @@ export function facts(letter: string, iteration: Iteration, cell: PairCell | und
   if (cell.parts > 1) found.push(`in ${cell.parts} parts`);
   if (cell.open_cells) found.push(plural(cell.open_cells, "open cell"));
   if (cell.worker && letter === "w") found.push(`on ${cell.worker}`);
-  if (cell.witness_q) found.push(`${letter === "r" ? "in collision" : "nearest"} at q = ${cell.witness_q.map((value) => value.toPrecision(4)).join(", ")}`);
+  if (cell.witness_q)
+    found.push(`${letter === "r" ? "in collision" : "nearest"} at q = ${cell.witness_q.map((value) => value.toPrecision(4)).join(", ")}`);
   if (cell.detail) found.push(cell.detail);
   return found;
 }

@@ -53,15 +53,26 @@ export function Pair({ store, version, robot, route }: Props) {
     // It is asked again when the pair has got a result.
   }, [store.job, route.pair, route.iteration, letter, cell?.open_cells, attempt]);
 
-  if (!pair) return <p class="notice bad">There is no pair {route.pair} in this scene. <a href="#">All pairs</a></p>;
+  if (!pair)
+    return (
+      <p class="notice bad">
+        There is no pair {route.pair} in this scene. <a href="#">All pairs</a>
+      </p>
+    );
   const here = { pair: route.pair, iteration: route.iteration };
   const about = store.obstacles?.find((one) => one.pair === route.pair);
   const where = cell?.witness_q ?? (letter === "c" || letter === "u" ? null : about?.q);
   return (
     <section aria-labelledby="h-pair" class="pair">
-      <p class="path"><a href="#">← All pairs</a></p>
-      <h2 id="h-pair" tabIndex={-1} ref={heading}>{pair.a} <span class="quiet">–</span> {pair.b}{" "}
-        <span class={`badge ${OUTCOMES[letter]!.name}`}>{OUTCOMES[letter]!.glyph} {OUTCOMES[letter]!.words}</span></h2>
+      <p class="path">
+        <a href="#">← All pairs</a>
+      </p>
+      <h2 id="h-pair" tabIndex={-1} ref={heading}>
+        {pair.a} <span class="quiet">–</span> {pair.b}{" "}
+        <span class={`badge ${OUTCOMES[letter]!.name}`}>
+          {OUTCOMES[letter]!.glyph} {OUTCOMES[letter]!.words}
+        </span>
+      </h2>
       <Iterations store={store} pair={route.pair} current={iteration?.index} />
       <div class={where ? "stage" : ""}>
         {where && <Contact pair={route.pair} a={pair.a} b={pair.b} q={where} robot={robot} />}
@@ -70,16 +81,34 @@ export function Pair({ store, version, robot, route }: Props) {
           {about && <p class="said">{about.text}</p>}
         </div>
       </div>
-      {problem && (problem.again
-        ? <p class="notice bad" role="alert">The cells could not be fetched. {problem.text} <button type="button" onClick={() => setAttempt(attempt + 1)}>Try again</button></p>
-        : <p class="empty">{problem.text}</p>)}
-      {!problem && !partition && <p class="empty" role="status">Loading the cells …</p>}
+      {problem &&
+        (problem.again ? (
+          <p class="notice bad" role="alert">
+            The cells could not be fetched. {problem.text}{" "}
+            <button type="button" onClick={() => setAttempt(attempt + 1)}>
+              Try again
+            </button>
+          </p>
+        ) : (
+          <p class="empty">{problem.text}</p>
+        ))}
+      {!problem && !partition && (
+        <p class="empty" role="status">
+          Loading the cells …
+        </p>
+      )}
       {partition && (
         <>
           <h3>Cells</h3>
           <p>{words(partition, iteration?.index)}</p>
-          <Cells partition={partition} joints={robot.model ? positions(robot.model) : []} root={route.root} cell={route.cell}
-            onZoom={(root) => go({ ...here, root, cell: route.cell })} onCell={(chosen) => go({ ...here, root: route.root, cell: chosen }, route.cell !== null)} />
+          <Cells
+            partition={partition}
+            joints={robot.model ? positions(robot.model) : []}
+            root={route.root}
+            cell={route.cell}
+            onZoom={(root) => go({ ...here, root, cell: route.cell })}
+            onCell={(chosen) => go({ ...here, root: route.root, cell: chosen }, route.cell !== null)}
+          />
         </>
       )}
     </section>
@@ -92,11 +121,27 @@ function Iterations({ store, pair, current }: { store: JobStore; pair: number; c
   if (there.length < 2) return null;
   return (
     <nav class="strip" aria-label="Iterations of the pair">
-      <span class="quiet" aria-hidden="true">Iteration</span>
+      <span class="quiet" aria-hidden="true">
+        Iteration
+      </span>
       {there.map(({ index, states }) => {
         const { name, glyph, words: outcome } = OUTCOMES[states[pair]!]!;
-        return <a key={index} class={`cell ${name}`} href={address({ pair, iteration: index === store.last?.index ? null : index })} title={`${outcome} in iteration ${index}`}
-          aria-current={index === current ? "true" : undefined}><span aria-hidden="true">{index} {glyph}</span><span class="sr">iteration {index}: {outcome}</span></a>;
+        return (
+          <a
+            key={index}
+            class={`cell ${name}`}
+            href={address({ pair, iteration: index === store.last?.index ? null : index })}
+            title={`${outcome} in iteration ${index}`}
+            aria-current={index === current ? "true" : undefined}
+          >
+            <span aria-hidden="true">
+              {index} {glyph}
+            </span>
+            <span class="sr">
+              iteration {index}: {outcome}
+            </span>
+          </a>
+        );
       })}
     </nav>
   );
@@ -107,9 +152,11 @@ function sentence(text: string): string {
 }
 
 function words({ certified, kind, iteration }: Partition, asked: number | undefined): string {
-  const parts = [certified
-    ? "A verified proof says that the two bodies are apart in every cell, on all of the polytope."
-    : "The pair is not certified. What the search has found in cells with a plane counts only once all cells have one and the proof is verified."];
+  const parts = [
+    certified
+      ? "A verified proof says that the two bodies are apart in every cell, on all of the polytope."
+      : "The pair is not certified. Cells with a plane count only once all cells have one, and the proof is verified.",
+  ];
   if (kind === "program") parts.push("One plane, which moves with the joints, separates them everywhere: there is one cell.");
   if (iteration !== null && iteration !== asked) parts.push(`The cells are those of iteration ${iteration}, whose proof still holds.`);
   return parts.join(" ");

@@ -16,8 +16,16 @@ function parsed(): Route {
 }
 
 export function address(route: Partial<Route>): string {
-  const parts = [["pair", route.pair], ["iteration", route.iteration], ["in", route.root || null], ["cell", route.cell]] as const;
-  return `#${parts.filter(([, value]) => value != null).map(([name, value]) => `${name}=${value}`).join("&")}`;
+  const parts = [
+    ["pair", route.pair],
+    ["iteration", route.iteration],
+    ["in", route.root || null],
+    ["cell", route.cell],
+  ] as const;
+  return `#${parts
+    .filter(([, value]) => value != null)
+    .map(([name, value]) => `${name}=${value}`)
+    .join("&")}`;
 }
 
 /** Returns what is open; the browser's buttons back and forward change it. */

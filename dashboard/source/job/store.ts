@@ -123,8 +123,12 @@ export class JobStore {
     await this.attempt(async () => {
       // The events come first: what happens while the rest is asked for is seen twice, and nothing is missed.
       this.events = (await get<{ events: JobEvent[] }>(`${this.path}/events?before=${2 ** 31 - 1}&limit=${EVENTS}`)).events;
-      const last = Math.max(this.begun - 1, 0), first = Math.max(this.begun - AT_FIRST, 0);
-      const [{ iterations }, { pairs, cells }] = await Promise.all([this.states(first), get<Matrix>(`${this.path}/pairs?iteration=${last}`)]);
+      const last = Math.max(this.begun - 1, 0),
+        first = Math.max(this.begun - AT_FIRST, 0);
+      const [{ iterations }, { pairs, cells }] = await Promise.all([
+        this.states(first),
+        get<Matrix>(`${this.path}/pairs?iteration=${last}`),
+      ]);
       this.iterations = iterations;
       this.pairs = pairs;
       this.keep(last, cells);
@@ -183,7 +187,13 @@ export class JobStore {
   }
 
   private listen(): void {
-    this.stop = follow(this.job, this.events.at(-1)?.seq ?? 0, (event) => this.take(event), connected, () => this.end());
+    this.stop = follow(
+      this.job,
+      this.events.at(-1)?.seq ?? 0,
+      (event) => this.take(event),
+      connected,
+      () => this.end(),
+    );
   }
 
   private end(): void {
@@ -216,10 +226,7 @@ export class JobStore {
       const changed = this.changed;
       this.changed = new Map();
       const since = Math.min(this.last?.index ?? 0, ...changed.keys());
-      const [{ iterations }, { workers }] = await Promise.all([
-        this.states(since),
-        get<{ workers: Worker[] }>(`${this.path}/workers`),
-      ]);
+      const [{ iterations }, { workers }] = await Promise.all([this.states(since), get<{ workers: Worker[] }>(`${this.path}/workers`)]);
       this.iterations = [...this.iterations.filter((one) => one.index < since), ...iterations];
       this.workers = workers;
       // Of an iteration that has just begun nothing is known but what the events will name.
@@ -234,7 +241,10 @@ export class JobStore {
     const known = this.details.get(iteration);
     if (!known) return;
     for (let i = 0; i < pairs.length; i += AT_ONCE) {
-      const which = pairs.slice(i, i + AT_ONCE).map((pair) => `&pair=${pair}`).join("");
+      const which = pairs
+        .slice(i, i + AT_ONCE)
+        .map((pair) => `&pair=${pair}`)
+        .join("");
       for (const cell of (await get<Matrix>(`${this.path}/pairs?iteration=${iteration}${which}`)).cells) known.set(cell.pair, cell);
     }
   }
