@@ -11,6 +11,7 @@ from typing import Any
 from api.schemas.progress import Obstacle
 from certifier.growth import obstacles as growth
 from certifier.model import Pair, Scene
+from certifier.outcome import Outcome
 from db import jobs, pairs, steps
 from db.models import JobRow, PairRow
 from db.session import Database
@@ -37,7 +38,7 @@ def of_job(database: Database, scene: Scene, job: JobRow) -> list[Obstacle]:
         cut = _cut(known)
         rated = [(_rank(job, cut.get(i), failed.get(i, [])), i) for i in cut.keys() | failed.keys()]
         found = [_of_pair(scene, i, cut.get(i), failed.get(i, [])) for _, i in sorted(rated)]
-    ended_badly = job.region_id is None and job.finished_at is not None
+    ended_badly = job.region_id is None and job.finished_at is not None and job.outcome != Outcome.CERTIFIED
     return found or ([_in_general(_said(job), _seed(job))] if ended_badly and _said(job) else [])
 
 

@@ -29,6 +29,12 @@ def emit(session: Session, job: JobRow, kind: str, data: dict[str, Any]) -> None
     session.add(EventRow(job_id=job.id, seq=job.event_seq, kind=kind, data=data))
 
 
+def before(session: Session, job_id: str, seq: int, limit: int) -> Sequence[EventRow]:
+    """Returns the last ``limit`` of the job's events before number ``seq``, in order."""
+    query = select(EventRow).where(EventRow.job_id == job_id, EventRow.seq < seq).order_by(EventRow.seq.desc()).limit(limit)
+    return session.scalars(query).all()[::-1]
+
+
 def since(session: Session, job_id: str, seq: int = 0, limit: int = 500) -> Sequence[EventRow]:
     """Returns the job's events after number ``seq``, in order, at most ``limit`` of them."""
     return session.scalars(select(EventRow).where(EventRow.job_id == job_id, EventRow.seq > seq).order_by(EventRow.seq).limit(limit)).all()

@@ -9,7 +9,7 @@ pairs, and says where the open ones begin. A job has one iteration at a time wit
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -281,9 +281,10 @@ def order(session: Session, iteration: IterationRow) -> list[int]:
     return list(session.scalars(select(PairRow.pair_index).where(*mine).order_by(PairRow.id)))
 
 
-def of_iteration(session: Session, job_id: str, iteration: int) -> Sequence[PairRow]:
-    """Returns the pairs of one iteration with their parts, in the order of the scene's pairs."""
-    return session.scalars(_pairs(job_id, iteration).order_by(PairRow.pair_index, PairRow.part)).all()
+def of_iteration(session: Session, job_id: str, iteration: int, only: Collection[int] | None = None) -> Sequence[PairRow]:
+    """Returns the pairs of one iteration with their parts, in the order of the scene's pairs; of all pairs, or of those asked for."""
+    query = _pairs(job_id, iteration).order_by(PairRow.pair_index, PairRow.part)
+    return session.scalars(query if only is None else query.where(PairRow.pair_index.in_(only))).all()
 
 
 def lately_failed(session: Session, job_id: str) -> dict[int, list[PairRow]]:
@@ -334,16 +335,41 @@ def parts_of(session: Session, job_id: str, pair: int, iterations: Iterable[int]
     return {index: parts.get(str(pair), 1) for index, parts in session.execute(select(IterationRow.index, IterationRow.parts).where(*mine))}
 
 
-def of_job(session: Session, job_id: str) -> Sequence[PairRow]:
-    """Returns the job's pair matrix: every pair of every iteration with its parts, in order."""
-    order = (PairRow.iteration, PairRow.pair_index, PairRow.part)
-    return session.scalars(select(PairRow).where(PairRow.job_id == job_id).order_by(*order)).all()
+def of_job(session: Session, job_id: str, only: Collection[int] | None = None) -> Sequence[PairRow]:
+    """Returns the job's pair matrix, in order: in every iteration every pair with its parts, or those asked for."""
+    query = select(PairRow).where(PairRow.job_id == job_id).order_by(PairRow.iteration, PairRow.pair_index, PairRow.part)
+    return session.scalars(query if only is None else query.where(PairRow.pair_index.in_(only))).all()
+
+
+def states(session: Session, job_id: str, since: int) -> dict[int, dict[int, PairState]]:
+    """Returns iteration -> pair index -> the pair's state, for the iterations from ``since`` on.
+
+    It reads columns and makes no rows, because a job may have 100 000 of them.
+    """
+    columns = (PairRow.iteration, PairRow.pair_index, PairRow.state)
+    query = select(*columns).where(PairRow.job_id == job_id, PairRow.iteration >= since)
+    found: dict[int, dict[int, PairState]] = {}
+    parts: dict[tuple[int, int], list[PairState]] = {}
+    for iteration, pair, value in session.execute(query):
+        known, state = found.setdefault(iteration, {}), PairState(value)
+        if pair in known:
+            parts.setdefault((iteration, pair), [known[pair]]).append(state)
+        else:
+            known[pair] = state
+    for (iteration, pair), states in parts.items():
+        found[iteration][pair] = state_of_parts(states)
+    return found
 
 
 def iterations(session: Session, job_id: str) -> Sequence[IterationRow]:
     """Returns the job's iterations, in order, without their arrays."""
     query = select(IterationRow).where(IterationRow.job_id == job_id).order_by(IterationRow.index)
     return session.scalars(query.options(defer(IterationRow.arrays, raiseload=True))).all()
+
+
+def begun(session: Session, job_id: str) -> int:
+    """Returns how many iterations the job has begun."""
+    return session.scalar(select(func.count()).select_from(IterationRow).where(IterationRow.job_id == job_id)) or 0
 
 
 def seconds(session: Session, job_id: str) -> float:

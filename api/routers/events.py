@@ -30,11 +30,15 @@ def list_job_events(
     db: Db,
     after: After = 0,
     limit: Annotated[int, Query(ge=1, le=1000)] = PAGE,
+    before: Annotated[
+        int | None, Query(ge=1, le=MAX_INT, description="Return the last events with a smaller number than this; `after` is not looked at.")
+    ] = None,
 ) -> EventList:
-    """Returns what happened to the job, in order."""
+    """Returns what happened to the job, in order: the first events after a number, or the last ones before it."""
     with db.read() as session:
         job = jobs.get(session, job_id)
-        return EventList(events=[Event.of(row) for row in events.since(session, job.id, after, limit)])
+        rows = events.since(session, job.id, after, limit) if before is None else events.before(session, job.id, before, limit)
+        return EventList(events=[Event.of(row) for row in rows])
 
 
 def _existing(job_id: str, db: Db) -> str:

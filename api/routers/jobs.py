@@ -9,11 +9,12 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import timedelta
 from typing import Annotated, Any
 
 from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
+from pydantic import Field
 
 from api import checks, obstacles
 from api.access import READ, SUBMIT, Db, Submitter
@@ -29,12 +30,14 @@ from api.schemas.jobs import (
     GrowthCurve,
     GrowthPoint,
     Iteration,
+    IterationStates,
     Job,
     JobPage,
     JobRequest,
     NewJob,
     PairCell,
     PairMatrix,
+    PairStates,
     RecertifyRequest,
     Webhook,
 )
@@ -260,18 +263,61 @@ def get_job_webhook(job_id: str, db: Db) -> Webhook:
 
 
 @router.get("/{job_id}/pairs")
-def get_job_pairs(job_id: str, db: Db, iteration: Annotated[int | None, Query(ge=0, le=MAX_INT)] = None) -> PairMatrix:
-    """Returns the pair matrix: the result of every pair on the polytope of every iteration, or of the given one."""
+def get_job_pairs(
+    job_id: str,
+    db: Db,
+    iteration: Annotated[int | None, Query(ge=0, le=MAX_INT)] = None,
+    pair: Annotated[
+        list[Annotated[int, Field(ge=0, le=MAX_INT)]] | None,
+        Query(max_length=200, description="Indices of the pairs wanted; all pairs if left out."),
+    ] = None,
+) -> PairMatrix:
+    """Returns the pair matrix: the result of every pair on the polytope of every iteration, or of the given ones."""
     with db.read() as session:
         job = jobs.get(session, job_id)
-        rows = pairs.of_job(session, job.id) if iteration is None else pairs.of_iteration(session, job.id, iteration)
+        rows = pairs.of_job(session, job.id, pair) if iteration is None else pairs.of_iteration(session, job.id, iteration, pair)
         iterations = [row for row in pairs.iterations(session, job.id) if iteration in (None, row.index)]
     scene = scenes.load(db, job.scene_id)
+    wanted = None if pair is None else set(pair)
     return PairMatrix(
-        pairs=[PairInfo(index=index, a=pair.a, b=pair.b) for index, pair in enumerate(scene.pairs)],
+        pairs=[PairInfo(index=index, a=one.a, b=one.b) for index, one in enumerate(scene.pairs) if wanted is None or index in wanted],
         iterations=[_iteration(row) for row in iterations],
         cells=[_cell(scene, list(parts)) for _, parts in itertools.groupby(rows, lambda row: (row.iteration, row.pair_index))],
     )
+
+
+@router.get("/{job_id}/pairs/states")
+def get_job_pair_states(
+    job_id: str, db: Db, since: Annotated[int, Query(ge=0, le=MAX_INT, description="Return only iterations from this one on.")] = 0
+) -> PairStates:
+    """Returns the state of every pair in every iteration as one letter. It is short, also for thousands of pairs in many iterations."""
+    with db.read() as session:
+        job = jobs.get(session, job_id)
+        known, rows = pairs.states(session, job.id, since), pairs.iterations(session, job.id)
+    count = len(scenes.load(db, job.scene_id).pairs)
+    return PairStates(iterations=[_letters(row, known.get(row.index, {}), count) for row in rows if row.index >= since])
+
+
+_LETTERS = {
+    PairState.CERTIFIED: "c",
+    PairState.REFUTED: "r",
+    PairState.NOT_CERTIFIABLE: "n",
+    PairState.TOO_CLOSE: "t",
+    PairState.INCONCLUSIVE: "i",
+    PairState.ERROR: "e",
+    PairState.SKIPPED: "s",
+    PairState.RUNNING: "w",
+    PairState.OPEN: "o",
+}
+
+
+def _letters(row: IterationRow, known: Mapping[int, PairState], count: int) -> IterationStates:
+    states = ["-"] * count
+    for pair in row.reuse:
+        states[int(pair)] = "u"
+    for index, state in known.items():
+        states[index] = _LETTERS[state]
+    return IterationStates(index=row.index, label=row.label, state=IterationState(row.state), faces=row.faces, states="".join(states))
 
 
 @router.get("/{job_id}/pairs/{pair}/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})

@@ -367,6 +367,30 @@ class PairMatrix(BaseModel):
     cells: list[PairCell]
 
 
+class IterationStates(BaseModel):
+    """Describes an iteration by one letter for each pair."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"index": 2, "label": "stage 1", "state": "running", "faces": 24, "states": "ccuwoo"}]}
+    )
+
+    index: int
+    label: str
+    state: IterationState
+    faces: int = Field(description="Number of rows of C, joint limits included.")
+    states: str = Field(
+        description="A letter for each pair of the scene, in its order: `c` certified, `r` refuted, `n` not certifiable, `t` too close, "
+        "`i` inconclusive, `e` error, `s` skipped, `w` running (a worker has it), `o` open, `u` certified by the proof of an earlier "
+        "iteration, `-` not reached."
+    )
+
+
+class PairStates(BaseModel):
+    """Holds the states of all pairs in iterations, in few characters: the pair matrix of a long job, to draw it."""
+
+    iterations: list[IterationStates]
+
+
 class GrowthPoint(BaseModel):
     """Describes a region that was certified during the job."""
 

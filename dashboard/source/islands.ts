@@ -2,6 +2,7 @@
 import type { ComponentType } from "preact";
 
 const ISLANDS: Record<string, () => Promise<ComponentType<any>>> = {
+  job: async () => (await import("./job/job")).JobIsland,
   library: async () => (await import("./library/library")).LibraryIsland,
   new: async () => (await import("./new/new")).NewIsland,
   region: async () => (await import("./region/region")).RegionIsland,
@@ -14,7 +15,11 @@ export function startIslands(root: ParentNode): void {
 async function start(place: HTMLElement): Promise<void> {
   const load = ISLANDS[place.dataset.island!];
   if (!load) throw new Error(`no island is called ${place.dataset.island}`);
-  const [{ createElement, render }, component] = await Promise.all([import("preact"), load()]);
+  const parts = Promise.all([import("preact"), load()]);
+  const [{ createElement, render }, component] = await parts.catch((reason: unknown) => {
+    place.textContent = "This part of the page could not be fetched. Load the page again.";
+    throw reason;
+  });
   place.replaceChildren();
   render(createElement(component, JSON.parse(place.dataset.props ?? "{}")), place);
 }

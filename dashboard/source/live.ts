@@ -1,22 +1,11 @@
-// Keeps #live, a part of a page that the server writes, up to date: by a job's events (data-events) or by asking again (data-poll).
+// Keeps #live, a part of a page that the server writes, up to date: by asking again (data-poll), or when a job's island says so.
 import { localTimes } from "./buttons";
-import { follow } from "./shared/api";
 
 const POLL_MS = 3000;
-const PAUSE_MS = 700;
 
 export function startLive(): void {
   const live = document.getElementById("live");
   if (live?.dataset.poll) setInterval(() => { if (!document.hidden) void refresh(live.dataset.poll!); }, POLL_MS);
-  if (live?.dataset.job) followJob(live.dataset.job, live.dataset.refresh!);
-}
-
-function followJob(job: string, url: string): void {
-  let waiting: ReturnType<typeof setTimeout> | null = null;
-  const soon = (): void => {
-    waiting ??= setTimeout(() => { waiting = null; void refresh(url); }, PAUSE_MS);
-  };
-  follow(job, 0, soon, connected, soon);
 }
 
 export function connected(is: boolean): void {

@@ -306,6 +306,14 @@ def test_a_job_that_ended_before_it_had_pairs_says_why(database: Database, job: 
     assert (found["pair"], found["text"], found["q"]) == (None, "a and b overlap by 0.1 m", [0.0])
 
 
+def test_nothing_holds_back_a_job_that_has_reached_what_was_asked(database: Database, job: JobRow, ask: Ask) -> None:
+    with database.write() as session:
+        row = jobs.lock(session, job.id)
+        row.kind = "certify-path"
+        jobs.finish(session, row, jobs.JobState.SUCCEEDED, reason="every pair is certified all along the motion", outcome="certified")
+    assert ask(f"jobs/{job.id}/obstacles") == {"obstacles": [], "total": 0}
+
+
 @pytest.mark.parametrize(("distance", "how"), [(0.0, "touch"), (0.002, "are only 0.002 m apart")])
 def test_the_first_contact_of_a_motion_is_its_obstacle(database: Database, job: JobRow, ask: Ask, distance: float, how: str) -> None:
     stop = {"a": "model/cart/ball", "b": "world/post1", "distance": distance, "q": [0.5], "piece": 0, "time": 0.2}

@@ -51,6 +51,9 @@ def test_events_are_listed_in_order(client: TestClient, database: Database, job_
     assert [event["seq"] for event in found] == [1, 2, 3, 4]
     rest = client.get(f"/v1/jobs/{job_id}/events?after=2&limit=1").json()["events"]
     assert [event["seq"] for event in rest] == [3]
+    last = client.get(f"/v1/jobs/{job_id}/events?before=4&limit=2").json()["events"]
+    assert [event["seq"] for event in last] == [2, 3]
+    assert client.get(f"/v1/jobs/{job_id}/events?before=1").json()["events"] == []
 
 
 def test_events_arrive_as_they_happen_and_the_stream_closes_with_the_job(url: str, database: Database, job_id: str) -> None:

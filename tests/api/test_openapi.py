@@ -33,6 +33,7 @@ OPERATIONS = {
     "cancel_job": "POST /v1/jobs/{job_id}/cancel",
     "retry_job": "POST /v1/jobs/{job_id}/retry",
     "get_job_pairs": "GET /v1/jobs/{job_id}/pairs",
+    "get_job_pair_states": "GET /v1/jobs/{job_id}/pairs/states",
     "download_pair_proof": "GET /v1/jobs/{job_id}/pairs/{pair}/proof",
     "get_job_cells": "GET /v1/jobs/{job_id}/pairs/{pair}/cells",
     "get_job_growth": "GET /v1/jobs/{job_id}/growth",

@@ -57,7 +57,7 @@ def test_a_job_is_followed_live_to_its_end(page: Any, url: str, database: Databa
     page.get_by_text("0 of 2 pairs settled").wait_for()
     settle(database, job_id, 0)
     page.get_by_text("1 of 2 pairs settled").wait_for()
-    assert page.locator("td.cell.certified").count() == 1
+    page.locator(".pairs .cell.certified").wait_for()
     page.get_by_text("Options").click()
     settle(database, job_id, 1)
     page.get_by_text("2 of 2 pairs settled").wait_for()

@@ -1,0 +1,65 @@
+// The page of a job, below its head: the matrix of pairs or one of them, what holds the region back, how it grew, and who works on it.
+import { useEffect, useMemo, useReducer, useState } from "preact/hooks";
+import { get, said } from "../shared/api";
+import type { SceneModel } from "../shared/kinematics";
+import { Growth } from "./growth";
+import { Log } from "./log";
+import { Matrix, Memory } from "./matrix";
+import { Obstacles } from "./obstacles";
+import { Pair } from "./pair";
+import { useRoute } from "./route";
+import { JobStore, type Drawable } from "./store";
+import { Workers } from "./workers";
+
+export function JobIsland({ job, kind, scene, ended, begun }: { job: string; kind: string; scene: string; ended: boolean; begun: number }) {
+  const [version, changed] = useReducer((count: number) => count + 1, 0);
+  const [robot, setRobot] = useState<Drawable>({ model: null, problem: null });
+  const store = useMemo(() => new JobStore(job, ended, begun, () => changed(undefined)), [job]);
+  const memory = useMemo(() => new Memory(), []);
+  const route = useRoute();
+  useEffect(() => {
+    void store.start();
+    return () => store.close();
+  }, [store]);
+  const needed = route.pair !== null || store.obstacles?.some(({ q }) => q !== null);
+  useEffect(() => {
+    // Without the model joints have numbers instead of names, and the robot is not drawn; what there is to read is there.
+    if (needed && !robot.model)
+      get<SceneModel>(`/v1/scenes/${scene}/model`).then(
+        (model) => setRobot({ model, problem: null }),
+        (reason: unknown) => setRobot({ model: null, problem: said(reason) }),
+      );
+  }, [needed, scene]);
+  if (!store.loaded)
+    return store.problem ? (
+      <p class="notice bad" role="alert">
+        {store.problem} It is asked again every few seconds.
+      </p>
+    ) : (
+      <p class="empty">Loading the pairs …</p>
+    );
+  return (
+    <>
+      {store.problem && (
+        <p class="notice bad" role="alert">
+          {store.problem}
+        </p>
+      )}
+      {route.pair !== null ? (
+        <Pair store={store} version={version} robot={robot} route={{ ...route, pair: route.pair }} />
+      ) : (
+        <>
+          {store.iterations.length > 0 && <Matrix store={store} version={version} memory={memory} />}
+          <Growth points={store.growth} />
+          <Obstacles
+            obstacles={store.obstacles}
+            robot={robot}
+            whom={{ cover: "the cover", "certify-path": "the motion" }[kind] ?? "the region"}
+          />
+          {!store.ended && <Workers store={store} />}
+          <Log store={store} />
+        </>
+      )}
+    </>
+  );
+}

@@ -1,0 +1,53 @@
+// Who does what for the job at this moment.
+import { plural } from "./outcomes";
+import { address } from "./route";
+import type { JobStore, Worker } from "./store";
+
+const WORK: Record<string, string> = {
+  seed: "looks for the first polytope",
+  step: "moves the faces of the region",
+  accept: "puts the region's proof together and verifies it",
+  scout: "looks at what is covered",
+  motion: "certifies a motion",
+  decide: "decides what comes next",
+};
+const NAMED = 4;
+
+export function Workers({ store }: { store: JobStore }) {
+  return (
+    <section aria-labelledby="h-workers">
+      <h2 id="h-workers">Workers</h2>
+      {store.workers.length === 0 ? (
+        <p class="empty">No process works for the job at this moment.</p>
+      ) : (
+        <ul class="workers">
+          {store.workers.map((worker) => (
+            <li key={worker.process + worker.pairs.join()}>
+              <code title={worker.process}>{worker.process.split(":").slice(0, 2).join(":")}</code>{" "}
+              <span>{worker.work === "pairs" ? <Certifies store={store} worker={worker} /> : (WORK[worker.work] ?? worker.work)}</span>
+            </li>
+          ))}
+        </ul>
+      )}
+    </section>
+  );
+}
+
+function Certifies({ store, worker }: { store: JobStore; worker: Worker }) {
+  const more = worker.pairs.length - NAMED;
+  return (
+    <>
+      certifies {plural(worker.pairs.length, "pair")}:{" "}
+      {worker.pairs.slice(0, NAMED).map((index, i) => {
+        const pair = store.pairs[index];
+        return (
+          <span key={index}>
+            {i > 0 && ", "}
+            <a href={address({ pair: index })}>{pair ? `${pair.a} – ${pair.b}` : `pair ${index}`}</a>
+          </span>
+        );
+      })}
+      {more > 0 && ` and ${more} more`}
+    </>
+  );
+}
