@@ -153,7 +153,15 @@ COMMANDS: list[Row] = [
         ),
     ),
     *rows(
-        "client/demo.py", ("stack_failed", "", "the service did not start", "see {log}", "a machine on which the stack does not come up")
+        "client/demo.py",
+        ("stack_failed", "", "the service did not start", "see {log}", "a machine on which the stack does not come up"),
+        (
+            "no_region",
+            "",
+            "no region was certified within {DEADLINE_SECONDS} s, which are enough where nothing else runs",
+            "run it again when this machine has less to do, or give it longer: ciris grow {SCENE} --deadline 1200",
+            "a machine that is too busy for the demonstration",
+        ),
     ),
     *rows(
         "ciris/find.py",
