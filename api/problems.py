@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from functools import partial
 from http import HTTPStatus
@@ -139,9 +140,10 @@ def _validation(error: RequestValidationError) -> Problem:
     problems = [FieldProblem(field=_field(e["loc"]), message=_sentence(e)) for e in found]
     if any(e["type"] == "json_invalid" for e in found):
         return problem_of(CirisError("malformed_json", "the body is not JSON", field="body", hint=_DESCRIBED), HTTPStatus.BAD_REQUEST)
-    return problem_of(
-        CirisError("invalid_request", problems[0].message, field=problems[0].field or "body", hint=_DESCRIBED), errors=problems
-    )
+    # Of the types that a field may have, the one that was meant is the one of which most was right.
+    first = max(range(len(found)), key=lambda i: (found[i]["loc"][:2] == found[0]["loc"][:2], len(found[i]["loc"]), -i))
+    meant = CirisError("invalid_request", problems[first].message, field=problems[first].field or "body", hint=_DESCRIBED)
+    return problem_of(meant, errors=problems)
 
 
 def _http(error: HTTPException) -> Problem:
@@ -169,9 +171,15 @@ _EXPLANATIONS: dict[type, Callable[[Any], Problem]] = {
 }
 
 
+_TYPE = re.compile(r"(constrained-)?(list|str|int|float|bool|dict|tuple)(\[.*\])?$")
+
+
 def _field(loc: Sequence[str | int]) -> str:
-    """Returns the name of a field as the client wrote it: ``("body", "grow", "seed", "q", 3)`` -> ``"seed.q[3]"``."""
-    parts = list(loc[1:])
+    """Returns the name of a field as the client wrote it: ``("body", "grow", "seed", "q", 3)`` -> ``"seed.q[3]"``.
+
+    Where a field may be of several types, pydantic names the one it has tried, as in ``("body", "start", "list[float]", 0)``.
+    """
+    parts = [part for part in loc[1:] if isinstance(part, int) or not _TYPE.match(part)]
     if loc[0] == "body" and parts and parts[0] in set(JobKind):
         del parts[0]
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".")

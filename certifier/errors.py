@@ -1,6 +1,7 @@
 """The errors here tell a user what is wrong, where, and what to do."""
 
 import difflib
+from functools import partial
 
 
 class CirisError(Exception):
@@ -19,6 +20,10 @@ class CirisError(Exception):
     def __str__(self) -> str:
         where = f"{self.field}: " if self.field else ""
         return f"{where}{self.message}" + (f" ({self.hint})" if self.hint else "")
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Says how the error travels between processes, and how it is copied."""
+        return partial(type(self), field=self.field, hint=self.hint), (self.code, self.message)
 
     def to_document(self) -> dict[str, str | None]:
         """Returns the error as a JSON-able dict with the keys code, message, field, hint."""

@@ -7,7 +7,7 @@ import os
 import re
 from pathlib import Path
 
-from certifier.errors import CirisError
+from certifier.errors import CirisError, unreadable
 
 
 def data_dir() -> Path:
@@ -19,12 +19,23 @@ def data_dir() -> Path:
     return (Path(home) if home else Path.home() / ".local" / "share") / "ciris"
 
 
+STACK = "stack.json"
+"""In this file of its data directory a stack writes down its address."""
+
+
 def running_stack(data: Path) -> str | None:
-    """Returns the URL that the stack of this data directory wrote down; None when no stack runs there."""
+    """Returns the URL that the stack of this data directory wrote down; None when no stack runs there.
+
+    Raises:
+        CirisError: no_service, where the file is damaged.
+    """
     try:
-        return str(json.loads((data / "stack.json").read_text())["url"])
+        return str(json.loads((data / STACK).read_text())["url"])
     except FileNotFoundError:
         return None
+    except (OSError, ValueError, KeyError, TypeError):
+        message = f"{data / STACK} does not say where the service is"
+        raise CirisError("no_service", message, hint="start it again with `ciris up`, or name its address") from None
 
 
 NO_SERVICE = "start one with `ciris up`, or name one: --url, CIRIS_URL, or url of ciris.connect; --local and scene check need none"
@@ -52,7 +63,21 @@ def api_key() -> str | None:
     value = os.environ.get(name)
     if not value:
         return None
-    key = (Path(value).expanduser().read_text(errors="replace") if name.endswith("FILE") else value).strip()
-    if not re.fullmatch(r"[\x21-\x7e]+", key):
-        raise CirisError("api_key", "this is not an API key", field=name, hint="it is one word, as `ciris key add` prints it")
-    return key
+    try:
+        key = Path(value).expanduser().read_text(errors="replace") if name.endswith("FILE") else value
+    except OSError as error:
+        raise CirisError(
+            "api_key", f"{value}: {unreadable(error)}", field="CIRIS_API_KEY_FILE", hint="name the file that holds the key"
+        ) from None
+    return checked_key(key, name)
+
+
+def checked_key(key: str, field: str) -> str:
+    """Returns an API key without the space around it. No message shows it.
+
+    Raises:
+        CirisError: api_key, for something that cannot be a key.
+    """
+    if not re.fullmatch(r"[\x21-\x7e]+", key.strip()):
+        raise CirisError("api_key", "this is not an API key", field=field, hint="it is one word, as `ciris key add` prints it")
+    return key.strip()

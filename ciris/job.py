@@ -40,5 +40,10 @@ def why_no_region(job: Document) -> CirisError:
     """Returns the error that says why an ended job has no result."""
     if job["error"]:
         return CirisError.from_document(job["error"])
+    hint = f"`ciris job show {job['id'][:8]}`, or `obstacles` of the job in Python, tells more"
+    if job["kind"] == "certify-path":
+        return CirisError("no_region", "a job that certifies a motion has no region", hint="`motion` of the job returns its verdict")
+    if job["state"] == "succeeded":
+        return CirisError("no_region", f"the job has ended without a region: {job['reason'] or job['outcome']}", hint=hint)
     reason = job["reason"] or f"the job is {job['state']}"
-    return CirisError(f"job_{job['state']}", reason, hint=f"`ciris job show {job['id'][:8]}` tells more")
+    return CirisError(f"job_{job['state']}", reason, hint=hint)

@@ -3,34 +3,79 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
+from typing import Any
 from urllib.parse import quote
 
 import httpx2
 
 from certifier.errors import CirisError
+from ciris.requests import named
+
+BUSY = (502, 503, 504)
+"""With these a proxy answers whose service does not, as while it starts again."""
+
+
+def address(url: str) -> str:
+    """Returns the address of a service without a slash at its end.
+
+    Raises:
+        CirisError: url.
+    """
+    hint = "write it as http://HOST:PORT"
+    try:
+        parsed = httpx2.URL(url)
+    except (TypeError, ValueError, httpx2.InvalidURL):
+        raise CirisError("url", f"{url!r} is no address", hint=hint) from None
+    if parsed.scheme not in ("http", "https") or not parsed.host:
+        raise CirisError("url", f"{url!r} is no address of a service", hint=hint)
+    return url.rstrip("/")
 
 
 def unreachable(url: str, error: Exception) -> CirisError:
     """Returns the error that says that nobody answers at ``url``."""
-    reason = re.sub(r"^\[.*?\] ", "", str(error))  # an errno, which helps nobody
-    message = f"the service at {url} does not answer: {reason}"
-    return CirisError("unreachable", message, hint="is `ciris up` running there?")
+    if isinstance(error, httpx2.TimeoutException):
+        return CirisError(
+            "timeout", f"the service at {url} has not answered in time", hint="ask for less, or connect with a longer timeout"
+        )
+    reason = re.sub(r"^\[.*?\] ", "", str(error)) or type(error).__name__  # without the errno, which helps nobody
+    return CirisError("unreachable", f"the service at {url} does not answer: {reason}", hint="is `ciris up` running there?")
 
 
 def problem(response: httpx2.Response) -> CirisError:
-    """Returns the error that the service has answered with."""
+    """Returns the error that the service, or whoever stands before it, has answered with."""
     if response.headers.get("content-type", "").startswith("application/problem+json"):
-        problem = response.json()
-        return CirisError(problem["code"], problem["detail"], field=problem["field"], hint=problem["hint"])
-    return CirisError("not_ciris", f"{response.url} answered {response.status_code}", hint="is that the address of a ciris service?")
+        with suppress(ValueError, KeyError, TypeError):
+            problem = response.json()
+            return CirisError(problem["code"], problem["detail"], field=problem["field"], hint=problem["hint"] or "")
+    url, status = response.url, response.status_code
+    if status in BUSY:
+        return CirisError("unreachable", f"{url} answered {status}: who answers there cannot reach the service now", hint="try again soon")
+    if response.is_redirect:
+        return CirisError("not_ciris", f"{url} sends you on to {response.headers['location']}", hint="give the address that it leads to")
+    return CirisError("not_ciris", f"{url} answered {status}", hint="is that the address of a ciris service?")
+
+
+def content(response: httpx2.Response) -> Any:
+    """Returns the JSON that the service has answered with.
+
+    Raises:
+        CirisError: not_ciris, where it is none.
+    """
+    try:
+        return response.json()
+    except ValueError:
+        message = f"{response.url} answered {response.status_code} with something that is not JSON"
+        raise CirisError("not_ciris", message, hint="is that the address of a ciris service?") from None
 
 
 def segment(name: str) -> str:
     """Returns a name or an id as one segment of a URL's path.
 
     Raises:
-        CirisError: not_found for what no name can be.
+        CirisError: not_found for what no name can be; argument for what is no text.
     """
+    name = named(name, "name", "a name or an id")
     if not name.strip(".") or "/" in name:
         raise CirisError("not_found", f"{name!r} is no name and no id", hint="`scene ls`, `job ls` and `region ls` of ciris list them")
     return quote(name, safe="")

@@ -10,6 +10,8 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from ciris.space import frozen
+
 T = TypeVar("T")
 
 
@@ -29,7 +31,7 @@ def _value(kind: Any, value: Any) -> Any:
     if origin is tuple:
         return tuple(_value(arguments[0], item) for item in value)
     if origin is np.ndarray:
-        return np.array(value, dtype=float)
+        return frozen(value)
     if kind is datetime:
         return datetime.fromisoformat(value)
     if isinstance(kind, type) and issubclass(kind, StrEnum):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from certifier.outcome import Guarantee
 from ciris.answers import SHORT, Document, QVolume, Share
 from ciris.reading import read
-from ciris.space import Array, InSpace, Space
+from ciris.space import Array, InSpace, Space, frozen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,7 +52,15 @@ class RegionData(InSpace):
         """
         positions = self.space.points(q, "q")
         within = ((self.space.q_lower <= positions) & (positions <= self.space.q_upper)).all(axis=-1)
-        return np.asarray(within & (self.to_s(positions) @ self.C.T <= self.d).all(axis=-1))
+        s = self.to_s(np.where(np.asarray(within)[..., None], positions, self.q_star))
+        return np.asarray(within & (s @ self.C.T <= self.d).all(axis=-1))
+
+    def __eq__(self, other: object) -> bool:
+        """Regions are equal that have the same id, which no other region of any service has."""
+        return isinstance(other, RegionData) and other.id == self.id
+
+    def __hash__(self) -> int:
+        return hash(self.id)
 
     def __repr__(self) -> str:
         size = f", {self.q_volume.value:.3g} {self.q_volume.unit}" if self.q_volume else ""
@@ -63,17 +71,17 @@ def region_fields(document: Document) -> dict[str, Any]:
     """Returns the fields of a region that ``GET /v1/regions/{region}`` describes."""
     manifest = document["manifest"]
     given = manifest["space"]
-    q_star, lower, upper = (np.array(given[name], dtype=float) for name in ("q_star", "q_lower", "q_upper"))
+    q_star, lower, upper = (frozen(given[name]) for name in ("q_star", "q_lower", "q_upper"))
     return {
         "id": document["id"],
         "scene": document["scene"],
         "scene_name": manifest["scene"]["name"],
         "job": document["job"],
         "guarantee": Guarantee(document["guarantee"]),
-        "C": np.array(manifest["halfspace_normals"], dtype=float),
-        "d": np.array(manifest["halfspace_offsets"], dtype=float),
-        "center": np.array(manifest["interior_point"], dtype=float),
-        "space": Space(tuple(given["joints"]), q_star, lower, upper, np.array(given["revolute"], dtype=bool)),
+        "C": frozen(manifest["halfspace_normals"]),
+        "d": frozen(manifest["halfspace_offsets"]),
+        "center": frozen(manifest["interior_point"]),
+        "space": Space(tuple(given["joints"]), q_star, lower, upper, frozen(given["revolute"], bool)),
         "q_volume": document["q_volume"] and read(QVolume, document["q_volume"]),
         "share": document["share"] and read(Share, document["share"]),
         "created_at": datetime.fromisoformat(document["created_at"]),

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal, TypedDict, get_type_hints
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from certifier.errors import RegionError
+from certifier.errors import CirisError, RegionError, close_matches
 from ciris.answers import Document
+from ciris.space import numbers
 
 Straight = Literal["q", "s"]
 
@@ -75,10 +76,10 @@ _IN_OPTIONS = ("contraction", "cells", "pushes", "max_rounds", "random_seed")
 
 def grow_request(scene: str, q: ArrayLike, options: GrowOptions) -> Document:
     """Returns the request of a job that grows a region around q, (n,)."""
-    given = dict(options)
-    seed: Document = {"q": np.asarray(q, dtype=float).tolist()}
+    given = _known(options, GrowOptions)
+    seed: Document = {"q": numbers(q, "q").tolist()}
     if "contain" in options:
-        seed["contain"] = np.atleast_2d(np.asarray(options["contain"], dtype=float)).tolist()
+        seed["contain"] = np.atleast_2d(numbers(options["contain"], "contain")).tolist()
     if "method" in given:
         seed["method"] = given["method"]
     request = {"kind": "grow", "scene": scene, "seed": seed, "options": {name: given[name] for name in _IN_OPTIONS if name in given}}
@@ -87,15 +88,49 @@ def grow_request(scene: str, q: ArrayLike, options: GrowOptions) -> Document:
 
 def cover_request(scene: str, options: CoverOptions) -> Document:
     """Returns the request of a job that covers a scene."""
-    given = dict(options)
+    given = _known(options, CoverOptions)
     asked = {name: value for name, value in given.items() if name not in dict(_IN_JOB)}
     for name in ("connect", "seeds"):
         if name in given:
-            asked[name] = np.atleast_2d(np.asarray(given[name], dtype=float)).tolist()
+            asked[name] = np.atleast_2d(numbers(given[name], name)).tolist()
     if "paths" in options:
-        asked["paths"] = [np.asarray(path, dtype=float).tolist() for path in options["paths"]]
+        asked["paths"] = [numbers(path, f"paths[{i}]").tolist() for i, path in enumerate(options["paths"])]
     request = {"kind": "cover", "scene": scene, "options": asked}
     return request | {field: given[name] for name, field in _IN_JOB if name in given}
+
+
+def _known(options: Mapping[str, Any], kind: type) -> Document:
+    """Returns the options that are given; None stands for the service's default.
+
+    Raises:
+        CirisError: unknown_option.
+    """
+    known = list(get_type_hints(kind))
+    for name in options:
+        if name not in known:
+            hint = close_matches(name, known) or f"options: {', '.join(known)}"
+            raise CirisError("unknown_option", f"there is no option {name!r}", field=name, hint=hint)
+    return given(**options)
+
+
+def document(value: Any) -> Any:
+    """Returns what json writes of a value: numpy's numbers and arrays as Python's."""
+    if isinstance(value, Mapping):
+        return {name: document(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [document(one) for one in value]
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+
+
+def named(name: object, field: str, what: str) -> str:
+    """Returns the name or the id of something.
+
+    Raises:
+        CirisError: argument, for what is no text.
+    """
+    if isinstance(name, str):
+        return name
+    raise CirisError("argument", f"{type(name).__name__} is no {field}", field=field, hint=f"give {what}")
 
 
 def given(**values: Any) -> Document:
@@ -103,9 +138,13 @@ def given(**values: Any) -> Document:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def plain(value: ArrayLike | str | None) -> Any:
-    """Returns an array, or what numpy makes one of, as nested lists; a text, such as an id, and None as they are."""
-    return value if value is None or isinstance(value, str) else np.asarray(value, dtype=float).tolist()
+def plain(value: ArrayLike | str | None, field: str) -> Any:
+    """Returns an array, or what numpy makes one of, as nested lists; a text, such as an id, and None as they are.
+
+    Raises:
+        RegionError: points.
+    """
+    return value if value is None or isinstance(value, str) else numbers(value, field).tolist()
 
 
 def straight(space: Straight | None, s: ArrayLike | None) -> str:
@@ -119,11 +158,11 @@ def points(axes: int, **values: ArrayLike | None) -> Document:
     Raises:
         RegionError: points.
     """
-    found = {name: np.asarray(value, dtype=float) for name, value in values.items() if value is not None}
+    found = {name: numbers(value, name) for name, value in values.items() if value is not None}
     if len(found) != 1:
         raise RegionError("points", "the points must be given either as q or as s", field="q")
     ((name, array),) = found.items()
-    if array.ndim not in (axes - 1, axes) or not np.isfinite(array).all():
+    if array.ndim not in (axes - 1, axes):
         raise RegionError("points", f"it must be finite numbers in {axes - 1} or {axes} axes, joints last", field=name)
     return {name: (array if array.ndim == axes else array[None]).tolist()}
 

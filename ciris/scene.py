@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ciris.answers import Document
-from ciris.space import InSpace, Space
+from ciris.requests import named
+from ciris.space import InSpace, Space, frozen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -28,6 +27,13 @@ class Scene(InSpace):
     padding: float
     """Metres added around every geometry of every pair."""
 
+    def __eq__(self, other: object) -> bool:
+        """Scenes are equal that the service knows by the same id, which is made from their content."""
+        return isinstance(other, Scene) and other.id == self.id
+
+    def __hash__(self) -> int:
+        return hash(self.id)
+
     def __repr__(self) -> str:
         return f"Scene({self.name!r}, {self.id}: {len(self.joints)} joints, {self.geometries} geometries, {self.pairs} pairs)"
 
@@ -35,13 +41,17 @@ class Scene(InSpace):
     def of(cls, document: Document) -> Scene:
         """Reads the service's description, ``GET /v1/scenes/{scene}``."""
         joints = document["positions"]
-        q_star, lower, upper = (np.array([joint[name] for joint in joints], dtype=float) for name in ("q_star", "lower", "upper"))
-        revolute = np.array([joint["kind"] == "revolute" for joint in joints])
+        q_star, lower, upper = (frozen([joint[name] for joint in joints]) for name in ("q_star", "lower", "upper"))
+        revolute = frozen([joint["kind"] == "revolute" for joint in joints], bool)
         space = Space(tuple(joint["name"] for joint in joints), q_star, lower, upper, revolute)
         names = ("id", "name", "hash", "geometries", "pairs", "warnings", "padding")
         return cls(space=space, **{name: document[name] for name in names})
 
 
 def scene_name(scene: str | Scene) -> str:
-    """Returns what the service calls a scene."""
-    return scene.id if isinstance(scene, Scene) else scene
+    """Returns what the service calls a scene.
+
+    Raises:
+        CirisError: argument, for anything but a name, an id or a scene.
+    """
+    return named(scene.id if isinstance(scene, Scene) else scene, "scene", "its name, its id or a ciris.Scene")

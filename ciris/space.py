@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +11,29 @@ from numpy.typing import ArrayLike, NDArray
 from certifier.errors import RegionError
 
 Array = NDArray[np.float64]
+
+
+def numbers(values: object, field: str) -> Array:
+    """Returns finite numbers as an array of floats.
+
+    Raises:
+        RegionError: points, for what is no array of finite real numbers.
+    """
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind in "biuf" and np.isfinite(array).all() and not np.ma.is_masked(values):
+            return array.astype(float)
+    except (TypeError, ValueError):
+        pass
+    message = "these are not finite numbers, as many in every row"
+    raise RegionError("points", message, field=field, hint="give real numbers, such as joint positions")
+
+
+def frozen(values: Any, dtype: Any = float) -> Any:
+    """Returns a new array that nobody can write to."""
+    array = np.array(values, dtype=dtype)
+    array.setflags(write=False)
+    return array
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +55,18 @@ class Space:
         """Returns the tangent-space coordinates of joint positions, (..., n) -> (..., n).
 
         Raises:
-            RegionError: wrong_length.
+            RegionError: wrong_length; outside_window, for a joint that is half a turn or more from q*, where s begins anew.
         """
-        delta = self.points(q, "q") - self.q_star
+        positions = self.points(q, "q")
+        delta = positions - self.q_star
+        outside = self.revolute & (np.abs(delta) >= np.pi)
+        if outside.any():
+            *at, joint = np.argwhere(outside)[0]
+            value, centre = positions[(*at, joint)], self.q_star[joint]
+            message = f"{self.joints[joint]} is {value:.6g} rad, which is half a turn or more from q* = {centre:.6g} rad"
+            raise RegionError(
+                "outside_window", message, field="q", hint=f"its limits are {self.q_lower[joint]:.6g} and {self.q_upper[joint]:.6g} rad"
+            )
         return np.where(self.revolute, np.tan(delta / 2), delta)
 
     def to_q(self, s: ArrayLike) -> Array:
@@ -49,9 +82,9 @@ class Space:
         """Returns points as an array, (..., n).
 
         Raises:
-            RegionError: wrong_length.
+            RegionError: points, wrong_length.
         """
-        array, n = np.asarray(values, dtype=float), len(self.joints)
+        array, n = numbers(values, field), len(self.joints)
         if array.shape[-1:] != (n,):
             message = f"it has the shape {array.shape}, and the last number must be {n}, one for each joint"
             raise RegionError("wrong_length", message, field=field, hint=f"in the order {', '.join(self.joints)}")

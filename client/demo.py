@@ -61,13 +61,24 @@ def _demonstrate(url: str) -> tuple[bool, str | None]:
         size = f"{scene['joints']} joints, {scene['geometries']} convex bodies, {scene['pairs']} pairs to separate"
         print(f"scene {scene['name']}: {size}", flush=True)
         request = {"kind": "grow", "scene": scene["id"], "seed": {"q": seed_of(str(SCENE), None)}, "deadline_seconds": DEADLINE_SECONDS}
-        grown = service.grow(client, request, Screen(), idempotency_key=_key(request))
+        grown = _grown(client, request)
     path = ProofFile(str(data_dir() / f"{file_name(scene['name'])}.proof")).write(scene["name"], grown.proof)
     print("\nevery pair of bodies:")
     output.print_pairs(grown.manifest["pairs"])
     print("\ncertified region:")
     output.print_region(grown.manifest, [("time", output.seconds(grown.seconds)), ("ended", grown.remark), ("proof", str(path))])
     return _verified(grown.proof), grown.region
+
+
+def _grown(client: Client, request: dict[str, Any]) -> service.Grown:
+    try:
+        return service.grow(client, request, Screen(), idempotency_key=_key(request))
+    except CirisError as error:
+        if error.code != "no_region":
+            raise
+        message = f"no region was certified within {DEADLINE_SECONDS} s, which are enough where nothing else runs"
+        hint = f"run it again when this machine has less to do, or give it longer: ciris grow {SCENE} --deadline 1200"
+        raise CirisError("no_region", message, hint=hint) from None
 
 
 def _verified(proof: bytes) -> bool:

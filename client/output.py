@@ -13,7 +13,7 @@ from certifier.verify.decimals import at_least_mm
 
 Row = Sequence[str]
 
-NEGATIVE = {"not_grown", "not_covered", "revoked"}
+NEGATIVE = {"no_region", "not_grown", "not_covered", "revoked"}
 """These errors are answers: the input was fine, and the answer is no."""
 
 

@@ -1,6 +1,6 @@
 """Plans with Drake's GcsTrajectoryOptimization through the certified regions of a service, which then says whether the plan is covered.
 
-    python examples/planner_gcs.py planar-2dof --start 0,0 --goal 0.3,0.2
+    python examples/planner_gcs.py planar-2dof --start 0 0 --goal 0.3 -0.2
 
 It looks for new regions until some lead from start to goal. It needs drake beside ``ciris[client]``.
 """
@@ -66,11 +66,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Plans through the certified regions of a service.")
     parser.add_argument("scene", help="name or id of a scene that the service knows")
     for end in ("start", "goal"):
-        parser.add_argument(f"--{end}", required=True, type=lambda text: [float(x) for x in text.split(",")], help="joint positions")
+        parser.add_argument(f"--{end}", required=True, nargs="+", type=float, metavar="Q", help="joint positions, in radians or metres")
     parser.add_argument("--patience", type=float, default=60, help="seconds to wait for regions that lead there")
     asked = parser.parse_args()
-    with ciris.connect() as service:
-        waypoints = drive(service, asked.scene, asked.start, asked.goal, asked.patience)
+    try:
+        with ciris.connect() as service:
+            waypoints = drive(service, asked.scene, asked.start, asked.goal, asked.patience)
+    except ciris.CirisError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
     if waypoints is None:
         print("no certified regions lead there", file=sys.stderr)
         return 1

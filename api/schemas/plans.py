@@ -14,7 +14,7 @@ from certifier.outcome import Guarantee
 SPEED, ACCELERATION = 1.0, 2.0
 """Limits of every joint where a request gives none, in rad/s and rad/s² (or m/s and m/s²)."""
 
-Positive = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
+Positive = Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False)]
 Positives = Annotated[list[Positive], Field(min_length=1, max_length=64)]
 Configuration = Annotated[list[Annotated[float, Field(allow_inf_nan=False)]], Field(min_length=1, max_length=64)]
 RegionPrefix = Annotated[str, Field(min_length=4, max_length=64, description="Id of a region, or its first characters.")]
@@ -33,10 +33,12 @@ class PlanRequest(Request):
     )
     goal: End = Field(description="Where the motion ends, like `start`.", examples=[[0.35, -0.2], REGION])
     speed: Positive | Positives = Field(
-        SPEED, description="Largest speed, in rad/s or m/s: one for all joints, or (n,), one for each.", examples=[1.0]
+        SPEED, description="Largest speed, in rad/s or m/s, 1e-6 to 1e6: one for all joints, or (n,), one for each.", examples=[1.0]
     )
     acceleration: Positive | Positives = Field(
-        ACCELERATION, description="Largest acceleration, in rad/s² or m/s²: one for all joints, or (n,), one for each.", examples=[2.0]
+        ACCELERATION,
+        description="Largest acceleration, in rad/s² or m/s², 1e-6 to 1e6: one for all joints, or (n,), one for each.",
+        examples=[2.0],
     )
 
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 from types import TracebackType
@@ -14,9 +16,11 @@ from typing import Any, Self
 
 import httpx2
 
+from certifier.errors import CirisError
 from ciris.answers import Document
-from ciris.problems import problem, segment, unreachable
-from ciris.requests import bundle, given
+from ciris.find import api_key
+from ciris.problems import address, content, problem, segment, unreachable
+from ciris.requests import bundle, document, given
 
 Rows = list[list[float]]
 Limit = float | list[float]
@@ -27,6 +31,8 @@ QUIET_S = 60.0
 
 PATIENCE = 5
 """The client repeats a request at most this often when the service answers that it was asked too often."""
+ABSENCE_S, PAUSE_S = 30.0, 0.5
+"""Whoever waits for a job bears with a service that does not answer for so long, as while it starts again, and asks with such pauses."""
 
 
 class _Patient(httpx2.AsyncHTTPTransport):
@@ -46,15 +52,41 @@ class _Patient(httpx2.AsyncHTTPTransport):
 class AsyncClient:
     """A client is a connection to the service at ``url``. Every method may raise CirisError: what the service said, or ``unreachable``.
 
+    It may be used in a process that was forked, which has connections of its own. Pickled, it has no key: where it is loaded,
+    :func:`ciris.find.api_key` finds one.
+
     Args:
         key: an API key, for a service that asks for one.
+        timeout: seconds that a question may take.
+
+    Raises:
+        CirisError: url.
     """
 
-    def __init__(self, url: str, key: str | None = None) -> None:
-        self.url = url.rstrip("/")
-        headers = {} if key is None else {"Authorization": f"Bearer {key}"}
-        transport = _Patient(trust_env=False)
-        self._http = httpx2.AsyncClient(base_url=self.url, headers=headers, timeout=TIMEOUT_S, trust_env=False, transport=transport)
+    def __init__(self, url: str, key: str | None = None, timeout: float = TIMEOUT_S) -> None:
+        self.url = address(url)
+        self._headers = {} if key is None else {"Authorization": f"Bearer {key}"}
+        self._timeout = timeout
+        self._connect()
+
+    def _connect(self) -> None:
+        # Every wait for a job has a connection, so there is no limit to their number.
+        limits = httpx2.Limits(max_connections=None, max_keepalive_connections=20)
+        transport = _Patient(trust_env=False, limits=limits)
+        self._process = os.getpid()
+        self._connections = httpx2.AsyncClient(
+            base_url=self.url, headers=self._headers, timeout=self._timeout, trust_env=False, transport=transport
+        )
+
+    @property
+    def _http(self) -> httpx2.AsyncClient:
+        """The connections of this process: on those of its parent it would hear the parent's answers."""
+        if self._process != os.getpid():
+            self._connect()
+        return self._connections
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _again, (type(self), self.url, self._timeout)
 
     async def __aenter__(self) -> Self:
         return self
@@ -68,7 +100,8 @@ class AsyncClient:
 
     async def ready(self) -> Document:
         """Returns whether the service can do its work: ``ready`` and ``checks``."""
-        return (await self._send("GET", "/readyz", accepted=(503,))).json()
+        response = await self._send("GET", "/readyz", accepted=(503,))
+        return content(response)
 
     async def add_scene(self, path: str | Path) -> Document:
         """Uploads a scene file with everything it refers to, and returns the scene."""
@@ -94,7 +127,7 @@ class AsyncClient:
         """Creates a job. Returns the job and True, or the job made earlier under the same key and False."""
         headers = given(**{"Idempotency-Key": idempotency_key})
         response = await self._send("POST", "/v1/jobs", json=request, headers=headers)
-        return response.json(), response.status_code == httpx2.codes.CREATED
+        return content(response), response.status_code == httpx2.codes.CREATED
 
     async def jobs(
         self, *, state: str | None = None, scene: str | None = None, parent: str | None = None, most: int = 50
@@ -115,6 +148,24 @@ class AsyncClient:
     async def job(self, job_id: str) -> Document:
         """Returns a job as it is now; the first characters of its id are enough."""
         return await self._json("GET", f"/v1/jobs/{segment(job_id)}")
+
+    async def job_after_all(self, job_id: str) -> Document:
+        """Returns a job as it is now, from a service that may be absent for a while.
+
+        Raises:
+            CirisError: unreachable, with what to do to wait for the job again.
+        """
+        until = time.monotonic() + ABSENCE_S
+        while True:
+            try:
+                return await self.job(job_id)
+            except CirisError as error:
+                if error.code not in ("unreachable", "timeout"):
+                    raise
+                if time.monotonic() > until:
+                    hint = f"wait for it again with job({job_id!r}) of the service, or with `ciris job watch {job_id[:8]}`"
+                    raise CirisError(error.code, f"{error.message}; the job {job_id} goes on", hint=hint) from None
+            await asyncio.sleep(PAUSE_S)
 
     async def cancel(self, job_id: str) -> Document:
         """Asks a job to end, and returns it."""
@@ -145,7 +196,11 @@ class AsyncClient:
         return await self._json("GET", f"/v1/jobs/{segment(job_id)}/pairs", params=given(iteration=iteration))
 
     async def events(self, job_id: str, after: int = 0) -> AsyncIterator[Document]:
-        """Yields the job's events in order until the job has ended. An interrupted stream goes on where it stopped."""
+        """Yields the job's events in order until the job has ended. An interrupted stream goes on where it stopped.
+
+        Raises:
+            CirisError: unreachable, where the service does not answer for ABSENCE_S.
+        """
         while True:
             try:
                 async for event in self._stream(job_id, after):
@@ -153,15 +208,18 @@ class AsyncClient:
                         return
                     after = event["seq"]
                     yield event
-            except (httpx2.ReadTimeout, httpx2.RemoteProtocolError, httpx2.ReadError):
-                await self.job(job_id)
+            except CirisError as error:
+                if error.code not in ("unreachable", "timeout"):
+                    raise
+            await asyncio.sleep(PAUSE_S)
+            await self.job_after_all(job_id)
 
     async def _stream(self, job_id: str, after: int) -> AsyncIterator[Document | None]:
         """Yields the events of one connection, and None when the job has ended."""
-        url, timeout = f"/v1/jobs/{segment(job_id)}/events/stream", httpx2.Timeout(TIMEOUT_S, read=QUIET_S)
+        url, timeout = f"/v1/jobs/{segment(job_id)}/events/stream", httpx2.Timeout(self._timeout, read=QUIET_S)
         try:
             async with self._http.stream("GET", url, headers={"Last-Event-ID": str(after)}, timeout=timeout) as response:
-                if response.is_error:
+                if not response.is_success:
                     await response.aread()
                     raise problem(response)
                 kind = ""
@@ -171,8 +229,11 @@ class AsyncClient:
                         kind = value
                     elif name == "data":
                         yield None if kind == "end" else json.loads(value)
-        except httpx2.ConnectError as error:
+        except httpx2.TransportError as error:
             raise unreachable(self.url, error) from None
+        except RuntimeError:
+            self._refuse_if_closed()
+            raise
 
     async def regions(self, *, scene: str | None = None, job: str | None = None) -> list[Document]:
         """Returns every region, newest first, or those of one scene or job."""
@@ -246,13 +307,31 @@ class AsyncClient:
             params["after"] = page["next"]
 
     async def _json(self, method: str, path: str, **options: Any) -> Any:
-        return (await self._send(method, path, **options)).json()
+        response = await self._send(method, path, **options)
+        return content(response)
 
     async def _send(self, method: str, path: str, accepted: tuple[int, ...] = (), **options: Any) -> httpx2.Response:
         try:
+            if "json" in options:
+                options["json"] = document(options["json"])
             response = await self._http.request(method, path, **options)
         except httpx2.TransportError as error:
             raise unreachable(self.url, error) from None
-        if response.is_error and response.status_code not in accepted:
+        except (TypeError, ValueError):
+            message = "the request holds something that cannot be sent, such as a number that is not finite"
+            raise CirisError("argument", message, hint="give texts, finite numbers, and lists of them") from None
+        except RuntimeError:
+            self._refuse_if_closed()
+            raise
+        if not response.is_success and response.status_code not in accepted:
             raise problem(response)
         return response
+
+    def _refuse_if_closed(self) -> None:
+        if self._connections.is_closed:
+            raise CirisError("closed", "the connections to the service are closed", hint="connect again") from None
+
+
+def _again(kind: type[AsyncClient], url: str, timeout: float) -> AsyncClient:
+    """Returns the client that was pickled."""
+    return kind(url, api_key(), timeout)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self, Unpack
+from weakref import WeakValueDictionary
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from certifier.errors import CirisError
@@ -33,8 +33,9 @@ from ciris.asynchronous.client import AsyncClient
 from ciris.job import JobData, why_no_region
 from ciris.reading import read
 from ciris.region import RegionData, region_fields
-from ciris.requests import CoverOptions, GrowOptions, Straight, cover_request, given, grow_request, plain, points, straight
+from ciris.requests import CoverOptions, GrowOptions, Straight, cover_request, given, grow_request, named, plain, points, straight
 from ciris.scene import Scene, scene_name
+from ciris.space import numbers
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,15 +68,19 @@ class AsyncJob(JobData):
         return await self._service.job(self.id)
 
     async def follow(self) -> AsyncIterator[Event]:
-        """Yields what happens, from the job's first event on, until the job has ended."""
+        """Yields what happens, from the job's first event on, until the job has ended.
+
+        Raises:
+            CirisError: ``unreachable`` where the service does not answer for half a minute. The job goes on, and can be followed again.
+        """
         async for event in self._service.client.events(self.id):
             yield read(Event, event)
 
     async def wait(self) -> AsyncJob:
-        """Waits until the job has ended, and returns it."""
+        """Waits until the job has ended, and returns it; :meth:`follow` says what it may raise."""
         async for _ in self.follow():
             pass
-        return await self.refresh()
+        return self._service._job(await self._service.client.job_after_all(self.id))
 
     async def result(self) -> AsyncRegion:
         """Waits until the job has ended, and returns its last certified region.
@@ -83,7 +88,7 @@ class AsyncJob(JobData):
         Raises:
             CirisError: why there is none.
         """
-        document = await self._service.client.job((await self.wait()).id)
+        document = await self._service.client.job_after_all((await self.wait()).id)
         if document["region"] is None:
             raise why_no_region(document)
         return await self._service.region(document["region"])
@@ -130,7 +135,10 @@ class AsyncService:
 
     def __init__(self, client: AsyncClient) -> None:
         self.client = client
-        self._known: dict[str, AsyncRegion] = {}
+        self._known: WeakValueDictionary[str, AsyncRegion] = WeakValueDictionary()
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.client,)
 
     def __repr__(self) -> str:
         return f"Service({self.client.url!r})"
@@ -202,7 +210,7 @@ class AsyncService:
 
     async def submit_recertify(self, region: str | AsyncRegion, scene: str | Scene, deadline: float | None = None) -> AsyncJob:
         """Creates a job that makes a region of a changed scene from one of the scene before, and returns it at once."""
-        old = region if isinstance(region, str) else region.id
+        old = named(region.id if isinstance(region, AsyncRegion) else region, "region", "its id or a region")
         request = {"kind": "recertify", "scene": scene_name(scene), "region": old, **given(deadline_seconds=deadline)}
         return self._job((await self.client.create_job(request))[0])
 
@@ -212,7 +220,7 @@ class AsyncService:
         Args:
             cells: so many cells of the polytope are looked at for each pair, each with a plane of its own.
         """
-        polytope = {"C": np.asarray(C, dtype=float).tolist(), "d": np.asarray(d, dtype=float).tolist()}
+        polytope = {"C": numbers(C, "C").tolist(), "d": numbers(d, "d").tolist()}
         request = {"kind": "certify", "scene": scene_name(scene), "polytope": polytope, "cells": cells}
         return self._job((await self.client.create_job(request))[0])
 
@@ -226,10 +234,10 @@ class AsyncService:
         return [self._job(document) for document in await self.client.jobs(scene=named, state=state, most=most)]
 
     async def regions(self, scene: str | Scene | None = None) -> list[AsyncRegion]:
-        """Returns every region of a scene, or of all scenes, newest first. Regions that were fetched before are not fetched again."""
+        """Returns every region of a scene, or of all scenes, newest first. Those that you still have are not fetched again."""
         named = None if scene is None else scene_name(scene)
         listed = [document["id"] for document in await self.client.regions(scene=named)]
-        return [self._known[name] if name in self._known else await self.region(name) for name in listed]
+        return [self._known.get(name) or await self.region(name) for name in listed]
 
     async def region(self, region_id: str) -> AsyncRegion:
         """Returns a region; the first characters of its id are enough."""
@@ -276,7 +284,7 @@ class AsyncService:
             space: in which the path is straight between them; default: in which they are given.
             times: (k,) when the path is at each waypoint; the answer is in these. Default: 0, 1, 2 ...
         """
-        when = None if times is None else np.asarray(times, dtype=float).tolist()
+        when = None if times is None else numbers(times, "times").tolist()
         asked = {"scene": scene_name(scene), **points(2, q=q, s=s), "space": straight(space, s), **given(times=when)}
         return read(Coverage, await self.client.path(asked))
 
@@ -295,7 +303,8 @@ class AsyncService:
             start, goal: joint positions (n,), or the id of a region, for any point of it.
             speed, acceleration: limits in rad/s and rad/s² (or m), one for all joints or one for each; default: those of the service.
         """
-        begin, end, fastest, hardest = map(plain, (start, goal, speed, acceleration))
+        begin, end = plain(start, "start"), plain(goal, "goal")
+        fastest, hardest = plain(speed, "speed"), plain(acceleration, "acceleration")
         while True:
             answer = await self.client.plan(scene_name(scene), begin, end, fastest, hardest)
             if answer["complete"] or answer["reason"] != "disconnected":

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self, Unpack
+from weakref import WeakValueDictionary
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from certifier.errors import CirisError
@@ -32,8 +32,9 @@ from ciris.answers import (
 from ciris.job import JobData, why_no_region
 from ciris.reading import read
 from ciris.region import RegionData, region_fields
-from ciris.requests import CoverOptions, GrowOptions, Straight, cover_request, given, grow_request, plain, points, straight
+from ciris.requests import CoverOptions, GrowOptions, Straight, cover_request, given, grow_request, named, plain, points, straight
 from ciris.scene import Scene, scene_name
+from ciris.space import numbers
 from ciris.synchronous.client import Client
 
 
@@ -67,15 +68,19 @@ class Job(JobData):
         return self._service.job(self.id)
 
     def follow(self) -> Iterator[Event]:
-        """Yields what happens, from the job's first event on, until the job has ended."""
+        """Yields what happens, from the job's first event on, until the job has ended.
+
+        Raises:
+            CirisError: ``unreachable`` where the service does not answer for half a minute. The job goes on, and can be followed again.
+        """
         for event in self._service.client.events(self.id):
             yield read(Event, event)
 
     def wait(self) -> Job:
-        """Waits until the job has ended, and returns it."""
+        """Waits until the job has ended, and returns it; :meth:`follow` says what it may raise."""
         for _ in self.follow():
             pass
-        return self.refresh()
+        return self._service._job(self._service.client.job_after_all(self.id))
 
     def result(self) -> Region:
         """Waits until the job has ended, and returns its last certified region.
@@ -83,7 +88,7 @@ class Job(JobData):
         Raises:
             CirisError: why there is none.
         """
-        document = self._service.client.job(self.wait().id)
+        document = self._service.client.job_after_all(self.wait().id)
         if document["region"] is None:
             raise why_no_region(document)
         return self._service.region(document["region"])
@@ -130,7 +135,10 @@ class Service:
 
     def __init__(self, client: Client) -> None:
         self.client = client
-        self._known: dict[str, Region] = {}
+        self._known: WeakValueDictionary[str, Region] = WeakValueDictionary()
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.client,)
 
     def __repr__(self) -> str:
         return f"Service({self.client.url!r})"
@@ -202,7 +210,7 @@ class Service:
 
     def submit_recertify(self, region: str | Region, scene: str | Scene, deadline: float | None = None) -> Job:
         """Creates a job that makes a region of a changed scene from one of the scene before, and returns it at once."""
-        old = region if isinstance(region, str) else region.id
+        old = named(region.id if isinstance(region, Region) else region, "region", "its id or a region")
         request = {"kind": "recertify", "scene": scene_name(scene), "region": old, **given(deadline_seconds=deadline)}
         return self._job((self.client.create_job(request))[0])
 
@@ -212,7 +220,7 @@ class Service:
         Args:
             cells: so many cells of the polytope are looked at for each pair, each with a plane of its own.
         """
-        polytope = {"C": np.asarray(C, dtype=float).tolist(), "d": np.asarray(d, dtype=float).tolist()}
+        polytope = {"C": numbers(C, "C").tolist(), "d": numbers(d, "d").tolist()}
         request = {"kind": "certify", "scene": scene_name(scene), "polytope": polytope, "cells": cells}
         return self._job((self.client.create_job(request))[0])
 
@@ -226,10 +234,10 @@ class Service:
         return [self._job(document) for document in self.client.jobs(scene=named, state=state, most=most)]
 
     def regions(self, scene: str | Scene | None = None) -> list[Region]:
-        """Returns every region of a scene, or of all scenes, newest first. Regions that were fetched before are not fetched again."""
+        """Returns every region of a scene, or of all scenes, newest first. Those that you still have are not fetched again."""
         named = None if scene is None else scene_name(scene)
         listed = [document["id"] for document in self.client.regions(scene=named)]
-        return [self._known[name] if name in self._known else self.region(name) for name in listed]
+        return [self._known.get(name) or self.region(name) for name in listed]
 
     def region(self, region_id: str) -> Region:
         """Returns a region; the first characters of its id are enough."""
@@ -276,7 +284,7 @@ class Service:
             space: in which the path is straight between them; default: in which they are given.
             times: (k,) when the path is at each waypoint; the answer is in these. Default: 0, 1, 2 ...
         """
-        when = None if times is None else np.asarray(times, dtype=float).tolist()
+        when = None if times is None else numbers(times, "times").tolist()
         asked = {"scene": scene_name(scene), **points(2, q=q, s=s), "space": straight(space, s), **given(times=when)}
         return read(Coverage, self.client.path(asked))
 
@@ -295,7 +303,8 @@ class Service:
             start, goal: joint positions (n,), or the id of a region, for any point of it.
             speed, acceleration: limits in rad/s and rad/s² (or m), one for all joints or one for each; default: those of the service.
         """
-        begin, end, fastest, hardest = map(plain, (start, goal, speed, acceleration))
+        begin, end = plain(start, "start"), plain(goal, "goal")
+        fastest, hardest = plain(speed, "speed"), plain(acceleration, "acceleration")
         while True:
             answer = self.client.plan(scene_name(scene), begin, end, fastest, hardest)
             if answer["complete"] or answer["reason"] != "disconnected":

@@ -21,6 +21,8 @@ much shorter than all of it.
 FEWEST, MOST = 17, 4000
 """A trajectory has so many configurations at least and at most."""
 _UP = 1 + 1e-6
+_FAST = 1e6
+"""No joint need be faster: Toppra has its numbers in units in which the whole motion lasts about 1."""
 
 
 def length(curve: Array) -> float:
@@ -42,14 +44,15 @@ def timed(curve: Array, through: list[int], speed: Array, acceleration: Array, s
         spacing: no joint moves much farther between two configurations, unless there would be more than MOST of them.
     """
     if length(curve) <= STILL:
-        way = np.abs(curve[-1] - curve[0])
-        return curve[[0, -1]], np.array([0.0, _UP * max((way / speed).max(), np.sqrt(way / acceleration).max())])
+        return curve[[0, -1]], np.array([0.0, _UP * _least(np.abs(curve[-1] - curve[0]), speed, acceleration)])
     along = _along(curve)
     moves = np.concatenate([[True], np.diff(along) > 0])
     path = PiecewisePolynomial.CubicWithContinuousSecondDerivatives(along[moves], curve[moves].T)
+    unit = _least(np.abs(np.diff(curve, axis=0)).sum(axis=0), speed, acceleration)
     toppra = Toppra(path, _sliders(len(speed)), along[moves])
-    toppra.AddJointVelocityLimit(-speed, speed)
-    toppra.AddJointAccelerationLimit(-acceleration, acceleration)
+    for limit, add in ((speed * unit, toppra.AddJointVelocityLimit), (acceleration * unit**2, toppra.AddJointAccelerationLimit)):
+        no_more = np.minimum(limit, _FAST)
+        add(-no_more, no_more)
     course = toppra.SolvePathParameterization()
     if course is None:
         return None
@@ -63,7 +66,13 @@ def timed(curve: Array, through: list[int], speed: Array, acceleration: Array, s
     t[places] = when[apart]
     q = path.vector_values(np.clip(course.vector_values(t)[0], 0.0, along[-1])).T
     q[places], q[0], q[-1], t[0], t[-1] = curve[through][apart], curve[0], curve[-1], fine[0], fine[-1]
+    t *= unit
     return q, t * _stretch(q, t, speed, acceleration)
+
+
+def _least(way: Array, speed: Array, acceleration: Array) -> float:
+    """Returns the time that the slowest joint needs for its way, (n,), by either limit alone. A motion takes a few times as long."""
+    return max(float((way / speed).max()), float(np.sqrt(way / acceleration).max()))
 
 
 def _along(curve: Array) -> Array:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -28,3 +31,20 @@ def test_a_plan_goes_through_regions_that_overlap_and_through_no_gap(url: str, r
         assert np.all(np.diff(waypoints[:, 0]) > 0)
         for goal in (0.5, 0.8):
             assert drive(service, "slider", [-0.2], [goal], patience=0) is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nowhere", "--start", "-0.1", "--goal", "0.1"], "error: scene: there is no scene 'nowhere'"),
+        (["slider", "--start", "x", "--goal", "0.1"], "invalid float value: 'x'"),
+        (["slider", "--start", "-0.1", "0.2", "--goal", "0.1"], "the last number must be 1"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_line(url: str, region: str, arguments: list[str], words: str) -> None:
+    done = subprocess.run(
+        [sys.executable, EXAMPLE, *arguments], env=os.environ | {"CIRIS_URL": url}, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr

@@ -19,6 +19,19 @@ assert all(service.certify_path(scene, segment) for segment in pairwise(waypoint
 """
 
 
+def programs() -> str:
+    """The page's code as one program."""
+    page = (ROOT / "docs" / "python.md").read_text()
+    return "\n".join(text for language, text in BLOCK.findall(page) if language == "python")
+
+
+def test_editors_find_nothing_wrong_with_the_programs(tmp_path: Path) -> None:
+    (tmp_path / "page.py").write_text(programs())
+    command = [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", "--config-file", os.devnull, str(tmp_path / "page.py")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
 def test_every_program_of_the_page_works_as_it_stands(tmp_path: Path) -> None:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     environment = surroundings(CIRIS_DATA_DIR=str(tmp_path / "data"), PATH=path)
@@ -31,10 +44,9 @@ def test_every_program_of_the_page_works_as_it_stands(tmp_path: Path) -> None:
         assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
         return done.stdout
 
-    program = "\n".join(text for language, text in BLOCK.findall(page) if language == "python")
     (by_drake,) = re.findall(r"^    python (examples/planner_gcs\.py .*)$", page, re.MULTILINE)
     with service(environment, tmp_path):
-        said = run("-c", f"{program}\n{CHECK}")
+        said = run("-c", f"{programs()}\n{CHECK}")
         waypoints = run(*by_drake.split()).splitlines()
     assert re.search(r"^Region\(\w{8} of planar-2dof: 2 joints, \d+ faces, .* rad\^2, exact\)$", said, re.MULTILINE)
     assert "[ True False]" in said

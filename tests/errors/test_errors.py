@@ -15,13 +15,14 @@ from tests.errors.covers import COVERS
 from tests.errors.drawing import DRAWING
 from tests.errors.motions import MOTIONS
 from tests.errors.proofs import PROOFS
+from tests.errors.python import PYTHON
 from tests.errors.regions import REGIONS
 from tests.errors.rows import Row, Trial, pattern
 from tests.errors.scenes import SCENES
 from tests.errors.service import SERVICE
 from tests.errors.sites import Site, sites
 
-TABLE = [*SCENES, *BUNDLES, *REGIONS, *MOTIONS, *COVERS, *DRAWING, *SERVICE, *COMMANDS, *PROOFS]
+TABLE = [*SCENES, *BUNDLES, *REGIONS, *MOTIONS, *COVERS, *DRAWING, *SERVICE, *COMMANDS, *PYTHON, *PROOFS]
 
 DEMANDS = re.compile(r"\bmust\b|\bat most\b|\bonly\b")
 """Words of a message that says by itself what has to be."""
@@ -35,7 +36,10 @@ ABOUT_ALL = {
     "api/problems.py",
     "client/bench.py",
     "client/demo.py",
+    "ciris/asynchronous/client.py",
+    "ciris/synchronous/client.py",
     "ciris/find.py",
+    "ciris/job.py",
     "workers/pairs.py",
     "workers/turns.py",
 }

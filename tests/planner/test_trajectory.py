@@ -16,6 +16,7 @@ from planner.trajectory import plan as planning
 from planner.trajectory.curve import optimised
 from planner.trajectory.plan import Answer, Apart, Limits, Outside, Trajectory, Unproved, plan
 from planner.trajectory.routes import Links, Terminal, routes
+from planner.trajectory.timing import timed
 from tests.planner.regions import box, cut_boxes, library
 from tests.planner.test_motion import arm
 
@@ -218,3 +219,18 @@ def test_the_first_route_is_the_shortest_of_all(seed: int, count: int) -> None:
         assert (route.regions[0], route.regions[-1]) == (0, len(stored) - 1)
         for (a, b), e in zip(pairwise(route.regions), route.overlaps, strict=True):
             assert {a, b} == set(links.ends[e].tolist())
+
+
+@pytest.mark.parametrize("slower", [1.0, 1e-6, 1e5])
+@pytest.mark.parametrize("limits", [([1.0, 1.0, 1.0], [2.0, 2.0, 2.0]), ([1.0, 1e-4, 1.0], [2.0, 2.0, 1e3])])
+def test_a_motion_is_as_fast_as_its_limits_whatever_their_size(slower: float, limits: tuple[list[float], list[float]]) -> None:
+    """Who gives limits in other units of time gets the same motion in them."""
+    u = np.linspace(0, 1, 60)[:, None]
+    curve = np.hstack([np.sin(2 * u), u**2, np.cos(3 * u)])
+    speed, acceleration = map(np.array, limits)
+    found, slow = (timed(curve, [0, 30, 59], speed / k, acceleration / k**2, 0.05) for k in (1.0, slower))
+    assert found is not None
+    assert slow is not None
+    assert slow[1][-1] == pytest.approx(slower * found[1][-1], rel=1e-6)
+    velocity = np.diff(slow[0], axis=0) / np.diff(slow[1])[:, None]
+    assert (np.abs(velocity) <= speed / slower).all()
