@@ -9,6 +9,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import resource
+import sys
 import tempfile
 import threading
 import time
@@ -22,7 +23,7 @@ from benchmarks.store import PROOF_BYTES, begin
 from certifier.outcome import Outcome, Stage
 from certifier.pair.result import PairResult
 from db import jobs, migrate, pairs
-from db.session import Database
+from db.session import Database, database
 
 WARM_SECONDS = 5.0
 """The fleet is not measured before everybody has work."""
@@ -44,22 +45,22 @@ def fleet(
     with ExitStack() as stack:
         url = postgresql or f"sqlite:///{Path(stack.enter_context(tempfile.TemporaryDirectory())) / 'fleet.sqlite3'}"
         migrate.upgrade(url)
-        database = stack.enter_context(closing(Database(url)))
-        job_id, _ = begin(database, pieces, seconds)
+        served = stack.enter_context(closing(Database(url)))
+        job_id, _ = begin(served, pieces, seconds)
         context = multiprocessing.get_context("spawn")
         over, spent = context.Event(), context.Queue()
         shares = [workers // processes + (number < workers % processes) for number in range(processes)]
         children = [context.Process(target=_workers, args=(url, share, seconds, over, spent)) for share in shares]
         for child in children:
             child.start()
-        while _open(database, job_id) > pieces - workers:  # processes begin, and load what they need
+        while _open(served, job_id) > pieces - workers:  # processes begin, and load what they need
             time.sleep(0.1)
         time.sleep(WARM_SECONDS)
-        start, left = time.monotonic(), _open(database, job_id)
+        start, left = time.monotonic(), _open(served, job_id)
         until, now = start + limit, left
         while time.monotonic() < until and now > workers:
             time.sleep(min(1.0, limit / 4))
-            now = _open(database, job_id)
+            now = _open(served, job_id)
         took = time.monotonic() - start
         over.set()
         processor = sum(spent.get() for _ in children)
@@ -83,15 +84,17 @@ def fleet(
     return {"benchmark": "fleet", "machine": measure.machine(), **row}
 
 
-def _open(database: Database, job_id: str) -> int:
+def _open(served: Database, job_id: str) -> int:
     """Returns how many pieces nobody has begun."""
-    with database.read() as session:
+    with served.read() as session:
         return jobs.get(session, job_id).open_pairs
 
 
 def _workers(url: str, count: int, seconds: float, over: Any, spent: Any) -> None:
     """Has so many workers at work in this process until it is over. Puts the seconds of processor time that they took."""
     os.environ["CIRIS_DATABASE_URL"] = url
+    sys.setswitchinterval(1e-4)  # who holds a lock of the database must not wait long for the interpreter
+    database()  # before the workers, which share it
     threads = [threading.Thread(target=_work, args=(seconds, over), daemon=True) for _ in range(count)]
     for thread in threads:
         thread.start()

@@ -28,7 +28,7 @@ from workers.transaction import persistently
 
 log = logging.getLogger(__name__)
 
-SAVE_SECONDS = 0.5
+SAVE_SECONDS = 2.0
 """Results are saved together once this much time has passed since the last saving."""
 
 
