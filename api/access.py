@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import math
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import Depends, Request, Security
 from fastapi.security import HTTPBearer
-from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
 from starlette.requests import cookie_parser
 
@@ -24,6 +24,8 @@ KEYS_SECONDS = 1.0
 """The keys that were read from the database are trusted for this many seconds."""
 AGAIN_SECONDS = 0.1
 """When requests bring unknown keys, the database is read at most once in this many seconds, however many requests there are."""
+_thread = ThreadPoolExecutor(1, "keys")
+"""Every request may wait for the keys, so their reading waits for no other request."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ class Keyring:
         try:
             await asyncio.sleep(not_before - time.monotonic())
             began = time.monotonic()
-            self._ring = await run_in_threadpool(self._read)
+            self._ring = await asyncio.get_running_loop().run_in_executor(_thread, self._read)
             self._read_at = began
         finally:
             self._reading = None

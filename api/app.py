@@ -24,6 +24,7 @@ from api.pages import site
 from api.pages.rendering import render_problem
 from api.reading import READERS
 from api.routers import cells, drawing, events, jobs, motions, planning, plans, regions, scenes, service
+from api.writing import WRITERS
 from certifier.scene.bundle import expect_bundles
 from db.session import CONNECTIONS, Database, database
 from db.settings import LOOPBACK_NAMES, settings
@@ -35,8 +36,8 @@ offline. Errors are problem+json (RFC 9457) with a `code`, the `field` and a `hi
 are not finite."""
 
 
-THREADS = CONNECTIONS - AT_ONCE - READERS
-"""All other requests share this many threads: those connections that uploads, checks and reading routes leave."""
+THREADS = CONNECTIONS - AT_ONCE - READERS - WRITERS - 1
+"""All other requests share this many threads: those connections that uploads, checks, reading and writing routes and the keys leave."""
 
 
 def create_app(db: Database | None = None) -> FastAPI:

@@ -15,6 +15,7 @@ from benchmarks import (
     catalogue,
     compare,
     cover,
+    fleet,
     growth,
     models,
     path,
@@ -92,6 +93,9 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "scaling": lambda args, screen: scaling.curves(args.against is not None, screen.line),
     "service": lambda args, screen: service.beside_local(args.example, args.processes, args.turns, screen.line),
     "store": lambda args, screen: store.store(args.postgresql, store.COUNTS, screen.line),
+    "fleet": lambda args, screen: fleet.fleet(
+        args.postgresql, args.workers, args.pieces, args.seconds, args.limit, args.processes, screen.line
+    ),
     "cover": _cover,
     "robots": lambda args, screen: robots.robots(args.robots, args.deadline, screen.line),
     "recertify": lambda args, screen: recertify.changes(args.scenes, args.limit, screen.line),
@@ -157,6 +161,13 @@ def _parser() -> ArgumentParser:
     served.add_argument("--turns", type=_count, default=5, metavar="N", help="how often each is run; default 5")
     stored = kinds.add_parser("store", parents=[as_json], help="measure what the database takes for a pair in jobs of 1000 and of 100000")
     stored.add_argument("--postgresql", metavar="URL", help="measure this empty PostgreSQL database too, besides SQLite")
+    many = kinds.add_parser("fleet", parents=[as_json], help="measure how many pieces of work many workers get from one database")
+    many.add_argument("--postgresql", metavar="URL", help="in this empty PostgreSQL database; default: in SQLite")
+    many.add_argument("--workers", type=_count, default=100, metavar="N", help="default 100")
+    many.add_argument("--pieces", type=_count, default=100_000, metavar="N", help="so many are open at the beginning; default 100000")
+    many.add_argument("--seconds", type=float, default=1.0, metavar="S", help="a worker holds a piece for so long; default 1")
+    many.add_argument("--limit", type=float, default=60.0, metavar="S", help="measure for so long; default 60")
+    many.add_argument("--processes", type=_count, default=2, metavar="N", help="have the workers in so many processes; default 2")
     shipped = kinds.add_parser("robots", parents=[as_json], help="take robots as people ship them from model files to a verified region")
     shipped.add_argument(
         "robots", nargs="*", metavar="ROBOT", default=list(models.ROBOTS), help=f"default: all; {', '.join(models.ROBOTS)}"

@@ -60,7 +60,7 @@ def store(postgresql: str | None, counts: Sequence[int], progress: Progress) -> 
 
 def _measured(database: Database, count: int) -> Iterator[dict[str, Any]]:
     """Measures a job with so many pairs, of which first none and then half are settled."""
-    job_id, insert_seconds = _begin(database, count)
+    job_id, insert_seconds = begin(database, count, 1.0)
     yield {"settled": 0, "insert_seconds": insert_seconds, **_milliseconds(database)}
     settled = REPEAT
     while settled < count // 2:
@@ -70,8 +70,8 @@ def _measured(database: Database, count: int) -> Iterator[dict[str, Any]]:
         jobs.cancel(session, job_id)
 
 
-def _begin(database: Database, count: int) -> tuple[str, float]:
-    """Makes a running job with so many pairs of 1 s. Returns its id and the seconds to insert the pairs.
+def begin(database: Database, count: int, seconds: float) -> tuple[str, float]:
+    """Makes a running job with so many pairs of so many seconds. Returns its id and the seconds to insert the pairs.
 
     The state of its growth names every pair, as it does when proofs of earlier iterations hold.
     """
@@ -91,7 +91,7 @@ def _begin(database: Database, count: int) -> tuple[str, float]:
             C=[[1.0], [-1.0]],
             d=[1.0, 1.0],
             center=None,
-            pairs=[pairs.NewPair(index, f"a{index}", f"b{index}", 1.0) for index in range(count)],
+            pairs=[pairs.NewPair(index, f"a{index}", f"b{index}", seconds) for index in range(count)],
             reuse={},
             hard=[],
             failures=1,

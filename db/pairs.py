@@ -29,6 +29,8 @@ UNFINISHED = unfinished(PAIR)
 FAILED = frozenset(PairState) - UNFINISHED - {PairState.CERTIFIED, PairState.SKIPPED}
 MOST_TOGETHER = 100
 """At most this many pairs are claimed together, however short they are."""
+FEW, LONGER = 500, 10.0
+"""With more open pairs than this, batches are longer in proportion, up to so many times."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,8 @@ def batch(pairs: Iterable[tuple[int, float]], seconds: float) -> list[int]:
 def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds: float) -> Claim | None:
     """Claims the next batch of the job's open pairs. A pair that may have killed its process is claimed alone, after the others.
 
-    It returns None when no pair is open. The caller holds the job's lock.
+    A batch takes ``batch_seconds``, and the longer, the more pairs are open: then many workers ask, and it is long until one of them would
+    wait for another at the end. It returns None when no pair is open. The caller holds the job's lock.
     """
     if job.open_pairs == 0:
         return None
@@ -171,7 +174,8 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
     first = select(*columns).where(*is_open, ahead).order_by(PairRow.deaths, PairRow.id).limit(MOST_TOGETHER)
     rows = session.execute(first).all()
     fresh = [row for row in rows if row.deaths == 0]
-    chosen = fresh[: len(batch(((row.pair_index, row.forecast_seconds) for row in fresh), batch_seconds))] or rows[:1]
+    seconds = batch_seconds * min(max(job.open_pairs / FEW, 1.0), LONGER)
+    chosen = fresh[: len(batch(((row.pair_index, row.forecast_seconds) for row in fresh), seconds))] or rows[:1]
     pairs = tuple(Claimed(row.pair_index, row.part, row.attempts + 1, row.deaths) for row in chosen)
     jobs.charge(session, job, sum(row.forecast_seconds for row in chosen))
     token = leases.take(session, PairRow, [row.id for row in chosen], seconds=lease_seconds)

@@ -29,7 +29,7 @@ from sqlalchemy.orm import DeclarativeBase, Session
 
 from db.settings import settings
 
-CONNECTIONS = 10
+CONNECTIONS = 12
 """One process has at most this many connections. It opens them when needed and keeps them, because opening one costs more than
 most of what it is used for.
 """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable
 from functools import lru_cache, partial
 
 from structlog.contextvars import bound_contextvars
@@ -27,24 +28,32 @@ from workers.transaction import persistently
 
 log = logging.getLogger(__name__)
 
-SAVE_SECONDS = 0.5
+SAVE_SECONDS = 2.0
 """Results are saved together once this much time has passed since the last saving."""
+
+
+CertifyPair = Callable[[pairs.Claim, pairs.Claimed], PairResult]
 
 
 def certify_pairs(claim: pairs.Claim) -> bool:
     """Certifies and saves the claimed pairs while any of them is held. Says whether that finished the iteration."""
+    return settle(claim, _certify)
+
+
+def settle(claim: pairs.Claim, certify: CertifyPair) -> bool:
+    """Does as :func:`certify_pairs` with what ``certify`` finds of each pair."""
     bound = bound_contextvars(job=claim.job_id, iteration=claim.iteration)
     with bound, leases.kept(database(), PairRow, claim.token, settings().lease_seconds, [JobState.RUNNING]):
-        return _certify_and_save(claim)
+        return _certify_and_save(claim, certify)
 
 
-def _certify_and_save(claim: pairs.Claim) -> bool:
+def _certify_and_save(claim: pairs.Claim, certify: CertifyPair) -> bool:
     """Certifies the claimed pairs and saves their results now and then. Says whether that finished the iteration."""
     results: dict[tuple[int, int], PairResult] = {}
     since = time.monotonic()
     for place, pair in enumerate(claim.pairs, start=1):
         with bound_contextvars(pair=pair.index):
-            result = results[pair.index, pair.part] = _certify(claim, pair)
+            result = results[pair.index, pair.part] = certify(claim, pair)
         failed = result.outcome is not Outcome.CERTIFIED
         if failed or place == len(claim.pairs) or time.monotonic() - since >= SAVE_SECONDS:
             saved = persistently(partial(_save, claim, results))

@@ -27,7 +27,7 @@ class Piece:
 
 def work() -> Piece | None:
     """Does the next piece of work, and returns None when there is none. It does no harm to call it too often."""
-    claim, more = _claim()
+    claim, more = claim_piece()
     if claim is None:
         return None
     if more:
@@ -36,7 +36,7 @@ def work() -> Piece | None:
     return Piece(claim.job_id, settles)
 
 
-def _claim() -> tuple[pairs.Claim | steps.Claim | None, bool]:
+def claim_piece() -> tuple[pairs.Claim | steps.Claim | None, bool]:
     """Claims the next piece, and says whether work is left for others."""
     claim, more, limits = None, False, settings()
     while claim is None:
@@ -46,5 +46,6 @@ def _claim() -> tuple[pairs.Claim | steps.Claim | None, bool]:
             break
         with database().write() as session:
             claim = queue.claim(session, job_id, lease_seconds=limits.lease_seconds, batch_seconds=limits.batch_seconds)
+        with database().read() as session:  # when others may claim already
             more = queue.next_job(session) is not None
     return claim, more

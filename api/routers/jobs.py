@@ -44,6 +44,7 @@ from api.schemas.jobs import (
 from api.schemas.motions import JobMotion
 from api.schemas.progress import JobWorkers, Obstacles, Work, Worker
 from api.schemas.scenes import PairInfo
+from api.writing import writing
 from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
@@ -65,6 +66,7 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ], route_
     status_code=status.HTTP_201_CREATED,
     responses={200: {"model": Job, "description": "The job was made earlier with the same Idempotency-Key."}},
 )
+@writing
 def create_job(
     body: NewJob,
     caller: Submitter,
@@ -168,6 +170,7 @@ def get_job(job_id: str, db: Db) -> Job:
 
 
 @router.post("/{job_id}/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
+@writing
 def cancel_job(job_id: str, db: Db, background: BackgroundTasks, announcements: Announcements) -> Job:
     """Asks a job to end. Regions that were certified before remain.
 
@@ -180,6 +183,7 @@ def cancel_job(job_id: str, db: Db, background: BackgroundTasks, announcements: 
 
 
 @router.post("/{job_id}/retry", status_code=status.HTTP_201_CREATED)
+@writing
 def retry_job(job_id: str, caller: Submitter, db: Db, response: Response, background: BackgroundTasks, announcements: Announcements) -> Job:
     """Creates a new job like one that failed or was cancelled.
 

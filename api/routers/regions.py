@@ -16,6 +16,7 @@ from api.reading import ReadingRoute
 from api.schemas.common import MAX_INT, Cursor
 from api.schemas.drawing import MAX_SAMPLES, Extreme, RegionConfigurations
 from api.schemas.regions import RegionDetail, RegionPage, RegionSummary, Verification
+from api.writing import writing
 from certifier.errors import CirisError
 from certifier.isolation.child import run_in_child
 from certifier.model import ALPHABET, escaped, is_name
@@ -147,6 +148,7 @@ def export_region(region_id: str, db: Db, format: ExportFormat = ExportFormat.JS
 
 
 @router.delete("/{region_id}", dependencies=[ADMIN], status_code=status.HTTP_204_NO_CONTENT)
+@writing
 def delete_region(region_id: str, db: Db) -> None:
     """Deletes a region, and its proof file unless another region has the same."""
     with db.write() as session:

@@ -194,7 +194,8 @@ class CellCertification:
             detail = f"the padded bodies are {distance:.3g} m apart at the configuration named, too close for a plane"
             return replace(result, outcome=Outcome.TOO_CLOSE, witness_s=s, detail=detail)
         inside = sum(((self._area.samples >= low) & (self._area.samples <= up)).all(axis=1).mean() for low, up in cells)
-        detail = f"{len(cells)} cells, {100 * float(inside):.2g} % of the polytope, are open after {report.cells} cells"
+        share = f"{100 * float(inside):.2g} %" if inside >= 1e-4 else "less than 0.01 %"
+        detail = f"{len(cells)} cells, {share} of the polytope, are open after {report.cells} cells"
         return replace(result, detail=detail)
 
     def _outline(self, search: Search, volumes: Volumes, streams: dict[str, Array]) -> Outline:

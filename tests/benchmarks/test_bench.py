@@ -109,6 +109,7 @@ def test_rows_of_several_machines_say_which_is_whose() -> None:
     assert "another: Measured on: an abacus, " in report.text(document)
 
 
+@pytest.mark.slow
 def test_the_service_is_measured_beside_local() -> None:
     document = bench("service", "planar_2dof", "--turns", "1")
     served, local = document["rows"]

@@ -254,6 +254,7 @@ def test_no_barriers_and_no_sideways_scrolling(
     context.close()
 
 
+@pytest.mark.slow
 def test_a_large_job_does_not_lag(page: Any, url: str, database: Database) -> None:
     """2000 pairs in 50 iterations, 10^5 results, and a pair with 10^5 cells. The longest frames and tasks are printed, tasks asserted."""
     scene = slider("large", posts=2000)

@@ -73,6 +73,7 @@ def check_rows(job_id: str) -> None:
             verify_region(proofs.get(session, region.proof_digest))
 
 
+@pytest.mark.lengthy
 def test_regions_come_to_cover_a_scene_and_each_is_proved(planar: Scene) -> None:
     job = ended(cover(planar, coverage=0.75, connected=True))
     assert (job.state, job.outcome, job.error, job.reason) == ("succeeded", "certified", None, "the goals are reached")
@@ -92,6 +93,7 @@ def test_regions_come_to_cover_a_scene_and_each_is_proved(planar: Scene) -> None
     assert abs(value - found["coverage"]["value"]) < 4 * found["coverage"]["stderr"] + 0.01
 
 
+@pytest.mark.lengthy
 def test_configurations_are_connected(planar: Scene) -> None:
     job = ended(cover(planar, connect=[LEFT, RIGHT]))
     assert (job.state, job.outcome) == ("succeeded", "certified")
@@ -99,6 +101,7 @@ def test_configurations_are_connected(planar: Scene) -> None:
     assert known(job.id)["connect"] == [0, 0]
 
 
+@pytest.mark.lengthy
 def test_it_goes_on_when_workers_die_between_its_regions(planar: Scene, service: Service) -> None:
     """The process that looks is killed, then the control worker, then all solving processes, when a region has just ended."""
     job_id = cover(planar, coverage=0.7)
@@ -122,6 +125,7 @@ def test_it_goes_on_when_workers_die_between_its_regions(planar: Scene, service:
     check_rows(job_id)
 
 
+@pytest.mark.lengthy
 def test_cancelling_it_ends_what_grows_and_keeps_what_is_certified(planar: Scene) -> None:
     job_id = cover(planar, coverage=1.0)
     eventually(lambda: any(child.region_id for child in children(job_id)), "there is a region")
@@ -139,6 +143,7 @@ def test_cancelling_it_ends_what_grows_and_keeps_what_is_certified(planar: Scene
     assert (again.kind, again.options, again.parent_id) == ("cover", job.options, None)
 
 
+@pytest.mark.lengthy
 def test_the_deadline_ends_it_and_what_grows(planar: Scene) -> None:
     job = ended(cover(planar, seconds=5.0, coverage=1.0), seconds=40)
     assert job.reason is not None
@@ -171,6 +176,7 @@ def test_a_cover_that_cannot_go_on_says_why(planar: Scene) -> None:
     assert "seed[0]: the deadline was reached" in (job.reason or "")
 
 
+@pytest.mark.lengthy
 def test_a_grow_job_is_no_part_of_a_cover(planar: Scene) -> None:
     job_id = submit(planar, {"kind": "grow", "seed": {"method": "box", "q": [0.0, 0.0], "half_width": 0.05}, "cells": 100})
     assert job_of(job_id).parent_id is None

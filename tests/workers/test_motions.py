@@ -71,6 +71,7 @@ def long(laps: int = LAPS) -> dict[str, Any]:
     return {"q": to_and_fro.tolist(), "tube": True}
 
 
+@pytest.mark.lengthy
 def test_a_motion_is_certified_as_by_a_plain_call_and_its_proof_holds(client: TestClient, planar: Scene) -> None:
     job_id = asked(client, planar, q=FREE, tube=True)
     job = ended(job_id)
@@ -105,6 +106,7 @@ def test_a_motion_that_begins_in_contact_has_no_proof(client: TestClient) -> Non
     assert (refused.status_code, refused.json()["code"]) == (404, "proof_not_found")
 
 
+@pytest.mark.lengthy
 def test_another_worker_begins_again_when_one_is_killed(client: TestClient, planar: Scene) -> None:
     job_id = asked(client, planar, **long())
     os.kill(int((running(job_id).worker or "").rsplit(":", 2)[1]), signal.SIGKILL)
@@ -130,6 +132,7 @@ def test_cancelling_ends_the_search(client: TestClient, planar: Scene) -> None:
     assert (again.options, again.outcome) == (job.options, "certified")
 
 
+@pytest.mark.lengthy
 def test_the_deadline_ends_the_search_without_a_verdict(client: TestClient, planar: Scene) -> None:
     job_id = submit(planar, long(60 * LAPS), seconds=1.0)
     job = ended(job_id, seconds=30)

@@ -46,6 +46,7 @@ def grown() -> tuple[RegionRow, bytes]:
     return region_of(job.region_id or "")
 
 
+@pytest.mark.lengthy
 def test_a_region_of_a_changed_scene_is_the_same_by_the_service_and_without_it(grown: tuple[RegionRow, bytes]) -> None:
     row, proof = grown
     changed = moved((1.6, 0.8, 0.0))
@@ -61,6 +62,7 @@ def test_a_region_of_a_changed_scene_is_the_same_by_the_service_and_without_it(g
     assert 0 < said["kept"]["value"] < 1
 
 
+@pytest.mark.lengthy
 def test_what_did_not_change_is_carried_over_and_a_seed_in_contact_revokes_the_region(grown: tuple[RegionRow, bytes]) -> None:
     row, _ = grown
     job = ended(

@@ -28,6 +28,7 @@ SEED = [0.0, 0.0]
 SAME = ("halfspace_normals", "halfspace_offsets", "interior_point", "inscribed_ellipsoid", "share", "joint_ranges", "archimedean")
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize("contraction", ["whole", "targeted", "uniform"])
 def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(planar: Scene, contraction: str) -> None:
     options = grow_box(SEED, 0.4, contraction=contraction, pushes=1, max_rounds=1, cells=600)
@@ -62,6 +63,7 @@ def certified_pairs(manifest: dict[str, Any]) -> list[tuple[Any, ...]]:
     return [tuple(pair[name] for name in ("a", "b", "outcome", "margin", "proof_digest")) for pair in manifest["pairs"]]
 
 
+@pytest.mark.lengthy
 def test_a_whole_region_is_the_same_when_workers_die_between_its_rounds(planar: Scene, service: Service) -> None:
     """What a dead process had begun is gone on with from where the round before left it."""
     options = grow_box(SEED, 0.4, contraction="whole", cells=600)
