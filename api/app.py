@@ -59,10 +59,11 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.links = LinksKept()
     app.state.maps = Maps()
     app.state.outlines = OutlinesKept()
+    app.state.keyring = Keyring(app.state.database, open_without_keys=settings().loopback)
     app.state.announcer = Announcer()
     app.add_middleware(
         guard.Guard,
-        keyring=Keyring(app.state.database, open_without_keys=settings().loopback),
+        keyring=app.state.keyring,
         hosts=LOOPBACK_NAMES if settings().loopback else None,
         rate=settings().requests_per_second,
         respond=partial(problems.respond, render_problem),

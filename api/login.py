@@ -41,4 +41,4 @@ def sign_out() -> Response:
 
 def _local(path: str) -> str:
     """Returns the path, or ``/`` when the path could lead to another site."""
-    return path if re.fullmatch(r"/([\w.-]+(/[\w.-]+)*)?", path, re.ASCII) else "/"
+    return path if re.fullmatch(r"/([\w.-]+(/[\w.-]+)*)?(\?[\w.,=&%+:-]*)?", path, re.ASCII) else "/"

@@ -39,5 +39,6 @@ def render_problem(request: Request, problem: problems.Problem) -> Response:
     if request.url.path.startswith(("/v1/", "/static/")) or "text/html" not in request.headers.get("accept", ""):
         return problems.as_json(problem)
     if problem.code == "key_needed" and request.method == "GET":
-        return RedirectResponse(f"/login?next={quote(request.url.path)}", HTTPStatus.SEE_OTHER)
+        wanted = request.url.path + (f"?{request.url.query}" if request.url.query else "")
+        return RedirectResponse(f"/login?next={quote(wanted)}", HTTPStatus.SEE_OTHER)
     return page(request, "problem.html", {"problem": problem}, problem.status)

@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Header, Query
+from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
-from api.access import READ, Db
+from api.access import READ, Db, presented_key
 from api.reading import ReadingRoute
 from api.schemas.common import MAX_INT
 from api.schemas.jobs import Event, EventList
@@ -51,6 +51,7 @@ def _existing(job_id: str, db: Db) -> str:
 async def stream_job_events(
     job_id: Annotated[str, Depends(_existing)],
     db: Db,
+    request: Request,
     after: After = 0,
     last_event_id: Annotated[
         int | None, Header(ge=0, le=MAX_INT, description="The stream goes on after this number; used instead of `after`.")
@@ -58,19 +59,20 @@ async def stream_job_events(
 ) -> AsyncIterator[ServerSentEvent]:
     """Streams the job's events as they happen.
 
-    The last event is called `end`. After it the stream closes.
+    The last event is called `end`. After it the stream closes. It closes without that event when the caller's key is revoked.
     """
     seq = after if last_event_id is None else last_event_id
-    while True:
+    keyring, given = request.app.state.keyring, presented_key(request.headers)
+    while await keyring.caller(given) is not None:
         page, ended = await run_in_threadpool(_next_page, db, job_id, seq)
         for event in page:
             yield ServerSentEvent(data=event.model_dump(mode="json"), event=event.kind, id=str(event.seq))
         if page:
             seq = page[-1].seq
         if ended and len(page) < PAGE:
-            break
+            yield ServerSentEvent(data={"job": job_id}, event="end")
+            return
         await asyncio.sleep(0 if page else POLL_SECONDS)
-    yield ServerSentEvent(data={"job": job_id}, event="end")
 
 
 def _next_page(db: Database, job_id: str, seq: int) -> tuple[list[Event], bool]:

@@ -12,16 +12,21 @@ from certifier.polytopes import gibbs, simplex
 from certifier.polytopes.polytope import chebyshev_center
 
 CHAINS = 25
+HAIR = 1e-9
 
 
 def extremes(polytope: Polytope) -> tuple[Array, Array]:
     """Returns points at which each coordinate is least, and points at which it is greatest, (n, n) each, one row a coordinate.
 
+    They are inside by a hair, which rounding does not take away.
+
     Raises:
         RegionError: as :func:`certifier.polytopes.polytope.chebyshev_center`.
     """
     n = polytope.C.shape[1]
-    points, _ = simplex.maximise(polytope.C, polytope.d, np.concatenate([-np.eye(n), np.eye(n)]), chebyshev_center(polytope)[0])
+    center = chebyshev_center(polytope)[0]
+    points, _ = simplex.maximise(polytope.C, polytope.d, np.concatenate([-np.eye(n), np.eye(n)]), center)
+    points = center + (1 - HAIR) * (points - center)
     return points[:n], points[n:]
 
 

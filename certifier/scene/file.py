@@ -251,7 +251,7 @@ def _string(value: Any, where: str) -> str:
 
 def _name(value: Any, where: str) -> str:
     if not is_name(value):
-        raise _wrong(where, f"must be text, not {value!a}", hint=f"names have {ALPHABET}")
+        raise _wrong(where, f"must be a name, not {value!a}", hint=f"names have {ALPHABET}")
     return str(value)
 
 

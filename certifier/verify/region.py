@@ -54,7 +54,7 @@ class RegionStatement:
         closest = min(self.gaps, key=self.gaps.__getitem__, default=None)
         return [
             f"scene of hash {scene.hash}",
-            f"{scene.n} joints, within their limits:",
+            f"{scene.n} {'joint' if scene.n == 1 else 'joints'}, within their limits:",
             *joints,
             f"a bounded, non-empty polytope of {self.faces} half-spaces in tangent space; |s|^2 <= {rounded_up(self.N, 6)}",
             f"{len(self.gaps)} pairs of bodies separated at every configuration of it",

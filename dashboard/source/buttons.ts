@@ -42,8 +42,20 @@ async function press(button: HTMLButtonElement): Promise<void> {
       button.disabled = false;
     } else void refresh(document.getElementById("live")!.dataset.refresh!);
   } catch (problem) {
-    button.textContent = said(problem);
+    button.disabled = false;
+    complain(button, said(problem));
   }
+}
+
+/** Says below a button's row why it could not be done. */
+function complain(button: HTMLButtonElement, text: string): void {
+  const row = button.parentElement!;
+  const old = row.nextElementSibling;
+  const notice = old?.classList.contains("refusal") ? old : document.createElement("p");
+  notice.className = "notice bad refusal";
+  notice.setAttribute("role", "alert");
+  notice.textContent = text;
+  row.after(notice);
 }
 
 function say(place: HTMLElement, answer: Answer): void {

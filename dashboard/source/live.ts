@@ -6,22 +6,45 @@ const POLL_MS = 3000;
 export function startLive(): void {
   const live = document.getElementById("live");
   if (live?.dataset.poll) setInterval(() => { if (!document.hidden) void refresh(live.dataset.poll!); }, POLL_MS);
+  setInterval(clocks, 1000);
 }
 
 export function connected(is: boolean): void {
   document.getElementById("connection")!.hidden = is;
 }
 
-/** Asks for the part again and shows it. */
+/** Times that run: <dd data-since="..."> shows how long ago that is, to the second. */
+function clocks(): void {
+  for (const clock of document.querySelectorAll<HTMLElement>("[data-since]")) {
+    const seconds = Math.max(0, Math.round((Date.now() - Date.parse(clock.dataset.since!)) / 1000));
+    const [hours, minutes] = [Math.floor(seconds / 3600), Math.floor(seconds / 60) % 60];
+    clock.textContent = seconds < 100 ? `${seconds} s` : hours ? `${hours} h ${minutes} min` : `${minutes} min ${seconds % 60} s`;
+  }
+}
+
+let asked = 0;
+let shown = 0;
+let again: ReturnType<typeof setTimeout> | undefined;
+
+/** Asks for the part again and shows it, unless a later answer is there already. It asks until it is answered. */
 export async function refresh(url: string): Promise<void> {
+  clearTimeout(again);
+  const turn = ++asked;
+  let ok = false;
   try {
     const response = await fetch(url, { headers: { Accept: "text/html" } });
-    if (response.status === 401) location.reload();
-    connected(response.ok);
-    if (response.ok) replace(document.getElementById("live")!, await response.text());
+    if (response.status === 401 || response.redirected) return location.reload(); // to the page for signing in
+    ok = response.ok;
+    const html = ok ? await response.text() : "";
+    if (ok && turn > shown) {
+      shown = turn;
+      replace(document.getElementById("live")!, html);
+    }
   } catch {
-    connected(false);
+    ok = false;
   }
+  connected(ok);
+  if (!ok) again = setTimeout(() => void refresh(url), POLL_MS);
 }
 
 // What the reader has opened, scrolled or focused stays as it was.

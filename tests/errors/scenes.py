@@ -100,7 +100,7 @@ FILES = rows(
     ("scene_field", "zzz", "is not a key of a scene file", "known keys: {...}", lambda t: t.load(D + "zzz: []\n")),
     ("scene_field", "mesh", "must be a mapping with the keys {...}", "", lambda t: t.load(D + "mesh: 3\n")),
     ("scene_field", "ignore[0][1]", "must be printable text, not {value}", "", lambda t: t.load(D + "ignore: [[a, 3]]\n")),
-    ("scene_field", "name", "must be text, not {value}", NAMES, lambda t: t.load(D + "name: 3\n")),
+    ("scene_field", "name", "must be a name, not {value}", NAMES, lambda t: t.load(D + "name: 3\n")),
     (
         "scene_field",
         "ignore[0].reason",

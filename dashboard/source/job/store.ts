@@ -222,9 +222,9 @@ export class JobStore {
   private async sync(): Promise<void> {
     if (this.syncing) return this.syncSoon();
     this.syncing = true;
+    const changed = this.changed;
+    this.changed = new Map();
     try {
-      const changed = this.changed;
-      this.changed = new Map();
       const since = Math.min(this.last?.index ?? 0, ...changed.keys());
       const [{ iterations }, { workers }] = await Promise.all([this.states(since), get<{ workers: Worker[] }>(`${this.path}/workers`)]);
       this.iterations = [...this.iterations.filter((one) => one.index < since), ...iterations];
@@ -232,6 +232,11 @@ export class JobStore {
       // Of an iteration that has just begun nothing is known but what the events will name.
       for (const one of iterations) if (one.index > since && !this.details.has(one.index)) this.keep(one.index, []);
       for (const [iteration, pairs] of changed) await this.results(iteration, [...pairs]);
+    } catch (reason) {
+      // What was not answered is asked for again.
+      for (const [iteration, pairs] of changed) this.changed.set(iteration, new Set([...pairs, ...(this.changed.get(iteration) ?? [])]));
+      setTimeout(this.syncSoon, AGAIN_MS);
+      throw reason;
     } finally {
       this.syncing = false;
     }

@@ -49,10 +49,11 @@ function Library({ model }: { model: SceneModel }) {
     ask();
     return () => clearTimeout(timer);
   }, [model]);
-  const some = (graph?.nodes.length ?? 0) > 0;
+  const regions = graph?.nodes.length ?? 0;
+  const some = regions > 0;
   useEffect(() => {
     if (some) void coverage(model).then(setCovered, () => setCovered(null));
-  }, [model, some]);
+  }, [model, regions]);
 
   const choose = (region: string): void => {
     setChosen(region);
@@ -83,7 +84,7 @@ function Library({ model }: { model: SceneModel }) {
             <>
               <p>
                 <strong>{graph.nodes.length}</strong> {graph.nodes.length === 1 ? "region" : "regions"}, {graph.edges.length} {graph.edges.length === 1 ? "overlap" : "overlaps"}, <strong>{graph.components}</strong> {graph.components === 1 ? "component" : "components"}{!graph.complete && ", so far"}.{" "}
-                {covered && <>They cover <strong>{(100 * covered.value).toFixed(0)} ± {(100 * covered.stderr).toFixed(0)} %</strong> of the free configurations, by {covered.free} of {covered.samples} random ones that are free.</>}
+                {covered && <>They cover <strong>{(100 * covered.value).toFixed(0)} ± {Number((100 * covered.stderr).toPrecision(1))} %</strong> of the free configurations, by a sample of {covered.free}.</>}
               </p>
               <Graph graph={graph} holding={holding} planned={planned} chosen={chosen} onChoose={choose} />
               <p class="quiet small">Choose a region to go to its centre. Ringed regions hold the configuration.</p>
@@ -119,7 +120,7 @@ function Library({ model }: { model: SceneModel }) {
         </section>
         <section aria-labelledby="h-plan">
           <h2 id="h-plan">Plan</h2>
-          <Planning scene={model.scene} names={names} units={model.units} q={q} onMove={setQ} plan={plan} onPlan={setPlan} />
+          <Planning scene={model.scene} names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onMove={setQ} plan={plan} onPlan={setPlan} />
         </section>
       </div>
     </div>

@@ -23,6 +23,8 @@ interface Props {
   scene: string;
   names: string[];
   units: ("rad" | "m")[];
+  lower: number[];
+  upper: number[];
   q: number[];
   onMove: (q: number[]) => void;
   plan: Plan | null;
@@ -37,7 +39,7 @@ function read(text: string, units: ("rad" | "m")[]): number[] | null {
   return numbers.length === units.length && numbers.every(Number.isFinite) ? numbers.map((value, i) => (units[i] === "rad" ? value * DEGREE : value)) : null;
 }
 
-export function Planning({ scene, names, units, q, onMove, plan, onPlan }: Props) {
+export function Planning({ scene, names, units, lower, upper, q, onMove, plan, onPlan }: Props) {
   const [ends, setEnds] = useState({ start: asText(q, units), goal: asText(q, units) });
   const [problem, setProblem] = useState<string | null>(null);
   const [asking, setAsking] = useState(false);
@@ -46,6 +48,10 @@ export function Planning({ scene, names, units, q, onMove, plan, onPlan }: Props
     event.preventDefault();
     const [start, goal] = [read(ends.start, units), read(ends.goal, units)];
     if (!start || !goal) return setProblem(`Give ${units.length} numbers for ${start ? "the goal" : "the start"}, one for each joint, in ${words}.`);
+    for (const [end, at] of [["start", start], ["goal", goal]] as const) {
+      const beyond = at.findIndex((value, i) => value < lower[i]! || value > upper[i]!);
+      if (beyond >= 0) return setProblem(`${names[beyond]} of the ${end} is beyond its limits, ${shown(lower[beyond]!, units[beyond]!)} to ${shown(upper[beyond]!, units[beyond]!)}.`);
+    }
     setProblem(null);
     setAsking(true);
     try {
@@ -155,7 +161,7 @@ const CHART = { width: 560, height: 130, pad: 6 };
 const DASHES = ["", "6 3", "2 3", "8 3 2 3", "1 4", "10 4", "4 2"];
 
 function Curves({ plan, names, units, time }: { plan: Plan; names: string[]; units: ("rad" | "m")[]; time: number }) {
-  const end = plan.t.at(-1)!;
+  const end = Math.max(plan.t.at(-1)!, 1e-9);
   const short = shortNames(names);
   const x = (t: number): number => CHART.pad + ((CHART.width - 2 * CHART.pad) * t) / end;
   const lines = names.map((_, joint) => {

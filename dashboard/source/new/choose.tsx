@@ -62,7 +62,7 @@ export function ChooseScene({ scenes, chosen, onChoose, onUpload }: Props) {
         {problem && <p class="notice bad">{problem}</p>}
         {added && (
           <p class="notice">
-            {added.name} is stored, with {added.joints} joints and {added.pairs} pairs.
+            {added.name} is stored, with {added.joints} {added.joints === 1 ? "joint" : "joints"} and {added.pairs} {added.pairs === 1 ? "pair" : "pairs"}.
             {added.warnings > 0 && <> Read its <a href={`/scenes/${added.id}`}>{added.warnings} {added.warnings === 1 ? "warning" : "warnings"}</a> first.</>}
           </p>
         )}

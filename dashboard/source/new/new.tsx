@@ -2,7 +2,7 @@
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { get, post, said } from "../shared/api";
 import { asText, positions, type SceneModel } from "../shared/kinematics";
-import { MomentText, touchingOf, useMoment } from "../shared/moment";
+import { MomentText, touchingOf, useMoment, type Contacts } from "../shared/moment";
 import { Robot } from "../shared/robot";
 import { Sliders } from "../shared/sliders";
 import { ChooseScene, type SceneSummary } from "./choose";
@@ -33,6 +33,7 @@ export function NewIsland() {
     setProblem(null);
     get<SceneModel>(`/v1/scenes/${encodeURIComponent(chosen)}/model`, stop.signal).then(
       (found) => {
+        if (stop.signal.aborted) return;
         setModel(found);
         setChosen(found.scene);
       },
@@ -61,6 +62,7 @@ export function NewIsland() {
 function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
   const names = useMemo(() => positions(model), [model]);
   const [q, setQ] = useState(() => within(model, read(asked, model.q_star.length) ?? model.q_star));
+  const [unread] = useState(() => asked !== null && q.join() !== read(asked, model.q_star.length)?.join());
   const [wish, setWish] = useState<Wish>(FIRST);
   const [problem, setProblem] = useState<string | null>(null);
   const [sending, setSending] = useState(false);
@@ -73,8 +75,8 @@ function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
   const search = async (): Promise<void> => {
     const drawn = Array.from({ length: TRIES }, () => model.q_lower.map((low, i) => low + (model.q_upper[i]! - low) * Math.random()));
     try {
-      const { contacts } = await post<{ contacts: { pairs: number[] | null }[] }>("/v1/planning/contacts", { scene: model.scene, q: drawn });
-      const free = contacts.findIndex(({ pairs }) => pairs?.length === 0);
+      const { contacts } = await post<{ contacts: Contacts[] }>("/v1/planning/contacts", { scene: model.scene, q: drawn });
+      const free = contacts.findIndex(({ pairs, outside }) => pairs.length === 0 && outside.length === 0);
       setProblem(free < 0 ? `None of ${TRIES} random configurations is free.` : null);
       if (free >= 0) setQ(drawn[free]!);
     } catch (reason) {
@@ -83,11 +85,15 @@ function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
   };
   const submit = async (event: Event): Promise<void> => {
     event.preventDefault();
-    if (wish.kind === "grow" && moment.pairs?.length) return setProblem("The robot is in collision there, so no region can hold the configuration. Move it first.");
     if (wish.kind === "cover" && wish.goal === "connect" && wish.marks.length < 2) return setProblem("Add at least two configurations to connect.");
     setSending(true);
     setProblem(null);
     try {
+      const { contacts } = await post<{ contacts: Contacts[] }>("/v1/planning/contacts", { scene: model.scene, q: [q] });
+      if (wish.kind === "grow" && contacts[0]!.pairs.length > 0) {
+        setSending(false);
+        return setProblem("The robot is in collision there, so no region can hold the configuration. Move it first.");
+      }
       const job = await post<{ id: string }>("/v1/jobs", body);
       location.assign(`/jobs/${job.id}`);
     } catch (reason) {
@@ -100,6 +106,7 @@ function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
       <div>
         <Robot model={model} q={q} touching={touching} label={`The robot of ${model.name}${touching.length ? ", in collision" : ""}`} />
         <MomentText model={model} moment={moment} />
+        {unread && <p class="notice">The address does not name a configuration within the limits: {asked}. The robot stands at the nearest one, or at q*.</p>}
         <div class="card">
           <Sliders names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onChange={setQ} />
           <p class="toolbar">

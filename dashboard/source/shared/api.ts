@@ -60,48 +60,80 @@ export interface JobEvent {
 
 const KINDS = ["job", "iteration", "pairs", "step", "region", "lost", "cover", "child"];
 const POLL_MS = 2000;
+/** A stream that says nothing, not even that it is open, for so long after it was asked for is held back by somebody. */
+const OPEN_MS = 4000;
 
 /**
- * Follows a job's events from `after` on: by the stream, or by asking again where the stream cannot be opened (a proxy that holds it back).
+ * Follows a job's events from `after` on: by the stream, or by asking again where no stream opens. A hidden page has no stream, because a
+ * browser opens only six connections to one service; it goes on where it stopped when it is looked at.
  *
  * @returns a function that ends it.
  */
 export function follow(job: string, after: number, seen: (event: JobEvent) => void, connected: (is: boolean) => void, ended: () => void): () => void {
   let last = after;
-  let timer: ReturnType<typeof setTimeout> | undefined;
   let stopped = false;
-  const source = new EventSource(`/v1/jobs/${job}/events/stream?after=${after}`);
+  let source: EventSource | null = null;
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  let polling = false;
   const take = (event: JobEvent): void => {
     if (event.seq <= last) return;
     last = event.seq;
     seen(event);
   };
+  const close = (): void => {
+    source?.close();
+    source = null;
+    clearTimeout(timer);
+    polling = false;
+  };
+  const end = (): void => {
+    if (stopped) return;
+    stop();
+    ended();
+  };
   const poll = async (): Promise<void> => {
+    polling = true;
     try {
       const { events } = await get<{ events: JobEvent[] }>(`/v1/jobs/${job}/events?after=${last}`);
       events.forEach(take);
       const now = await get<{ ended: boolean }>(`/v1/jobs/${job}`);
       connected(true);
-      if (now.ended && events.length === 0) return ended();
+      if (now.ended && events.length === 0) return end();
     } catch {
       connected(false);
     }
-    if (!stopped) timer = setTimeout(() => void poll(), POLL_MS);
+    if (!stopped && polling) timer = setTimeout(() => void poll(), POLL_MS);
   };
-  for (const kind of KINDS) source.addEventListener(kind, (message) => take(JSON.parse((message as MessageEvent<string>).data) as JobEvent));
-  source.addEventListener("end", () => {
-    source.close();
-    ended();
-  });
-  source.addEventListener("open", () => connected(true));
-  source.addEventListener("error", () => {
-    connected(false);
-    // A browser opens a stream again by itself, unless the first answer was no stream.
-    if (source.readyState === EventSource.CLOSED && timer === undefined) void poll();
-  });
-  return () => {
+  const open = (): void => {
+    close();
+    source = new EventSource(`/v1/jobs/${job}/events/stream?after=${last}`);
+    timer = setTimeout(() => {
+      source?.close();
+      void poll();
+    }, OPEN_MS);
+    for (const kind of KINDS) source.addEventListener(kind, (message) => take(JSON.parse((message as MessageEvent<string>).data) as JobEvent));
+    source.addEventListener("end", end);
+    source.addEventListener("open", () => {
+      clearTimeout(timer);
+      connected(true);
+    });
+    source.addEventListener("error", () => {
+      // A browser opens a stream again by itself, unless the first answer was no stream. Meanwhile the events are asked for.
+      if (stopped || polling) return;
+      clearTimeout(timer);
+      timer = setTimeout(() => {
+        source?.close();
+        void poll();
+      }, POLL_MS);
+    });
+  };
+  const look = (): void => (document.hidden ? close() : open());
+  const stop = (): void => {
     stopped = true;
-    source.close();
-    clearTimeout(timer);
+    close();
+    document.removeEventListener("visibilitychange", look);
   };
+  document.addEventListener("visibilitychange", look);
+  look();
+  return stop;
 }

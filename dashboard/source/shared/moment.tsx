@@ -1,48 +1,77 @@
-// What is known of one configuration: what touches there, which regions hold it, and which is nearest. The latest answer counts.
-import { useEffect, useState } from "preact/hooks";
+// What is known of one configuration: what touches there, which regions hold it, and which is nearest. An answer counts for the
+// configuration that it was asked for, and for no other.
+import { useEffect, useRef, useState } from "preact/hooks";
 import { post, said } from "./api";
 import type { SceneModel } from "./kinematics";
 
 export interface Moment {
-  /** Indices of the pairs that touch; undefined while nobody knows; empty where a joint is outside the window. */
+  /** Indices of the pairs that touch; undefined while nobody knows. */
   pairs?: number[];
+  /** Joints that are outside of their limits, by name. */
+  outside: string[];
   regions: string[];
   nearest: { region: string; distance: number } | null;
   problem: string | null;
 }
 
-const PAUSE_MS = 60;
-const NOTHING: Moment = { regions: [], nearest: null, problem: null };
+/** What POST /v1/planning/contacts says of one configuration. */
+export interface Contacts {
+  pairs: number[];
+  outside: string[];
+}
 
+const AGAIN_MS = 2000;
+const NOTHING: Moment = { outside: [], regions: [], nearest: null, problem: null };
+
+async function ask(scene: string, q: number[]): Promise<Moment> {
+  const body = { scene, q: [q] };
+  const [touching, containing] = await Promise.all([
+    post<{ contacts: Contacts[] }>("/v1/planning/contacts", body),
+    post<{ regions: number; points: { regions: { region: string }[] }[] }>("/v1/planning/contains", body),
+  ]);
+  const { pairs, outside } = touching.contacts[0]!;
+  const regions = containing.points[0]!.regions.map(({ region }) => region);
+  let nearest: Moment["nearest"] = null;
+  if (regions.length === 0 && containing.regions > 0 && outside.length === 0) {
+    nearest = (await post<{ points: { nearest: Moment["nearest"] }[] }>("/v1/planning/nearest", body)).points[0]!.nearest;
+  }
+  return { pairs, outside, regions, nearest, problem: null };
+}
+
+/** Asks about one configuration at a time, then about the latest; where the service does not answer, again. */
 export function useMoment(scene: string, q: number[]): Moment {
-  const [moment, setMoment] = useState<Moment>(NOTHING);
-  useEffect(() => {
-    const stop = new AbortController();
-    const body = { scene, q: [q] };
-    const ask = async (): Promise<void> => {
-      const [touching, containing] = await Promise.all([
-        post<{ contacts: { pairs: number[] | null }[] }>("/v1/planning/contacts", body, stop.signal),
-        post<{ regions: number; points: { regions: { region: string }[] }[] }>("/v1/planning/contains", body, stop.signal),
-      ]);
-      const regions = containing.points[0]!.regions.map(({ region }) => region);
-      let nearest: Moment["nearest"] = null;
-      if (regions.length === 0 && containing.regions > 0) {
-        const near = await post<{ points: { nearest: Moment["nearest"] }[] }>("/v1/planning/nearest", body, stop.signal);
-        nearest = near.points[0]!.nearest;
-      }
-      setMoment({ pairs: touching.contacts[0]!.pairs ?? [], regions, nearest, problem: null });
-    };
-    const timer = setTimeout(() => {
-      ask().catch((reason: unknown) => {
-        if (!stop.signal.aborted) setMoment({ ...NOTHING, problem: said(reason) });
-      });
-    }, PAUSE_MS);
-    return () => {
-      clearTimeout(timer);
-      stop.abort();
-    };
-  }, [scene, q.join()]);
-  return moment;
+  const key = `${scene} ${q.join()}`;
+  const [known, setKnown] = useState<{ key: string; moment: Moment }>({ key: "", moment: NOTHING });
+  const latest = useRef({ key, scene, q });
+  const asking = useRef({ busy: false, over: false, timer: 0 });
+  latest.current = { key, scene, q };
+  const next = async (): Promise<void> => {
+    const state = asking.current;
+    if (state.busy || state.over) return;
+    clearTimeout(state.timer);
+    state.busy = true;
+    const asked = latest.current;
+    let moment: Moment;
+    try {
+      moment = await ask(asked.scene, asked.q);
+    } catch (reason) {
+      moment = { ...NOTHING, problem: said(reason) };
+      state.timer = window.setTimeout(() => void next(), AGAIN_MS);
+    }
+    state.busy = false;
+    if (state.over) return clearTimeout(state.timer);
+    setKnown({ key: asked.key, moment });
+    if (latest.current.key !== asked.key) void next();
+  };
+  useEffect(() => void next(), [key]);
+  useEffect(
+    () => () => {
+      asking.current.over = true;
+      clearTimeout(asking.current.timer);
+    },
+    [],
+  );
+  return known.key === key ? known.moment : NOTHING;
 }
 
 /** The geometries that touch, by index. */
@@ -52,11 +81,13 @@ export function touchingOf(model: SceneModel, moment: Moment): number[] {
 
 /** Says in words what is known of the configuration, and how surely. */
 export function MomentText({ model, moment }: { model: SceneModel; moment: Moment }) {
-  const { pairs, regions, nearest, problem } = moment;
+  const { pairs, outside, regions, nearest, problem } = moment;
   const names = (pairs ?? []).map((pair) => model.pairs[pair]!.map((i) => model.geometries[i]!.name).join(" and "));
   return (
     <p class="said" role="status">
-      {problem ? <span class="bad">{problem}</span> : pairs === undefined ? "…" : names.length ? (
+      {problem ? <span class="bad">{problem}</span> : pairs === undefined ? "…" : outside.length ? (
+        <span class="bad">Outside of the limits: {outside.join(", ")}.</span>
+      ) : names.length ? (
         <span class="bad">In collision: {names.slice(0, 3).join("; ")}{names.length > 3 && `; and ${names.length - 3} more pairs`}.</span>
       ) : regions.length ? (
         <span class="good">In {regions.length === 1 ? "a certified region" : `${regions.length} certified regions`}: {regions.slice(0, 4).map((region, i) => <>{i > 0 && ", "}<a href={`/regions/${region}`} key={region}>{region.slice(0, 8)}</a></>)}. No collision, as proved.</span>

@@ -46,7 +46,7 @@ const PAD = { left: 52, right: 10, top: 10, bottom: 34 };
 export function Slice(props: Props) {
   const { scene, space, units, q, onPick, regions, strongest = null, cells = null, way } = props;
   const [axes, setAxes] = useState<[number, number]>([0, Math.min(1, space.joints.length - 1)]);
-  const [answer, setAnswer] = useState<SliceAnswer | null>(null);
+  const [known, setKnown] = useState<{ asked: string; answer: SliceAnswer } | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   const [scheme, setScheme] = useState(0);
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -63,11 +63,13 @@ export function Slice(props: Props) {
       const body = { scene, q, x: space.joints[x], y: space.joints[y], size: SIZE, ...(regions && { regions }) };
       post<SliceAnswer>("/v1/planning/slice", body, stop.signal).then(
         (found) => {
-          setAnswer(found);
+          setKnown({ asked, answer: found });
           setProblem(null);
         },
         (reason: unknown) => {
-          if (!stop.signal.aborted) setProblem(said(reason));
+          if (stop.signal.aborted) return;
+          setKnown(null);
+          setProblem(said(reason));
         },
       );
     }, PAUSE_MS);
@@ -77,6 +79,9 @@ export function Slice(props: Props) {
     };
   }, [asked]);
   useEffect(() => onScheme(() => setScheme((old) => old + 1)), []);
+  // While the next slice is computed, the one before stays, faintly, and nothing is said of it.
+  const answer = known?.answer ?? null;
+  const current = known?.asked === asked;
 
   const leaves = useMemo(
     () => (cells ? leavesInSlice(cells, toS(space, q), x, y).map(({ kind, lower, upper }) => ({ kind, lower: inQ(space, axes, lower), upper: inQ(space, axes, upper) })) : []),
@@ -135,9 +140,10 @@ export function Slice(props: Props) {
       </div>
       <canvas
         ref={canvas}
+        class={current ? "" : "stale"}
         tabIndex={0}
         role="application"
-        aria-label={`Slice through configuration space: ${at(x)} across, ${at(y)} up. ${answer ? summary(answer) : "It is being computed."} Arrow keys move the robot.`}
+        aria-label={`Slice through configuration space: ${at(x)} across, ${at(y)} up. ${answer && current ? summary(answer) : "It is being computed."} Arrow keys move the robot.`}
         onKeyDown={onKeyDown}
         onPointerDown={onPointer}
         onPointerMove={onPointer}
@@ -146,7 +152,7 @@ export function Slice(props: Props) {
         <span class="key-map certified">in a certified region</span> <span class="key-map free">free at the sample</span> <span class="key-map taken">in collision</span>
         {cells && <> <span class="key-map cells">cells</span></>}
         <br />
-        {problem ? <strong class="bad">{problem}</strong> : answer ? summary(answer) : "Computing …"}
+        {problem ? <strong class="bad">{problem}</strong> : answer && current ? summary(answer) : "Computing …"}
       </figcaption>
     </figure>
   );
