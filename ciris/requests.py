@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypedDict, get_type_hints
@@ -160,7 +161,8 @@ def points(axes: int, **values: ArrayLike | None) -> Document:
     """
     found = {name: numbers(value, name) for name, value in values.items() if value is not None}
     if len(found) != 1:
-        raise RegionError("points", "the points must be given either as q or as s", field="q")
+        hint = "q are joint positions, s tangent-space coordinates: give one of them"
+        raise RegionError("points", "the points must be given either as q or as s", field="q", hint=hint)
     ((name, array),) = found.items()
     if array.ndim not in (axes - 1, axes):
         raise RegionError("points", f"it must be finite numbers in {axes - 1} or {axes} axes, joints last", field=name)
@@ -171,8 +173,9 @@ def bundle(path: str | Path) -> bytes:
     """Packs a scene file. What it takes, PyYAML and python-flint, is loaded here, so that asking needs neither.
 
     Raises:
+        CirisError: argument, for what is no path.
         SceneError: as :func:`certifier.scene.bundle.pack_bundle`.
     """
     from certifier.scene.bundle import pack_bundle
 
-    return pack_bundle(path)
+    return pack_bundle(named(os.fspath(path) if isinstance(path, os.PathLike) else path, "path", "the path of a scene file"))

@@ -10,6 +10,7 @@ import pytest
 
 from certifier.errors import CirisError
 from certifier.model import Scene
+from ciris.synchronous import client as synchronous
 from ciris.synchronous.client import Client
 
 
@@ -29,7 +30,7 @@ def test_a_job_under_a_key_is_made_once(url: str, scene: Scene) -> None:
 
 def pretending(answer: Callable[[httpx2.Request], httpx2.Response]) -> Client:
     client = Client("http://service")
-    client._http = httpx2.Client(base_url="http://service", transport=httpx2.MockTransport(answer))
+    client._connections = httpx2.Client(base_url="http://service", transport=httpx2.MockTransport(answer))
     return client
 
 
@@ -67,11 +68,18 @@ def test_a_broken_stream_is_taken_up_after_the_last_event() -> None:
 
 def test_a_stream_that_closes_without_an_end_is_taken_up_too() -> None:
     answers = iter([sse(1), sse(2) + "event: end\ndata: {}\n\n"])
-    events = pretending(lambda request: httpx2.Response(200, text=next(answers))).events("j")
+
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        streamed = request.url.path.endswith("/stream")
+        return httpx2.Response(200, text=next(answers)) if streamed else httpx2.Response(200, json={"id": "j"})
+
+    events = pretending(answer).events("j")
     assert [event["seq"] for event in events] == [1, 2]
 
 
-def test_a_service_that_goes_away_for_good_is_an_error() -> None:
+def test_a_service_that_goes_away_for_good_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(synchronous, "ABSENCE_S", 0.1)
+
     def answer(request: httpx2.Request) -> httpx2.Response:
         if request.url.path.endswith("/stream"):
             return httpx2.Response(200, stream=Breaking(sse(1)))
