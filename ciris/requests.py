@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypedDict, get_type_hints
 
@@ -79,8 +79,8 @@ def grow_request(scene: str, q: ArrayLike, options: GrowOptions) -> Document:
     """Returns the request of a job that grows a region around q, (n,)."""
     given = _known(options, GrowOptions)
     seed: Document = {"q": numbers(q, "q").tolist()}
-    if "contain" in options:
-        seed["contain"] = np.atleast_2d(numbers(options["contain"], "contain")).tolist()
+    if "contain" in given:
+        seed["contain"] = np.atleast_2d(numbers(given["contain"], "contain")).tolist()
     if "method" in given:
         seed["method"] = given["method"]
     request = {"kind": "grow", "scene": scene, "seed": seed, "options": {name: given[name] for name in _IN_OPTIONS if name in given}}
@@ -94,8 +94,10 @@ def cover_request(scene: str, options: CoverOptions) -> Document:
     for name in ("connect", "seeds"):
         if name in given:
             asked[name] = np.atleast_2d(numbers(given[name], name)).tolist()
-    if "paths" in options:
-        asked["paths"] = [numbers(path, f"paths[{i}]").tolist() for i, path in enumerate(options["paths"])]
+    if "paths" in given:
+        if not isinstance(given["paths"], Iterable) or isinstance(given["paths"], str):
+            raise CirisError("argument", f"{type(given['paths']).__name__} is no paths", field="paths", hint="give a list of (k, n) arrays")
+        asked["paths"] = [numbers(path, f"paths[{i}]").tolist() for i, path in enumerate(given["paths"])]
     request = {"kind": "cover", "scene": scene, "options": asked}
     return request | {field: given[name] for name, field in _IN_JOB if name in given}
 
@@ -132,6 +134,17 @@ def named(name: object, field: str, what: str) -> str:
     if isinstance(name, str):
         return name
     raise CirisError("argument", f"{type(name).__name__} is no {field}", field=field, hint=f"give {what}")
+
+
+def patience(timeout: float) -> float:
+    """Returns the seconds that a question may take.
+
+    Raises:
+        CirisError: argument, for what is no positive, finite number.
+    """
+    if isinstance(timeout, int | float | np.number) and 0 < timeout < np.inf:
+        return float(timeout)
+    raise CirisError("argument", f"{timeout!r} is no timeout", field="timeout", hint="give seconds, a number above 0")
 
 
 def given(**values: Any) -> Document:

@@ -19,7 +19,7 @@ from certifier.errors import CirisError
 from ciris.answers import Document
 from ciris.find import api_key
 from ciris.problems import address, content, problem, segment, unreachable
-from ciris.requests import bundle, document, given
+from ciris.requests import bundle, document, given, patience
 
 Rows = list[list[float]]
 Limit = float | list[float]
@@ -59,13 +59,13 @@ class Client:
         timeout: seconds that a question may take.
 
     Raises:
-        CirisError: url.
+        CirisError: url, argument.
     """
 
     def __init__(self, url: str, key: str | None = None, timeout: float = TIMEOUT_S) -> None:
         self.url = address(url)
         self._headers = {} if key is None else {"Authorization": f"Bearer {key}"}
-        self._timeout = timeout
+        self._timeout = patience(timeout)
         self._connect()
 
     def _connect(self) -> None:

@@ -216,6 +216,19 @@ def test_what_is_no_address_is_refused_before_anybody_is_asked(url: str) -> None
     assert caught.value.code == "url"
 
 
+@pytest.mark.parametrize("timeout", [0, -1, float("nan"), float("inf"), None, "x"])
+def test_a_timeout_is_a_positive_number(timeout: Any) -> None:
+    with pytest.raises(ciris.CirisError) as caught:
+        ciris.connect("http://127.0.0.1:9", timeout=timeout)
+    assert (caught.value.code, caught.value.field) == ("argument", "timeout")
+
+
+def test_options_that_are_none_are_not_given(url: str, region: str) -> None:
+    service = ciris.connect(url)
+    assert service.submit_grow("slider", [0.0], contain=None, method=None).cancel()  # type: ignore[typeddict-item]
+    assert service.submit_cover("slider", paths=None, connect=None, deadline=1).cancel()  # type: ignore[arg-type]
+
+
 def test_names_that_are_none_are_refused() -> None:
     service = ciris.connect(NOBODY)
     for name in ("x" * 100_000, "\ud800", "a\nb", "a\0b", ""):

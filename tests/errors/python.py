@@ -106,6 +106,14 @@ PYTHON: list[Row] = [
             "give {what}",
             lambda t: connect(NOBODY).contains(3, [0.0]),  # type: ignore[arg-type]
         ),
+        ("argument", "timeout", "{timeout} is no timeout", "give seconds, a number above 0", lambda t: connect(NOBODY, timeout=0)),
+        (
+            "argument",
+            "paths",
+            "{__name__} is no paths",
+            "give a list of (k, n) arrays",
+            lambda t: connect(NOBODY).cover("cell", paths=3),  # type: ignore[arg-type]
+        ),
     ),
     *rows(
         "ciris/space.py",
