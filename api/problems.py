@@ -188,7 +188,7 @@ def _field(loc: Sequence[str | int]) -> str:
 def _sentence(error: dict[str, Any]) -> str:
     if error["type"] == "extra_forbidden":
         return "there is no such field"
-    message = str(error["msg"]).removeprefix("Value error, ")
+    message = str(error["msg"]).removeprefix("Value error, ").replace(" after validation", "")
     return message[:1].lower() + message[1:]
 
 

@@ -18,7 +18,7 @@ def connect(url: str | None = None, key: str | None = None, timeout: float = TIM
         timeout: seconds that a question may take. A wait for a job may take as long as the job.
 
     Raises:
-        CirisError: no_service, url, api_key.
+        CirisError: no_service, url, api_key, argument.
     """
     return Service(Client(service_url(url), checked_key(key, "key") if key else api_key(), timeout))
 

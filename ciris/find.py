@@ -78,6 +78,6 @@ def checked_key(key: str, field: str) -> str:
     Raises:
         CirisError: api_key, for something that cannot be a key.
     """
-    if not re.fullmatch(r"[\x21-\x7e]+", key.strip()):
+    if not isinstance(key, str) or not re.fullmatch(r"[\x21-\x7e]+", key.strip()):
         raise CirisError("api_key", "this is not an API key", field=field, hint="it is one word, as `ciris key add` prints it")
     return key.strip()

@@ -44,6 +44,6 @@ def why_no_region(job: Document) -> CirisError:
     if job["kind"] == "certify-path":
         return CirisError("no_region", "a job that certifies a motion has no region", hint="`motion` of the job returns its verdict")
     if job["state"] == "succeeded":
-        return CirisError("no_region", f"the job has ended without a region: {job['reason'] or job['outcome']}", hint=hint)
+        return CirisError("no_region", f"the job has ended without a region; its outcome is {job['outcome']}", hint=hint)
     reason = job["reason"] or f"the job is {job['state']}"
     return CirisError(f"job_{job['state']}", reason, hint=hint)

@@ -10,8 +10,14 @@ from urllib.parse import quote
 import httpx2
 
 from certifier.errors import CirisError
+from ciris.answers import Document
 from ciris.requests import named
 
+DESCRIBED, WHICH = "/openapi.json", "is that the address of a ciris service of this version?"
+HELP = {"invalid_request": "help() of the method in Python, or --help of the command, says what it takes"}
+"""What is said instead of where the API is described, which is for those who write requests themselves."""
+LONGEST = 200
+"""No name and no id has more characters."""
 BUSY = (502, 503, 504)
 """With these a proxy answers whose service does not, as while it starts again."""
 
@@ -27,7 +33,7 @@ def address(url: str) -> str:
         parsed = httpx2.URL(url)
     except (TypeError, ValueError, httpx2.InvalidURL):
         raise CirisError("url", f"{url!r} is no address", hint=hint) from None
-    if parsed.scheme not in ("http", "https") or not parsed.host:
+    if parsed.scheme not in ("http", "https") or not parsed.host or re.search(r"\s", url) or (parsed.port or 0) > 65535:
         raise CirisError("url", f"{url!r} is no address of a service", hint=hint)
     return url.rstrip("/")
 
@@ -38,6 +44,8 @@ def unreachable(url: str, error: Exception) -> CirisError:
         return CirisError(
             "timeout", f"the service at {url} has not answered in time", hint="ask for less, or connect with a longer timeout"
         )
+    if isinstance(error, httpx2.DecodingError):
+        return CirisError("not_ciris", f"{url} answered with what cannot be decoded", hint="is that the address of a ciris service?")
     reason = re.sub(r"^\[.*?\] ", "", str(error)) or type(error).__name__  # without the errno, which helps nobody
     return CirisError("unreachable", f"the service at {url} does not answer: {reason}", hint="is `ciris up` running there?")
 
@@ -47,25 +55,35 @@ def problem(response: httpx2.Response) -> CirisError:
     if response.headers.get("content-type", "").startswith("application/problem+json"):
         with suppress(ValueError, KeyError, TypeError):
             problem = response.json()
-            return CirisError(problem["code"], problem["detail"], field=problem["field"], hint=problem["hint"] or "")
+            hint = HELP.get(problem["code"], WHICH) if DESCRIBED in (problem["hint"] or "") else problem["hint"] or ""
+            return CirisError(problem["code"], problem["detail"], field=problem["field"], hint=hint)
     url, status = response.url, response.status_code
     if status in BUSY:
         return CirisError("unreachable", f"{url} answered {status}: who answers there cannot reach the service now", hint="try again soon")
+    if status == httpx2.codes.TOO_MANY_REQUESTS:
+        return CirisError("too_many_requests", f"{url} answered that it was asked too often", hint="ask less often, or try again later")
     if response.is_redirect:
         return CirisError("not_ciris", f"{url} sends you on to {response.headers['location']}", hint="give the address that it leads to")
     return CirisError("not_ciris", f"{url} answered {status}", hint="is that the address of a ciris service?")
 
 
+class Answer(Document):
+    """An answer of the service. Whoever looks for an entry that it lacks at its top is told that something else has answered."""
+
+    def __missing__(self, name: str) -> Any:
+        raise CirisError("not_ciris", f"the answer lacks {name}", hint="is it a ciris service of this version that answers?")
+
+
 def content(response: httpx2.Response) -> Any:
-    """Returns the JSON that the service has answered with.
+    """Returns the JSON object that the service has answered with.
 
     Raises:
         CirisError: not_ciris, where it is none.
     """
     try:
-        return response.json()
-    except ValueError:
-        message = f"{response.url} answered {response.status_code} with something that is not JSON"
+        return Answer(response.json())
+    except (ValueError, TypeError):
+        message = f"{response.url} answered {response.status_code} with something that is not a JSON object"
         raise CirisError("not_ciris", message, hint="is that the address of a ciris service?") from None
 
 
@@ -76,6 +94,8 @@ def segment(name: str) -> str:
         CirisError: not_found for what no name can be; argument for what is no text.
     """
     name = named(name, "name", "a name or an id")
-    if not name.strip(".") or "/" in name:
-        raise CirisError("not_found", f"{name!r} is no name and no id", hint="`scene ls`, `job ls` and `region ls` of ciris list them")
+    if not name.strip(".") or "/" in name or len(name) > LONGEST or not name.isprintable():
+        shown = name if len(name) <= LONGEST else f"{name[:LONGEST]}..."
+        hint = "`ls` of `ciris scene`, `job` and `region`, or `scenes()`, `jobs()` and `regions()` in Python, list them"
+        raise CirisError("not_found", f"{shown!r} is no name and no id", hint=hint)
     return quote(name, safe="")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypedDict, get_type_hints
 
@@ -78,8 +79,8 @@ def grow_request(scene: str, q: ArrayLike, options: GrowOptions) -> Document:
     """Returns the request of a job that grows a region around q, (n,)."""
     given = _known(options, GrowOptions)
     seed: Document = {"q": numbers(q, "q").tolist()}
-    if "contain" in options:
-        seed["contain"] = np.atleast_2d(numbers(options["contain"], "contain")).tolist()
+    if "contain" in given:
+        seed["contain"] = np.atleast_2d(numbers(given["contain"], "contain")).tolist()
     if "method" in given:
         seed["method"] = given["method"]
     request = {"kind": "grow", "scene": scene, "seed": seed, "options": {name: given[name] for name in _IN_OPTIONS if name in given}}
@@ -93,8 +94,10 @@ def cover_request(scene: str, options: CoverOptions) -> Document:
     for name in ("connect", "seeds"):
         if name in given:
             asked[name] = np.atleast_2d(numbers(given[name], name)).tolist()
-    if "paths" in options:
-        asked["paths"] = [numbers(path, f"paths[{i}]").tolist() for i, path in enumerate(options["paths"])]
+    if "paths" in given:
+        if not isinstance(given["paths"], Iterable) or isinstance(given["paths"], str):
+            raise CirisError("argument", f"{type(given['paths']).__name__} is no paths", field="paths", hint="give a list of (k, n) arrays")
+        asked["paths"] = [numbers(path, f"paths[{i}]").tolist() for i, path in enumerate(given["paths"])]
     request = {"kind": "cover", "scene": scene, "options": asked}
     return request | {field: given[name] for name, field in _IN_JOB if name in given}
 
@@ -133,6 +136,17 @@ def named(name: object, field: str, what: str) -> str:
     raise CirisError("argument", f"{type(name).__name__} is no {field}", field=field, hint=f"give {what}")
 
 
+def patience(timeout: float) -> float:
+    """Returns the seconds that a question may take.
+
+    Raises:
+        CirisError: argument, for what is no positive, finite number.
+    """
+    if isinstance(timeout, int | float | np.number) and 0 < timeout < np.inf:
+        return float(timeout)
+    raise CirisError("argument", f"{timeout!r} is no timeout", field="timeout", hint="give seconds, a number above 0")
+
+
 def given(**values: Any) -> Document:
     """Returns the values that are not None, by name."""
     return {name: value for name, value in values.items() if value is not None}
@@ -160,7 +174,8 @@ def points(axes: int, **values: ArrayLike | None) -> Document:
     """
     found = {name: numbers(value, name) for name, value in values.items() if value is not None}
     if len(found) != 1:
-        raise RegionError("points", "the points must be given either as q or as s", field="q")
+        hint = "q are joint positions, s tangent-space coordinates: give one of them"
+        raise RegionError("points", "the points must be given either as q or as s", field="q", hint=hint)
     ((name, array),) = found.items()
     if array.ndim not in (axes - 1, axes):
         raise RegionError("points", f"it must be finite numbers in {axes - 1} or {axes} axes, joints last", field=name)
@@ -171,8 +186,9 @@ def bundle(path: str | Path) -> bytes:
     """Packs a scene file. What it takes, PyYAML and python-flint, is loaded here, so that asking needs neither.
 
     Raises:
+        CirisError: argument, for what is no path.
         SceneError: as :func:`certifier.scene.bundle.pack_bundle`.
     """
     from certifier.scene.bundle import pack_bundle
 
-    return pack_bundle(path)
+    return pack_bundle(named(os.fspath(path) if isinstance(path, os.PathLike) else path, "path", "the path of a scene file"))

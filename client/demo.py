@@ -18,6 +18,7 @@ from typing import Any
 
 import certifier
 from certifier.errors import CirisError
+from certifier.growth.refusal import DEADLINE
 from ciris.find import api_key, data_dir, running_stack
 from ciris.synchronous.client import Client
 from client import output, service
@@ -74,11 +75,11 @@ def _grown(client: Client, request: dict[str, Any]) -> service.Grown:
     try:
         return service.grow(client, request, Screen(), idempotency_key=_key(request))
     except CirisError as error:
-        if error.code != "no_region":
+        if error.code != "not_grown" or error.message != DEADLINE:
             raise
         message = f"no region was certified within {DEADLINE_SECONDS} s, which are enough where nothing else runs"
         hint = f"run it again when this machine has less to do, or give it longer: ciris grow {SCENE} --deadline 1200"
-        raise CirisError("no_region", message, hint=hint) from None
+        raise CirisError("not_grown", message, hint=hint) from None
 
 
 def _verified(proof: bytes) -> bool:

@@ -146,7 +146,9 @@ def lock(session: Session, job_id: str) -> JobRow:
 
 def _found(job: JobRow | None, job_id: str) -> JobRow:
     if job is None:
-        raise CirisError("job_not_found", f"there is no job {job_id!r}", field="job", hint="`ciris job ls` lists them")
+        raise CirisError(
+            "job_not_found", f"there is no job {job_id!r}", field="job", hint="`ciris job ls`, or `jobs()` in Python, lists them"
+        )
     return job
 
 

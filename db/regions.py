@@ -58,7 +58,7 @@ def get(session: Session, region_id: str) -> RegionRow:
     """
     row = session.get(RegionRow, region_id) or session.get(RegionRow, expanded(session, RegionRow.id, region_id))
     if row is None:
-        hint = "`ciris region ls` lists them"
+        hint = "`ciris region ls`, or `regions()` in Python, lists them"
         raise CirisError("region_not_found", f"there is no region {region_id!r}", field="region", hint=hint)
     return row
 

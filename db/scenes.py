@@ -76,7 +76,7 @@ def find(session: Session, name: str) -> str:
     longer = expanded(session, SceneRow.id, name)
     if longer == name:
         known = session.scalars(select(SceneNameRow.name).order_by(SceneNameRow.created_at.desc()).limit(SUGGESTED_AMONG)).all()
-        hint = close_matches(name, list(dict.fromkeys(known))) or "`ciris scene ls` lists them"
+        hint = close_matches(name, list(dict.fromkeys(known))) or "`ciris scene ls`, or `scenes()` in Python, lists them"
         raise SceneError("scene_not_found", f"there is no scene {name!r}", field="scene", hint=hint)
     return longer
 

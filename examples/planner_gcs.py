@@ -46,18 +46,31 @@ def plan(regions: Sequence[ciris.Region], start: NDArray[np.float64], goal: NDAr
     return np.array([start, *kept[1:-1], goal])
 
 
+def within(space: ciris.Space, q: Sequence[float], field: str) -> None:
+    """Refuses joint positions, (n,), outside of the limits, where no region can be: nobody needs to wait for one."""
+    for joint, value, lower, upper in zip(space.joints, space.points(q, field), space.q_lower, space.q_upper, strict=True):
+        if not lower <= value <= upper:
+            message = f"{joint} is at {value:.6g}, not between its limits {lower:.6g} and {upper:.6g}"
+            raise ciris.CirisError("outside_limits", message, field=field, hint="move it between them")
+
+
 def drive(service: ciris.Service, name: str, start: Sequence[float], goal: Sequence[float], patience: float) -> NDArray[np.float64] | None:
     """Plans from start to goal, joint positions, with the regions that there are, again and again until some lead there.
 
     Returns:
         The waypoints in q, (k, n), of a motion that is straight in s and proved to be free of collision; None if ``patience`` seconds pass.
+
+    Raises:
+        CirisError: outside_limits; what the service refuses.
     """
     scene, until = service.scene(name), time.monotonic() + patience
+    for field, end in (("start", start), ("goal", goal)):
+        within(scene.space, end, field)
     while True:
         waypoints = plan(service.regions(scene), scene.to_s(start), scene.to_s(goal))
         if waypoints is not None and service.path(scene, s=waypoints):
             return scene.to_q(waypoints)
-        if time.monotonic() > until:
+        if not time.monotonic() < until:
             return None
         time.sleep(1)
 

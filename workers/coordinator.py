@@ -13,8 +13,8 @@ from certifier.errors import CirisError
 from certifier.growth.actions import Failed, Report, Transition
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
+from certifier.growth.refusal import DEADLINE, refusal
 from certifier.growth.state import GrowthState
-from certifier.growth.whole import REVOKED
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.seeding.proposal import Proposal
@@ -66,5 +66,4 @@ def ending(kind: str, outcome: Outcome, reason: str, error: dict[str, Any] | Non
         return Ending(JobState.FAILED if error else JobState.SUCCEEDED, outcome, reason, error)
     if outcome == Outcome.CERTIFIED or (kind in (JobKind.CERTIFY, JobKind.CERTIFY_PATH) and outcome != Outcome.ERROR):
         return Ending(JobState.SUCCEEDED, outcome, reason)
-    code = "revoked" if reason.startswith(REVOKED) else "not_grown"
-    return Ending(JobState.FAILED, outcome, reason, error or {"code": code, "message": reason, "field": None, "hint": ""})
+    return Ending(JobState.FAILED, outcome, reason, error or refusal(reason, late=reason == DEADLINE).to_document())

@@ -18,6 +18,7 @@ from sqlalchemy.orm import Session
 from certifier.errors import CirisError
 from certifier.growth.actions import Candidate, Certify, Finish, Outcomes, Propose, Report, Step, Transition
 from certifier.growth.options import GrowthOptions
+from certifier.growth.refusal import DEADLINE
 from certifier.outcome import Outcome
 from certifier.pair.forecast import PairCost, forecast
 from certifier.pair.result import Weakness
@@ -102,7 +103,7 @@ def _begin(job_id: str) -> Turn | None:
             _finish_growth(session, job, Finish(Outcome.INCONCLUSIVE, "cancelled"), afterwards)
         elif _is_late(session, job, now):
             outcome = Outcome.CERTIFIED if steps.accepted(session, job_id) else Outcome.INCONCLUSIVE
-            _finish_growth(session, job, Finish(outcome, "the deadline was reached"), afterwards)
+            _finish_growth(session, job, Finish(outcome, DEADLINE), afterwards)
         if job.coordinator_attempts >= settings().max_attempts:
             problem = "the coordinator died or hung each time it decided about this job"
             job.error = CirisError("coordination_failed", problem, hint=IN_LOG).to_document()

@@ -12,9 +12,9 @@ from certifier.errors import CirisError
 from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Step, Transition
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
+from certifier.growth.refusal import DEADLINE, refusal
 from certifier.growth.state import Start
 from certifier.growth.trials import alike
-from certifier.growth.whole import REVOKED
 from certifier.jobs.former import Former
 from certifier.jobs.pairs import part_certifier
 from certifier.jobs.parallel import side_by_side
@@ -245,14 +245,11 @@ def _carried_out(run: _Run, options: GrowthOptions, deliver: Deliver | None = No
         late = run.passed >= 1
         if late and not isinstance(transition.action, Finish):
             outcome = Outcome.INCONCLUSIVE if run.candidate is None else Outcome.CERTIFIED
-            transition = Transition(transition.state, Finish(outcome, "the deadline was reached"))
+            transition = Transition(transition.state, Finish(outcome, DEADLINE))
         if deliver is not None and run.has_news and not isinstance(transition.action, Finish):
             deliver(run.make_region(options, "growing"))
     if run.candidate is None:
-        if transition.action.reason.startswith(REVOKED):
-            raise CirisError("revoked", transition.action.reason, hint="grow a region of the new scene from another seed")
-        hint = "allow more time" if late else "try another seed, or look at the pair named"
-        raise CirisError("not_grown", transition.action.reason, hint=hint)
+        raise refusal(transition.action.reason, late)
     return run.make_region(options, transition.action.reason)
 
 

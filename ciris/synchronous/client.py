@@ -19,7 +19,7 @@ from certifier.errors import CirisError
 from ciris.answers import Document
 from ciris.find import api_key
 from ciris.problems import address, content, problem, segment, unreachable
-from ciris.requests import bundle, document, given
+from ciris.requests import bundle, document, given, patience
 
 Rows = list[list[float]]
 Limit = float | list[float]
@@ -28,8 +28,8 @@ TIMEOUT_S = 120.0
 QUIET_S = 60.0
 """When a stream says nothing for this many seconds, not even a ping, the client opens it again."""
 
-PATIENCE = 5
-"""The client repeats a request at most this often when the service answers that it was asked too often."""
+PATIENCE, LONGEST_WAIT_S = 5, 60
+"""The client repeats a request at most this often, each time after at most so many seconds, when the service was asked too often."""
 ABSENCE_S, PAUSE_S = 30.0, 0.5
 """Whoever waits for a job bears with a service that does not answer for so long, as while it starts again, and asks with such pauses."""
 
@@ -41,7 +41,7 @@ class _Patient(httpx2.HTTPTransport):
         for _ in range(PATIENCE):
             response = super().handle_request(request)
             wait = response.headers.get("retry-after", "")
-            if response.status_code != httpx2.codes.TOO_MANY_REQUESTS or not wait.isdigit():
+            if response.status_code != httpx2.codes.TOO_MANY_REQUESTS or not wait.isdigit() or int(wait) > LONGEST_WAIT_S:
                 return response
             response.close()
             time.sleep(int(wait))
@@ -59,13 +59,13 @@ class Client:
         timeout: seconds that a question may take.
 
     Raises:
-        CirisError: url.
+        CirisError: url, argument.
     """
 
     def __init__(self, url: str, key: str | None = None, timeout: float = TIMEOUT_S) -> None:
         self.url = address(url)
         self._headers = {} if key is None else {"Authorization": f"Bearer {key}"}
-        self._timeout = timeout
+        self._timeout = patience(timeout)
         self._connect()
 
     def _connect(self) -> None:
@@ -226,7 +226,7 @@ class Client:
                         kind = value
                     elif name == "data":
                         yield None if kind == "end" else json.loads(value)
-        except httpx2.TransportError as error:
+        except (httpx2.TransportError, httpx2.DecodingError) as error:
             raise unreachable(self.url, error) from None
         except RuntimeError:
             self._refuse_if_closed()
@@ -312,10 +312,10 @@ class Client:
             if "json" in options:
                 options["json"] = document(options["json"])
             response = self._http.request(method, path, **options)
-        except httpx2.TransportError as error:
+        except (httpx2.TransportError, httpx2.DecodingError) as error:
             raise unreachable(self.url, error) from None
-        except (TypeError, ValueError):
-            message = "the request holds something that cannot be sent, such as a number that is not finite"
+        except (TypeError, ValueError, httpx2.InvalidURL):
+            message = "the request holds something that cannot be sent, such as a number that is not finite or a name of many pages"
             raise CirisError("argument", message, hint="give texts, finite numbers, and lists of them") from None
         except RuntimeError:
             self._refuse_if_closed()

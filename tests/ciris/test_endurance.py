@@ -7,6 +7,7 @@ import copy
 import dataclasses
 import multiprocessing
 import pickle
+import re
 import socket
 import threading
 import time
@@ -24,6 +25,7 @@ from ciris.synchronous import client as synchronous
 from db import jobs
 from db.session import Database
 from db.states import JobState
+from tests.errors.python import NOBODY, answered
 
 
 @contextmanager
@@ -193,9 +195,89 @@ def test_numbers_of_numpy_are_numbers(url: str, region: str) -> None:
     assert job.cancel().id == job.id
 
 
-def test_no_message_shows_a_key(monkeypatch: pytest.MonkeyPatch) -> None:
-    for key in ("secret\nkey", "secret key", "geheimnisß"):
+@pytest.mark.parametrize("body", [b"[]", b"3", b"null", b"{}"])
+def test_json_that_is_no_answer_of_ciris_is_said(body: bytes) -> None:
+    with pytest.raises(ciris.CirisError) as caught:
+        answered(200, body)
+    assert caught.value.code == "not_ciris"
+
+
+def test_a_pause_of_a_day_is_not_waited_for() -> None:
+    begin = time.monotonic()
+    with pytest.raises(ciris.CirisError, match="asked too often"):
+        answered(429, **{"retry-after": "86400"})
+    assert time.monotonic() - begin < 30
+
+
+@pytest.mark.parametrize("url", ["http://127.0.0.1:99999", "http://two words", "http://[::1"])
+def test_what_is_no_address_is_refused_before_anybody_is_asked(url: str) -> None:
+    with pytest.raises(ciris.CirisError) as caught:
+        ciris.connect(url)
+    assert caught.value.code == "url"
+
+
+@pytest.mark.parametrize("timeout", [0, -1, float("nan"), float("inf"), None, "x"])
+def test_a_timeout_is_a_positive_number(timeout: Any) -> None:
+    with pytest.raises(ciris.CirisError) as caught:
+        ciris.connect("http://127.0.0.1:9", timeout=timeout)
+    assert (caught.value.code, caught.value.field) == ("argument", "timeout")
+
+
+def test_options_that_are_none_are_not_given(url: str, region: str) -> None:
+    service = ciris.connect(url)
+    assert service.submit_grow("slider", [0.0], contain=None, method=None).cancel()  # type: ignore[typeddict-item]
+    assert service.submit_cover("slider", paths=None, connect=None, deadline=1).cancel()  # type: ignore[arg-type]
+
+
+def test_names_that_are_none_are_refused() -> None:
+    service = ciris.connect(NOBODY)
+    for name in ("x" * 100_000, "\ud800", "a\nb", "a\0b", ""):
         with pytest.raises(ciris.CirisError) as caught:
-            ciris.connect("http://127.0.0.1:9", key)
+            service.scene(name)
+        assert caught.value.code == "not_found"
+        assert len(str(caught.value)) < 1000
+        with pytest.raises(ciris.CirisError) as caught:
+            service.jobs("x" * 100_000)
+        assert caught.value.code == "argument"
+    for path in (None, 3, b"scene.yaml"):
+        with pytest.raises(ciris.CirisError) as caught:
+            service.add_scene(path)  # type: ignore[arg-type]
+        assert (caught.value.code, caught.value.field) == ("argument", "path")
+
+
+def test_hints_are_for_whoever_asks_in_python(url: str, region: str) -> None:
+    service = ciris.connect(url)
+    for ask, hint in (
+        (lambda: service.submit_grow("slider", [0.0], deadline=-1), r"help\(\) of the method"),
+        (lambda: ciris.connect(f"{url}/elsewhere").scenes(), "address of a ciris service"),
+        (lambda: service.region("nothing"), r"regions\(\)"),
+        (lambda: service.job("nothing"), r"jobs\(\)"),
+        (lambda: service.scene("nothing like it"), r"scenes\(\)"),
+    ):
+        with pytest.raises(ciris.CirisError) as caught:
+            ask()
+        assert re.search(hint, caught.value.hint)
+        assert "openapi" not in caught.value.hint
+    with pytest.raises(ciris.CirisError) as caught:
+        service.contains("slider", np.zeros((0, 1)))
+    assert "validation" not in caught.value.message
+
+
+def test_a_refuted_polytope_has_no_region_and_says_so(url: str, scene: Any, database: Database) -> None:
+    job = ciris.connect(url).submit_certify("slider", [[1.0], [-1.0]], [0.1, 0.1])
+    with database.write() as session:
+        row = jobs.get(session, job.id)
+        jobs.start(session, row)
+        jobs.finish(session, row, JobState.SUCCEEDED, outcome="refuted", reason="the given polytope, every pair")
+    with pytest.raises(ciris.CirisError, match="its outcome is refuted") as caught:
+        job.result()
+    assert caught.value.code == "no_region"
+
+
+def test_no_message_shows_a_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    for key in ("secret\nkey", "secret key", "geheimnisß", b"secret key"):
+        with pytest.raises(ciris.CirisError) as caught:
+            ciris.connect("http://127.0.0.1:9", key)  # type: ignore[arg-type]
         assert caught.value.code == "api_key"
-        assert key.split()[0] not in str(caught.value)
+        assert "secret" not in str(caught.value)
+        assert "geheimnis" not in str(caught.value)

@@ -39,6 +39,8 @@ def test_a_plan_goes_through_regions_that_overlap_and_through_no_gap(url: str, r
         (["nowhere", "--start", "-0.1", "--goal", "0.1"], "error: scene: there is no scene 'nowhere'"),
         (["slider", "--start", "x", "--goal", "0.1"], "invalid float value: 'x'"),
         (["slider", "--start", "-0.1", "0.2", "--goal", "0.1"], "the last number must be 1"),
+        (["slider", "--start", "-0.1", "--goal", "3"], "error: goal: model/slide is at 3, not between its limits"),
+        (["slider", "--start", "nan", "--goal", "0.1"], "error: start: these are not finite numbers"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_line(url: str, region: str, arguments: list[str], words: str) -> None:

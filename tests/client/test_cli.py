@@ -305,7 +305,7 @@ def test_scenes_are_added_listed_and_shown(ciris: Ciris, url: str) -> None:
     assert "arm/lower/bar - obstacles/body/post" in shown.stdout
     assert len(ciris("scene", "show", "planar-2dof", "--json", CIRIS_URL=url).json["pair_list"]) == 6
     unknown = ciris("scene", "show", "nope", CIRIS_URL=url)
-    assert (unknown.status, unknown.error) == (2, "scene: there is no scene 'nope' (`ciris scene ls` lists them)")
+    assert (unknown.status, unknown.error) == (2, "scene: there is no scene 'nope' (`ciris scene ls`, or `scenes()` in Python, lists them)")
 
 
 def test_regions_are_listed_shown_and_exported(ciris: Ciris, url: str, region: str, certified: Region) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from certifier.errors import CirisError
 from certifier.model import Scene
-from ciris.synchronous import client as client_module
+from ciris.synchronous import client as synchronous
 from ciris.synchronous.client import Client
 
 
@@ -70,14 +70,15 @@ def test_a_stream_that_closes_without_an_end_is_taken_up_too() -> None:
     answers = iter([sse(1), sse(2) + "event: end\ndata: {}\n\n"])
 
     def answer(request: httpx2.Request) -> httpx2.Response:
-        return httpx2.Response(200, text=next(answers)) if request.url.path.endswith("/stream") else httpx2.Response(200, json={"id": "j"})
+        streamed = request.url.path.endswith("/stream")
+        return httpx2.Response(200, text=next(answers)) if streamed else httpx2.Response(200, json={"id": "j"})
 
     events = pretending(answer).events("j")
     assert [event["seq"] for event in events] == [1, 2]
 
 
 def test_a_service_that_goes_away_for_good_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(client_module, "ABSENCE_S", 0.1)
+    monkeypatch.setattr(synchronous, "ABSENCE_S", 0.1)
 
     def answer(request: httpx2.Request) -> httpx2.Response:
         if request.url.path.endswith("/stream"):

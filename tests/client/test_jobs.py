@@ -66,12 +66,12 @@ def test_what_is_unknown_or_ambiguous_is_said(
     monkeypatch.setattr("db.jobs.uuid4", lambda: waiting[:-1] + ("0" if waiting[-1] != "0" else "1"))
     queued(database, scene)
     cases = [
-        (("job", "show", "00000000-nothing"), "`ciris job ls` lists them"),
+        (("job", "show", "00000000-nothing"), "`ciris job ls`, or `jobs()` in Python, lists them"),
         (("job", "show", waiting[:3]), "there is no job"),
         (("job", "show", waiting[:4]), "give more of it"),
-        (("region", "show", "00000000-nothing"), "`ciris region ls` lists them"),
+        (("region", "show", "00000000-nothing"), "`ciris region ls`, or `regions()` in Python, lists them"),
         (("scene", "show", scene.name[:-1] + "x"), f"did you mean {scene.name}"),
-        (("scene", "show", "nothing like it"), "`ciris scene ls` lists them"),
+        (("scene", "show", "nothing like it"), "`ciris scene ls`, or `scenes()` in Python, lists them"),
     ]
     for words, said in cases:
         done = ciris(*words, CIRIS_URL=url)

@@ -156,7 +156,7 @@ COMMANDS: list[Row] = [
         "client/demo.py",
         ("stack_failed", "", "the service did not start", "see {log}", "a machine on which the stack does not come up"),
         (
-            "no_region",
+            "not_grown",
             "",
             "no region was certified within {DEADLINE_SECONDS} s, which are enough where nothing else runs",
             "run it again when this machine has less to do, or give it longer: ciris grow {SCENE} --deadline 1200",
@@ -187,7 +187,7 @@ COMMANDS: list[Row] = [
             "points",
             "q",
             "the points must be given either as q or as s",
-            "",
+            "q are joint positions, s tangent-space coordinates: give one of them",
             lambda t: connect("http://127.0.0.1:9").contains("cell"),
         ),
         (
@@ -220,8 +220,8 @@ COMMANDS: list[Row] = [
         (
             "not_found",
             "",
-            "{name} is no name and no id",
-            "`scene ls`, `job ls` and `region ls` of ciris list them",
+            "{shown} is no name and no id",
+            "`ls` of `ciris scene`, `job` and `region`, or `scenes()`, `jobs()` and `regions()` in Python, list them",
             lambda t: asked(t, "job", "show", ".."),
         ),
         ("{...}", "{...}", "{...}", "{...}", lambda t: asked(t, "job", "show", "nothing")),

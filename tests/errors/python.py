@@ -80,7 +80,7 @@ CLIENT: list[tuple[str, str, str, str, Provoke | str]] = [
     (
         "argument",
         "",
-        "the request holds something that cannot be sent, such as a number that is not finite",
+        "the request holds something that cannot be sent, such as a number that is not finite or a name of many pages",
         "give texts, finite numbers, and lists of them",
         lambda t: connect(NOBODY).grow("cell", [0.0], deadline=float("nan")),
     ),
@@ -105,6 +105,14 @@ PYTHON: list[Row] = [
             "{__name__} is no {field}",
             "give {what}",
             lambda t: connect(NOBODY).contains(3, [0.0]),  # type: ignore[arg-type]
+        ),
+        ("argument", "timeout", "{timeout} is no timeout", "give seconds, a number above 0", lambda t: connect(NOBODY, timeout=0)),
+        (
+            "argument",
+            "paths",
+            "{__name__} is no paths",
+            "give a list of (k, n) arrays",
+            lambda t: connect(NOBODY).cover("cell", paths=3),  # type: ignore[arg-type]
         ),
     ),
     *rows(
@@ -143,6 +151,27 @@ PYTHON: list[Row] = [
             lambda t: answered(502),
         ),
         (
+            "too_many_requests",
+            "",
+            "{url} answered that it was asked too often",
+            "ask less often, or try again later",
+            lambda t: answered(429, **{"retry-after": "86400"}),
+        ),
+        (
+            "not_ciris",
+            "",
+            "{url} answered with what cannot be decoded",
+            "is that the address of a ciris service?",
+            lambda t: answered(200, b"no gzip", **{"content-encoding": "gzip"}),
+        ),
+        (
+            "not_ciris",
+            "",
+            "the answer lacks {name}",
+            "is it a ciris service of this version that answers?",
+            lambda t: answered(200, b"{}"),
+        ),
+        (
             "not_ciris",
             "",
             "{url} sends you on to {...}",
@@ -153,7 +182,7 @@ PYTHON: list[Row] = [
         (
             "not_ciris",
             "",
-            "{url} answered {status_code} with something that is not JSON",
+            "{url} answered {status_code} with something that is not a JSON object",
             "is that the address of a ciris service?",
             lambda t: answered(200, b"<html>"),
         ),
@@ -187,7 +216,7 @@ PYTHON: list[Row] = [
         (
             "no_region",
             "",
-            "the job has ended without a region: {...}",
+            "the job has ended without a region; its outcome is {...}",
             TELLS,
             "`result` of a job that certified a polytope, and found it refuted",
         ),

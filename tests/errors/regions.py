@@ -169,7 +169,7 @@ GROWTH = [
         ),
     ),
     *rows(
-        "certifier/jobs/local.py",
+        "certifier/growth/refusal.py",
         (
             "not_grown",
             "",

@@ -138,7 +138,13 @@ STORED = [
             "create a new one",
             lambda t: t.ask("POST", f"/v1/jobs/{queued(t)}/retry"),
         ),
-        ("job_not_found", "job", "there is no job {job_id}", "`ciris job ls` lists them", lambda t: t.ask("GET", "/v1/jobs/nope")),
+        (
+            "job_not_found",
+            "job",
+            "there is no job {job_id}",
+            "`ciris job ls`, or `jobs()` in Python, lists them",
+            lambda t: t.ask("GET", "/v1/jobs/nope"),
+        ),
     ),
     *rows(
         "db/keys.py",
@@ -198,7 +204,7 @@ STORED = [
             "region_not_found",
             "region",
             "there is no region {region_id}",
-            "`ciris region ls` lists them",
+            "`ciris region ls`, or `regions()` in Python, lists them",
             lambda t: t.ask("GET", "/v1/regions/nope"),
         ),
         (
@@ -226,7 +232,7 @@ STORED = [
             "scene_not_found",
             "scene",
             "there is no scene {name}",
-            "`ciris scene ls` lists them",
+            "`ciris scene ls`, or `scenes()` in Python, lists them",
             lambda t: post(t, GROW | {"scene": "zzz"}),
         ),
     ),

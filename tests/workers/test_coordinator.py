@@ -47,6 +47,19 @@ def test_how_a_job_ends(kind: str, outcome: Outcome, state: JobState) -> None:
     assert state == JobState.SUCCEEDED or ending(kind, outcome, "because", {"code": "cause"}).error == {"code": "cause"}
 
 
+@pytest.mark.parametrize(
+    ("reason", "code", "hint"),
+    [
+        ("the deadline was reached", "not_grown", "allow more time"),
+        ("a and b touch", "not_grown", "try another seed, or look at the pair named"),
+        ("revoked: a and b touch", "revoked", "grow a region of the new scene from another seed"),
+    ],
+)
+def test_a_growth_in_vain_says_what_to_do(reason: str, code: str, hint: str) -> None:
+    error = ending("grow", Outcome.INCONCLUSIVE, reason, None).error
+    assert error == {"code": code, "message": reason, "field": None, "hint": hint}
+
+
 def test_a_job_that_has_begun_needs_a_report() -> None:
     options = box_around([0.0], 0.1)
     transition = next_transition(slider(), options, None, None)
