@@ -312,6 +312,10 @@ REQUESTS = [
         ("busy", "", "too many requests of this kind wait already", "try again in a while", "many uploads or checks at the same time"),
     ),
     *rows(
+        "api/writing.py",
+        ("busy", "", "too many requests that change something wait already", "try again in a while", "tests/api/test_writers.py"),
+    ),
+    *rows(
         "api/guard.py",
         ("too_many_requests", "", "more requests than one caller may make", "wait as long as Retry-After says", too_often),
         (

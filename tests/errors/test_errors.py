@@ -34,6 +34,7 @@ ABOUT_ALL = {
     "api/children.py",
     "api/guard.py",
     "api/problems.py",
+    "api/writing.py",
     "client/bench.py",
     "client/demo.py",
     "ciris/asynchronous/client.py",
