@@ -52,8 +52,8 @@ def views(browser: Browser, url: str, ids: dict[str, str]) -> None:
     """Takes the pictures."""
     planned = f"/scenes/{ids['planar']}"
     shoot(browser, f"{url}/new?scene={ids['planar']}&q=0.3,-0.6", "dashboard_new", ".said >> text=/Free|certified/")
-    shoot(browser, f"{url}{planned}", "dashboard_scene", "text=components", planning)
-    shoot(browser, f"{url}{planned}", "dashboard_scene_dark", "text=components", planning, scheme="dark")
+    shoot(browser, f"{url}{planned}", "dashboard_scene", "text=/component/", planning)
+    shoot(browser, f"{url}{planned}", "dashboard_scene_dark", "text=/component/", planning, scheme="dark")
     shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_region", "text=of this slice is certified")
     shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_region_phone", "text=of this slice is certified", size=PHONE)
     shoot(browser, f"{url}/jobs/{ids['pair']}", "dashboard_pair", "role=grid", pair)
