@@ -233,6 +233,13 @@ def _store(document: Document) -> list[str]:
     return [f"Milliseconds for one pair by the clock, medians of {document['repeat']}.", _table(header, rows)]
 
 
+def _fleet(document: Document) -> list[str]:
+    header = ["database", "workers", "pieces", "seconds each", "pieces a second", "efficiency", "processor time of a piece, ms"]
+    counts = [document["database"], str(document["workers"]), str(document["pieces"]), f"{document['piece_seconds']:g}"]
+    rates = [f"{document['pieces_per_second']:.1f}", f"{document['efficiency']:.3f}", f"{document['worker_cpu_ms_per_piece']:.1f}"]
+    return [f"Measured for {document['measured_seconds']:.0f} s.", _table(header, [[*counts, *rates]])]
+
+
 def _robots(document: Document) -> list[str]:
     columns = {"scene init": "init, s", "scene check": "check, s", "grow": "grow, s", "verify": "verify, s"}
     rows = []
@@ -371,6 +378,7 @@ _TABLES: dict[str, Callable[[Document], list[str]]] = {
     "scaling": _scaling,
     "robots": _robots,
     "service": _service,
+    "fleet": _fleet,
     "store": _store,
     "survey": _survey,
     "query": _query,

@@ -414,7 +414,7 @@ def _parser() -> argparse.ArgumentParser:
 
     bench = verbs.add_parser("bench", help="measure ciris, and Drake beside it if asked; see ciris bench BENCHMARK --help")
     kinds = ["pairs", "scene", "growth", "path", "agreement", "scaling", "service", "store", "survey", "robots", "query", "plan"]
-    bench.add_argument("benchmark", choices=[*kinds, "cover", "recertify", "docs"])
+    bench.add_argument("benchmark", choices=[*kinds, "cover", "recertify", "fleet", "docs"])
     bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...")
     bench.set_defaults(run="client.bench:bench")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -22,8 +23,14 @@ _SECURITY = {
     "Referrer-Policy": "same-origin",
 }
 
+
+def powers(unit: str) -> str:
+    """Returns a unit with its powers raised, as people write them: rad^3 m as rad³ m."""
+    return re.sub(r"\^(\d+)", lambda power: power[1].translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")), unit)
+
+
 templates = Jinja2Templates(ROOT / "templates")
-templates.env.filters |= {"at_least_mm": at_least_mm, "at_most_mm": at_most_mm}
+templates.env.filters |= {"at_least_mm": at_least_mm, "at_most_mm": at_most_mm, "powers": powers}
 
 
 def page(request: Request, name: str, context: dict[str, Any], status: int = 200) -> Response:

@@ -139,6 +139,17 @@ def test_the_store_is_measured_on_both_databases(postgres: Postgres) -> None:
         assert row["database"] in report.text(document)
 
 
+@pytest.mark.parametrize("database", ["SQLite", pytest.param("PostgreSQL", marks=pytest.mark.slow)])
+def test_a_fleet_is_measured(database: str, request: pytest.FixtureRequest) -> None:
+    """Twenty workers hold pieces of 50 ms: no more than 400 a second can be done, and more than one by one."""
+    where = ["--postgresql", request.getfixturevalue("postgres").new_database()] if database == "PostgreSQL" else []
+    document = bench("fleet", *where, "--workers", "20", "--pieces", "3000", "--seconds", "0.05", "--limit", "2")
+    assert 20 < document["pieces_per_second"] < 500
+    assert document["efficiency"] == pytest.approx(document["pieces_per_second"] * 0.05 / 20)
+    assert document["database"] == database
+    assert database in report.text(document)
+
+
 @pytest.mark.parametrize(
     ("ours", "theirs", "same", "expected"),
     [

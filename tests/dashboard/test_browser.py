@@ -49,6 +49,20 @@ def test_text_takes_room(page: Any) -> None:
     assert [page.locator(tag).bounding_box()["width"] > 40 for tag in ("span", "code")] == [True, True]
 
 
+def test_what_leaves_the_machine_is_noticed(page: Any, outside: tuple[str, list[str]], complaints: list[str]) -> None:
+    page.evaluate("fetch('http://elsewhere.invalid/beacon', {mode: 'no-cors'}).catch(() => {})")
+    page.evaluate("new Promise((done) => { new WebSocket('ws://elsewhere.invalid:81/').onerror = done; })")
+    page.evaluate("""new Promise((done) => {
+        const source = "fetch('http://worker.invalid/').catch(() => postMessage(0))";
+        new Worker(URL.createObjectURL(new Blob([source]))).onmessage = done;
+    })""")
+    assert [name in " ".join(outside[1]) for name in ("elsewhere.invalid/beacon", "elsewhere.invalid:81", "worker.invalid")] == [True] * 3
+    assert "ws://elsewhere.invalid:81/" in complaints
+    assert "http://elsewhere.invalid/beacon" in complaints
+    outside[1].clear()
+    complaints.clear()
+
+
 def test_a_job_is_followed_live_to_its_end(page: Any, url: str, database: Database, scene: Scene, job_id: str) -> None:
     page.goto(f"{url}/jobs/{job_id}")
     page.get_by_text("Waiting for a worker").wait_for()

@@ -92,6 +92,26 @@ def test_threads_that_race_for_batches_never_share_a_pair(db: Database) -> None:
     assert taken == Counter(range(12))
 
 
+def test_batches_are_longer_while_very_many_pairs_are_open(db: Database) -> None:
+    """So a hundred workers do not queue for the job. Towards the end each takes a pair again, and none waits for another."""
+    with db.write() as session:
+        job_id = a_running_job(session, 2500).id
+    many = claim(db, job_id)
+    assert many is not None
+    assert len(many.pairs) == 2
+    most = claim(db, job_id, batch_seconds=1e9)
+    assert most is not None
+    assert len(most.pairs) == pairs.MOST_TOGETHER
+    while (held := claim(db, job_id, batch_seconds=1e9)) is not None:
+        with db.read() as session:
+            if jobs.get(session, job_id).open_pairs < pairs.FEW:
+                break
+    few = claim(db, job_id)
+    assert held is not None
+    assert few is not None
+    assert len(few.pairs) == 1
+
+
 def test_a_claim_is_refused_when_the_job_is_not_running(db: Database) -> None:
     with db.write() as session:
         job_id = a_running_job(session).id

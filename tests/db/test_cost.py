@@ -53,7 +53,7 @@ def efforts(db: Database, pair_count: int, settled: int) -> dict[str, int]:
             pairs.save(session, done, {(pair.index, 0): certified(pair.index)[pair.index, 0] for pair in done.pairs})
         settled -= len(done.pairs)
     asked = {"job_states": [JobState.RUNNING]}
-    claim, claiming = effort(db, lambda session: work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5))
+    claim, claiming = effort(db, lambda session: work.claim(session, job_id, lease_seconds=60, batch_seconds=0.05))  # one pair
     wanted, looking = effort(db, lambda session: session.scalar(leases._wanted(PairRow), {"token": claim.token, **asked}))
     saved, saving = effort(db, lambda session: pairs.save(session, claim, certified(claim.pairs[0].index)))
     next_job, finding = effort(db, work.next_job)

@@ -91,7 +91,7 @@ padding: 0
         (D + "q_star: 3\n", "scene_field", "q_star", "list"),
         (D + "q_star: [0, x]\n", "scene_field", "q_star[1]", "'x'"),
         (D + "q_star: [0, .inf]\n", "scene_field", "q_star[1]", "finite"),
-        (D + "name: 3\n", "scene_field", "name", "text"),
+        (D + "name: 3\n", "scene_field", "name", "must be a name"),
         (D + "packages: {m: nowhere}\n", "scene_field", "packages.m", "/nowhere"),
         (D + "packages: [m]\n", "scene_field", "packages", "map"),
         (D + "ignore: [[a]]\n", "scene_field", "ignore[0]", "two names"),

@@ -1,0 +1,122 @@
+"""``python -m tests.dashboard.pictures`` takes the pictures of docs/dashboard.md from a real run, and times the first view of each page.
+
+It starts a service of its own, has regions grown for some minutes, and looks at the pages in the tests' Chromium.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from PIL import Image
+from playwright.sync_api import Browser, Page, sync_playwright
+
+import ciris
+from benchmarks.service import running
+
+ROOT = Path(__file__).parents[2]
+PICTURES = ROOT / "docs" / "pictures"
+WIDE, PHONE = {"width": 1280, "height": 860}, {"width": 390, "height": 844}
+COLOURS = 128
+Prepare = Callable[[Page], object]
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as data, running(Path(data), 2) as service, sync_playwright() as playwright:
+        chromium = os.environ.get("CHROMIUM_BIN", Path(sys.prefix) / "browser" / "chromium")
+        browser = playwright.chromium.launch(executable_path=chromium)
+        asked = ciris.connect(service.url)
+        planar, arm, bin_ = (asked.add_scene(ROOT / "examples" / name / "scene.yaml") for name in ("planar_2dof", "arm_3dof", "ur3e_bin"))
+        asked.cover(planar, coverage=0.8, deadline=500)
+        done = asked.submit_grow(arm, seed("arm_3dof"), deadline=400)
+        region = done.result()
+        growing = asked.submit_grow(bin_, seed("ur3e_bin"), deadline=400)
+        views(browser, service.url, {"planar": planar.id, "job": growing.id, "pair": done.id, "region": region.id})
+        growing.cancel().wait()
+        browser.close()
+
+
+def seed(example: str) -> Any:
+    """The joint positions beside an example's scene."""
+    return yaml.safe_load((ROOT / "examples" / example / "seed.yaml").read_text())["q"]
+
+
+def views(browser: Browser, url: str, ids: dict[str, str]) -> None:
+    """Takes the pictures."""
+    planned = f"/scenes/{ids['planar']}"
+    shoot(browser, f"{url}/new?scene={ids['planar']}&q=0.3,-0.6", "dashboard_new", ".said >> text=/Free|certified/")
+    shoot(browser, f"{url}{planned}", "dashboard_scene", "text=/component/", planning)
+    shoot(browser, f"{url}{planned}", "dashboard_scene_dark", "text=/component/", planning, scheme="dark")
+    shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_region", "text=of this slice is certified")
+    shoot(browser, f"{url}/regions/{ids['region']}", "dashboard_region_phone", "text=of this slice is certified", size=PHONE)
+    shoot(browser, f"{url}/jobs/{ids['pair']}", "dashboard_pair", "role=grid", pair)
+    while "certified" not in browser_text(browser, f"{url}/jobs/{ids['job']}"):
+        time.sleep(2)
+    shoot(browser, f"{url}/jobs/{ids['job']}", "dashboard_job", "role=grid")
+    shoot(browser, url, "dashboard_jobs", "tbody tr")
+
+
+def browser_text(browser: Browser, address: str) -> str:
+    """What a page says."""
+    page = browser.new_page()
+    page.goto(address)
+    page.locator("role=grid").or_(page.locator(".empty")).first.wait_for()
+    text = page.locator("main").text_content() or ""
+    page.close()
+    return text
+
+
+def planning(page: Page) -> None:
+    """Has a trajectory planned between two configurations that are far from each other, and stops halfway."""
+    page.get_by_label("From").fill("-90, -35")
+    page.get_by_label("To", exact=True).fill("90, 50")
+    page.get_by_role("button", name="Plan a trajectory").click()
+    page.get_by_text("Now in region").wait_for()
+    page.get_by_label("Time, seconds").evaluate("field => { field.value = field.max / 2; field.dispatchEvent(new Event('input')); }")
+
+
+def pair(page: Page) -> None:
+    """Opens the pair that has the most cells."""
+    page.get_by_role("grid").focus()
+    page.keyboard.press("Enter")
+    page.get_by_text("Cells", exact=True).first.wait_for()
+
+
+def shoot(
+    browser: Browser,
+    address: str,
+    name: str,
+    there: str,
+    prepare: Prepare = lambda page: None,
+    *,
+    size: dict[str, int] = WIDE,
+    scheme: str = "light",
+) -> None:
+    """Takes a picture of a page, and says how long it took until something was to be seen, and until ``there`` was."""
+    context = browser.new_context(viewport=size, color_scheme=scheme, device_scale_factor=1)  # type: ignore[arg-type]
+    page = context.new_page()
+    began = time.perf_counter()
+    page.goto(address, wait_until="commit")
+    page.locator(there).first.wait_for(timeout=60_000)
+    drawn = time.perf_counter() - began
+    first = page.evaluate("performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? NaN") / 1000
+    print(f"{name}: first view {first:.2f} s, {there!r} after {drawn:.2f} s", flush=True)
+    prepare(page)
+    page.wait_for_timeout(2500)
+    file = PICTURES / f"{name}.png"
+    page.screenshot(path=file, full_page=size is WIDE)
+    picture = Image.open(file).convert("RGB")
+    picture.crop((0, 0, picture.width, min(picture.height, 1600))).quantize(COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
+    print(f"{file.relative_to(ROOT)}: {file.stat().st_size // 1024} KiB, mean {np.asarray(picture).mean():.0f}", flush=True)
+    context.close()
+
+
+if __name__ == "__main__":
+    main()
