@@ -1,5 +1,5 @@
 // Buttons with data-post ask the service to do something; forms with data-submit-on-change need no button; times are shown as the reader's clock has them.
-import { post, said } from "./shared/api";
+import { post, said } from "./common/api";
 import { refresh } from "./live";
 
 interface Answer {

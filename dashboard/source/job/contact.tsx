@@ -1,7 +1,7 @@
 // A configuration at which a pair touches, or is nearest, in 3D.
 import type { ComponentType } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
-import { positions, shortNames, shown, type SceneModel } from "../shared/kinematics";
+import { positions, shortNames, shown, type SceneModel } from "../common/kinematics";
 import type { Drawable } from "./store";
 
 interface Props {
@@ -32,7 +32,7 @@ export function Contact({ pair, a, b, q, robot: { model, problem } }: Props) {
       // What there is to read is drawn before it.
       whenIdle(
         () =>
-          void import("../shared/robot").then(
+          void import("../common/robot").then(
             (module) => setRobot(() => module.Robot),
             () => setFailed("The script that draws it could not be fetched. Load the page again."),
           ),

@@ -1,6 +1,6 @@
 // What has happened to the job, in sentences, the newest first.
 import { useState } from "preact/hooks";
-import type { JobEvent } from "../shared/api";
+import type { JobEvent } from "../common/api";
 import { duration, plural } from "./outcomes";
 import type { JobStore } from "./store";
 

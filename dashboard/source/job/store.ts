@@ -1,8 +1,8 @@
 // What the page knows of the job. At first it asks for one letter per pair and iteration and for the last iteration's results; after that
 // it follows the events, and asks only for the pairs that they name.
 import { refresh, connected } from "../live";
-import type { SceneModel } from "../shared/kinematics";
-import { follow, get, said, type JobEvent } from "../shared/api";
+import type { SceneModel } from "../common/kinematics";
+import { follow, get, said, type JobEvent } from "../common/api";
 
 export interface PairName {
   index: number;

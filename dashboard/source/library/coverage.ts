@@ -1,7 +1,7 @@
 // How much of the free space the regions cover, estimated from random configurations.
-import { post } from "../shared/api";
-import type { SceneModel } from "../shared/kinematics";
-import type { Contacts } from "../shared/moment";
+import { post } from "../common/api";
+import type { SceneModel } from "../common/kinematics";
+import type { Contacts } from "../common/moment";
 
 const SAMPLES = 400;
 const AT_ONCE = 100;

@@ -1,6 +1,6 @@
 // How the regions of a scene hang together: a node for each region, a line where two overlap.
 import { useMemo } from "preact/hooks";
-import { LINKS } from "../shared/colours";
+import { LINKS } from "../common/colours";
 import { layout } from "./layout";
 
 export interface GraphAnswer {

@@ -1,12 +1,12 @@
 // A scene and its library of regions: the robot, which regions hold it, how they hang together, slices, and plans.
 import { useEffect, useMemo, useState } from "preact/hooks";
-import { get, said } from "../shared/api";
-import { positions, type SceneModel } from "../shared/kinematics";
-import { MomentText, touchingOf, useMoment } from "../shared/moment";
-import type { Space } from "../shared/polytope";
-import { Robot } from "../shared/robot";
-import { Slice } from "../shared/slice";
-import { Sliders } from "../shared/sliders";
+import { get, said } from "../common/api";
+import { positions, type SceneModel } from "../common/kinematics";
+import { MomentText, touchingOf, useMoment } from "../common/moment";
+import type { Space } from "../common/polytope";
+import { Robot } from "../common/robot";
+import { Slice } from "../common/slice";
+import { Sliders } from "../common/sliders";
 import { coverage, type Coverage } from "./coverage";
 import { Graph, type GraphAnswer } from "./graph";
 import { Planning, type Plan } from "./plan";

@@ -1,8 +1,8 @@
 // A trajectory between two configurations: asked for, said why there is none, or played.
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { post, said } from "../shared/api";
-import { LINKS } from "../shared/colours";
-import { asText, shortNames, shown } from "../shared/kinematics";
+import { post, said } from "../common/api";
+import { LINKS } from "../common/colours";
+import { asText, shortNames, shown } from "../common/kinematics";
 
 export interface Plan {
   found: boolean;

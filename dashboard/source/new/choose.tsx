@@ -1,6 +1,6 @@
 // The scene to work on: one that is stored, or one that is uploaded now.
 import { useState } from "preact/hooks";
-import { said, upload } from "../shared/api";
+import { said, upload } from "../common/api";
 
 export interface SceneSummary {
   id: string;

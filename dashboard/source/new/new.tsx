@@ -1,10 +1,10 @@
 // The form that starts a job: a scene, a configuration that the robot shows, and what shall be done.
 import { useEffect, useMemo, useState } from "preact/hooks";
-import { get, post, said } from "../shared/api";
-import { asText, positions, type SceneModel } from "../shared/kinematics";
-import { MomentText, touchingOf, useMoment, type Contacts } from "../shared/moment";
-import { Robot } from "../shared/robot";
-import { Sliders } from "../shared/sliders";
+import { get, post, said } from "../common/api";
+import { asText, positions, type SceneModel } from "../common/kinematics";
+import { MomentText, touchingOf, useMoment, type Contacts } from "../common/moment";
+import { Robot } from "../common/robot";
+import { Sliders } from "../common/sliders";
 import { ChooseScene, type SceneSummary } from "./choose";
 import { FIRST, request, type Wish } from "./request";
 import { Wishes } from "./wishes";

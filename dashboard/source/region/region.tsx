@@ -1,12 +1,12 @@
 // A region to walk about in: the robot swept through it, sliders that stay inside, the ends of each joint, slices, cells.
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { get, said } from "../shared/api";
-import type { PairProof, Partition } from "../shared/cells";
-import { shortNames, type SceneModel } from "../shared/kinematics";
-import { contains, rooms, toQ, toS, type Faces, type Space } from "../shared/polytope";
-import { Robot } from "../shared/robot";
-import { Slice } from "../shared/slice";
-import { Sliders } from "../shared/sliders";
+import { get, said } from "../common/api";
+import type { PairProof, Partition } from "../common/cells";
+import { shortNames, type SceneModel } from "../common/kinematics";
+import { contains, rooms, toQ, toS, type Faces, type Space } from "../common/polytope";
+import { Robot } from "../common/robot";
+import { Slice } from "../common/slice";
+import { Sliders } from "../common/sliders";
 
 interface RegionDetail {
   scene: string;
