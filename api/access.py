@@ -17,6 +17,7 @@ from starlette.requests import cookie_parser
 from certifier.errors import CirisError
 from db import keys
 from db.keys import Ring, Scope
+from db.models import DEFAULT_PROJECT
 from db.session import Database
 
 COOKIE = "ciris_key"
@@ -33,8 +34,12 @@ class Caller:
     """A caller is whoever sent a request. The caller has no key where the service asks for none."""
 
     scope: Scope
+    project: str = DEFAULT_PROJECT
     key_id: str | None = None
     name: str = "anybody"
+
+    def __str__(self) -> str:
+        return self.name if self.key_id is None else f"{self.name} ({self.key_id})"
 
 
 class Keyring:
@@ -57,7 +62,7 @@ class Keyring:
             self._read_soon()
         if given is not None:
             key = ring.check(given)
-            return None if key is None else Caller(key.scope, key.id, key.name)
+            return None if key is None else Caller(key.scope, key.project, key.id, key.name)
         return Caller(Scope.ADMIN) if self._open and not ring.keys else None
 
     async def newcomer(self, given: str | None) -> Caller | None:
@@ -132,12 +137,22 @@ class _Needs(HTTPBearer):
 READ, SUBMIT, ADMIN = (Security(_Needs(scope), scopes=[scope.value]) for scope in Scope)
 """A route depends on one of these to demand that scope."""
 
+Reader = Annotated[Caller, READ]
 Submitter = Annotated[Caller, SUBMIT]
+Admin = Annotated[Caller, ADMIN]
 
 
-async def _database(request: Request) -> Database:
+async def _whole(request: Request) -> Database:
     database: Database = request.app.state.database
     return database
 
 
-Db = Annotated[Database, Depends(_database)]
+async def _own(request: Request) -> Database:
+    database, caller = await _whole(request), request.state.caller
+    return database.of(caller.project)
+
+
+Db = Annotated[Database, Depends(_own)]
+"""The database as the caller's project sees it."""
+WholeDb = Annotated[Database, Depends(_whole)]
+"""All of the database: for what is about the service, and for signing in."""

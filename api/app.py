@@ -23,7 +23,8 @@ from api.metrics import Requests
 from api.pages import site
 from api.pages.rendering import render_problem
 from api.reading import READERS
-from api.routers import cells, drawing, events, jobs, motions, planning, plans, regions, scenes, service
+from api.room import Room
+from api.routers import cells, drawing, events, jobs, motions, planning, plans, project, regions, scenes, service
 from api.writing import WRITERS
 from certifier.scene.bundle import expect_bundles
 from db.session import CONNECTIONS, Database, database
@@ -59,6 +60,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.links = LinksKept()
     app.state.maps = Maps()
     app.state.outlines = OutlinesKept()
+    app.state.room = Room()
     app.state.keyring = Keyring(app.state.database, open_without_keys=settings().loopback)
     app.state.announcer = Announcer()
     app.add_middleware(
@@ -70,7 +72,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     )
     app.add_middleware(AccessLog, requests=app.state.requests)
     problems.install(app, render_problem)
-    for module in (scenes, jobs, events, regions, cells, planning, plans, drawing, motions, service):
+    for module in (scenes, jobs, events, regions, cells, planning, plans, drawing, motions, project, service):
         app.include_router(module.router)
     app.include_router(login.router)
     site.install(app)

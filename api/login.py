@@ -9,7 +9,7 @@ from typing import Annotated
 from fastapi import APIRouter, Form, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
 
-from api.access import COOKIE, Db
+from api.access import COOKIE, WholeDb
 from api.pages.rendering import page
 from db import keys
 
@@ -22,7 +22,7 @@ def login_page(request: Request, next: str = "/") -> Response:
 
 
 @router.post("/login")
-def sign_in(request: Request, db: Db, key: Annotated[str, Form()], next: Annotated[str, Form()] = "/") -> Response:
+def sign_in(request: Request, db: WholeDb, key: Annotated[str, Form()], next: Annotated[str, Form()] = "/") -> Response:
     with db.read() as session:
         valid = keys.ring(session).check(key.strip()) is not None
     if not valid:

@@ -129,6 +129,12 @@ def _fail(message: str, status: int) -> int:
     return status
 
 
+def _limits(args: argparse.Namespace) -> list[str]:
+    """Returns the words of ``ciris project set``."""
+    given = {"--max-bytes": args.max_bytes, "--keep-days": args.keep_days}
+    return ["set", args.name, *(f"{option}={value}" for option, value in given.items() if value is not None)]
+
+
 def _joined(arguments: Sequence[str]) -> list[str]:
     """Joins ``--q -0.5,1`` to ``--q=-0.5,1``, because argparse takes a list that begins with a minus for an option."""
     joined: list[str] = []
@@ -163,22 +169,42 @@ def _parser() -> argparse.ArgumentParser:
     up.add_argument("--data", metavar="DIR", help="data directory; default: CIRIS_DATA_DIR")
     up.set_defaults(run="client.commands:up")
 
-    key = _group(verbs.add_parser("key", help="make, list and revoke API keys, in the database of this machine's service"))
     database = _Parser(add_help=False)
     database.add_argument("--data", metavar="DIR", help="data directory; default: CIRIS_DATA_DIR; not used where CIRIS_DATABASE_URL is set")
-    made = key.add_parser("add", parents=[database], help="make a key and print it; it is shown only once")
+    project = _group(verbs.add_parser("project", help="make and list projects and set their limits, in this machine's database"))
+    new = project.add_parser("add", parents=[database], help="make a project, which sees nothing of the others")
+    new.add_argument("name", metavar="NAME")
+    new.set_defaults(run="client.commands:in_database", module="db.projects", words=lambda args: ["add", args.name])
+    known = project.add_parser("ls", parents=[database, json], help="list the projects with their limits")
+    known.set_defaults(
+        run="client.commands:in_database", module="db.projects", words=lambda args: ["ls", *(["--json"] if args.json else [])]
+    )
+    limits = project.add_parser("set", parents=[database], help="set a project's limits; 0 for none")
+    limits.add_argument("name", metavar="NAME")
+    limits.add_argument("--max-bytes", metavar="N", help="take no more scenes and jobs once so many bytes are stored")
+    limits.add_argument("--keep-days", metavar="DAYS", help="so many days after their end, delete what jobs have besides their regions")
+    limits.set_defaults(run="client.commands:in_database", module="db.projects", words=_limits)
+
+    key = _group(verbs.add_parser("key", help="make, list and revoke API keys: in this machine's database, or with --url over HTTP"))
+    over_http = _Parser(add_help=False)
+    over_http.add_argument("--url", help="URL of a service; then an admin's key of it manages the keys of its own project")
+    of_project = _Parser(add_help=False)
+    of_project.add_argument("--project", metavar="NAME", help="the project that the key belongs to; default: default; not with --url")
+    made = key.add_parser("add", parents=[database, over_http, of_project], help="make a key and print it; it is shown only once")
     made.add_argument("name", metavar="NAME")
     made.add_argument(
         "--scope", choices=["read", "submit", "admin"], required=True, help="what the key allows; each scope includes those before it"
     )
-    made.set_defaults(run="client.commands:key", verb="add", words=lambda args: [args.name, f"--scope={args.scope}"])
-    listed = key.add_parser("ls", parents=[database, json], help="list the keys, without their secrets")
-    listed.set_defaults(run="client.commands:key", verb="ls", words=lambda args: ["--json"] if args.json else [])
-    revoked = key.add_parser("revoke", parents=[database], help="revoke a key; the service refuses it within a second")
+    made.set_defaults(run="client.keys:add")
+    listed = key.add_parser("ls", parents=[database, over_http, json], help="list the keys, without their secrets")
+    listed.set_defaults(run="client.keys:ls")
+    revoked = key.add_parser(
+        "revoke", parents=[database, over_http, of_project], help="revoke a key; the service refuses it within a second"
+    )
     revoked.add_argument("name", metavar="NAME")
-    revoked.set_defaults(run="client.commands:key", verb="revoke", words=lambda args: [args.name])
+    revoked.set_defaults(run="client.keys:revoke")
 
-    scene = _group(verbs.add_parser("scene", help="draft, check, add, list and show scenes"))
+    scene = _group(verbs.add_parser("scene", help="draft, check, add, list, show and delete scenes"))
     init = scene.add_parser("init", help="write a scene file and a seed for a robot's model", epilog="Nothing is overwritten.")
     init.add_argument("robot", metavar="ROBOT", help="model file: URDF, SDFormat or MJCF")
     init.add_argument("--world", metavar="FILE", action="append", default=[], help="model of what stands around it; may be repeated")
@@ -201,6 +227,13 @@ def _parser() -> argparse.ArgumentParser:
     show = scene.add_parser("show", parents=[remote, json], help="show a scene's joints, warnings and pairs")
     show.add_argument("scene", metavar="ID")
     show.set_defaults(run="client.commands:scene_show")
+    together = _Parser(add_help=False)
+    together.add_argument(
+        "--dependents", action="store_true", help="delete what depends on it, too; without this the command says what does"
+    )
+    gone = scene.add_parser("rm", parents=[remote, together], help="delete a scene")
+    gone.add_argument("scene", metavar="ID")
+    gone.set_defaults(run="client.removal:scene_rm")
 
     grow = verbs.add_parser("grow", parents=[remote, json], help="grow a certified region around a configuration")
     grow.add_argument("scene", metavar="SCENE")
@@ -341,7 +374,7 @@ def _parser() -> argparse.ArgumentParser:
     verify.add_argument("proof", metavar="PROOF")
     verify.set_defaults(run="client.verify:verify")
 
-    job = _group(verbs.add_parser("job", help="list, show, follow, cancel and retry jobs of the service"))
+    job = _group(verbs.add_parser("job", help="list, show, follow, cancel, retry and delete jobs of the service"))
     ls = job.add_parser("ls", parents=[remote, json], help="list jobs, newest first")
     ls.add_argument("--state", help="list only jobs in this state: queued, running, succeeded, failed, cancelled and others")
     ls.add_argument("--scene", help="list only the jobs of this scene")
@@ -359,7 +392,14 @@ def _parser() -> argparse.ArgumentParser:
             of_one.add_argument("--watch", action="store_true", help="print a line for every pair as it is settled")
         of_one.set_defaults(run=f"client.jobs:job_{verb}")
 
-    region = _group(verbs.add_parser("region", help="list, show and export regions"))
+    gone = job.add_parser("rm", parents=[remote, together], help="delete a job that has ended")
+    gone.add_argument("job", metavar="ID")
+    gone.set_defaults(run="client.removal:job_rm")
+
+    region = _group(verbs.add_parser("region", help="list, show, export and delete regions"))
+    gone = region.add_parser("rm", parents=[remote], help="delete a region")
+    gone.add_argument("region", metavar="ID")
+    gone.set_defaults(run="client.removal:region_rm")
     ls = region.add_parser("ls", parents=[remote, json], help="list regions, newest first")
     ls.add_argument("--scene", help="list only the regions of this scene")
     ls.set_defaults(run="client.commands:region_ls")

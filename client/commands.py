@@ -27,11 +27,11 @@ def up(args: Namespace) -> int:
     os.execv(sys.executable, [sys.executable, "-P", "-m", "workers.stack", *options])
 
 
-def key(args: Namespace) -> int:
-    """Replaces this process by the command that acts on the keys in the database."""
+def in_database(args: Namespace) -> int:
+    """Replaces this process by the command that acts on the database: ``args.module`` with ``args.words``."""
     options = [] if args.data is None else [f"--data={args.data}"]
     sys.stdout.flush()
-    os.execv(sys.executable, [sys.executable, "-P", "-m", "db.keys", *options, args.verb, *args.words(args)])
+    os.execv(sys.executable, [sys.executable, "-P", "-m", args.module, *options, *args.words(args)])
 
 
 def scene_add(args: Namespace) -> int:

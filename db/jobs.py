@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session, aliased
 from certifier.errors import CirisError
 from db import events, leases, pages, webhooks
 from db.ids import expanded
-from db.models import GrowthRow, JobRow, StepRow
+from db.models import GrowthRow, JobRow, SceneRow, StepRow
 from db.pages import Page
 from db.session import insert_new
 from db.settings import settings
@@ -37,7 +37,7 @@ def create(
     parent_id: str | None = None,
     number: int | None = None,
 ) -> tuple[JobRow, bool]:
-    """Creates a queued job and returns it with True, or returns the job made under the same idempotency key with False.
+    """Creates a queued job in the scene's project and returns it with True, or returns the job of the same idempotency key with False.
 
     The caller commits and then sends ``coordinate`` for the job. If sending fails, the sweeper sends it later.
 
@@ -48,6 +48,7 @@ def create(
     job_id = str(uuid4())
     new = {
         "id": job_id,
+        "project": session.scalars(select(SceneRow.project).where(SceneRow.id == scene_id)).one(),
         "kind": kind,
         "scene_id": scene_id,
         "options": options,

@@ -8,13 +8,12 @@ from __future__ import annotations
 import argparse
 import hashlib
 import hmac
-import json
 import re
 import secrets
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 
 from sqlalchemy import select
@@ -22,14 +21,15 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db import migrate
-from db.models import ApiKeyRow
+from db import audit, command_line, pages, projects
+from db.audit import COMMAND_LINE, Action
+from db.models import DEFAULT_PROJECT, ApiKeyRow
+from db.pages import Page
 from db.session import Database
 from db.settings import Settings
 from db.types import utcnow
 
 _KEY = re.compile(r"ciris_([0-9a-f]{12})_[\w-]{43}", re.ASCII)
-_NAME = re.compile(r"\w[\w.@-]{0,63}")
 
 
 class Scope(StrEnum):
@@ -40,7 +40,7 @@ class Scope(StrEnum):
     SUBMIT = "submit"
     """The key may upload scenes, and create, cancel and retry jobs."""
     ADMIN = "admin"
-    """The key may delete regions."""
+    """The key may delete scenes, jobs and regions, and manage the keys of its project."""
 
     def includes(self, other: Scope) -> bool:
         """Says whether a key of this scope may do what needs the other scope."""
@@ -48,29 +48,30 @@ class Scope(StrEnum):
         return order.index(self) >= order.index(other)
 
 
-def add(session: Session, name: str, scope: Scope) -> str:
-    """Makes a key and returns it. Only this call ever shows it.
+def add(session: Session, name: str, scope: Scope, project: str = DEFAULT_PROJECT) -> str:
+    """Makes a key of a project and returns it. Only this call ever shows it.
 
     Raises:
-        CirisError: key_name, for a name that cannot be used or is in use.
+        CirisError: project_not_found; key_name, for a name that cannot be used or that another key of the project has.
     """
-    if not _NAME.fullmatch(name):
+    projects.get(session, project)
+    if not projects.NAME.fullmatch(name):
         raise CirisError("key_name", f"{name!r} is no name for a key", field="name", hint="choose up to 64 letters, digits and . _ - @")
-    if _active(session, name):
+    if _active(session, name, project):
         raise CirisError("key_name", f"there is a key {name!r} already", field="name", hint="revoke it, or choose another name")
     key_id = secrets.token_hex(6)
     key = f"ciris_{key_id}_{secrets.token_urlsafe(32)}"
-    session.add(ApiKeyRow(id=key_id, name=name, digest=_digest(key), scope=scope))
+    session.add(ApiKeyRow(id=key_id, project=project, name=name, digest=_digest(key), scope=scope))
     return key
 
 
-def revoke(session: Session, name: str) -> None:
-    """Revokes the key of this name. A running API refuses it within a second.
+def revoke(session: Session, name: str, project: str = DEFAULT_PROJECT) -> None:
+    """Revokes the project's key of this name. A running API refuses it within a second.
 
     Raises:
         CirisError: key_not_found.
     """
-    rows = _active(session, name)
+    rows = _active(session, name, project)
     if not rows:
         raise CirisError("key_not_found", f"there is no key {name!r}", field="name", hint="`ciris key ls` lists them")
     for row in rows:
@@ -78,13 +79,23 @@ def revoke(session: Session, name: str) -> None:
 
 
 def newest(session: Session) -> Sequence[ApiKeyRow]:
-    """Returns every key, the newest first, the revoked ones too."""
+    """Returns every key of every project, the newest first, the revoked ones too."""
     return session.scalars(select(ApiKeyRow).order_by(ApiKeyRow.created_at.desc(), ApiKeyRow.id)).all()
+
+
+def page(session: Session, after: str | None = None, limit: int = 100) -> Page[ApiKeyRow]:
+    """Returns one page of the keys of the session's project, the revoked ones too.
+
+    Raises:
+        CirisError: cursor.
+    """
+    return pages.page(session, ApiKeyRow, select(ApiKeyRow), after, limit)
 
 
 def exist(session: Session) -> bool:
     """Says whether a key was ever made. So revoking the last key locks the service instead of opening it."""
-    return session.scalar(select(ApiKeyRow.id).limit(1)) is not None
+    table = ApiKeyRow.__table__  # whatever the session's project
+    return session.scalar(select(table.c.id).limit(1)) is not None
 
 
 @dataclass(frozen=True)
@@ -92,6 +103,7 @@ class Key:
     """Describes a key that was made; ``digest`` is its SHA-256."""
 
     id: str
+    project: str
     name: str
     digest: str
     scope: Scope
@@ -120,9 +132,9 @@ class Ring:
 
 def ring(session: Session) -> Ring:
     """Returns the keys as they are now."""
-    columns = (ApiKeyRow.id, ApiKeyRow.name, ApiKeyRow.digest, ApiKeyRow.scope, ApiKeyRow.revoked_at.is_not(None))
+    columns = (ApiKeyRow.id, ApiKeyRow.project, ApiKeyRow.name, ApiKeyRow.digest, ApiKeyRow.scope, ApiKeyRow.revoked_at.is_not(None))
     rows = session.execute(select(*columns))
-    return Ring({id: Key(id, name, digest, Scope(scope), revoked) for id, name, digest, scope, revoked in rows})
+    return Ring({id: Key(id, project, name, digest, Scope(scope), revoked) for id, project, name, digest, scope, revoked in rows})
 
 
 def check_bind(settings: Settings) -> None:
@@ -147,8 +159,9 @@ def check_bind(settings: Settings) -> None:
         raise CirisError("no_keys", problem, field="CIRIS_HOST", hint="`ciris key add NAME --scope admin` makes one")
 
 
-def _active(session: Session, name: str) -> Sequence[ApiKeyRow]:
-    return session.scalars(select(ApiKeyRow).where(ApiKeyRow.name == name, ApiKeyRow.revoked_at.is_(None))).all()
+def _active(session: Session, name: str, project: str) -> Sequence[ApiKeyRow]:
+    mine = (ApiKeyRow.project == project, ApiKeyRow.name == name)
+    return session.scalars(select(ApiKeyRow).where(*mine, ApiKeyRow.revoked_at.is_(None))).all()
 
 
 def _digest(key: str) -> str:
@@ -164,20 +177,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     adding.add_argument("name")
     adding.add_argument("--scope", type=Scope, choices=list(Scope), required=True)
     verbs.add_parser("ls", help="list the keys, without what is secret").add_argument("--json", action="store_true")
-    verbs.add_parser("revoke", help="end a key within a second").add_argument("name")
+    revoking = verbs.add_parser("revoke", help="end a key within a second")
+    revoking.add_argument("name")
+    for verb in (adding, revoking):
+        verb.add_argument("--project", default=DEFAULT_PROJECT, help="the project that the key belongs to; default: %(default)s")
     given = parser.parse_args(arguments)
-    settings = Settings() if given.data is None else Settings(data_dir=given.data)
-    migrate.upgrade(settings.database)
-    database = Database(settings.database)
-    try:
-        with database.write() as session:
-            lines = _run(session, given)
-    except CirisError as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(2)
-    finally:
-        database.close()
-    for line in lines:
+    for line in command_line.on_database(given.data, partial(_run, given=given)):
         print(line)
 
 
@@ -185,20 +190,29 @@ def _run(session: Session, given: argparse.Namespace) -> list[str]:
     """Does what the user asked, and returns the lines to print once it is committed."""
     match given.verb:
         case "add":
-            return [add(session, given.name, given.scope)]
+            key = add(session, given.name, given.scope, given.project)
+            audit.note(session, given.project, COMMAND_LINE, Action.KEY_MADE, f"{given.name} ({given.scope})")
+            return [key]
         case "revoke":
-            revoke(session, given.name)
+            revoke(session, given.name, given.project)
+            audit.note(session, given.project, COMMAND_LINE, Action.KEY_REVOKED, given.name)
             return []
         case _:
-            rows = [_described(row) for row in newest(session)]
-            return [json.dumps(rows, indent=1)] if given.json else ["  ".join(f"{k} {v}" for k, v in row.items() if v) for row in rows]
+            return command_line.listed([_described(row) for row in newest(session)], as_json=given.json)
 
 
 def _described(row: ApiKeyRow) -> dict[str, str | None]:
     """Returns what may be shown of a key."""
     created_at = row.created_at.isoformat(timespec="seconds")
     revoked_at = None if row.revoked_at is None else row.revoked_at.isoformat(timespec="seconds")
-    return {"name": row.name, "scope": row.scope, "id": row.id, "created_at": created_at, "revoked_at": revoked_at}
+    return {
+        "name": row.name,
+        "scope": row.scope,
+        "project": row.project,
+        "id": row.id,
+        "created_at": created_at,
+        "revoked_at": revoked_at,
+    }
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +46,7 @@ def upgrade(url: str, revision: str = "head") -> None:
     """Migrates up to ``revision``. Nothing happens when the database is there already."""
     with connection_for_migrations(url) as connection:
         command.upgrade(_config(connection), revision)
+    _let_it_shrink(url)
 
 
 def downgrade(url: str, revision: str) -> None:
@@ -58,6 +59,20 @@ def drift(url: str) -> list[Any]:
     """Returns what differs between the database and the models; empty when nothing does."""
     with connection_for_migrations(url) as connection:
         return list(compare_metadata(MigrationContext.configure(connection), Base.metadata))
+
+
+def _let_it_shrink(url: str) -> None:
+    """Rewrites an SQLite database of an earlier version once, so that deletions give room back. Meanwhile it needs as much room again."""
+    database = Database(url)
+    try:
+        if database.sqlite:
+            with closing(database.writer.raw_connection()) as connection:
+                cursor = connection.cursor()
+                cursor.execute("PRAGMA auto_vacuum")
+                if cursor.fetchone() == (0,):
+                    cursor.execute("VACUUM")
+    finally:
+        database.close()
 
 
 def _config(connection: Connection) -> Config:

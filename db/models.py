@@ -5,13 +5,15 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any, ClassVar
 
-from sqlalchemy import JSON, ForeignKey, Index, LargeBinary, MetaData, String, Text, UniqueConstraint
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy import JSON, BigInteger, ForeignKey, Index, LargeBinary, MetaData, String, Text, UniqueConstraint, text
+from sqlalchemy.orm import DeclarativeBase, Mapped, declared_attr, mapped_column
 
 from db import states
 from db.types import Arrays, Npz, Utc, utcnow
 
 Document = dict[str, Any]
+DEFAULT_PROJECT = "default"
+"""This project is always there. A service without keys works in it."""
 
 
 class Base(DeclarativeBase):
@@ -34,29 +36,59 @@ class Base(DeclarativeBase):
     }
 
 
-class SceneRow(Base):
-    """A scene never changes. ``id`` is the first 16 hexadecimal digits of ``hash``, or all of it where those are taken."""
+class ProjectRow(Base):
+    """A project is a team's part of the service. Its keys see its scenes, jobs and regions, and nothing of other projects."""
+
+    __tablename__ = "projects"
+
+    name: Mapped[str] = mapped_column(String(64), primary_key=True)
+    max_bytes: Mapped[int | None] = mapped_column(BigInteger)
+    """What it stores may take so many bytes; None for any number."""
+    keep_days: Mapped[float | None]
+    """Jobs without a region are deleted so many days after their end; None where they stay."""
+    created_at: Mapped[datetime] = mapped_column(default=utcnow)
+
+
+class Owned:
+    """Such a row belongs to a project. A session of a project finds no rows of other projects (db.session)."""
+
+    @declared_attr
+    def project(cls) -> Mapped[str]:
+        return mapped_column(String(64), ForeignKey("projects.name"), default=DEFAULT_PROJECT)
+
+
+class SceneRow(Owned, Base):
+    """A scene of a project never changes. Two projects with the same scene have a row each, so that neither can tell of the other."""
 
     __tablename__ = "scenes"
+    __table_args__ = (UniqueConstraint("project", "hash"),)
 
     id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    """What db.scenes makes of the hash and the project."""
     name: Mapped[str]
     """The name that it was last added under. Another scene may have been added under that name since."""
-    hash: Mapped[str] = mapped_column(String(64), unique=True)
+    hash: Mapped[str] = mapped_column(String(64))
     document: Mapped[Document]
     """The document that certifier.model.Scene.to_document() returns."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
 
 
-class SceneNameRow(Base):
-    """A version of a name. The name means the scene of its last version."""
+class SceneNameRow(Owned, Base):
+    """A version of a name in a project. The name means the scene of its last version."""
 
     __tablename__ = "scene_names"
 
+    project: Mapped[str] = mapped_column(String(64), ForeignKey("projects.name"), primary_key=True)
     name: Mapped[str] = mapped_column(primary_key=True)
     version: Mapped[int] = mapped_column(primary_key=True)
     scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), index=True)
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
+
+
+def _proofs_of(table: str) -> Index:
+    """Returns the index by which a proof's deletion finds out whether rows of the table have it."""
+    present = text("proof_digest IS NOT NULL")
+    return Index(f"ix_{table}_proof_digest", "proof_digest", sqlite_where=present, postgresql_where=present)
 
 
 class Leased:
@@ -75,8 +107,8 @@ class Leased:
     lease_until: Mapped[datetime | None]
 
 
-class ApiKeyRow(Base):
-    """A key lets its holder in. The key itself is shown once and not stored."""
+class ApiKeyRow(Owned, Base):
+    """A key lets its holder into a project. The key itself is shown once and not stored."""
 
     __tablename__ = "api_keys"
 
@@ -91,11 +123,27 @@ class ApiKeyRow(Base):
     revoked_at: Mapped[datetime | None]
 
 
-class JobRow(Base):
+class AuditRow(Owned, Base):
+    """This row says who changed what a project's people rely on: a key, a limit, something that was deleted. Nobody changes such a row."""
+
+    __tablename__ = "audit"
+    __table_args__ = (Index(None, "project", "created_at", "id"),)
+
+    id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    who: Mapped[str]
+    """The name of the key that was used, and its id; ``command line``; or ``anybody`` where the service asks for no key."""
+    action: Mapped[str] = mapped_column(String(32))
+    """A value of db.audit.Action."""
+    what: Mapped[str]
+    """Names what was changed."""
+    created_at: Mapped[datetime] = mapped_column(default=utcnow)
+
+
+class JobRow(Owned, Base):
     """A job is one request to grow a region, to certify a polytope or a motion, or to cover a scene; or a region of a cover."""
 
     __tablename__ = "jobs"
-    __table_args__ = (Index(None, "state"), Index(None, "created_at", "id"), UniqueConstraint("parent_id", "number"))
+    __table_args__ = (Index(None, "state"), Index(None, "project", "created_at", "id"), UniqueConstraint("parent_id", "number"))
     transitions: ClassVar[states.Table] = states.JOB
 
     id: Mapped[str] = mapped_column(String(36), primary_key=True)
@@ -220,6 +268,7 @@ class PairRow(Leased, Base):
         UniqueConstraint("job_id", "iteration", "pair_index", "part"),
         Index(None, "state", "lease_token"),
         Index(None, "job_id", "state", "deaths", "id"),
+        _proofs_of("pairs"),
     )
     transitions: ClassVar[states.Table] = states.PAIR
 
@@ -270,7 +319,12 @@ class StepRow(Leased, Base):
     """A step is a piece of a job that is no pair: seeding, the polytope step, accepting a region, a look at what is covered, a motion."""
 
     __tablename__ = "steps"
-    __table_args__ = (UniqueConstraint("job_id", "turn", "kind"), Index(None, "state", "lease_until"), Index(None, "job_id", "state"))
+    __table_args__ = (
+        UniqueConstraint("job_id", "turn", "kind"),
+        Index(None, "state", "lease_until"),
+        Index(None, "job_id", "state"),
+        _proofs_of("steps"),
+    )
     transitions: ClassVar[states.Table] = states.STEP
 
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -284,6 +338,8 @@ class StepRow(Leased, Base):
     """What the step works on: the action, or the accepted polytope."""
     report: Mapped[Document | None]
     """What the step found, or the CirisError document that says why it failed."""
+    proof_digest: Mapped[str | None] = mapped_column(ForeignKey("proofs.digest"))
+    """The proof of the motion that the step has certified."""
     seconds: Mapped[float | None]
 
 
@@ -298,11 +354,11 @@ class ProofRow(Base):
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
 
 
-class RegionRow(Base):
+class RegionRow(Owned, Base):
     """A region is a polytope all of whose pairs are certified. ``proof_digest`` names the proof of this."""
 
     __tablename__ = "regions"
-    __table_args__ = (UniqueConstraint("job_id", "iteration"),)
+    __table_args__ = (UniqueConstraint("job_id", "iteration"), Index(None, "project", "created_at", "id"), _proofs_of("regions"))
 
     id: Mapped[str] = mapped_column(String(36), primary_key=True)
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id"))
@@ -328,7 +384,7 @@ class RegionRow(Base):
     """How large the region is in q, as its manifest says it; None for a region of an earlier version."""
     share: Mapped[Document | None]
     """How much of the proposal the region keeps, as its manifest says it; None for a given polytope."""
-    created_at: Mapped[datetime] = mapped_column(default=utcnow, index=True)
+    created_at: Mapped[datetime] = mapped_column(default=utcnow)
 
 
 class LibraryRow(Base):
@@ -336,7 +392,8 @@ class LibraryRow(Base):
 
     __tablename__ = "libraries"
 
-    scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), primary_key=True)
+    scene_id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    """The row outlives its scene. So a version never means other regions, even when the scene is added again."""
     version: Mapped[int] = mapped_column(default=0)
     """How often a region of the scene was added or deleted."""
 

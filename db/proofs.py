@@ -5,11 +5,15 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Collection
 
+from sqlalchemy import delete, exists, or_
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db.models import ProofRow
+from db.models import PairRow, ProofRow, RegionRow, StepRow
 from db.session import insert_new
+
+TOGETHER = 500
+"""So many proofs are deleted by one statement."""
 
 
 def put(session: Session, files: Collection[bytes]) -> dict[bytes, str]:
@@ -35,3 +39,16 @@ def get(session: Session, digest: str) -> bytes:
         hint = "the database has lost it: restore a backup, or grow the region again"
         raise CirisError("proof_not_found", f"there is no proof {digest}", field="proof", hint=hint)
     return row.data
+
+
+def drop_unused(session: Session, digests: Collection[str]) -> None:
+    """Deletes those of these proofs that nothing has any more, of whatever project.
+
+    Projects may share a proof. So the rows are looked for in the tables themselves, where a session's project does not count.
+    """
+    tables = (model.__table__ for model in (RegionRow, PairRow, StepRow))
+    used = or_(*(exists().where(table.c.proof_digest == ProofRow.digest) for table in tables))
+    session.flush()
+    wanted = list(digests)
+    for begin in range(0, len(wanted), TOGETHER):
+        session.execute(delete(ProofRow).where(ProofRow.digest.in_(wanted[begin : begin + TOGETHER]), ~used))

@@ -14,7 +14,7 @@ from certifier.errors import CirisError
 from certifier.model import StoredRegion
 from db import events, jobs, pages, proofs
 from db.ids import expanded
-from db.models import IterationRow, JobRow, LibraryRow, ProofRow, RegionRow
+from db.models import IterationRow, JobRow, LibraryRow, RegionRow
 from db.pages import Page
 from db.session import insert_new
 
@@ -27,9 +27,10 @@ def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any],
     d = np.array(manifest["halfspace_offsets"])
     region = RegionRow(
         id=str(uuid4()),
+        project=job.project,
         job_id=job.id,
         scene_id=job.scene_id,
-        number=_changed(session, job.scene_id),
+        number=changed(session, job.scene_id),
         iteration=iteration,
         guarantee=manifest["guarantee"],
         manifest=manifest,
@@ -137,15 +138,14 @@ def delete(session: Session, region_id: str) -> None:
     if region.id != region_id:
         raise CirisError("region_not_found", f"there is no region {region_id!r}", field="region", hint="give all of its id to delete it")
     job = jobs.lock(session, region.job_id)
-    _changed(session, region.scene_id)
+    changed(session, region.scene_id)
     session.delete(region)
     session.flush()
-    if not session.scalar(select(RegionRow.id).where(RegionRow.proof_digest == region.proof_digest).limit(1)):
-        session.delete(session.get_one(ProofRow, region.proof_digest))
+    proofs.drop_unused(session, [region.proof_digest])
     job.region_id = session.scalar(_latest(job.id))
 
 
-def _changed(session: Session, scene_id: str) -> int:
+def changed(session: Session, scene_id: str) -> int:
     """Counts a change of the scene's regions and returns the new version. Changes of one scene wait for each other until they commit."""
     insert_new(session, LibraryRow, [{"scene_id": scene_id, "version": 0}])
     counted = update(LibraryRow).where(LibraryRow.scene_id == scene_id).values(version=LibraryRow.version + 1)

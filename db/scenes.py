@@ -1,20 +1,21 @@
-"""Scenes never change. Each is stored once for its content hash. A name means the scene that was last added under it."""
+"""Scenes never change. A project has each once for its content hash. A name means the scene that was last added under it."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from functools import lru_cache
 
-from sqlalchemy import func, select
+from sqlalchemy import and_, func, select
 from sqlalchemy.orm import Session
 
 from certifier.errors import SceneError, close_matches
 from certifier.model import Scene
 from db import pages
 from db.ids import expanded
-from db.models import SceneNameRow, SceneRow
+from db.models import DEFAULT_PROJECT, SceneNameRow, SceneRow
 from db.pages import Page
-from db.session import Database, insert_new
+from db.session import Database, insert_new, project_of
 
 ID_LENGTH = 16
 SUGGESTED_AMONG = 1000
@@ -22,32 +23,40 @@ SUGGESTED_AMONG = 1000
 
 
 def add(session: Session, scene: Scene) -> SceneRow:
-    """Returns the row of this scene, which its name means from now on. It makes the row if no scene has the same content."""
-    for scene_id in (scene.hash[:ID_LENGTH], scene.hash):
-        insert_new(session, SceneRow, [{"id": scene_id, "name": scene.name, "hash": scene.hash, "document": scene.to_document()}])
-        row = session.scalar(select(SceneRow).where(SceneRow.hash == scene.hash))
+    """Returns the row of this scene in the session's project, or in the default one. Its name means the scene from now on.
+
+    It makes the row if no scene of the project has the same content.
+    """
+    project = project_of(session) or DEFAULT_PROJECT
+    whole = scene.hash if project == DEFAULT_PROJECT else hashlib.sha256(f"{project}:{scene.hash}".encode()).hexdigest()
+    new = {"project": project, "name": scene.name, "hash": scene.hash, "document": scene.to_document()}
+    for scene_id in (whole[:ID_LENGTH], whole):
+        insert_new(session, SceneRow, [{"id": scene_id, **new}])
+        row = session.scalar(select(SceneRow).where(SceneRow.project == project, SceneRow.hash == scene.hash))
         if row is not None:
             row.name = scene.name
-            _name(session, scene.name, row.id)
+            _name(session, project, scene.name, row.id)
             return row
-    raise AssertionError("a full hash can only be taken by the scene that has it")
+    raise AssertionError("all of a hash can only be taken by the scene that has it")
 
 
-def _name(session: Session, name: str, scene_id: str) -> None:
+def _name(session: Session, project: str, name: str, scene_id: str) -> None:
     """Makes the name mean this scene. Whoever is overtaken by another addition under the name comes after it."""
-    versions = select(SceneNameRow.version, SceneNameRow.scene_id).where(SceneNameRow.name == name)
+    versions = select(SceneNameRow.version, SceneNameRow.scene_id).where(SceneNameRow.project == project, SceneNameRow.name == name)
     while True:
         last = session.execute(versions.order_by(SceneNameRow.version.desc()).limit(1)).first()
         if last is not None and last.scene_id == scene_id:
             return
-        if insert_new(session, SceneNameRow, [{"name": name, "version": last.version + 1 if last else 1, "scene_id": scene_id}]):
+        version = {"project": project, "name": name, "version": last.version + 1 if last else 1, "scene_id": scene_id}
+        if insert_new(session, SceneNameRow, [version]):
             return
 
 
 def names(session: Session, scene_ids: Sequence[str]) -> dict[str, list[str]]:
     """Returns scene id -> the names that mean the scene now, the last one first, for each of these scenes."""
-    last = select(SceneNameRow.name, func.max(SceneNameRow.version).label("version")).group_by(SceneNameRow.name).subquery()
-    current = (SceneNameRow.name == last.c.name) & (SceneNameRow.version == last.c.version)
+    named = (SceneNameRow.project, SceneNameRow.name)
+    last = select(*named, func.max(SceneNameRow.version).label("version")).group_by(*named).subquery()
+    current = and_(*(getattr(SceneNameRow, column.name) == column for column in last.c))
     rows = session.execute(
         select(SceneNameRow.scene_id, SceneNameRow.name)
         .join(last, current)

@@ -7,16 +7,19 @@ While another process writes on SQLite, a writer looks again and again, at longe
 process share one connection, and queue for it instead. A committed transaction survives the end of the process. With
 ``synchronous=NORMAL`` a power cut may take back the last transactions, but never leaves half of one.
 
+A session of a project finds the rows of this project only, whatever it looks for: its condition is added to every statement here.
+
 PostgreSQL gives every statement its own view of the database unless told otherwise. So reading there needs no transaction, and no
 messages that begin and end one.
 """
 
 from __future__ import annotations
 
+import copy
 import json
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -25,8 +28,9 @@ from sqlalchemy import Connection, Dialect, Engine, QueuePool, create_engine, ev
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import DisconnectionError, InterfaceError, OperationalError, TimeoutError
-from sqlalchemy.orm import DeclarativeBase, Session
+from sqlalchemy.orm import DeclarativeBase, ORMExecuteState, Session, with_loader_criteria
 
+from db.models import Owned
 from db.settings import settings
 
 CONNECTIONS = 12
@@ -35,6 +39,8 @@ most of what it is used for.
 """
 BUSY_SECONDS = 30.0
 """A caller waits at most this long for a connection, and a writer at most this long for another writer (SQLite)."""
+SPARE_PAGES, PAGES_TOGETHER = 1000, 2000
+"""SQLite may keep so many pages, of 4 KiB, that it does not use; so many are given back at a time."""
 IDLE_SECONDS = 1.0
 """A connection to PostgreSQL that was idle for this many seconds is tested before it is used: the server may have been restarted."""
 SILENCE_SECONDS = 20
@@ -50,25 +56,72 @@ _LINK = {
 }
 
 
+_PROJECT = "project"
+
+
+@event.listens_for(Session, "do_orm_execute")
+def _only_own(state: ORMExecuteState) -> None:
+    """Leaves the rows of other projects out of what a project's session finds or changes, also where they are joined or asked for by id."""
+    project = project_of(state.session)
+    if project is not None and (state.is_select or state.is_update or state.is_delete):
+        state.statement = state.statement.options(with_loader_criteria(Owned, lambda row: row.project == project, include_aliases=True))
+
+
+def project_of(session: Session) -> str | None:
+    """Returns the project whose rows alone the session finds; None where it finds all rows."""
+    project: str | None = session.info.get(_PROJECT)
+    return project
+
+
 class Database:
-    """Holds one database: its engines for reading and for writing, and the two kinds of transaction."""
+    """Holds one database: its engines for reading and for writing, and the two kinds of transaction.
+
+    Attributes:
+        project: sessions find the rows of this project only; None for all rows.
+    """
 
     def __init__(self, url: str) -> None:
         parsed = make_url(url)
         self.sqlite = parsed.get_backend_name() == "sqlite"
         self.reader, self.writer = _sqlite(parsed) if self.sqlite else _postgresql(parsed)
+        self.project: str | None = None
+        self._views: dict[str, Database] = {}
+
+    def of(self, project: str) -> Database:
+        """Returns this database as a project sees it, always the same object for the same project. The connections are shared."""
+        view = self._views.get(project)
+        if view is None:
+            view = copy.copy(self)
+            view.project = project
+            view = self._views.setdefault(project, view)
+        return view
 
     @contextmanager
     def read(self) -> Iterator[Session]:
         """Opens a session that only reads. Its rows stay usable after it."""
-        with Session(self.reader, expire_on_commit=False) as session:
+        with Session(self.reader, expire_on_commit=False, info=self._info()) as session:
             yield session
 
     @contextmanager
     def write(self) -> Iterator[Session]:
         """Opens a transaction that may write. It commits at the end, and rolls back when an exception leaves the block."""
-        with Session(self.writer, expire_on_commit=False) as session, session.begin():
+        with Session(self.writer, expire_on_commit=False, info=self._info()) as session, session.begin():
             yield session
+
+    def _info(self) -> dict[str, Any]:
+        return {} if self.project is None else {_PROJECT: self.project}
+
+    def shrink(self) -> None:
+        """Gives some of the room that SQLite does not use back to the disk, where there is much of it. PostgreSQL sees to this itself."""
+        if not self.sqlite:
+            return
+        with self.reader.connect() as connection:
+            pages, free = (connection.exec_driver_sql(f"PRAGMA {name}").scalar_one() for name in ("page_count", "freelist_count"))
+        if free > max(SPARE_PAGES, pages / 4):
+            # One step of this statement gives back one page, and only a script is stepped to its end.
+            script = f"BEGIN IMMEDIATE; PRAGMA incremental_vacuum({PAGES_TOGETHER}); COMMIT"
+            with closing(self.writer.raw_connection()) as connection:
+                connection.cursor().executescript(script)
 
     def close(self) -> None:
         self.reader.dispose()
@@ -119,7 +172,8 @@ def _engine(url: URL, connections: int = CONNECTIONS, **options: Any) -> Engine:
 
 def _configure_sqlite(connection: Any, _record: Any) -> None:
     connection.isolation_level = None
-    for pragma in ("journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON"):
+    # The first has an effect on a database without tables only.
+    for pragma in ("auto_vacuum=INCREMENTAL", "journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON"):
         connection.execute(f"PRAGMA {pragma}")
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
-from db import events, jobs, leases
+from db import events, jobs, leases, proofs
 from db.models import JobRow, StepRow
 from db.states import STEP, StepKind, StepState, transition, unfinished
 
@@ -66,6 +66,11 @@ def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any
         earlier = (StepRow.job_id == job.id, StepRow.kind == StepKind.ACCEPT, StepRow.turn < turn)
         transition(session, StepRow, StepState.SKIPPED, *earlier, StepRow.state == StepState.OPEN)
     return True
+
+
+def keep_proof(session: Session, claim: Claim, proof: bytes) -> None:
+    """Stores the proof of the motion that the step has certified. The caller holds the job's lock."""
+    session.get_one(StepRow, claim.step_id).proof_digest = proofs.put(session, [proof])[proof]
 
 
 def is_open(step: type[StepRow], job_id: str | InstrumentedAttribute[str], kinds: Collection[StepKind]) -> ColumnElement[bool]:

@@ -122,7 +122,7 @@ def _motion(scene: Scene, claim: steps.Claim) -> Done:
     proof = base64.b64decode(found["proof"])
 
     def save(session: Session, job: JobRow) -> None:
-        proofs.put(session, [proof])
+        steps.keep_proof(session, claim, proof)
 
     return Done({**found, "proof": proofs.digest(proof)}, save)
 

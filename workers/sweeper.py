@@ -14,7 +14,7 @@ from typing import Any
 from kombu.exceptions import OperationalError
 from sqlalchemy.orm import Session
 
-from db import events, jobs, leases, pairs, work
+from db import events, jobs, leases, pairs, projects, retention, work
 from db.models import JobRow, PairRow, StepRow
 from db.session import database
 from db.settings import settings
@@ -66,6 +66,17 @@ def sweep(*, by_time: bool = True) -> None:
         send_coordinate(job_id)
     if is_open and waiting(SOLVE) == 0:
         send_work()
+    expire()
+
+
+def expire() -> None:
+    """Deletes some of what has expired, and gives room that is not used back to the disk."""
+    with database().read() as session:
+        keeps = projects.some_expires(session)
+    if keeps:
+        with database().write() as session:
+            retention.expire(session, utcnow())
+    database().shrink()
 
 
 def release_lost(*, by_time: bool) -> None:

@@ -10,6 +10,7 @@ import hashlib
 import itertools
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from datetime import timedelta
 from typing import Annotated, Any
 
@@ -17,10 +18,11 @@ from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 from pydantic import Field
 
 from api import checks, obstacles
-from api.access import READ, SUBMIT, Db, Submitter
+from api.access import READ, SUBMIT, Admin, Db, Submitter
 from api.announce import Announcements
 from api.reading import ReadingRoute
-from api.schemas.common import MAX_INT, Cursor
+from api.room import KeptRoom
+from api.schemas.common import MAX_INT, Cursor, WithDependents
 from api.schemas.covers import Cover, CoverRegion
 from api.schemas.jobs import (
     CertifyPathRequest,
@@ -44,12 +46,14 @@ from api.schemas.jobs import (
 from api.schemas.motions import JobMotion
 from api.schemas.progress import JobWorkers, Obstacles, Work, Worker
 from api.schemas.scenes import PairInfo
+from api.schemas.service import Dependents
 from api.writing import writing
 from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.proof.container import with_scene
-from db import jobs, leases, pairs, proofs, regions, scenes, steps, webhooks
+from db import audit, jobs, leases, pairs, proofs, regions, retention, scenes, steps, webhooks
+from db.audit import Action
 from db.models import IterationRow, JobRow, PairRow, StepRow
 from db.session import Database
 from db.states import IterationState, JobKind, JobState, PairState, StepKind
@@ -74,6 +78,7 @@ def create_job(
     response: Response,
     background: BackgroundTasks,
     announcements: Announcements,
+    room: KeptRoom,
     idempotency_key: Annotated[str | None, Header(min_length=1, max_length=200)] = None,
 ) -> Job:
     """Starts a job that grows a region, certifies a polytope or a motion, certifies a region of a changed scene again, or covers a scene.
@@ -86,6 +91,7 @@ def create_job(
     options = _recertify(body, scene, db) if isinstance(body, RecertifyRequest) else _options(body, scene)
     if body.webhook is not None:
         checks.webhook(body.webhook)
+    room.check(db, caller.project)
     with db.write() as session:
         job, made = jobs.create(
             session,
@@ -167,6 +173,22 @@ def get_job(job_id: str, db: Db) -> Job:
     with db.read() as session:
         job = jobs.get(session, job_id)
     return _described(db, [job])[0]
+
+
+@router.get("/{job_id}/dependents")
+def get_job_dependents(job_id: str, db: Db) -> Dependents:
+    """Returns what is deleted with a job: its regions and proofs, and the jobs that a cover has made."""
+    with db.read() as session:
+        return Dependents(**asdict(retention.of_job(session, job_id)))
+
+
+@router.delete("/{job_id}", status_code=status.HTTP_204_NO_CONTENT)
+@writing
+def delete_job(job_id: str, caller: Admin, db: Db, dependents: WithDependents = "keep") -> None:
+    """Deletes a job that has ended. Where it has regions or other jobs, the request has to say that they are deleted, too."""
+    with db.write() as session:
+        retention.delete_job(session, job_id, dependents=dependents == "delete")
+        audit.note(session, caller.project, str(caller), Action.JOB_DELETED, job_id)
 
 
 @router.post("/{job_id}/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)

@@ -10,7 +10,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response, status
 
 from api import drawing, exports
-from api.access import ADMIN, READ, Db
+from api.access import READ, Admin, Db
 from api.children import Children
 from api.reading import ReadingRoute
 from api.schemas.common import MAX_INT, Cursor
@@ -20,7 +20,8 @@ from api.writing import writing
 from certifier.errors import CirisError
 from certifier.isolation.child import run_in_child
 from certifier.model import ALPHABET, escaped, is_name
-from db import jobs, proofs, regions, scenes
+from db import audit, jobs, proofs, regions, scenes
+from db.audit import Action
 from db.session import Database
 from db.settings import settings
 
@@ -147,12 +148,13 @@ def export_region(region_id: str, db: Db, format: ExportFormat = ExportFormat.JS
     return _download(data, f"{region_id}.{suffix}", exports.MEDIA_TYPES[format])
 
 
-@router.delete("/{region_id}", dependencies=[ADMIN], status_code=status.HTTP_204_NO_CONTENT)
+@router.delete("/{region_id}", status_code=status.HTTP_204_NO_CONTENT)
 @writing
-def delete_region(region_id: str, db: Db) -> None:
+def delete_region(region_id: str, caller: Admin, db: Db) -> None:
     """Deletes a region, and its proof file unless another region has the same."""
     with db.write() as session:
         regions.delete(session, region_id)
+        audit.note(session, caller.project, str(caller), Action.REGION_DELETED, region_id)
 
 
 def _download(data: bytes, filename: str, media_type: str, etag: str | None = None) -> Response:

@@ -8,25 +8,31 @@ from typing import Annotated, BinaryIO
 from fastapi import APIRouter, File, Query, Response, UploadFile, status
 
 from api import drawing
-from api.access import READ, SUBMIT, Db
+from api.access import READ, Admin, Db, Submitter
 from api.children import Children
 from api.reading import ReadingRoute
-from api.schemas.common import Cursor
+from api.room import KeptRoom, Room
+from api.schemas.common import Cursor, WithDependents
 from api.schemas.drawing import SceneModel
 from api.schemas.scenes import IgnoredPair, LintReport, PairForecast, SceneDetail, ScenePage, ScenePairs, SceneSummary, Substitution
+from api.schemas.service import Dependents
+from api.writing import writing
 from certifier.pair.forecast import forecast
 from certifier.scene.bundle import load_bundle
-from db import scenes
+from db import audit, retention, scenes
+from db.audit import Action
 from db.session import Database
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"], dependencies=[READ], route_class=ReadingRoute)
 
 
-@router.post("", dependencies=[SUBMIT], status_code=status.HTTP_201_CREATED)
+@router.post("", status_code=status.HTTP_201_CREATED)
 async def create_scene(
     bundle: Annotated[UploadFile, File(description="A zip of the directory with `scene.yaml` and every file it refers to.")],
     db: Db,
     children: Children,
+    room: KeptRoom,
+    caller: Submitter,
     response: Response,
 ) -> SceneDetail:
     """Uploads a scene.
@@ -34,12 +40,13 @@ async def create_scene(
     A separate process reads it, so a bad file cannot harm the service. The same content is the same scene. From now on its name means this
     scene, also where it meant another one.
     """
-    scene = await children.run(_add_scene, db, bundle.file)
+    scene = await children.run(_add_scene, db, room, caller.project, bundle.file)
     response.headers["Location"] = f"/v1/scenes/{scene.id}"
     return scene
 
 
-def _add_scene(db: Database, file: BinaryIO) -> SceneDetail:
+def _add_scene(db: Database, room: Room, project: str, file: BinaryIO) -> SceneDetail:
+    room.check(db, project)
     scene = load_bundle(file.read())
     with db.write() as session:
         row = scenes.add(session, scene)
@@ -99,3 +106,19 @@ def get_scene_lint(scene_id: str, db: Db) -> LintReport:
         ],
         ignored=[IgnoredPair(a=i["pair"][0], b=i["pair"][1], reason=i["reason"]) for i in document["ignored"]],
     )
+
+
+@router.get("/{scene_id}/dependents")
+def get_scene_dependents(scene_id: str, db: Db) -> Dependents:
+    """Returns what is deleted with a scene: its jobs, and their regions and proofs."""
+    with db.read() as session:
+        return Dependents(**asdict(retention.of_scene(session, scene_id)))
+
+
+@router.delete("/{scene_id}", status_code=status.HTTP_204_NO_CONTENT)
+@writing
+def delete_scene(scene_id: str, caller: Admin, db: Db, dependents: WithDependents = "keep") -> None:
+    """Deletes a scene with its names. Where jobs or regions depend on it, the request has to say that they are deleted, too."""
+    with db.write() as session:
+        retention.delete_scene(session, scene_id, dependents=dependents == "delete")
+        audit.note(session, caller.project, str(caller), Action.SCENE_DELETED, scene_id)

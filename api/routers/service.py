@@ -9,7 +9,7 @@ from sqlalchemy import text
 from sqlalchemy.exc import SQLAlchemyError
 
 from api import metrics
-from api.access import READ, Db
+from api.access import READ, WholeDb
 from api.schemas.service import Health, Readiness
 from db.session import Database
 from db.statistics import collect
@@ -25,7 +25,7 @@ async def get_health() -> Health:
 
 
 @router.get("/readyz", responses={503: {"model": Readiness, "description": "The service cannot reach something that it needs."}})
-def get_readiness(db: Db, response: Response) -> Readiness:
+def get_readiness(db: WholeDb, response: Response) -> Readiness:
     """Says whether the service can reach the database and the queue.
 
     Without the queue the service still accepts jobs, but they wait.
@@ -40,8 +40,8 @@ def get_readiness(db: Db, response: Response) -> Readiness:
 @router.get(
     "/metrics", dependencies=[READ], response_class=Response, responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}}
 )
-def get_metrics(request: Request, db: Db) -> Response:
-    """Returns the numbers of jobs, pairs, waiting messages and requests, in Prometheus' text format."""
+def get_metrics(request: Request, db: WholeDb) -> Response:
+    """Returns the numbers of jobs, pairs, waiting messages and requests of all projects, in Prometheus' text format."""
     try:
         messages = {queue: waiting(queue) for queue in (CONTROL, SOLVE)}
     except (OperationalError, RedisError):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import Query
 from pydantic import BaseModel, ConfigDict, Field
@@ -23,6 +23,10 @@ Document = dict[str, Any]
 Rows = Annotated[list[Vector], Field(max_length=2000)]
 Cursor = Annotated[
     str | None, Query(max_length=200, description="The value of `next` from the page before; leave it out for the first page.")
+]
+WithDependents = Annotated[
+    Literal["keep", "delete"],
+    Query(description="`delete` deletes what depends on it, too; otherwise the request is refused where something does."),
 ]
 Offsets = Annotated[list[Real], Field(max_length=2000)]
 

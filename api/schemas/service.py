@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from datetime import datetime
+from typing import Literal, Self
 
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
+
+from api.schemas.common import Page, Request
+from db import projects
+from db.audit import Action
+from db.keys import Scope
+from db.models import ApiKeyRow, AuditRow
 
 
 class Health(BaseModel):
@@ -18,3 +25,78 @@ class Readiness(BaseModel):
 
     ready: bool
     checks: dict[str, str]
+
+
+class NewKey(Request):
+    """Asks for an API key of the caller's project."""
+
+    name: str = Field(
+        pattern=f"^{projects.NAME.pattern}$", description="No other key of the project may have this name.", examples=["planner"]
+    )
+    scope: Scope = Field(description="What the key allows; each scope includes those before it: read, submit, admin.")
+
+
+class KeySummary(BaseModel):
+    """Describes an API key, without what is secret."""
+
+    id: str = Field(description="The part of the key that is no secret. Logs name it.")
+    name: str = Field(description="The name by which it is revoked.")
+    scope: Scope = Field(description="What the key allows.")
+    created_at: datetime = Field(description="When it was made.")
+    revoked_at: datetime | None = Field(description="When it was revoked; null while it is valid.")
+
+    @classmethod
+    def of(cls, row: ApiKeyRow) -> Self:
+        return cls(id=row.id, name=row.name, scope=Scope(row.scope), created_at=row.created_at, revoked_at=row.revoked_at)
+
+
+class MadeKey(BaseModel):
+    """Holds a new API key. Nobody can ask for it again."""
+
+    name: str = Field(description="The name by which it is revoked.")
+    scope: Scope = Field(description="What the key allows.")
+    key: str = Field(description="The key itself. The service stores no more than a hash of it.")
+
+
+class KeyPage(Page):
+    """Holds one page of the keys of the caller's project, newest first."""
+
+    keys: list[KeySummary] = Field(description="The keys, the revoked ones too.")
+
+
+class AuditLine(BaseModel):
+    """Says who changed a key or a limit, or deleted something."""
+
+    at: datetime = Field(description="When it was done.")
+    who: str = Field(description="The key's name and id; `command line`; or `anybody` where the service asks for no key.")
+    action: Action = Field(description="What was done.")
+    what: str = Field(description="Names what was changed.")
+
+    @classmethod
+    def of(cls, row: AuditRow) -> Self:
+        return cls(at=row.created_at, who=row.who, action=Action(row.action), what=row.what)
+
+
+class AuditPage(Page):
+    """Holds one page of the log, newest first."""
+
+    lines: list[AuditLine] = Field(description="Lines of the log.")
+
+
+class Dependents(BaseModel):
+    """Counts what is deleted with a scene or a job."""
+
+    jobs: int = Field(description="Jobs of the scene, or those that a cover has made.")
+    unfinished: int = Field(description="Jobs that have not ended, the job itself included. Nothing is deleted before they have.")
+    regions: int = Field(description="Certified regions.")
+    bytes: int = Field(description="Bytes of proofs and cells.")
+
+
+class Project(BaseModel):
+    """Describes the caller's project."""
+
+    name: str = Field(description="The project's name.")
+    scope: Scope = Field(description="What the caller's key allows.")
+    bytes: int = Field(description="Bytes of scenes, proofs and cells that the project stores, as of some seconds ago.")
+    max_bytes: int | None = Field(description="From so many bytes on, the service takes no more scenes and jobs; null for no limit.")
+    keep_days: float | None = Field(description="So many days after their end jobs lose what they have besides regions; null for never.")

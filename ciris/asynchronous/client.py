@@ -175,6 +175,37 @@ class AsyncClient:
         """Creates a new job like one that failed or was cancelled, and returns it."""
         return await self._json("POST", f"/v1/jobs/{segment(job_id)}/retry")
 
+    async def delete_scene(self, scene_id: str, dependents: bool = False) -> None:
+        """Deletes the scene with this id, and with ``dependents`` its jobs and regions."""
+        await self._delete(f"scenes/{segment(scene_id)}", dependents)
+
+    async def delete_job(self, job_id: str, dependents: bool = False) -> None:
+        """Deletes the job with this id, which has ended, and with ``dependents`` its regions and the jobs of a cover."""
+        await self._delete(f"jobs/{segment(job_id)}", dependents)
+
+    async def delete_region(self, region_id: str) -> None:
+        """Deletes the region with this id."""
+        await self._send("DELETE", f"/v1/regions/{segment(region_id)}")
+
+    async def _delete(self, path: str, dependents: bool) -> None:
+        await self._send("DELETE", f"/v1/{path}", params={"dependents": "delete" if dependents else "keep"})
+
+    async def project(self) -> Document:
+        """Returns the project of the key: how much it stores, and its limits."""
+        return await self._json("GET", "/v1/project")
+
+    async def keys(self) -> list[Document]:
+        """Returns the keys of the project, newest first, without what is secret."""
+        return await self._all("keys")
+
+    async def add_key(self, name: str, scope: str) -> Document:
+        """Makes a key of the project. The answer is the only one that shows it."""
+        return await self._json("POST", "/v1/keys", json={"name": name, "scope": scope})
+
+    async def revoke_key(self, name: str) -> None:
+        """Revokes the project's key of this name."""
+        await self._send("DELETE", f"/v1/keys/{segment(name)}")
+
     async def cover(self, job_id: str) -> Document:
         """Returns what a cover has come to."""
         return await self._json("GET", f"/v1/jobs/{segment(job_id)}/cover")

@@ -10,7 +10,7 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 from sqlalchemy.orm import Session
 
-from db.models import Base, IterationRow, JobRow, PairRow, StepRow, WebhookRow
+from db.models import DEFAULT_PROJECT, Base, IterationRow, JobRow, PairRow, ProjectRow, StepRow, WebhookRow
 from db.session import Database
 from db.states import JobState, PairState, StepState, sources, transition, unfinished
 from tests.db.builders import a_running_job
@@ -24,6 +24,7 @@ def session() -> Iterator[Session]:
     database = Database("sqlite://")
     Base.metadata.create_all(database.writer)
     with database.write() as session:
+        session.add(ProjectRow(name=DEFAULT_PROJECT))
         a_running_job(session, pair_count=1)
         yield session
     database.close()

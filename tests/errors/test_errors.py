@@ -21,8 +21,9 @@ from tests.errors.rows import Row, Trial, pattern
 from tests.errors.scenes import SCENES
 from tests.errors.service import SERVICE
 from tests.errors.sites import Site, sites
+from tests.errors.teams import TEAMS
 
-TABLE = [*SCENES, *BUNDLES, *REGIONS, *MOTIONS, *COVERS, *DRAWING, *SERVICE, *COMMANDS, *PYTHON, *PROOFS]
+TABLE = [*SCENES, *BUNDLES, *REGIONS, *MOTIONS, *COVERS, *DRAWING, *SERVICE, *COMMANDS, *PYTHON, *PROOFS, *TEAMS]
 
 DEMANDS = re.compile(r"\bmust\b|\bat most\b|\bonly\b")
 """Words of a message that says by itself what has to be."""

@@ -1,0 +1,64 @@
+"""Commands about API keys: in this machine's database, or with ``--url`` over HTTP, where they act on the project of the caller's key."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+from certifier.errors import CirisError
+from ciris.synchronous.client import Client
+from client import output
+from client.commands import in_database
+from client.service import connect
+
+OK = 0
+
+
+def add(args: Namespace) -> int:
+    if args.url is None:
+        return _here(args, ["add", args.name, f"--scope={args.scope}", *_project(args)])
+    with _there(args) as client:
+        print(client.add_key(args.name, args.scope)["key"])
+    return OK
+
+
+def ls(args: Namespace) -> int:
+    if args.url is None:
+        return _here(args, ["ls", *(["--json"] if args.json else [])])
+    with _there(args) as client:
+        keys = client.keys()
+    if args.json:
+        output.print_json(keys)
+    else:
+        rows = [(key["name"], key["scope"], key["id"], key["created_at"][:19], (key["revoked_at"] or "")[:19]) for key in keys]
+        output.print_table(("name", "scope", "id", "created", "revoked"), rows)
+    return OK
+
+
+def revoke(args: Namespace) -> int:
+    if args.url is None:
+        return _here(args, ["revoke", args.name, *_project(args)])
+    with _there(args) as client:
+        client.revoke_key(args.name)
+    return OK
+
+
+def _project(args: Namespace) -> list[str]:
+    return [] if args.project is None else [f"--project={args.project}"]
+
+
+def _here(args: Namespace, words: list[str]) -> int:
+    args.module, args.words = "db.keys", lambda _: words
+    return in_database(args)
+
+
+def _there(args: Namespace) -> Client:
+    """Returns a client of the service at ``--url``.
+
+    Raises:
+        CirisError: bad_option, with an option that is about the database.
+    """
+    for option in ("data", "project"):
+        if getattr(args, option, None) is not None:
+            hint = "leave one of them out; the keys of a service are those of the project of your own key"
+            raise CirisError("bad_option", "does not go with --url", field=f"--{option}", hint=hint)
+    return connect(args.url)

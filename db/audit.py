@@ -1,0 +1,42 @@
+"""The audit log says who changed keys and limits, and who deleted what. It is written with the change, in the same transaction."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from uuid import uuid4
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from db import pages
+from db.models import AuditRow
+from db.pages import Page
+
+COMMAND_LINE = "command line"
+"""Whoever can write to the database from a shell is not known by name."""
+
+
+class Action(StrEnum):
+    """Says what was done."""
+
+    PROJECT_MADE = "project_made"
+    LIMITS_SET = "limits_set"
+    KEY_MADE = "key_made"
+    KEY_REVOKED = "key_revoked"
+    SCENE_DELETED = "scene_deleted"
+    JOB_DELETED = "job_deleted"
+    REGION_DELETED = "region_deleted"
+
+
+def note(session: Session, project: str, who: str, action: Action, what: str) -> None:
+    """Adds a line to a project's log."""
+    session.add(AuditRow(id=str(uuid4()), project=project, who=who, action=action, what=what))
+
+
+def page(session: Session, after: str | None = None, limit: int = 100) -> Page[AuditRow]:
+    """Returns one page of the log of the session's project.
+
+    Raises:
+        CirisError: cursor.
+    """
+    return pages.page(session, AuditRow, select(AuditRow), after, limit)

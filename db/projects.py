@@ -1,0 +1,117 @@
+"""This module makes projects and sets their limits. ``ciris project`` runs it as ``python -m db.projects``.
+
+A project is a team's part of the service. Whoever has a key of it sees its scenes, jobs and regions, and nothing of other projects.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from certifier.errors import CirisError
+from db import audit, command_line
+from db.audit import COMMAND_LINE, Action
+from db.models import ProjectRow
+from db.session import insert_new
+
+NAME = re.compile(r"\w[\w.@-]{0,63}")
+"""Projects and keys have such names."""
+
+
+def add(session: Session, name: str) -> ProjectRow:
+    """Makes a project.
+
+    Raises:
+        CirisError: project_name, for a name that cannot be used or is in use.
+    """
+    if not NAME.fullmatch(name):
+        raise CirisError(
+            "project_name", f"{name!r} is no name for a project", field="name", hint="choose up to 64 letters, digits and . _ - @"
+        )
+    if not insert_new(session, ProjectRow, [{"name": name}]):
+        raise CirisError("project_name", f"there is a project {name!r} already", field="name", hint="choose another name")
+    return get(session, name)
+
+
+def get(session: Session, name: str) -> ProjectRow:
+    """Returns the project of this name.
+
+    Raises:
+        CirisError: project_not_found.
+    """
+    row = session.get(ProjectRow, name)
+    if row is None:
+        raise CirisError("project_not_found", f"there is no project {name!r}", field="project", hint="`ciris project add NAME` makes one")
+    return row
+
+
+def all_of(session: Session) -> Sequence[ProjectRow]:
+    """Returns every project, by name."""
+    return session.scalars(select(ProjectRow).order_by(ProjectRow.name)).all()
+
+
+def some_expires(session: Session) -> bool:
+    """Says whether a project deletes what is old."""
+    return session.scalar(select(ProjectRow.name).where(ProjectRow.keep_days.is_not(None)).limit(1)) is not None
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Runs ``ciris project`` on the database that the settings name. It migrates the database first if that is needed."""
+    parser = argparse.ArgumentParser(prog="ciris project", description="The projects of the service whose database the settings name.")
+    parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    verbs.add_parser("add", help="make a project").add_argument("name")
+    verbs.add_parser("ls", help="list the projects with their limits").add_argument("--json", action="store_true")
+    setting = verbs.add_parser("set", help="set a project's limits; 0 for none")
+    setting.add_argument("name")
+    setting.add_argument("--max-bytes", type=_at_least_none, help="what the project stores may take so many bytes")
+    setting.add_argument("--keep-days", type=_at_least_none, help="jobs without a region are deleted so many days after their end")
+    given = parser.parse_args(arguments)
+    for line in command_line.on_database(given.data, partial(_run, given=given)):
+        print(line)
+
+
+def _at_least_none(text: str) -> float:
+    number = float(text)
+    if not 0 <= number <= 2**62:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 0 on")
+    return number
+
+
+def _run(session: Session, given: argparse.Namespace) -> list[str]:
+    """Does what the user asked, and returns the lines to print once it is committed."""
+    match given.verb:
+        case "add":
+            add(session, given.name)
+            audit.note(session, given.name, COMMAND_LINE, Action.PROJECT_MADE, given.name)
+            return []
+        case "set":
+            row = get(session, given.name)
+            if given.max_bytes is not None:
+                row.max_bytes = int(given.max_bytes) or None
+            if given.keep_days is not None:
+                row.keep_days = given.keep_days or None
+            audit.note(session, row.name, COMMAND_LINE, Action.LIMITS_SET, f"max_bytes {row.max_bytes}, keep_days {row.keep_days}")
+            return []
+        case _:
+            return command_line.listed([_described(row) for row in all_of(session)], as_json=given.json)
+
+
+def _described(row: ProjectRow) -> dict[str, Any]:
+    return {
+        "name": row.name,
+        "max_bytes": row.max_bytes,
+        "keep_days": row.keep_days,
+        "created_at": row.created_at.isoformat(timespec="seconds"),
+    }
+
+
+if __name__ == "__main__":
+    main()

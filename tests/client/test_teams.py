@@ -1,0 +1,76 @@
+"""Keys over HTTP, projects, and what is deleted, on the command line."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from api.access import KEYS_SECONDS
+from db import keys, projects
+from db.keys import Scope
+from db.session import Database
+from tests.client.conftest import Ciris, command, surroundings
+
+
+def test_scenes_jobs_and_regions_are_deleted_once_it_was_said_what_goes_with_them(ciris: Ciris, url: str, region: str) -> None:
+    told = ciris("scene", "rm", "slider", CIRIS_URL=url)
+    assert told.status == 2
+    assert "1 job, 1 region" in told.error
+    assert "--dependents" in told.error
+    assert ciris("region", "rm", region[:8]).status == 0
+    (job,) = ciris("job", "ls", "--json").json
+    assert ciris("job", "rm", job["id"][:8]).status == 0
+    assert ciris("scene", "rm", "slider", "--dependents").status == 0
+    assert ciris("scene", "ls", "--json").json == []
+
+
+def test_an_admin_manages_the_keys_of_the_project_over_http(ciris: Ciris, url: str, database: Database) -> None:
+    with database.write() as session:
+        projects.add(session, "others")
+        admin = keys.add(session, "boss", Scope.ADMIN, "others")
+    time.sleep(KEYS_SECONDS)
+    made = ciris("key", "add", "planner", "--scope", "read", "--url", url, CIRIS_API_KEY=admin)
+    assert made.status == 0
+    time.sleep(KEYS_SECONDS)
+    key = made.stdout.strip()
+    assert ciris("job", "ls", "--json", CIRIS_URL=url, CIRIS_API_KEY=key).json == []
+    listed = ciris("key", "ls", "--url", url, "--json", CIRIS_API_KEY=admin)
+    assert [(one["name"], one["scope"]) for one in listed.json] == [("planner", "read"), ("boss", "admin")]
+    assert "planner" in ciris("key", "ls", "--url", url, CIRIS_API_KEY=admin).stdout
+    assert ciris("key", "add", "x", "--scope", "admin", "--url", url, CIRIS_API_KEY=key).status == 2
+    assert ciris("key", "revoke", "planner", "--url", url, CIRIS_API_KEY=admin).status == 0
+    time.sleep(KEYS_SECONDS)
+    assert ciris("job", "ls", CIRIS_URL=url, CIRIS_API_KEY=key).status == 2
+
+
+def test_projects_on_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("CIRIS_DATA_DIR", str(tmp_path))
+    projects.main(["add", "welding"])
+    projects.main(["set", "welding", "--max-bytes", "1e9", "--keep-days", "30"])
+    keys.main(["add", "planner", "--scope", "read", "--project", "welding"])
+    capsys.readouterr()
+    projects.main(["ls", "--json"])
+    listed = json.loads(capsys.readouterr().out)
+    assert [(row["name"], row["max_bytes"], row["keep_days"]) for row in listed] == [("default", None, None), ("welding", 10**9, 30.0)]
+    keys.main(["ls", "--json"])
+    assert [(row["name"], row["project"]) for row in json.loads(capsys.readouterr().out)] == [("planner", "welding")]
+    projects.main(["set", "welding", "--max-bytes", "0"])
+    projects.main(["ls"])
+    assert "max_bytes" not in capsys.readouterr().out
+    for wrong in (["set", "welding", "--keep-days", "-1"], ["set", "nobody"], ["add", "welding"]):
+        with pytest.raises(SystemExit) as ended:
+            projects.main(wrong)
+        assert ended.value.code == 2
+    with pytest.raises(SystemExit):
+        keys.main(["revoke", "planner"])  # that of the default project
+
+
+def test_the_command_passes_limits_on(tmp_path: Path) -> None:
+    for words in (("add", "welding"), ("set", "welding", "--keep-days", "7")):
+        subprocess.run(command("project", *words, "--data", tmp_path), env=surroundings(), check=True)
+    listed = subprocess.run(command("project", "ls", "--json", "--data", tmp_path), env=surroundings(), check=True, capture_output=True)
+    assert [row["keep_days"] for row in json.loads(listed.stdout)] == [None, 7.0]

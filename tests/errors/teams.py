@@ -1,0 +1,132 @@
+"""Errors about projects, keys over HTTP, and what is deleted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi.testclient import TestClient
+from sqlalchemy import update
+
+from db import keys, projects, retention
+from db.keys import Scope
+from db.models import JobRow
+from db.session import Database
+from tests.db.builders import a_running_job, add_region
+from tests.errors.rows import Trial, rows
+from tests.errors.service import GROW, database, post, queued, write
+
+SAY_SO = "say dependents=delete (--dependents) to delete them too"
+
+
+def full(t: Trial) -> None:
+    """Asks for a job in a project that has no room."""
+    t.request.getfixturevalue("scene")
+    with database(t).write() as session:
+        projects.get(session, "default").max_bytes = 1
+    post(t, GROW)
+
+
+def a_region_of_a_job(t: Trial) -> str:
+    db: Database = database(t)
+    client: TestClient = t.request.getfixturevalue("client")
+    with db.write() as session:
+        job = a_running_job(session)
+        add_region(session, job)
+        job_id = job.id
+    client.post(f"/v1/jobs/{job_id}/cancel")
+    with db.write() as session:
+        session.execute(update(JobRow).values(state="cancelled"))
+    return job_id
+
+
+def named_twice(session: Any) -> None:
+    projects.add(session, "others")
+    projects.add(session, "others")
+
+
+def by_its_name(t: Trial) -> None:
+    with database(t).write() as session:
+        a_running_job(session)
+        retention.delete_scene(session, "slider", dependents=True)
+
+
+def by_a_few_characters(t: Trial) -> None:
+    with database(t).write() as session:
+        retention.delete_job(session, a_running_job(session).id[:8], dependents=True)
+
+
+TEAMS = [
+    *rows(
+        "db/projects.py",
+        (
+            "project_name",
+            "name",
+            "{name} is no name for a project",
+            "choose up to 64 letters, digits and . _ - @",
+            lambda t: write(t, lambda session: projects.add(session, "a b")),
+        ),
+        ("project_name", "name", "there is a project {name} already", "choose another name", lambda t: write(t, named_twice)),
+        (
+            "project_not_found",
+            "project",
+            "there is no project {name}",
+            "`ciris project add NAME` makes one",
+            lambda t: write(t, lambda session: keys.add(session, "planner", Scope.READ, "nobody")),
+        ),
+    ),
+    *rows(
+        "db/retention.py",
+        (
+            "scene_not_found",
+            "scene",
+            "no scene has the id {scene_id}",
+            "give all of its id to delete it",
+            by_its_name,
+        ),
+        (
+            "job_not_found",
+            "job",
+            "no job has the id {job_id}",
+            "give all of its id to delete it",
+            by_a_few_characters,
+        ),
+        (
+            "not_ended",
+            "job",
+            "{what} has jobs that have not ended, {unfinished} in all",
+            "cancel what you do not need, and wait for the end",
+            lambda t: t.ask("DELETE", f"/v1/jobs/{queued(t)}"),
+        ),
+        ("has_dependents", "dependents", "with {what} go {found}", SAY_SO, lambda t: t.ask("DELETE", f"/v1/jobs/{a_region_of_a_job(t)}")),
+    ),
+    *rows(
+        "api/room.py",
+        (
+            "storage_quota",
+            "",
+            "the project {project} stores as many bytes as it may, {most}",
+            "delete jobs, regions or scenes, or have the limit raised: `ciris project set`",
+            full,
+        ),
+    ),
+    *rows(
+        "api/routers/project.py",
+        (
+            "first_key",
+            "name",
+            "the first key locks everybody else out",
+            "make it at the service's machine: `ciris key add`",
+            lambda t: t.ask("POST", "/v1/keys", json={"name": "mine", "scope": "admin"}),
+        ),
+    ),
+    *rows(
+        "client/keys.py",
+        (
+            "bad_option",
+            "--{option}",
+            "does not go with --url",
+            "leave one of them out; the keys of a service are those of the project of your own key",
+            lambda t: t.ciris("key", "ls", "--url", "http://127.0.0.1:9", "--data", "here"),
+        ),
+    ),
+]
