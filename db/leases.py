@@ -1,7 +1,7 @@
 """A lease gives a row of work to one holder at a time, for a limited time, however often the row's message is delivered.
 
 A holder renews its lease while it works. A lease ends when its holder is seen to be gone, which only processes of the same host can
-see, or else when it runs out.
+see, or else when it runs out by the database's clock.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from uuid import uuid4
 from sqlalchemy import BindParameter, ColumnElement, Select, bindparam, select, update
 from sqlalchemy.orm import Session
 
+from db import clock
 from db.models import JobRow, PairRow, StepRow
 from db.session import Database
 from db.states import PairState, transition
-from db.types import utcnow
 
 log = logging.getLogger(__name__)
 
@@ -95,7 +95,7 @@ def take(session: Session, model: type[PairRow] | type[StepRow], ids: Sequence[i
         worker=this_worker(),
         parent=_name(os.getppid()),
         lease_token=token,
-        lease_until=utcnow() + timedelta(seconds=seconds),
+        lease_until=clock.now(session) + timedelta(seconds=seconds),
     )
     return token
 
@@ -152,7 +152,8 @@ def _wanted(model: type[Row]) -> Select[int]:
 
 def _renew(database: Database, model: type[Row], token: str, seconds: float) -> None:
     with database.write() as session:
-        session.execute(update(model).where(held(model, token)).values(lease_until=utcnow() + timedelta(seconds=seconds)))
+        until = clock.now(session) + timedelta(seconds=seconds)
+        session.execute(update(model).where(held(model, token)).values(lease_until=until))
 
 
 @dataclass(frozen=True)
@@ -172,7 +173,7 @@ class Lost:
 
 def lost(session: Session, model: type[Row], *, by_time: bool) -> list[Lost]:
     """Returns the leases whose holder is gone and, with ``by_time``, those that ran out."""
-    now = utcnow()
+    now = clock.now(session)
     found = {}
     for row in session.scalars(select(model).where(model.state == RUNNING)):
         alone = False

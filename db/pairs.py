@@ -22,7 +22,7 @@ from certifier.outcome import Outcome, combine
 from certifier.pair.result import PairResult
 from db import events, jobs, leases, proofs, subtrees
 from db.models import IterationRow, JobRow, PairRow
-from db.states import PAIR, IterationState, PairState, transition, unfinished
+from db.states import PAIR, IterationState, PairState, transition, transition_each, unfinished
 from db.types import utcnow
 
 UNFINISHED = unfinished(PAIR)
@@ -210,9 +210,8 @@ def save(session: Session, claim: Claim, results: Mapping[tuple[int, int], PairR
     if not saved:
         return Saved(held=False, finished=False)
     digests = proofs.put(session, [result.proof for result in saved.values() if result.proof is not None])
-    for work, result in saved.items():
-        digest = None if result.proof is None else digests[result.proof]
-        transition(session, PairRow, state_of(result), PairRow.id == held[work], lease_until=None, proof_digest=digest, **_columns(result))
+    moves = {held[work]: (state_of(result), _columns(result, digests)) for work, result in saved.items()}
+    transition_each(session, PairRow, PairState.RUNNING, moves)
     left = {work: (r.subtrees, r.outline) for work, r in saved.items() if r.subtrees is not None}
     subtrees.keep(session, job.id, claim.iteration, left)
     job.running_pairs -= len(saved)
@@ -432,8 +431,10 @@ def state_of_parts(states: Sequence[PairState]) -> PairState:
     return PairState(combine([Outcome(state) for state in states]))
 
 
-def _columns(result: PairResult) -> dict[str, Any]:
+def _columns(result: PairResult, digests: Mapping[bytes, str]) -> dict[str, Any]:
     return {
+        "lease_until": None,
+        "proof_digest": None if result.proof is None else digests[result.proof],
         "stage": result.stage,
         "margin": result.margin,
         "seconds": result.seconds,

@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, cast
 
-from sqlalchemy import ColumnElement, CursorResult, update
+import sqlalchemy
+from sqlalchemy import ColumnElement, CursorResult, bindparam, update
 from sqlalchemy.orm import Session
 
 if TYPE_CHECKING:
@@ -187,3 +188,26 @@ def transition(
     """
     moved = update(model).where(*where, model.state.in_(sources(model.transitions, target))).values(state=target, **values)
     return cast("CursorResult[Any]", session.execute(moved)).rowcount
+
+
+def transition_each(session: Session, model: type[PairRow], source: str, moves: Mapping[int, tuple[str, Mapping[str, Any]]]) -> None:
+    """Moves each of these rows from ``source`` to a state of its own, all by one message to the database.
+
+    Rows that the session has loaded do not learn of it.
+
+    Args:
+        moves: id -> the state, and further columns to set, the same ones for every row.
+
+    Raises:
+        ValueError: the model's table does not allow a move.
+    """
+    if any(source not in sources(model.transitions, target) for target, _ in moves.values()):
+        raise ValueError(f"no row may go from {source} to one of {sorted({target for target, _ in moves.values()})}")
+    table = cast("sqlalchemy.Table", model.__table__)
+    more = next(iter(moves.values()))[1]
+    columns: dict[str, Any] = {name: bindparam(f"new_{name}") for name in ("state", *more)}
+    rows = [
+        {"row": row, "new_state": target, **{f"new_{name}": value for name, value in values.items()}}
+        for row, (target, values) in moves.items()
+    ]
+    session.connection().execute(update(table).where(table.c.id == bindparam("row"), table.c.state == source).values(columns), rows)

@@ -14,7 +14,7 @@ from typing import Any
 from kombu.exceptions import OperationalError
 from sqlalchemy.orm import Session
 
-from db import events, jobs, leases, pairs, projects, retention, work
+from db import clock, events, jobs, leases, pairs, projects, retention, work
 from db.models import JobRow, PairRow, StepRow
 from db.session import database
 from db.settings import settings
@@ -60,7 +60,7 @@ def sweep(*, by_time: bool = True) -> None:
     """Does one round: it frees what lost workers held, wakes a solver when work has no message, and asks for due coordinations."""
     release_lost(by_time=by_time)
     with database().read() as session:
-        due = jobs.awaiting_coordination(session, utcnow())
+        due = jobs.awaiting_coordination(session, clock.now(session))
         is_open = work.next_job(session) is not None
     for job_id in due:
         send_coordinate(job_id)

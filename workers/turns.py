@@ -22,7 +22,7 @@ from certifier.growth.refusal import DEADLINE
 from certifier.outcome import Outcome
 from certifier.pair.forecast import PairCost, forecast
 from certifier.pair.result import Weakness
-from db import jobs, leases, pairs, steps, subtrees, work
+from db import clock, jobs, leases, pairs, steps, subtrees, work
 from db.models import IterationRow, JobRow
 from db.settings import settings
 from db.states import JOB, STEP, IterationState, JobKind, JobState, StepKind, StepState, unfinished
@@ -98,7 +98,7 @@ def _begin(job_id: str) -> Turn | None:
         job = jobs.lock(session, job_id)
         if job.state not in unfinished(JOB):
             return None
-        now = utcnow()
+        now = clock.now(session)
         if job.state == JobState.CANCELLING:
             _finish_growth(session, job, Finish(Outcome.INCONCLUSIVE, "cancelled"), afterwards)
         elif _is_late(session, job, now):

@@ -52,7 +52,7 @@ from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.proof.container import with_scene
-from db import audit, jobs, leases, pairs, proofs, regions, retention, scenes, steps, webhooks
+from db import audit, clock, jobs, leases, pairs, proofs, regions, retention, scenes, steps, webhooks
 from db.audit import Action
 from db.models import IterationRow, JobRow, PairRow, StepRow
 from db.session import Database
@@ -98,7 +98,7 @@ def create_job(
             kind=body.kind,
             scene_id=scene_id,
             options=options,
-            deadline_at=utcnow() + timedelta(seconds=body.deadline_seconds) if body.deadline_seconds else None,
+            deadline_at=clock.now(session) + timedelta(seconds=body.deadline_seconds) if body.deadline_seconds else None,
             idempotency_key=idempotency_key and f"{caller.key_id or 'open'}:{idempotency_key}",
             request_digest=_digest(scene_id, options, body),
             key_id=caller.key_id,
@@ -406,7 +406,8 @@ def get_job_workers(job_id: str, db: Db) -> JobWorkers:
     with db.read() as session:
         job = jobs.get(session, job_id)
         held, begun = leases.of_job(session, PairRow, job.id), leases.of_job(session, StepRow, job.id)
-    return JobWorkers(workers=[*_certifying(held), *(_doing(step) for step in begun), *_deciding(job)])
+        decided = jobs.is_coordinated(job, clock.now(session))
+    return JobWorkers(workers=[*_certifying(held), *(_doing(step) for step in begun), *([_deciding(job)] if decided else [])])
 
 
 def _certifying(rows: Sequence[PairRow]) -> list[Worker]:
@@ -431,10 +432,8 @@ def _doing(step: StepRow) -> Worker:
     return Worker(process=step.worker or "", work=work, iteration=None, pairs=[], until=step.lease_until)
 
 
-def _deciding(job: JobRow) -> list[Worker]:
-    if job.coordinator is None or not jobs.is_coordinated(job, utcnow()):
-        return []
-    return [Worker(process=job.coordinator, work=Work.DECIDE, iteration=None, pairs=[], until=job.coordinator_until)]
+def _deciding(job: JobRow) -> Worker:
+    return Worker(process=job.coordinator or "", work=Work.DECIDE, iteration=None, pairs=[], until=job.coordinator_until)
 
 
 @router.get("/{job_id}/obstacles")

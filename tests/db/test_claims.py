@@ -20,7 +20,7 @@ from certifier.pair.result import PairResult, Weakness
 from db import events, jobs, leases, pairs, steps, work
 from db.models import IterationRow, PairRow, ProofRow, StepRow
 from db.session import Database
-from db.states import IterationState, JobState, PairState, StepKind, StepState
+from db.states import IterationState, JobState, PairState, StepKind, StepState, transition_each
 from db.types import utcnow
 from tests.db.builders import a_running_job, certified
 
@@ -368,3 +368,41 @@ def test_the_latest_region_is_accepted_and_an_earlier_one_only_if_it_is_refused(
 def test_a_pair_is_in_the_worst_state_of_its_parts_once_all_are_settled(parts: str, whole: str) -> None:
     for states in itertools.permutations(map(PairState, parts.split())):
         assert pairs.state_of_parts(states) == whole
+
+
+def test_a_lease_goes_by_the_databases_clock(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A worker whose clock is an hour ahead holds its pairs no longer than others, and one whose clock is slow does not lose them.
+
+    On SQLite all are on one machine, so they have one clock.
+    """
+    for wrong in (timedelta(hours=1), timedelta(hours=-1)):
+        with db.write() as session:
+            job_id = a_running_job(session, 1).id
+        monkeypatch.setattr("db.clock.utcnow", lambda wrong=wrong: utcnow() + wrong)
+        held = claim(db, job_id)
+        assert held is not None
+        with db.write() as session:
+            leases._renew(db, PairRow, held.token, 60)
+            (row,) = leases.of_job(session, PairRow, job_id)
+            row.worker = ELSEWHERE
+            assert row.lease_until is not None
+            ahead = wrong if db.sqlite else timedelta()
+            assert abs((row.lease_until - utcnow() - ahead).total_seconds() - 60) < 5
+        with db.read() as session:
+            assert [lost for lost in leases.lost(session, PairRow, by_time=True) if lost.job_id == job_id] == []
+
+
+def test_settled_pairs_move_together_and_only_where_they_may(db: Database) -> None:
+    with db.write() as session:
+        job_id = a_running_job(session, 3).id
+        rows = {row.pair_index: row.id for row in pairs.of_job(session, job_id)}
+        moves = {rows[0]: (PairState.CERTIFIED, {"margin": 0.5}), rows[1]: (PairState.REFUTED, {"margin": None})}
+        with pytest.raises(ValueError, match="no row may go from open"):
+            transition_each(session, PairRow, PairState.OPEN, moves)
+        transition_each(session, PairRow, PairState.RUNNING, moves)  # they are open, so they stay
+        session.expire_all()
+        assert {row.state for row in pairs.of_job(session, job_id)} == {"open"}
+        leases.take(session, PairRow, list(rows.values())[:2], seconds=60)
+        transition_each(session, PairRow, PairState.RUNNING, moves)
+        session.expire_all()
+        assert [(row.state, row.margin) for row in pairs.of_job(session, job_id)] == [("certified", 0.5), ("refuted", None), ("open", None)]
