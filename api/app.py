@@ -22,6 +22,7 @@ from api.links import LinksKept
 from api.metrics import Requests
 from api.pages import site
 from api.pages.rendering import render_problem
+from api.questions import LARGE, SMALL
 from api.reading import READERS
 from api.room import Room
 from api.routers import cells, drawing, events, jobs, motions, planning, plans, project, regions, scenes, service
@@ -37,8 +38,8 @@ offline. Errors are problem+json (RFC 9457) with a `code`, the `field` and a `hi
 are not finite."""
 
 
-THREADS = CONNECTIONS - AT_ONCE - READERS - WRITERS - 1
-"""All other requests share this many threads: those connections that uploads, checks, reading and writing routes and the keys leave."""
+THREADS = CONNECTIONS - AT_ONCE - READERS - WRITERS - SMALL - LARGE - 1
+"""All other requests share this many threads: those connections that children, reading and writing routes, questions and keys leave."""
 
 
 def create_app(db: Database | None = None) -> FastAPI:

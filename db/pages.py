@@ -52,7 +52,10 @@ def _place(cursor: str) -> tuple[datetime, str]:
         if place.tzinfo is None or not row_id.isprintable():
             raise ValueError
     except ValueError:
-        raise CirisError(
-            "cursor", "this is not the `next` of a page", field="after", hint="leave it out to begin with the first page"
-        ) from None
+        raise unknown() from None
     return place, row_id
+
+
+def unknown() -> CirisError:
+    """Returns the error for a cursor that did not come from a page."""
+    return CirisError("cursor", "this is not the `next` of a page", field="after", hint="leave it out to begin with the first page")

@@ -338,10 +338,39 @@ def parts_of(session: Session, job_id: str, pair: int, iterations: Iterable[int]
     return {index: parts.get(str(pair), 1) for index, parts in session.execute(select(IterationRow.index, IterationRow.parts).where(*mine))}
 
 
-def of_job(session: Session, job_id: str, only: Collection[int] | None = None) -> Sequence[PairRow]:
-    """Returns the job's pair matrix, in order: in every iteration every pair with its parts, or those asked for."""
-    query = select(PairRow).where(PairRow.job_id == job_id).order_by(PairRow.iteration, PairRow.pair_index, PairRow.part)
-    return session.scalars(query if only is None else query.where(PairRow.pair_index.in_(only))).all()
+def page(
+    session: Session,
+    job_id: str,
+    *,
+    iteration: int | None = None,
+    only: Collection[int] | None = None,
+    after: tuple[int, int] | None = None,
+    limit: int,
+) -> tuple[Sequence[PairRow], tuple[int, int] | None]:
+    """Returns one page of the job's pair matrix, in order: in every iteration every pair, with all of its parts.
+
+    Args:
+        iteration, only: leave out other iterations, and pairs with other indices.
+        after: the page begins after this pair in this iteration, (iteration, pair index).
+        limit: so many pairs at most.
+
+    Returns:
+        The rows, and what is ``after`` for the next page; None on the last page.
+    """
+    place = (PairRow.iteration, PairRow.pair_index)
+    query = select(PairRow).where(PairRow.job_id == job_id)
+    if iteration is not None:
+        query = query.where(PairRow.iteration == iteration)
+    if only is not None:
+        query = query.where(PairRow.pair_index.in_(only))
+    if after is not None:
+        query = query.where(tuple_(*place) > tuple_(*after))
+    firsts = query.with_only_columns(*place).where(PairRow.part == 0).order_by(*place).limit(limit + 1)
+    places = [(row.iteration, row.pair_index) for row in session.execute(firsts)]
+    if len(places) > limit:
+        query = query.where(tuple_(*place) <= tuple_(*places[limit - 1]))
+    rows = session.scalars(query.order_by(*place, PairRow.part)).all()
+    return rows, places[limit - 1] if len(places) > limit else None
 
 
 def states(session: Session, job_id: str, since: int) -> dict[int, dict[int, PairState]]:

@@ -33,7 +33,7 @@ from sqlalchemy.orm import DeclarativeBase, ORMExecuteState, Session, with_loade
 from db.models import Owned
 from db.settings import settings
 
-CONNECTIONS = 12
+CONNECTIONS = 15
 """One process has at most this many connections. It opens them when needed and keeps them, because opening one costs more than
 most of what it is used for.
 """

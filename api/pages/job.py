@@ -12,6 +12,7 @@ from fastapi import APIRouter, Request, Response
 from api.access import Db
 from api.pages.rendering import page
 from api.routers import jobs, regions, scenes
+from api.schemas.common import MAX_INT
 from api.schemas.jobs import Iteration, Job, PairMatrix
 from db import pairs
 from db.session import Database
@@ -35,7 +36,7 @@ def _job(db: Database, job_id: str) -> dict[str, Any]:
     with db.read() as session:
         begun = pairs.begun(session, job.id)
     # Only the last iteration is looked at: a job may have 100 000 results. The matrix is drawn in the browser.
-    last = jobs.get_job_pairs(job_id, db, begun - 1) if begun else None
+    last = jobs.get_job_pairs(job_id, db, begun - 1, limit=MAX_INT) if begun else None
     return {
         "job": job,
         "cover": jobs.get_job_cover(job_id, db) if job.kind is JobKind.COVER else None,

@@ -52,7 +52,7 @@ from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.proof.container import with_scene
-from db import audit, clock, jobs, leases, pairs, proofs, regions, retention, scenes, steps, webhooks
+from db import audit, clock, jobs, leases, pages, pairs, proofs, regions, retention, scenes, steps, webhooks
 from db.audit import Action
 from db.models import IterationRow, JobRow, PairRow, StepRow
 from db.session import Database
@@ -61,6 +61,9 @@ from db.types import utcnow
 from planner.cover.options import CoverOptions
 from planner.cover.result import said
 from planner.cover.state import CoverState
+
+MOST_PAIRS = 5000
+"""One page of a pair matrix has so many results at most."""
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ], route_class=ReadingRoute)
 
@@ -297,19 +300,37 @@ def get_job_pairs(
         list[Annotated[int, Field(ge=0, le=MAX_INT)]] | None,
         Query(max_length=200, description="Indices of the pairs wanted; all pairs if left out."),
     ] = None,
+    after: Cursor = None,
+    limit: Annotated[int, Query(ge=1, le=MOST_PAIRS, description="Return so many results at most.")] = MOST_PAIRS,
 ) -> PairMatrix:
     """Returns the pair matrix: the result of every pair on the polytope of every iteration, or of the given ones."""
+    begin = _place(after)
     with db.read() as session:
         job = jobs.get(session, job_id)
-        rows = pairs.of_job(session, job.id, pair) if iteration is None else pairs.of_iteration(session, job.id, iteration, pair)
-        iterations = [row for row in pairs.iterations(session, job.id) if iteration in (None, row.index)]
+        rows, last = pairs.page(session, job.id, iteration=iteration, only=pair, after=begin, limit=limit)
+        iterations = [row for row in pairs.iterations(session, job.id) if iteration in (None, row.index)] if begin is None else []
     scene = scenes.load(db, job.scene_id)
-    wanted = None if pair is None else set(pair)
+    known = enumerate(scene.pairs) if begin is None else ()
     return PairMatrix(
-        pairs=[PairInfo(index=index, a=one.a, b=one.b) for index, one in enumerate(scene.pairs) if wanted is None or index in wanted],
+        pairs=[PairInfo(index=index, a=one.a, b=one.b) for index, one in known if pair is None or index in pair],
         iterations=[_iteration(row) for row in iterations],
         cells=[_cell(scene, list(parts)) for _, parts in itertools.groupby(rows, lambda row: (row.iteration, row.pair_index))],
+        next=None if last is None else f"{last[0]}.{last[1]}",
     )
+
+
+def _place(after: str | None) -> tuple[int, int] | None:
+    """Returns where a page of the pair matrix begins: after (iteration, pair).
+
+    Raises:
+        CirisError: cursor.
+    """
+    if after is None:
+        return None
+    iteration, _, pair = after.partition(".")
+    if not all(part.isascii() and part.isdigit() and int(part) <= MAX_INT for part in (iteration, pair)):
+        raise pages.unknown()
+    return int(iteration), int(pair)
 
 
 @router.get("/{job_id}/pairs/states")
@@ -354,7 +375,7 @@ def download_pair_proof(job_id: str, pair: int, iteration: Annotated[int, Query(
     """
     with db.read() as session:
         job = jobs.get(session, job_id)
-        rows = [row for row in pairs.of_iteration(session, job.id, iteration) if row.pair_index == pair]
+        rows = pairs.of_iteration(session, job.id, iteration, [pair])
         digest = _cell(scenes.load(db, job.scene_id), rows).proof if rows else None
         if digest is None:
             message = f"there is no proof of pair {pair} in iteration {iteration}"

@@ -14,6 +14,7 @@ from api.access import READ, Db
 from api.answers import asked
 from api.children import Children
 from api.libraries import KeptLibraries, Libraries
+from api.questions import asking
 from api.schemas.planning import (
     Containment,
     ContainsRequest,
@@ -42,6 +43,7 @@ router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ]
 
 
 @router.post("/contains")
+@asking(few=100)
 def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries) -> ContainsResponse:
     """Returns, for each point, the certified regions of the scene that contain it, and how deep inside it is."""
     scene_id, scene, library = asked(db, libraries, body.scene)
@@ -57,6 +59,7 @@ def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries) -> Contain
 
 
 @router.post("/nearest")
+@asking(few=50)
 def find_nearest(body: NearestRequest, db: Db, libraries: KeptLibraries) -> NearestResponse:
     """Returns, for each point, the nearest certified region of the scene, its nearest point and how far that is."""
     scene_id, scene, library = asked(db, libraries, body.scene)
@@ -67,6 +70,7 @@ def find_nearest(body: NearestRequest, db: Db, libraries: KeptLibraries) -> Near
 
 
 @router.post("/segment")
+@asking(few=20)
 def cover_segments(body: SegmentRequest, db: Db, libraries: KeptLibraries) -> SegmentResponse:
     """Says of each straight motion whether every point of it is in certified regions, and which.
 
@@ -83,6 +87,7 @@ def cover_segments(body: SegmentRequest, db: Db, libraries: KeptLibraries) -> Se
 
 
 @router.post("/path")
+@asking(few=20)
 def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries) -> PathResponse:
     """Says whether every point of a path, straight between its waypoints or along a curve, is in certified regions, and which.
 

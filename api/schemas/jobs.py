@@ -356,15 +356,15 @@ class PairCell(BaseModel):
     proof: str | None = Field(description="SHA-256 of the pair's proof file; null where the outcome has none.")
 
 
-class PairMatrix(BaseModel):
-    """Holds the results of all pairs in all iterations.
+class PairMatrix(Page):
+    """Holds one page of the results of pairs in iterations, by iteration and pair.
 
     A pair without a cell in an iteration was reused there from an earlier iteration, or was not reached.
     """
 
-    pairs: list[PairInfo]
-    iterations: list[Iteration]
-    cells: list[PairCell]
+    pairs: list[PairInfo] = Field(description="The pairs that were asked for; on the first page only.")
+    iterations: list[Iteration] = Field(description="The iterations that were asked for; on the first page only.")
+    cells: list[PairCell] = Field(description="The results of this page.")
 
 
 class IterationStates(BaseModel):

@@ -224,7 +224,12 @@ class AsyncClient:
 
     async def job_pairs(self, job_id: str, iteration: int | None = None) -> Document:
         """Returns a job's pair matrix, of all iterations or of one."""
-        return await self._json("GET", f"/v1/jobs/{segment(job_id)}/pairs", params=given(iteration=iteration))
+        path, params = f"/v1/jobs/{segment(job_id)}/pairs", given(iteration=iteration)
+        matrix = await self._json("GET", path, params=params)
+        while matrix["next"] is not None:
+            page = await self._json("GET", path, params={**params, "after": matrix["next"]})
+            matrix = {**matrix, "cells": matrix["cells"] + page["cells"], "next": page["next"]}
+        return matrix
 
     async def events(self, job_id: str, after: int = 0) -> AsyncIterator[Document]:
         """Yields the job's events in order until the job has ended. An interrupted stream goes on where it stopped.

@@ -309,3 +309,32 @@ def test_a_region_is_not_certified_again_for_another_robot(client: TestClient, d
     assert (refused.status_code, refused.json()["code"], refused.json()["field"]) == (422, "other_robot", "scene")
     missing = client.post("/v1/jobs", json={"kind": "recertify", "scene": "other", "region": "nothing"})
     assert (missing.status_code, missing.json()["code"]) == (404, "region_not_found")
+
+
+def test_the_pair_matrix_comes_in_pages_that_do_not_part_the_parts_of_a_pair(client: TestClient, database: Database, scene: Scene) -> None:
+    job_id = client.post("/v1/jobs", json=CERTIFY | {"cells": 50}).json()["id"]
+    with database.write() as session:
+        job = jobs.lock(session, job_id)
+        jobs.start(session, job)
+        for index in range(3):
+            new = [pairs.NewPair(i, one.a, one.b, 1.0, part) for i, one in enumerate(scene.pairs) for part in range(index + 1)]
+            given = {"C": [[1.0], [-1.0]], "d": [1.0, 1.0], "center": None, "reuse": {}, "hard": [], "failures": None}
+            pairs.add_iteration(session, job, index=index, label="given", pairs=new, **given)
+    path = f"/v1/jobs/{job_id}/pairs"
+    whole = client.get(path).json()
+    assert ([(c["iteration"], c["pair"]) for c in whole["cells"]], whole["next"]) == ([(i, p) for i in range(3) for p in range(2)], None)
+    for limit in (1, 2, 3, 5, 6):
+        cells, after = [], None
+        while True:
+            page = client.get(path, params={"limit": limit, **({"after": after} if after else {})}).json()
+            assert len(page["cells"]) <= limit
+            assert (page["pairs"] == whole["pairs"]) == (page["iterations"] == whole["iterations"]) == (after is None)
+            cells += page["cells"]
+            after = page["next"]
+            if after is None:
+                break
+        assert cells == whole["cells"]
+    one = client.get(path, params={"pair": [1], "limit": 2}).json()
+    assert [(c["iteration"], c["pair"]) for c in one["cells"]] == [(0, 1), (1, 1)]
+    for wrong in ("1", "a.b", "-1.0", "9999999999.0", "²2.0"):
+        assert client.get(path, params={"after": wrong}).json()["code"] == "cursor"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
@@ -9,7 +11,7 @@ from sqlalchemy.orm import Session
 from certifier.outcome import Outcome, Stage
 from certifier.pair.result import PairResult
 from db import jobs, pairs, regions, scenes
-from db.models import IterationRow, JobRow, RegionRow, SceneRow
+from db.models import IterationRow, JobRow, PairRow, RegionRow, SceneRow
 from tests.scenes import slider
 
 
@@ -69,3 +71,8 @@ def add_region(session: Session, job: JobRow, lower: float = -1.0, upper: float 
         "share": None,
     }
     return regions.add(session, job, index, manifest, proof)
+
+
+def all_pairs(session: Session, job_id: str) -> Sequence[PairRow]:
+    """The job's pairs with their parts, in the order of the iterations and of the scene's pairs."""
+    return pairs.page(session, job_id, limit=10**6)[0]

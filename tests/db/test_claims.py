@@ -22,7 +22,7 @@ from db.models import IterationRow, PairRow, ProofRow, StepRow
 from db.session import Database
 from db.states import IterationState, JobState, PairState, StepKind, StepState, transition_each
 from db.types import utcnow
-from tests.db.builders import a_running_job, certified
+from tests.db.builders import a_running_job, all_pairs, certified
 
 ELSEWHERE = "elsewhere:1:1"
 
@@ -79,7 +79,7 @@ def test_processes_that_race_for_pairs_never_share_one(db: Database, database_ur
     assert sum(finished for _, finished in done) == 1
     with db.read() as session:
         assert session.get_one(IterationRow, (job_id, 0)).state == IterationState.CERTIFIED
-        assert all(row.attempts == 1 for row in pairs.of_job(session, job_id))
+        assert all(row.attempts == 1 for row in all_pairs(session, job_id))
         assert len(session.scalars(select(ProofRow)).all()) == 1
 
 
@@ -128,12 +128,12 @@ def test_the_first_failure_in_the_order_of_the_pairs_counts_whenever_it_comes(db
     assert third is not None
     assert save(db, second, refuted(2)) == pairs.Saved(held=False, finished=False)
     with db.read() as session:
-        assert [row.state for row in pairs.of_job(session, job_id)] == ["running", "running", "refuted", "skipped", "skipped"]
+        assert [row.state for row in all_pairs(session, job_id)] == ["running", "running", "refuted", "skipped", "skipped"]
     assert save(db, third, certified(3)) == pairs.Saved(held=False, finished=False)
     assert save(db, first, certified(0)) == pairs.Saved(held=True, finished=False)
     assert save(db, first, refuted(1)) == pairs.Saved(held=False, finished=True)
     with db.read() as session:
-        rows, iteration = pairs.of_job(session, job_id), session.get_one(IterationRow, (job_id, 0))
+        rows, iteration = all_pairs(session, job_id), session.get_one(IterationRow, (job_id, 0))
         assert [row.state for row in rows] == ["certified", "refuted", "refuted", "skipped", "skipped"]
         assert [row.pair_index for row in pairs.reached(session, iteration)] == [0, 1]
         assert rows[1].witness_s == [0.5]
@@ -152,7 +152,7 @@ def test_an_iteration_may_wait_for_several_failures(db: Database) -> None:
     assert save(db, third, refuted(3)) == pairs.Saved(held=False, finished=False)
     assert save(db, second, refuted(2)) == pairs.Saved(held=False, finished=False)
     with db.read() as session:
-        assert [row.state for row in pairs.of_job(session, job_id)] == ["running", "running", "refuted", "refuted", "skipped"]
+        assert [row.state for row in all_pairs(session, job_id)] == ["running", "running", "refuted", "refuted", "skipped"]
     assert save(db, first, refuted(0)) == pairs.Saved(held=True, finished=False)
     assert save(db, first, certified(1)) == pairs.Saved(held=False, finished=True)
     with db.read() as session:
@@ -178,7 +178,7 @@ def test_without_early_end_every_pair_gets_its_verdict(db: Database) -> None:
     assert not save(db, held, {(0, 0): failed}).finished
     assert save(db, held, certified(1)).finished
     with db.read() as session:
-        assert [row.state for row in pairs.of_job(session, job_id)] == ["not_certifiable", "certified"]
+        assert [row.state for row in all_pairs(session, job_id)] == ["not_certifiable", "certified"]
         assert set(pairs.proving(session, job_id, {0: 0, 1: 0})) == {1}
         assert [row.pair_index for row in pairs.reached(session, session.get_one(IterationRow, (job_id, 0)))] == [0, 1]
 
@@ -395,14 +395,14 @@ def test_a_lease_goes_by_the_databases_clock(db: Database, monkeypatch: pytest.M
 def test_settled_pairs_move_together_and_only_where_they_may(db: Database) -> None:
     with db.write() as session:
         job_id = a_running_job(session, 3).id
-        rows = {row.pair_index: row.id for row in pairs.of_job(session, job_id)}
+        rows = {row.pair_index: row.id for row in all_pairs(session, job_id)}
         moves = {rows[0]: (PairState.CERTIFIED, {"margin": 0.5}), rows[1]: (PairState.REFUTED, {"margin": None})}
         with pytest.raises(ValueError, match="no row may go from open"):
             transition_each(session, PairRow, PairState.OPEN, moves)
         transition_each(session, PairRow, PairState.RUNNING, moves)  # they are open, so they stay
         session.expire_all()
-        assert {row.state for row in pairs.of_job(session, job_id)} == {"open"}
+        assert {row.state for row in all_pairs(session, job_id)} == {"open"}
         leases.take(session, PairRow, list(rows.values())[:2], seconds=60)
         transition_each(session, PairRow, PairState.RUNNING, moves)
         session.expire_all()
-        assert [(row.state, row.margin) for row in pairs.of_job(session, job_id)] == [("certified", 0.5), ("refuted", None), ("open", None)]
+        assert [(row.state, row.margin) for row in all_pairs(session, job_id)] == [("certified", 0.5), ("refuted", None), ("open", None)]

@@ -16,7 +16,7 @@ from db.models import IterationRow, JobRow
 from db.pairs import FAILED, UNFINISHED
 from db.session import Database
 from db.states import IterationState, PairState
-from tests.db.builders import a_running_job
+from tests.db.builders import a_running_job, all_pairs
 
 RESULTS = {
     "certified": PairResult(Outcome.CERTIFIED, Stage.SOS, seconds=0.1, margin=0.01, proof=b"proof"),
@@ -39,7 +39,7 @@ class Log:
     def rows(self) -> list[tuple[str, int, str | None]]:
         """State, deaths and token of each pair, in their order, which is also that of their indices."""
         with self.db.read() as session:
-            return [(row.state, row.deaths, row.lease_token) for row in pairs.of_job(session, self.job_id)]
+            return [(row.state, row.deaths, row.lease_token) for row in all_pairs(session, self.job_id)]
 
     def check(self) -> None:
         states = Counter(state for state, _, _ in self.rows())

@@ -10,7 +10,7 @@ from db import jobs, migrate, overlaps, pairs, regions, scenes, subtrees, work
 from db.models import SceneRow
 from db.session import Database
 from db.types import utcnow
-from tests.db.builders import a_running_job, add_region, certified
+from tests.db.builders import a_running_job, add_region, all_pairs, certified
 from tests.scenes import slider
 
 
@@ -65,7 +65,7 @@ def test_jobs_and_their_pairs_survive_the_way_down_and_up(empty_database_url: st
     assert migrate.drift(empty_database_url) == []
     with database.read() as session:
         job = jobs.get(session, job_id)
-        assert (job.state, len(pairs.of_job(session, job_id))) == ("running", 3)
+        assert (job.state, len(all_pairs(session, job_id))) == ("running", 3)
         assert (job.action, jobs.growth(session, job_id)) == (certify, {"next": 1})
         assert [(row.hard, row.failures, row.faces) for row in pairs.iterations(session, job_id)] == [([], 1, 2)]
     database.close()
@@ -111,7 +111,7 @@ def test_iterations_stored_before_there_were_cells_say_that_they_have_none(empty
     database = Database(empty_database_url)
     with database.read() as session:
         assert [(row.cells, row.begun, row.parts, row.ending) for row in pairs.iterations(session, job_id)] == [(1, None, {}, [])]
-        assert {row.open_cells for row in pairs.of_job(session, job_id)} == {None}
+        assert {row.open_cells for row in all_pairs(session, job_id)} == {None}
     database.close()
 
 

@@ -14,7 +14,7 @@ from db.models import Base, JobRow, LibraryRow, ProofRow, RegionRow, SceneRow
 from db.session import Database, Session
 from db.states import JobState
 from db.types import utcnow
-from tests.db.builders import a_running_job, a_scene, add_region, certified
+from tests.db.builders import a_running_job, a_scene, add_region, all_pairs, certified
 
 LEFT = {"projects", "libraries", "alembic_version"}
 """These rows stay when everything else is deleted."""
@@ -132,8 +132,8 @@ def test_what_is_old_expires_where_the_project_says_so(db: Database) -> None:
         assert set(session.scalars(select(JobRow.id))) == {kept, running}
         assert session.get(JobRow, without) is None
         assert len(regions.of_job(session, kept)) == 1
-        assert len(pairs.of_job(session, kept)) == 0
-        assert len(pairs.of_job(session, running)) == 4
+        assert len(all_pairs(session, kept)) == 0
+        assert len(all_pairs(session, running)) == 4
         assert set(session.scalars(select(ProofRow.digest))) == {proofs.digest(b"of a region")}
 
 

@@ -10,7 +10,7 @@ from certifier.pair.result import PairResult
 from db import jobs, leases, pairs, subtrees
 from db.models import ProofRow, SubtreesRow
 from db.session import Database
-from tests.db.builders import a_running_job
+from tests.db.builders import a_running_job, all_pairs
 
 CERTIFIED = PairResult(Outcome.CERTIFIED, Stage.CELLS, margin=0.01, proof=b"proof")
 
@@ -66,7 +66,7 @@ def test_what_is_left_is_kept_and_is_no_proof(db: Database, outcome: Outcome) ->
     assert read(db, job_id, 0, 0) == [b"part"]
     assert stored(db) == (1, 1)
     with db.read() as session:
-        rows = pairs.of_job(session, job_id)
+        rows = all_pairs(session, job_id)
         assert [(row.state, row.proof_digest is None, row.open_cells) for row in rows] == [(outcome, True, 3), ("certified", False, None)]
     assert read(db, job_id, 1, 0) == []
 

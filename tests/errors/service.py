@@ -316,6 +316,16 @@ REQUESTS = [
         ("busy", "", "too many requests that change something wait already", "try again in a while", "tests/api/test_writers.py"),
     ),
     *rows(
+        "api/questions.py",
+        (
+            "busy",
+            "",
+            "too many large questions wait already",
+            "try again in a while, or ask about {few} points at a time",
+            "tests/api/test_questions.py",
+        ),
+    ),
+    *rows(
         "api/guard.py",
         ("too_many_requests", "", "more requests than one caller may make", "wait as long as Retry-After says", too_often),
         (

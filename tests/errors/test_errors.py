@@ -35,6 +35,8 @@ ABOUT_ALL = {
     "api/children.py",
     "api/guard.py",
     "api/problems.py",
+    "api/questions.py",
+    "api/room.py",
     "api/writing.py",
     "client/bench.py",
     "client/demo.py",

@@ -13,6 +13,7 @@ from db import jobs, pairs, proofs, regions, scenes, steps
 from db.models import RegionRow
 from db.session import database
 from db.states import IterationState, PairState, StepKind, StepState
+from tests.db.builders import all_pairs
 from tests.workers.service import events_of
 
 SETTLED = set(PairState) - {PairState.OPEN, PairState.RUNNING, PairState.SKIPPED}
@@ -22,7 +23,7 @@ def check_record(job_id: str) -> None:
     """Nothing is unfinished, lost, or done twice, and the events say the same as the rows."""
     with database().read() as session:
         job = jobs.get(session, job_id)
-        rows, iterations, did = pairs.of_job(session, job_id), pairs.iterations(session, job_id), steps.of_job(session, job_id)
+        rows, iterations, did = all_pairs(session, job_id), pairs.iterations(session, job_id), steps.of_job(session, job_id)
         stored = session.scalars(select(RegionRow).where(RegionRow.job_id == job_id)).all()
         scene_pairs = len(scenes.get(session, job.scene_id).document["pairs"])
     events = events_of(job_id)

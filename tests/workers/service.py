@@ -16,11 +16,12 @@ from typing import Any, TypeVar
 import pytest
 
 from certifier.model import Scene
-from db import events, jobs, pairs, scenes
+from db import events, jobs, scenes
 from db.models import EventRow, JobRow, PairRow
 from db.session import database
 from db.settings import settings
 from db.states import JOB, unfinished
+from tests.db.builders import all_pairs
 from workers.app import celery_app, send_coordinate
 from workers.processes import die_with_parent
 
@@ -139,7 +140,7 @@ def job_of(job_id: str) -> JobRow:
 
 def pairs_of(job_id: str) -> list[PairRow]:
     with database().read() as session:
-        return list(pairs.of_job(session, job_id))
+        return list(all_pairs(session, job_id))
 
 
 def events_of(job_id: str) -> list[EventRow]:

@@ -64,6 +64,7 @@ export interface Drawable {
 interface Matrix {
   pairs: PairName[];
   cells: PairCell[];
+  next: string | null;
 }
 
 const SYNC_MS = 500;
@@ -127,7 +128,7 @@ export class JobStore {
         first = Math.max(this.begun - AT_FIRST, 0);
       const [{ iterations }, { pairs, cells }] = await Promise.all([
         this.states(first),
-        get<Matrix>(`${this.path}/pairs?iteration=${last}`),
+        this.matrix(last),
       ]);
       this.iterations = iterations;
       this.pairs = pairs;
@@ -163,7 +164,7 @@ export class JobStore {
     if (this.details.has(iteration) || this.asked.has(iteration)) return;
     this.asked.add(iteration);
     void this.attempt(async () => {
-      this.keep(iteration, (await get<Matrix>(`${this.path}/pairs?iteration=${iteration}`)).cells);
+      this.keep(iteration, (await this.matrix(iteration)).cells);
       this.asked.delete(iteration);
     });
   }
@@ -240,6 +241,18 @@ export class JobStore {
     } finally {
       this.syncing = false;
     }
+  }
+
+  /** The results of an iteration, from all pages. */
+  private async matrix(iteration: number): Promise<Matrix> {
+    const path = `${this.path}/pairs?iteration=${iteration}`,
+      first = await get<Matrix>(path);
+    for (let next = first.next; next !== null; ) {
+      const page = await get<Matrix>(`${path}&after=${next}`);
+      first.cells.push(...page.cells);
+      next = page.next;
+    }
+    return first;
   }
 
   private async results(iteration: number, pairs: number[]): Promise<void> {
