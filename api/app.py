@@ -10,7 +10,7 @@ from anyio import to_thread
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
-from api import guard, login, problems
+from api import document, guard, login, problems
 from api.access import Keyring
 from api.access_log import AccessLog
 from api.announce import Announcer
@@ -77,7 +77,7 @@ def create_app(db: Database | None = None) -> FastAPI:
         app.include_router(module.router)
     app.include_router(login.router)
     site.install(app)
-    app.openapi = partial(problems.describe, app)  # type: ignore[method-assign]
+    app.openapi = partial(document.describe, app)  # type: ignore[method-assign]
     return app
 
 

@@ -10,10 +10,8 @@ from typing import Any
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
-from fastapi.openapi.utils import get_openapi
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel, ConfigDict
-from pydantic.json_schema import models_json_schema
+from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
 from certifier.errors import CirisError
@@ -54,6 +52,9 @@ _STATUS_OF_CODE = {
     "too_many_requests": HTTPStatus.TOO_MANY_REQUESTS,
     "quota_exceeded": HTTPStatus.TOO_MANY_REQUESTS,
     "busy": HTTPStatus.SERVICE_UNAVAILABLE,
+    "malformed_json": HTTPStatus.BAD_REQUEST,
+    "database_unavailable": HTTPStatus.SERVICE_UNAVAILABLE,
+    "internal": HTTPStatus.INTERNAL_SERVER_ERROR,
 }
 
 RETRY_SECONDS = 5
@@ -66,8 +67,8 @@ _PLACES = {HTTPStatus.NOT_FOUND: "url", HTTPStatus.METHOD_NOT_ALLOWED: "method",
 class FieldProblem(BaseModel):
     """Names one field of the request that is wrong, and says why."""
 
-    field: str
-    message: str
+    field: str = Field(description="The field, as in `seed.q[1]`.")
+    message: str = Field(description="What is wrong with it.")
 
 
 class Problem(BaseModel):
@@ -90,22 +91,27 @@ class Problem(BaseModel):
         }
     )
 
-    type: str
-    title: str
-    status: int
-    detail: str
-    code: str
-    field: str | None = None
-    hint: str = ""
-    errors: list[FieldProblem] = []
+    type: str = Field(description="`urn:ciris:problem:` and the code.")
+    title: str = Field(description="The phrase of the HTTP status.")
+    status: int = Field(description="The HTTP status.")
+    detail: str = Field(description="What is wrong, in words.")
+    code: str = Field(description="What is wrong, for programs. Codes are stable.")
+    field: str | None = Field(None, description="Where it is wrong: a field, a header or `url`; null where the whole request is meant.")
+    hint: str = Field("", description="What to do about it.")
+    errors: list[FieldProblem] = Field([], description="All fields that are wrong, where there are several.")
 
 
 Render = Callable[[Request, Problem], Response]
 
 
+def status_of(code: str) -> HTTPStatus:
+    """Returns the status of an error with this code."""
+    return _STATUS_OF_CODE.get(code, HTTPStatus.UNPROCESSABLE_ENTITY)
+
+
 def problem_of(error: CirisError, status: HTTPStatus | None = None, errors: Sequence[FieldProblem] = ()) -> Problem:
     """Turns an error into a problem. The status is the given one, or else that of the error's code."""
-    status = _STATUS_OF_CODE.get(error.code, HTTPStatus.UNPROCESSABLE_ENTITY) if status is None else status
+    status = status_of(error.code) if status is None else status
     return Problem(
         type=f"urn:ciris:problem:{error.code}",
         title=status.phrase,
@@ -143,7 +149,7 @@ def _validation(error: RequestValidationError) -> Problem:
     found = error.errors()
     problems = [FieldProblem(field=_field(e["loc"]), message=_sentence(e)) for e in found]
     if any(e["type"] == "json_invalid" for e in found):
-        return problem_of(CirisError("malformed_json", "the body is not JSON", field="body", hint=_DESCRIBED), HTTPStatus.BAD_REQUEST)
+        return problem_of(CirisError("malformed_json", "the body is not JSON", field="body", hint=_DESCRIBED))
     # Of the types that a field may have, the one that was meant is the one of which most was right.
     first = max(range(len(found)), key=lambda i: (found[i]["loc"][:2] == found[0]["loc"][:2], len(found[i]["loc"]), -i))
     meant = CirisError("invalid_request", problems[first].message, field=problems[first].field or "body", hint=_DESCRIBED)
@@ -158,12 +164,12 @@ def _http(error: HTTPException) -> Problem:
 
 def _unavailable(_error: Exception) -> Problem:
     hint = "try again; what was committed is safe"
-    return problem_of(CirisError("database_unavailable", "the database cannot be reached", hint=hint), HTTPStatus.SERVICE_UNAVAILABLE)
+    return problem_of(CirisError("database_unavailable", "the database cannot be reached", hint=hint))
 
 
 def _unexpected(_error: Exception) -> Problem:
     hint = "the service's log has the details"
-    return problem_of(CirisError("internal", "something went wrong in the service", hint=hint), HTTPStatus.INTERNAL_SERVER_ERROR)
+    return problem_of(CirisError("internal", "something went wrong in the service", hint=hint))
 
 
 _EXPLANATIONS: dict[type, Callable[[Any], Problem]] = {
@@ -194,23 +200,3 @@ def _sentence(error: dict[str, Any]) -> str:
         return "there is no such field"
     message = str(error["msg"]).removeprefix("Value error, ").replace(" after validation", "")
     return message[:1].lower() + message[1:]
-
-
-def describe(app: FastAPI) -> dict[str, Any]:
-    """Returns the OpenAPI document, in which every operation has the problem as its error response."""
-    if app.openapi_schema is None:
-        document = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
-        schemas = document["components"]["schemas"]
-        for name in ("HTTPValidationError", "ValidationError"):
-            schemas.pop(name, None)
-        schemas.update(models_json_schema([(Problem, "serialization")], ref_template="#/components/schemas/{model}")[1]["$defs"])
-        problem = {
-            "description": "A problem says what is wrong.",
-            "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
-        }
-        for path in document["paths"].values():
-            for operation in path.values():
-                operation["responses"].pop("422", None)
-                operation["responses"]["default"] = problem
-        app.openapi_schema = document
-    return app.openapi_schema

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Depends, Request
 
 from api import cells
 from api.access import READ, Db
 from api.cells import OutlinesKept
 from api.reading import ReadingRoute
 from api.schemas.cells import Partition, RegionPairs
-from api.schemas.common import MAX_INT
+from api.schemas.common import JobGiven, OfIteration, PairGiven, RegionGiven
 from db import jobs, regions, scenes
 
 router = APIRouter(prefix="/v1", dependencies=[READ], route_class=ReadingRoute)
@@ -26,7 +26,7 @@ Outlines = Annotated[OutlinesKept, Depends(_outlines)]
 
 
 @router.get("/regions/{region_id}/pairs", tags=["regions"])
-def get_region_pairs(region_id: str, db: Db, outlines: Outlines) -> RegionPairs:
+def get_region_pairs(region_id: RegionGiven, db: Db, outlines: Outlines) -> RegionPairs:
     """Returns how each pair of a region is proved: by one plane or over how many cells, with what margin, and together with which pairs."""
     with db.read() as session:
         region = regions.get(session, region_id)
@@ -35,7 +35,7 @@ def get_region_pairs(region_id: str, db: Db, outlines: Outlines) -> RegionPairs:
 
 
 @router.get("/regions/{region_id}/pairs/{pair}/cells", tags=["regions"])
-def get_region_cells(region_id: str, pair: int, db: Db, outlines: Outlines) -> Partition:
+def get_region_cells(region_id: RegionGiven, pair: PairGiven, db: Db, outlines: Outlines) -> Partition:
     """Returns the cells over which a pair of a region is proved; one cell where one plane serves on all of the region."""
     with db.read() as session:
         region = regions.get(session, region_id)
@@ -45,9 +45,7 @@ def get_region_cells(region_id: str, pair: int, db: Db, outlines: Outlines) -> P
 
 
 @router.get("/jobs/{job_id}/pairs/{pair}/cells", tags=["jobs"])
-def get_job_cells(
-    job_id: str, pair: int, db: Db, outlines: Outlines, iteration: Annotated[int | None, Query(ge=0, le=MAX_INT)] = None
-) -> Partition:
+def get_job_cells(job_id: JobGiven, pair: PairGiven, db: Db, outlines: Outlines, iteration: OfIteration = None) -> Partition:
     """Returns the cells of a pair as a job has left them in an iteration, or in its last one, proved and open.
 
     Where the pair's proof of an earlier iteration serves, these are its cells. A job that has ended keeps the cells of the pairs that it

@@ -12,7 +12,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from api.access import READ, Db, presented_key
 from api.reading import ReadingRoute
-from api.schemas.common import MAX_INT
+from api.schemas.common import MAX_INT, JobGiven, Listed
 from api.schemas.jobs import Event, EventList
 from db import events, jobs
 from db.session import Database
@@ -26,10 +26,10 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ], route_
 
 @router.get("/{job_id}/events")
 def list_job_events(
-    job_id: str,
+    job_id: JobGiven,
     db: Db,
     after: After = 0,
-    limit: Annotated[int, Query(ge=1, le=1000)] = PAGE,
+    limit: Listed = PAGE,
     before: Annotated[
         int | None, Query(ge=1, le=MAX_INT, description="Return the last events with a smaller number than this; `after` is not looked at.")
     ] = None,
@@ -41,7 +41,7 @@ def list_job_events(
         return EventList(events=[Event.of(row) for row in rows])
 
 
-def _existing(job_id: str, db: Db) -> str:
+def _existing(job_id: JobGiven, db: Db) -> str:
     """Returns the id if the job exists. This comes before the stream begins, because a stream cannot answer 404 any more."""
     with db.read() as session:
         return jobs.get(session, job_id).id

@@ -22,7 +22,7 @@ from api.access import READ, SUBMIT, Admin, Db, Submitter
 from api.announce import Announcements
 from api.reading import ReadingRoute
 from api.room import KeptRoom
-from api.schemas.common import MAX_INT, Cursor, WithDependents
+from api.schemas.common import MAX_INT, Cursor, JobGiven, OfIteration, OfScene, PairGiven, WithDependents
 from api.schemas.covers import Cover, CoverRegion
 from api.schemas.jobs import (
     CertifyPathRequest,
@@ -65,6 +65,8 @@ from planner.cover.state import CoverState
 MOST_PAIRS = 5000
 """One page of a pair matrix has so many results at most."""
 
+InIteration = Annotated[int, Query(ge=0, le=MAX_INT, description="The iteration whose result is meant.")]
+
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ], route_class=ReadingRoute)
 
 
@@ -82,7 +84,10 @@ def create_job(
     background: BackgroundTasks,
     announcements: Announcements,
     room: KeptRoom,
-    idempotency_key: Annotated[str | None, Header(min_length=1, max_length=200)] = None,
+    idempotency_key: Annotated[
+        str | None,
+        Header(min_length=1, max_length=200, description="The same key and body give the same job."),
+    ] = None,
 ) -> Job:
     """Starts a job that grows a region, certifies a polytope or a motion, certifies a region of a changed scene again, or covers a scene.
 
@@ -154,13 +159,13 @@ def _digest(scene_id: str, options: dict[str, Any], body: JobRequest) -> str:
 @router.get("")
 def list_jobs(
     db: Db,
-    state: JobState | None = None,
-    kind: JobKind | None = None,
-    scene: str | None = None,
+    state: Annotated[JobState | None, Query(description="List only the jobs in this state.")] = None,
+    kind: Annotated[JobKind | None, Query(description="List only the jobs of this kind.")] = None,
+    scene: OfScene = None,
     ended: Annotated[bool | None, Query(description="`true` lists the jobs that have ended, `false` the others.")] = None,
     parent: Annotated[str | None, Query(max_length=64, description="List the jobs that grow the regions of this cover.")] = None,
     after: Cursor = None,
-    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+    limit: Annotated[int, Query(ge=1, le=200, description="Return so many at most.")] = 50,
 ) -> JobPage:
     """Lists the jobs that were asked for, newest first; or those that a cover has made for its regions."""
     with db.read() as session:
@@ -171,7 +176,7 @@ def list_jobs(
 
 
 @router.get("/{job_id}")
-def get_job(job_id: str, db: Db) -> Job:
+def get_job(job_id: JobGiven, db: Db) -> Job:
     """Returns one job as it is now."""
     with db.read() as session:
         job = jobs.get(session, job_id)
@@ -179,7 +184,7 @@ def get_job(job_id: str, db: Db) -> Job:
 
 
 @router.get("/{job_id}/dependents")
-def get_job_dependents(job_id: str, db: Db) -> Dependents:
+def get_job_dependents(job_id: JobGiven, db: Db) -> Dependents:
     """Returns what is deleted with a job: its regions and proofs, and the jobs that a cover has made."""
     with db.read() as session:
         return Dependents(**asdict(retention.of_job(session, job_id)))
@@ -187,7 +192,7 @@ def get_job_dependents(job_id: str, db: Db) -> Dependents:
 
 @router.delete("/{job_id}", status_code=status.HTTP_204_NO_CONTENT)
 @writing
-def delete_job(job_id: str, caller: Admin, db: Db, dependents: WithDependents = "keep") -> None:
+def delete_job(job_id: JobGiven, caller: Admin, db: Db, dependents: WithDependents = "keep") -> None:
     """Deletes a job that has ended. Where it has regions or other jobs, the request has to say that they are deleted, too."""
     with db.write() as session:
         retention.delete_job(session, job_id, dependents=dependents == "delete")
@@ -196,7 +201,7 @@ def delete_job(job_id: str, caller: Admin, db: Db, dependents: WithDependents = 
 
 @router.post("/{job_id}/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
 @writing
-def cancel_job(job_id: str, db: Db, background: BackgroundTasks, announcements: Announcements) -> Job:
+def cancel_job(job_id: JobGiven, db: Db, background: BackgroundTasks, announcements: Announcements) -> Job:
     """Asks a job to end. Regions that were certified before remain.
 
     Nothing happens to a job that has ended.
@@ -209,7 +214,9 @@ def cancel_job(job_id: str, db: Db, background: BackgroundTasks, announcements: 
 
 @router.post("/{job_id}/retry", status_code=status.HTTP_201_CREATED)
 @writing
-def retry_job(job_id: str, caller: Submitter, db: Db, response: Response, background: BackgroundTasks, announcements: Announcements) -> Job:
+def retry_job(
+    job_id: JobGiven, caller: Submitter, db: Db, response: Response, background: BackgroundTasks, announcements: Announcements
+) -> Job:
     """Creates a new job like one that failed or was cancelled.
 
     A repetition of the request returns the same new job.
@@ -222,7 +229,7 @@ def retry_job(job_id: str, caller: Submitter, db: Db, response: Response, backgr
 
 
 @router.get("/{job_id}/cover")
-def get_job_cover(job_id: str, db: Db) -> Cover:
+def get_job_cover(job_id: JobGiven, db: Db) -> Cover:
     """Returns what a cover has come to: how much is covered, how it hangs together, and which regions it has grown."""
     with db.read() as session:
         job = jobs.get(session, job_id)
@@ -248,13 +255,13 @@ def get_job_cover(job_id: str, db: Db) -> Cover:
 
 
 @router.get("/{job_id}/motion")
-def get_job_motion(job_id: str, db: Db) -> JobMotion:
+def get_job_motion(job_id: JobGiven, db: Db) -> JobMotion:
     """Returns what has become of the motion that a job has certified."""
     return JobMotion.model_validate(_verdict(db, job_id)[1])
 
 
 @router.get("/{job_id}/motion/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
-def download_motion_proof(job_id: str, db: Db) -> Response:
+def download_motion_proof(job_id: JobGiven, db: Db) -> Response:
     """Returns the proof of the motion that a job has certified, or of its beginning, together with the scene.
 
     `ciris verify` checks the file offline.
@@ -285,7 +292,7 @@ def _verdict(db: Database, job_id: str) -> tuple[str, dict[str, Any]]:
 
 
 @router.get("/{job_id}/webhook")
-def get_job_webhook(job_id: str, db: Db) -> Webhook:
+def get_job_webhook(job_id: JobGiven, db: Db) -> Webhook:
     """Returns the job's webhook: whether its receiver has been told that the job has ended."""
     with db.read() as session:
         return Webhook.of(webhooks.of_job(session, jobs.get(session, job_id).id))
@@ -293,9 +300,9 @@ def get_job_webhook(job_id: str, db: Db) -> Webhook:
 
 @router.get("/{job_id}/pairs")
 def get_job_pairs(
-    job_id: str,
+    job_id: JobGiven,
     db: Db,
-    iteration: Annotated[int | None, Query(ge=0, le=MAX_INT)] = None,
+    iteration: OfIteration = None,
     pair: Annotated[
         list[Annotated[int, Field(ge=0, le=MAX_INT)]] | None,
         Query(max_length=200, description="Indices of the pairs wanted; all pairs if left out."),
@@ -335,7 +342,7 @@ def _place(after: str | None) -> tuple[int, int] | None:
 
 @router.get("/{job_id}/pairs/states")
 def get_job_pair_states(
-    job_id: str, db: Db, since: Annotated[int, Query(ge=0, le=MAX_INT, description="Return only iterations from this one on.")] = 0
+    job_id: JobGiven, db: Db, since: Annotated[int, Query(ge=0, le=MAX_INT, description="Return only iterations from this one on.")] = 0
 ) -> PairStates:
     """Returns the state of every pair in every iteration as one letter. It is short, also for thousands of pairs in many iterations."""
     with db.read() as session:
@@ -368,7 +375,12 @@ def _letters(row: IterationRow, known: Mapping[int, PairState], count: int) -> I
 
 
 @router.get("/{job_id}/pairs/{pair}/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
-def download_pair_proof(job_id: str, pair: int, iteration: Annotated[int, Query(ge=0, le=MAX_INT)], db: Db) -> Response:
+def download_pair_proof(
+    job_id: JobGiven,
+    pair: PairGiven,
+    iteration: Annotated[int, Query(ge=0, le=MAX_INT, description="The iteration whose result is meant.")],
+    db: Db,
+) -> Response:
     """Returns the proof of a pair's outcome (certified, refuted or not certifiable), together with the scene.
 
     `ciris verify` checks the file offline. What a search over partitions has not certified has no proof.
@@ -422,7 +434,7 @@ def _cell(scene: Scene, parts: Sequence[PairRow]) -> PairCell:
 
 
 @router.get("/{job_id}/workers")
-def get_job_workers(job_id: str, db: Db) -> JobWorkers:
+def get_job_workers(job_id: JobGiven, db: Db) -> JobWorkers:
     """Returns which processes hold which work of a job at this moment."""
     with db.read() as session:
         job = jobs.get(session, job_id)
@@ -459,7 +471,7 @@ def _deciding(job: JobRow) -> Worker:
 
 @router.get("/{job_id}/obstacles")
 def get_job_obstacles(
-    job_id: str, db: Db, limit: Annotated[int, Query(ge=1, le=1000, description="Return so many obstacles at most, the worst.")] = 100
+    job_id: JobGiven, db: Db, limit: Annotated[int, Query(ge=1, le=1000, description="Return so many obstacles at most, the worst.")] = 100
 ) -> Obstacles:
     """Returns what holds the region of a job back, or has cut it, in words, worst first: each with the pair and a configuration.
 
@@ -473,7 +485,7 @@ def get_job_obstacles(
 
 
 @router.get("/{job_id}/growth")
-def get_job_growth(job_id: str, db: Db) -> GrowthCurve:
+def get_job_growth(job_id: JobGiven, db: Db) -> GrowthCurve:
     """Returns the regions that were certified during the job, with their volumes and shares of the proposal."""
     with db.read() as session:
         job = jobs.get(session, job_id)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, status
+from fastapi import APIRouter, Path, status
 
 from api.access import ADMIN, READ, Admin, Db, Reader
 from api.reading import ReadingRoute
 from api.room import KeptRoom
-from api.schemas.common import Cursor
+from api.schemas.common import Cursor, Listed
 from api.schemas.service import AuditLine, AuditPage, KeyPage, KeySummary, MadeKey, NewKey, Project
 from api.writing import writing
 from certifier.errors import CirisError
@@ -18,7 +18,8 @@ from db.audit import Action
 
 router = APIRouter(prefix="/v1", tags=["project"], dependencies=[READ], route_class=ReadingRoute)
 
-Limit = Annotated[int, Query(ge=1, le=1000, description="Return so many at most.")]
+
+KeyName = Annotated[str, Path(description="The name of a key that has not been revoked.", examples=["planner"])]
 
 
 @router.get("/project")
@@ -51,7 +52,7 @@ def create_key(body: NewKey, caller: Admin, db: Db) -> MadeKey:
 
 
 @router.get("/keys", dependencies=[ADMIN])
-def list_keys(db: Db, after: Cursor = None, limit: Limit = 100) -> KeyPage:
+def list_keys(db: Db, after: Cursor = None, limit: Listed = 100) -> KeyPage:
     """Lists the keys of the caller's project, newest first, without what is secret."""
     with db.read() as session:
         page = keys.page(session, after, limit)
@@ -60,7 +61,9 @@ def list_keys(db: Db, after: Cursor = None, limit: Limit = 100) -> KeyPage:
 
 @router.delete("/keys/{name}", status_code=status.HTTP_204_NO_CONTENT)
 @writing
-def revoke_key(name: str, caller: Admin, db: Db) -> None:
+def revoke_key(
+    name: Annotated[str, Path(description="The name of a key that has not been revoked.", examples=["planner"])], caller: Admin, db: Db
+) -> None:
     """Revokes the key of this name, the caller's own too. The service refuses it a second later at the latest."""
     with db.write() as session:
         keys.revoke(session, name, caller.project)
@@ -68,7 +71,7 @@ def revoke_key(name: str, caller: Admin, db: Db) -> None:
 
 
 @router.get("/audit", dependencies=[ADMIN])
-def list_audit(db: Db, after: Cursor = None, limit: Limit = 100) -> AuditPage:
+def list_audit(db: Db, after: Cursor = None, limit: Listed = 100) -> AuditPage:
     """Lists who changed keys and limits of the caller's project, and who deleted what, newest first."""
     with db.read() as session:
         page = audit.page(session, after, limit)

@@ -13,7 +13,7 @@ from api import drawing, exports
 from api.access import READ, Admin, Db
 from api.children import Children
 from api.reading import ReadingRoute
-from api.schemas.common import MAX_INT, Cursor
+from api.schemas.common import MAX_INT, Cursor, Listed, OfScene, RegionGiven
 from api.schemas.drawing import MAX_SAMPLES, Extreme, RegionConfigurations
 from api.schemas.regions import RegionDetail, RegionPage, RegionSummary, Verification
 from api.writing import writing
@@ -39,13 +39,17 @@ class ExportFormat(StrEnum):
     """Drake's IrisRegions, in tangent-space coordinates s, for Drake's LoadIrisRegionsYamlFile."""
 
 
+Format = Annotated[ExportFormat, Query(description="The format of the file.")]
+RegionName = Annotated[str | None, Query(max_length=255, description="What the region is called in the file; default: its id.")]
+
+
 @router.get("")
 def list_regions(
     db: Db,
-    scene: str | None = None,
-    job: str | None = None,
+    scene: OfScene = None,
+    job: Annotated[str | None, Query(max_length=64, description="List only the regions that this job has grown.")] = None,
     after: Cursor = None,
-    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    limit: Listed = 100,
 ) -> RegionPage:
     """Lists the certified regions, newest first.
 
@@ -59,7 +63,7 @@ def list_regions(
 
 
 @router.get("/{region_id}")
-def get_region(region_id: str, db: Db) -> RegionDetail:
+def get_region(region_id: RegionGiven, db: Db) -> RegionDetail:
     """Returns one region with its manifest."""
     with db.read() as session:
         return RegionDetail.of(regions.get(session, region_id))
@@ -67,7 +71,7 @@ def get_region(region_id: str, db: Db) -> RegionDetail:
 
 @router.get("/{region_id}/configurations")
 async def get_region_configurations(
-    region_id: str,
+    region_id: RegionGiven,
     db: Db,
     children: Children,
     samples: Annotated[int, Query(ge=0, le=MAX_SAMPLES, description="So many samples.")] = 100,
@@ -95,7 +99,7 @@ def _configurations(db: Database, region_id: str, samples: int, seed: int) -> Re
 
 
 @router.get("/{region_id}/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
-def download_region_proof(region_id: str, db: Db) -> Response:
+def download_region_proof(region_id: RegionGiven, db: Db) -> Response:
     """Returns the region's proof file, which `ciris verify` checks offline."""
     with db.read() as session:
         digest = regions.get(session, region_id).proof_digest
@@ -104,7 +108,7 @@ def download_region_proof(region_id: str, db: Db) -> Response:
 
 
 @router.post("/{region_id}/verify")
-async def verify_region(region_id: str, db: Db, children: Children) -> Verification:
+async def verify_region(region_id: RegionGiven, db: Db, children: Children) -> Verification:
     """Checks the region's whole stored proof again and returns what it proves, in plain words.
 
     A process of its own, with limits on time and memory, does the check.
@@ -134,7 +138,7 @@ def _verify(db: Database, region_id: str) -> Verification:
 @router.get(
     "/{region_id}/export", response_class=Response, responses={200: {"content": {kind: {} for kind in exports.MEDIA_TYPES.values()}}}
 )
-def export_region(region_id: str, db: Db, format: ExportFormat = ExportFormat.JSON, name: str | None = None) -> Response:
+def export_region(region_id: RegionGiven, db: Db, format: Format = ExportFormat.JSON, name: RegionName = None) -> Response:
     """Returns the region as a file for other programs.
 
     `json` is the manifest. `npz` holds arrays in s for NumPy: C, d, center and the ellipsoid. `drake-yaml` holds Drake's IrisRegions in s,
@@ -150,7 +154,7 @@ def export_region(region_id: str, db: Db, format: ExportFormat = ExportFormat.JS
 
 @router.delete("/{region_id}", status_code=status.HTTP_204_NO_CONTENT)
 @writing
-def delete_region(region_id: str, caller: Admin, db: Db) -> None:
+def delete_region(region_id: RegionGiven, caller: Admin, db: Db) -> None:
     """Deletes a region, and its proof file unless another region has the same."""
     with db.write() as session:
         regions.delete(session, region_id)

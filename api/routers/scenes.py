@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Annotated, BinaryIO
 
-from fastapi import APIRouter, File, Query, Response, UploadFile, status
+from fastapi import APIRouter, File, Response, UploadFile, status
 
 from api import drawing
 from api.access import READ, Admin, Db, Submitter
 from api.children import Children
 from api.reading import ReadingRoute
 from api.room import KeptRoom, Room
-from api.schemas.common import Cursor, WithDependents
+from api.schemas.common import Cursor, Listed, SceneGiven, WithDependents
 from api.schemas.drawing import SceneModel
 from api.schemas.scenes import IgnoredPair, LintReport, PairForecast, SceneDetail, ScenePage, ScenePairs, SceneSummary, Substitution
 from api.schemas.service import Dependents
@@ -28,7 +28,9 @@ router = APIRouter(prefix="/v1/scenes", tags=["scenes"], dependencies=[READ], ro
 
 @router.post("", status_code=status.HTTP_201_CREATED)
 async def create_scene(
-    bundle: Annotated[UploadFile, File(description="A zip of the directory with `scene.yaml` and every file it refers to.")],
+    bundle: Annotated[
+        UploadFile, File(description="A zip of the scene file and every file that it refers to.", json_schema_extra={"format": "binary"})
+    ],
     db: Db,
     children: Children,
     room: KeptRoom,
@@ -37,8 +39,14 @@ async def create_scene(
 ) -> SceneDetail:
     """Uploads a scene.
 
-    A separate process reads it, so a bad file cannot harm the service. The same content is the same scene. From now on its name means this
-    scene, also where it meant another one.
+    The body is multipart/form-data with one part, `bundle`: a zip of at most 64 MiB, which unpacks to at most 256 MiB and 1000 files. It
+    holds the scene file and every file that this refers to: models (URDF, SDFormat, MJCF) and their meshes. All paths stay inside of the
+    zip. A plain zip of a directory is enough where exactly one file is called `scene.yaml`, or else only one is a YAML file. Otherwise a
+    file `bundle.json` says which one is the scene: `{"scene": "cell/left.yaml"}`. docs/scenes.md describes the scene file. `ciris scene
+    add` makes such a zip and sends it.
+
+    A separate process reads the zip, so a bad file cannot harm the service. The same content is the same scene, whose id does not change.
+    From now on its name means this scene, also where it meant another one.
     """
     scene = await children.run(_add_scene, db, room, caller.project, bundle.file)
     response.headers["Location"] = f"/v1/scenes/{scene.id}"
@@ -54,7 +62,7 @@ def _add_scene(db: Database, room: Room, project: str, file: BinaryIO) -> SceneD
 
 
 @router.get("")
-def list_scenes(db: Db, after: Cursor = None, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> ScenePage:
+def list_scenes(db: Db, after: Cursor = None, limit: Listed = 100) -> ScenePage:
     """Lists the scenes, newest first."""
     with db.read() as session:
         page = scenes.page(session, after, limit)
@@ -63,7 +71,7 @@ def list_scenes(db: Db, after: Cursor = None, limit: Annotated[int, Query(ge=1, 
 
 
 @router.get("/{scene_id}")
-def get_scene(scene_id: str, db: Db) -> SceneDetail:
+def get_scene(scene_id: SceneGiven, db: Db) -> SceneDetail:
     """Returns one scene, by its id or by its name. A name means the scene that was last added under it."""
     with db.read() as session:
         row = scenes.get(session, scene_id)
@@ -71,7 +79,7 @@ def get_scene(scene_id: str, db: Db) -> SceneDetail:
 
 
 @router.get("/{scene_id}/model")
-def get_scene_model(scene_id: str, db: Db) -> SceneModel:
+def get_scene_model(scene_id: SceneGiven, db: Db) -> SceneModel:
     """Returns the scene as it is drawn: its kinematic tree, and the convex bodies that are certified."""
     with db.read() as session:
         found = scenes.find(session, scene_id)
@@ -79,7 +87,7 @@ def get_scene_model(scene_id: str, db: Db) -> SceneModel:
 
 
 @router.get("/{scene_id}/pairs")
-def get_scene_pairs(scene_id: str, db: Db) -> ScenePairs:
+def get_scene_pairs(scene_id: SceneGiven, db: Db) -> ScenePairs:
     """Returns the pairs to certify, with the reference frame chosen for each pair and a forecast of its cost."""
     with db.read() as session:
         scene_id = scenes.find(session, scene_id)
@@ -93,7 +101,7 @@ def get_scene_pairs(scene_id: str, db: Db) -> ScenePairs:
 
 
 @router.get("/{scene_id}/lint")
-def get_scene_lint(scene_id: str, db: Db) -> LintReport:
+def get_scene_lint(scene_id: SceneGiven, db: Db) -> LintReport:
     """Returns what a reader should know about the scene before trusting a certificate for it."""
     with db.read() as session:
         document = scenes.get(session, scene_id).document
@@ -109,7 +117,7 @@ def get_scene_lint(scene_id: str, db: Db) -> LintReport:
 
 
 @router.get("/{scene_id}/dependents")
-def get_scene_dependents(scene_id: str, db: Db) -> Dependents:
+def get_scene_dependents(scene_id: SceneGiven, db: Db) -> Dependents:
     """Returns what is deleted with a scene: its jobs, and their regions and proofs."""
     with db.read() as session:
         return Dependents(**asdict(retention.of_scene(session, scene_id)))
@@ -117,7 +125,7 @@ def get_scene_dependents(scene_id: str, db: Db) -> Dependents:
 
 @router.delete("/{scene_id}", status_code=status.HTTP_204_NO_CONTENT)
 @writing
-def delete_scene(scene_id: str, caller: Admin, db: Db, dependents: WithDependents = "keep") -> None:
+def delete_scene(scene_id: SceneGiven, caller: Admin, db: Db, dependents: WithDependents = "keep") -> None:
     """Deletes a scene with its names. Where jobs or regions depend on it, the request has to say that they are deleted, too."""
     with db.write() as session:
         retention.delete_scene(session, scene_id, dependents=dependents == "delete")

@@ -22,7 +22,7 @@ class ProofKind(StrEnum):
 class RegionPair(PairInfo):
     """Describes the proof of one pair of a region."""
 
-    kind: ProofKind
+    kind: ProofKind = Field(description="The form of the proof.")
     cells: int = Field(description="Number of cells of the proof, the leaves of its tree; 1 for one plane on all of the polytope.")
     margin: float | None = Field(
         description="Certified lower bound, in metres, of the distance between the padded bodies; null where the proof bounds none."
@@ -53,7 +53,7 @@ class RegionPairs(BaseModel):
         }
     )
 
-    pairs: list[RegionPair]
+    pairs: list[RegionPair] = Field(description="The pairs, in the scene's order.")
 
 
 class CellCounts(BaseModel):
@@ -78,7 +78,7 @@ class Partition(BaseModel):
                     "pair": {"index": 0, "a": "arm/link2/box", "b": "world/post"},
                     "state": "certified",
                     "certified": True,
-                    "iteration": None,
+                    "iteration": 7,
                     "kind": "partition",
                     "joints": [0, 1],
                     "lower": [-0.6, -0.4],
@@ -96,11 +96,11 @@ class Partition(BaseModel):
         }
     )
 
-    pair: PairInfo
+    pair: PairInfo = Field(description="The pair.")
     state: PairState = Field(description="State of the pair in `iteration`; `certified` for a pair of a region.")
     certified: bool = Field(description="True where a verified proof says that the pair is apart in all cells, on all of the polytope.")
     iteration: int | None = Field(description="The job's iteration that the cells are of; null for a region.")
-    kind: ProofKind
+    kind: ProofKind = Field(description="The form of its proof.")
     joints: list[int] = Field(description="Position indices of the joints in play, ascending: only these are cut.")
     lower: list[float] = Field(description="(n,) lower corner of the root cell, in s.")
     upper: list[float] = Field(description="(n,) upper corner of the root cell, in s.")

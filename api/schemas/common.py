@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from fastapi import Query
+from fastapi import Path, Query
 from pydantic import BaseModel, ConfigDict, Field
 
 from certifier.growth.options import WHOLE_NUMBERS
@@ -24,6 +24,13 @@ Rows = Annotated[list[Vector], Field(max_length=2000)]
 Cursor = Annotated[
     str | None, Query(max_length=200, description="The value of `next` from the page before; leave it out for the first page.")
 ]
+Listed = Annotated[int, Query(ge=1, le=1000, description="Return so many at most.")]
+SceneGiven = Annotated[str, Path(description="A scene: its id, its first characters, or a name of it.", examples=["planar-2dof"])]
+JobGiven = Annotated[str, Path(description="The id of a job, or its first characters, four at least.", examples=["1f9b2a7c"])]
+RegionGiven = Annotated[str, Path(description="The id of a region, or its first characters, four at least.", examples=["5d0c1e42"])]
+PairGiven = Annotated[int, Path(description="Index of a pair among the scene's, from 0.", examples=[0])]
+OfScene = Annotated[str | None, Query(max_length=255, description="List only what belongs to this scene: its id or a name of it.")]
+OfIteration = Annotated[int | None, Query(ge=0, le=MAX_INT, description="The number of an iteration, from 0.")]
 WithDependents = Annotated[
     Literal["keep", "delete"],
     Query(description="`delete` deletes what depends on it, too; otherwise the request is refused where something does."),

@@ -64,7 +64,7 @@ class CoverRequestOptions(Request):
 class Coverage(BaseModel):
     """Says how much of the collision-free configurations is in regions. It is estimated from samples, and proves nothing."""
 
-    value: float
+    value: float = Field(description="Covered part of the collision-free configurations, by volume in joint positions.")
     stderr: float = Field(description="Standard error of the value.")
     samples: int = Field(description="Number of collision-free configurations that were drawn, uniform in joint positions.")
 
@@ -73,8 +73,8 @@ class CoverRegion(BaseModel):
     """Describes a region that a cover has begun."""
 
     job: str = Field(description="Id of the job that grows it.")
-    number: int
-    state: JobState
+    number: int = Field(description="Number of the region among those that the cover has begun.")
+    state: JobState = Field(description="State of the job that grows it.")
     region: str | None = Field(description="Id of the last certified region of that job.")
     reason: str | None = Field(description="A sentence that says why growing ended.")
 
@@ -82,13 +82,13 @@ class CoverRegion(BaseModel):
 class Cover(BaseModel):
     """Describes what a cover has come to. All but ``regions`` is as of its last look at the scene, and null before the first."""
 
-    state: JobState
-    outcome: Outcome | None
+    state: JobState = Field(description="State of the job.")
+    outcome: Outcome | None = Field(description="`certified` where all goals are reached; null before the job ends.")
     reason: str | None = Field(description="A sentence that says why the cover ended, and which goals it has not reached.")
     seconds: float | None = Field(description="Seconds from the job's start to its end, or until now.")
     regions: list[str] = Field(description="Ids of the certified regions that the cover has grown.")
     grown: list[CoverRegion] = Field(description="The regions that it has begun.")
-    coverage: Coverage | None
+    coverage: Coverage | None = Field(description="How much is covered.")
     components: list[int] | None = Field(
         description="Number of regions of each connected component of the scene's regions, the component that covers most first."
     )

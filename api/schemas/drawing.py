@@ -21,10 +21,10 @@ Unit = Literal["rad", "m"]
 class DrawnJoint(BaseModel):
     """Describes an edge of the kinematic tree. The pose of the child in the parent is X_PF X_FM(q) X_BM^-1."""
 
-    name: str = Field(examples=["arm/shoulder"])
-    kind: JointKind
+    name: str = Field(examples=["arm/shoulder"], description="Name of the joint.")
+    kind: JointKind = Field(description="How the joint moves.")
     parent: str = Field(description="The body on the side of the world.")
-    child: str
+    child: str = Field(description="The body on the side of the hand.")
     axis: list[float] = Field(description="(3,) unit axis in F; zeros for a weld.")
     X_PF: Pose
     X_BM: Pose
@@ -36,8 +36,8 @@ class DrawnJoint(BaseModel):
 class DrawnGeometry(BaseModel):
     """Describes a convex body as it is certified: the hull of its vertices, and a ball of `radius` about every point of it."""
 
-    name: str = Field(examples=["arm/upper/bar"])
-    body: str
+    name: str = Field(examples=["arm/upper/bar"], description="Name of the geometry.")
+    body: str = Field(description="Name of the body that it is fixed to.")
     radius: float = Field(description="Metres; 0 for a polytope. The padding is not included.")
     vertices: list[list[float]] = Field(description="(v, 3), metres, in the frame of the body.")
     triangles: list[list[int]] = Field(
@@ -50,15 +50,15 @@ class SceneModel(BaseModel):
     """Describes a scene as it is drawn: what is drawn is what is certified."""
 
     scene: SceneId
-    name: str
-    joints: list[DrawnJoint]
-    bodies: list[str]
-    q_star: list[float]
-    q_lower: list[float]
-    q_upper: list[float]
+    name: str = Field(description="Name of the scene.")
+    joints: list[DrawnJoint] = Field(description="The joints, parents before children.")
+    bodies: list[str] = Field(description="Names of the bodies.")
+    q_star: list[float] = Field(description="(n,), the configuration q*.")
+    q_lower: list[float] = Field(description="(n,), lower limits.")
+    q_upper: list[float] = Field(description="(n,), upper limits.")
     units: list[Unit] = Field(description="(n,), of each joint position.")
     padding: float = Field(description="Metres that are added around every geometry of every pair.")
-    geometries: list[DrawnGeometry]
+    geometries: list[DrawnGeometry] = Field(description="The convex bodies that are certified.")
     pairs: list[tuple[int, int]] = Field(description="Indices of the geometries of every pair to certify, in the order of the pairs.")
 
 
@@ -159,8 +159,8 @@ class SliceResponse(BaseModel):
 class Extreme(BaseModel):
     """Names configurations of a region at which a joint is as far as it can be within the region."""
 
-    joint: str
-    unit: Unit
+    joint: str = Field(description="Name of the joint.")
+    unit: Unit = Field(description="Unit of the joint.")
     lower: Q
     upper: Q
 
@@ -170,5 +170,5 @@ class RegionConfigurations(BaseModel):
 
     center: Q
     seed: list[float] | None = Field(description="(n,), where growing began; null where the region has no seed.")
-    extremes: list[Extreme]
+    extremes: list[Extreme] = Field(description="For each joint, in position order.")
     samples: list[list[float]] = Field(description="(k, n), nearly uniform in q; the same `seed` gives the same.")

@@ -90,7 +90,7 @@ class Seed(Request):
         None, description="More configurations (joint positions) that the region must contain, such as where it meets another region."
     )
     C: Rows | None = Field(None, description="(m, n), the first polytope {s : C s <= d}, one row a face, in s; for the method `polytope`.")
-    d: Offsets | None = None
+    d: Offsets | None = Field(None, description="(m,), the right-hand sides of these faces.")
     center: Vector | None = Field(None, description="(n,), a point inside that polytope, in s.")
     half_width: Real | None = Field(None, description="Half the edge length of the first polytope, in s; for the method `box`.")
     epsilon: Real | None = Field(None, description="Largest fraction of the volume that IRIS may leave in collision.")
@@ -139,7 +139,7 @@ class JobRequest(Request):
     deadline_seconds: Real | None = Field(
         None, gt=0, le=30 * 86400, description="The job ends this many seconds after its creation, with the regions it has by then."
     )
-    webhook: WebhookRequest | None = None
+    webhook: WebhookRequest | None = Field(None, description="Whom to tell when the job has ended; nobody by default.")
 
 
 class GrowRequest(JobRequest):
@@ -149,16 +149,16 @@ class GrowRequest(JobRequest):
         json_schema_extra={"examples": [{"kind": "grow", "scene": "iiwa-shelf", "seed": {"q": [0, 0.3, 0, -1.8, 0, 0.9, 0]}}]}
     )
 
-    kind: Literal["grow"]
-    seed: Seed
-    options: GrowOptions = Field(default_factory=GrowOptions)
+    kind: Literal["grow"] = Field(description="The kind of the job.")
+    seed: Seed = Field(description="Where growing begins.")
+    options: GrowOptions = Field(default_factory=GrowOptions, description="How the region grows.")
 
 
 class PolytopeBody(Request):
     """Describes the polytope {s : C s <= d}. The service always adds the joint limits."""
 
     C: Rows = Field(description="(m, n), one row a face, in s, with the joints in position order.")
-    d: Offsets
+    d: Offsets = Field(description="(m,), the right-hand sides of the faces.")
     center: Vector | None = Field(None, description="(n,), an interior point, in s; the service finds one if none is given.")
 
 
@@ -169,8 +169,8 @@ class CertifyRequest(JobRequest):
         json_schema_extra={"examples": [{"kind": "certify", "scene": "planar-2dof", "polytope": {"C": [[1, 0], [-1, 0]], "d": [0.1, 0.1]}}]}
     )
 
-    kind: Literal["certify"]
-    polytope: PolytopeBody
+    kind: Literal["certify"] = Field(description="The kind of the job.")
+    polytope: PolytopeBody = Field(description="The polytope to certify.")
     cells: Annotated[
         int,
         _whole(
@@ -192,7 +192,7 @@ class RecertifyRequest(JobRequest):
         json_schema_extra={"examples": [{"kind": "recertify", "scene": "iiwa-shelf", "region": "1f9b2a7c-5b0e-4b58-9c39-2f1d6a3c8e10"}]}
     )
 
-    kind: Literal["recertify"]
+    kind: Literal["recertify"] = Field(description="The kind of the job.")
     region: str = Field(
         max_length=MAX_NAME,
         description="Id of the region, or its first characters. Its scene must have the same joints, limits and q* as `scene`. "
@@ -208,7 +208,7 @@ class CertifyPathRequest(JobRequest, GivenMotion):
         json_schema_extra={"examples": [{"kind": "certify-path", "scene": "planar-2dof", "q": [[0.2, -0.4], [-0.4, 0.3]], "tube": True}]}
     )
 
-    kind: Literal["certify-path"]
+    kind: Literal["certify-path"] = Field(description="The kind of the job.")
 
 
 class CoverRequest(JobRequest):
@@ -218,8 +218,8 @@ class CoverRequest(JobRequest):
         json_schema_extra={"examples": [{"kind": "cover", "scene": "planar-2dof", "deadline_seconds": 60, "options": {"coverage": 0.95}}]}
     )
 
-    kind: Literal["cover"]
-    options: CoverRequestOptions = Field(default_factory=CoverRequestOptions)
+    kind: Literal["cover"] = Field(description="The kind of the job.")
+    options: CoverRequestOptions = Field(default_factory=CoverRequestOptions, description="What to cover, and when to end.")
 
 
 NewJob = Annotated[GrowRequest | CertifyRequest | RecertifyRequest | CertifyPathRequest | CoverRequest, Field(discriminator="kind")]
@@ -228,24 +228,24 @@ NewJob = Annotated[GrowRequest | CertifyRequest | RecertifyRequest | CertifyPath
 class Job(BaseModel):
     """Describes a job as it is now."""
 
-    id: str
-    kind: JobKind
+    id: str = Field(description="Id of the job.")
+    kind: JobKind = Field(description="What the job does.")
     scene: str = Field(description="Id of the scene.")
-    state: JobState
+    state: JobState = Field(description="Where the job is.")
     outcome: Outcome | None = Field(description="Outcome for the polytope or the motion asked for; null before the job ends.")
     reason: str | None = Field(description="A sentence that says why the job ended.")
     error: Document | None = Field(description="What was wrong (code, message, field, hint) when the job failed.")
-    options: Document
-    priority: int
+    options: Document = Field(description="The options that it was made with, defaults included.")
+    priority: int = Field(description="Each step up doubles the job's share of the work for its API key.")
     region: str | None = Field(description="Id of the last certified region.")
-    retry_of: str | None
-    attempt: int
+    retry_of: str | None = Field(description="Id of the job that it repeats; null for a first attempt.")
+    attempt: int = Field(description="1, or one more than the attempt of `retry_of`.")
     parent: str | None = Field(description="Id of the cover that the job grows a region for; null where somebody asked for the job.")
-    created_at: datetime
-    started_at: datetime | None
-    finished_at: datetime | None
-    deadline_at: datetime | None
-    ended: bool
+    created_at: datetime = Field(description="When it was asked for.")
+    started_at: datetime | None = Field(description="When it was first worked on; null before.")
+    finished_at: datetime | None = Field(description="When it ended; null before.")
+    deadline_at: datetime | None = Field(description="When it ends at the latest; null without a deadline.")
+    ended: bool = Field(description="True once it has ended, however it did.")
     progress: Progress = Field(description="How far the job is in its last iteration, and what its last region has come to.")
 
     @classmethod
@@ -283,15 +283,15 @@ class Job(BaseModel):
 class JobPage(Page):
     """Holds one page of jobs, newest first."""
 
-    jobs: list[Job]
+    jobs: list[Job] = Field(description="The jobs of this page.")
 
 
 class Webhook(BaseModel):
     """Says whether the receiver has been told that the job has ended."""
 
-    url: str
-    state: WebhookState
-    attempts: int
+    url: str = Field(description="The address that is called.")
+    state: WebhookState = Field(description="Whether the receiver has been told.")
+    attempts: int = Field(description="How often it was called.")
     next_at: datetime = Field(description="The service does not try before this time.")
     error: str | None = Field(description="Why the last attempt failed.")
 
@@ -305,8 +305,8 @@ class Event(BaseModel):
 
     seq: int = Field(description="Number of the event within the job: 1, 2, 3 ... It is the event's id in the stream.")
     kind: str = Field(description="One of job, iteration, pairs, step, region, lost; of a cover also cover and child.")
-    data: Document
-    created_at: datetime
+    data: Document = Field(description="What happened; its keys depend on `kind`.")
+    created_at: datetime = Field(description="When it happened.")
 
     @classmethod
     def of(cls, row: EventRow) -> Self:
@@ -316,36 +316,36 @@ class Event(BaseModel):
 class EventList(BaseModel):
     """Holds events in order."""
 
-    events: list[Event]
+    events: list[Event] = Field(description="The events, by their numbers.")
 
 
 class Iteration(BaseModel):
     """Describes a polytope whose pairs were certified together."""
 
-    index: int
-    label: str
-    state: IterationState
+    index: int = Field(description="Number of the iteration, from 0.")
+    label: str = Field(description="Says to people what the polytope is.")
+    state: IterationState = Field(description="What has become of the iteration.")
     faces: int = Field(description="Number of rows of C, joint limits included.")
-    ellipsoid_volume: float | None
+    ellipsoid_volume: float | None = Field(description="Volume of the inscribed ellipsoid of its region, in s; null without a region.")
     reused: dict[int, int] = Field(description="Maps a pair's index to the earlier iteration whose proof serves here too.")
-    started_at: datetime
-    finished_at: datetime | None
+    started_at: datetime = Field(description="When it began.")
+    finished_at: datetime | None = Field(description="When its last pair was settled; null before.")
 
 
 class PairCell(BaseModel):
     """Describes the result of one pair on the polytope of one iteration."""
 
-    iteration: int
-    pair: int
-    state: PairState
+    iteration: int = Field(description="Number of the iteration.")
+    pair: int = Field(description="Index of the pair among the scene's.")
+    state: PairState = Field(description="What has become of the pair.")
     parts: int = Field(
         description="Number of parts that the pair's open cells, or the cells to verify, were dealt to; 1 for an undivided pair."
     )
-    stage: Stage | None
+    stage: Stage | None = Field(description="Which method settled it; null before.")
     margin: float | None = Field(description="Certified lower bound, in metres, of the distance between the padded bodies.")
-    seconds: float | None
-    detail: str | None
-    worker: str | None
+    seconds: float | None = Field(description="Processor time that it took; null before it is settled.")
+    detail: str | None = Field(description="More about the outcome, in words.")
+    worker: str | None = Field(description="The process that holds it, or held it last: host, process number and start.")
     witness_q: list[float] | None = Field(
         description="A configuration (joint positions) at which the pair collides (refuted), or is nearest (too_close, where `detail` says "
         "how near); else null."
@@ -374,9 +374,9 @@ class IterationStates(BaseModel):
         json_schema_extra={"examples": [{"index": 2, "label": "stage 1", "state": "running", "faces": 24, "states": "ccuwoo"}]}
     )
 
-    index: int
-    label: str
-    state: IterationState
+    index: int = Field(description="Number of the iteration, from 0.")
+    label: str = Field(description="Says to people what the polytope is.")
+    state: IterationState = Field(description="What has become of the iteration.")
     faces: int = Field(description="Number of rows of C, joint limits included.")
     states: str = Field(
         description="A letter for each pair of the scene, in its order: `c` certified, `r` refuted, `n` not certifiable, `t` too close, "
@@ -388,15 +388,15 @@ class IterationStates(BaseModel):
 class PairStates(BaseModel):
     """Holds the states of all pairs in iterations, in few characters: the pair matrix of a long job, to draw it."""
 
-    iterations: list[IterationStates]
+    iterations: list[IterationStates] = Field(description="The iterations, in order.")
 
 
 class GrowthPoint(BaseModel):
     """Describes a region that was certified during the job."""
 
-    iteration: int
-    region: str
-    ellipsoid_volume: float
+    iteration: int = Field(description="The iteration that the region is of.")
+    region: str = Field(description="Id of the region.")
+    ellipsoid_volume: float = Field(description="Volume of its inscribed ellipsoid, in s.")
     share: float | None = Field(description="Part of the proposal's collision-free configurations that the region contains, by q-volume.")
     seconds: float = Field(description="Seconds from the job's start to the region.")
 
@@ -404,4 +404,4 @@ class GrowthPoint(BaseModel):
 class GrowthCurve(BaseModel):
     """Holds the volume of the certified region over time."""
 
-    points: list[GrowthPoint]
+    points: list[GrowthPoint] = Field(description="The regions, in the order of their certification.")

@@ -44,7 +44,7 @@ class Worker(BaseModel):
     """Describes a process that holds work of the job."""
 
     process: str = Field(description="Name of the process: host, process number, and when it began, with colons between.")
-    work: Work
+    work: Work = Field(description="What the process does.")
     iteration: int | None = Field(description="Iteration of the pairs; null where the work is no pairs.")
     pairs: list[int] = Field(description="Indices of the pairs that it certifies, ascending; those that are done already are left out.")
     until: datetime | None = Field(description="Without a sign of life until then, the work is given to another process.")
@@ -71,15 +71,15 @@ class JobWorkers(BaseModel):
         }
     )
 
-    workers: list[Worker]
+    workers: list[Worker] = Field(description="The processes, in no order.")
 
 
 class Obstacle(BaseModel):
     """Says what a pair of bodies does to a region: it cut it, or it is not certified."""
 
     pair: int | None = Field(description="Index of the pair; null for an obstacle that no pair is known for, such as a seed that collides.")
-    a: str | None
-    b: str | None
+    a: str | None = Field(description="Name of the first geometry; null where no pair is to blame.")
+    b: str | None = Field(description="Name of the second geometry; null where no pair is to blame.")
     text: str = Field(description="What stands in the way, in a sentence. It says what is proved, and what floating point or samples say.")
     q: list[float] | None = Field(
         description="Joint positions at which the bodies touch, come too close, or could not be proved apart; null where none is known."
@@ -117,5 +117,5 @@ class Obstacles(BaseModel):
         }
     )
 
-    obstacles: list[Obstacle]
+    obstacles: list[Obstacle] = Field(description="The obstacles, the worst first.")
     total: int = Field(description="Number of obstacles, of which the answer has the worst.")

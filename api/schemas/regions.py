@@ -35,17 +35,17 @@ class QVolume(BaseModel):
 class RegionSummary(BaseModel):
     """Describes a certified region in a list."""
 
-    id: str
-    job: str
-    scene: str
-    iteration: int
-    guarantee: Guarantee
+    id: str = Field(description="Id of the region.")
+    job: str = Field(description="Id of the job that grew it.")
+    scene: str = Field(description="Id of its scene.")
+    iteration: int = Field(description="The iteration of the job that it is of.")
+    guarantee: Guarantee = Field(description="What its certificate is worth.")
     faces: int = Field(description="Number of rows of C, joint limits included.")
     ellipsoid_volume: float = Field(description="Volume of the inscribed ellipsoid, in s.")
     q_volume: QVolume | None = Field(description="How large the region is; null for one that an earlier version stored.")
     share: Share | None = Field(description="How much of the proposal the region keeps; null for a region that was not grown.")
     proof: str = Field(description="SHA-256 of the proof file.")
-    created_at: datetime
+    created_at: datetime = Field(description="When it was stored.")
 
     @classmethod
     def of(cls, row: RegionRow) -> Self:
@@ -67,13 +67,13 @@ class RegionSummary(BaseModel):
 class RegionPage(Page):
     """Holds one page of regions, newest first."""
 
-    regions: list[RegionSummary]
+    regions: list[RegionSummary] = Field(description="The regions of this page.")
 
 
 class RegionDetail(RegionSummary):
     """Describes a certified region, with its manifest."""
 
-    manifest: Document
+    manifest: Document = Field(description="Everything that is known about the region; docs/architecture.md lists the keys.")
 
     @classmethod
     def of(cls, row: RegionRow) -> Self:
@@ -83,9 +83,9 @@ class RegionDetail(RegionSummary):
 class Verification(BaseModel):
     """Says whether a region's stored proof holds, and what it proves."""
 
-    region: str
-    holds: bool
+    region: str = Field(description="Id of the region.")
+    holds: bool = Field(description="True where the verifier has accepted all of the proof.")
     statement: list[str] = Field([], description="What was proved, in plain words, line by line; empty when the proof does not hold.")
-    guarantee: Guarantee = Guarantee.NONE
+    guarantee: Guarantee = Field(Guarantee.NONE, description="What the proof is worth.")
     error: Document | None = Field(None, description="Why the proof does not hold: code, message, field, hint; null when it holds.")
-    seconds: float
+    seconds: float = Field(description="How long the check took.")

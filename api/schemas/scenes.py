@@ -15,7 +15,7 @@ from db.models import SceneRow
 class SceneSummary(BaseModel):
     """Describes a scene in a list."""
 
-    id: str
+    id: str = Field(description="Id of the scene.")
     name: str = Field(description="The name that the scene was last added under.")
     names: list[str] = Field(
         description="The names that mean this scene now. A name means the scene that was last added under it, so a scene may have none or "
@@ -23,10 +23,10 @@ class SceneSummary(BaseModel):
     )
     hash: str = Field(description="SHA-256 of everything in the scene that a proof depends on.")
     joints: int = Field(description="Number of joint positions.")
-    geometries: int
-    pairs: int
-    warnings: int
-    created_at: datetime
+    geometries: int = Field(description="Number of convex geometries.")
+    pairs: int = Field(description="Number of pairs to certify.")
+    warnings: int = Field(description="Number of warnings; `/lint` has them.")
+    created_at: datetime = Field(description="When it was first added.")
 
     @classmethod
     def of(cls, row: SceneRow, names: list[str]) -> Self:
@@ -47,26 +47,26 @@ class SceneSummary(BaseModel):
 class ScenePage(Page):
     """Holds one page of scenes, newest first."""
 
-    scenes: list[SceneSummary]
+    scenes: list[SceneSummary] = Field(description="The scenes of this page.")
 
 
 class JointInfo(BaseModel):
     """Describes a joint that has a position, in radians or metres."""
 
-    name: str
-    kind: JointKind
-    lower: float
-    upper: float
+    name: str = Field(description="Name of the joint.")
+    kind: JointKind = Field(description="How the joint moves.")
+    lower: float = Field(description="Lower limit, in radians or metres.")
+    upper: float = Field(description="Upper limit, in radians or metres.")
     q_star: float = Field(description="Centre of the parametrisation: s = tan((q - q_star) / 2), or q - q_star for a prismatic joint.")
 
 
 class SceneDetail(SceneSummary):
     """Describes a scene with its joints, in position order."""
 
-    positions: list[JointInfo]
-    bodies: list[str]
+    positions: list[JointInfo] = Field(description="The joints that have a position.")
+    bodies: list[str] = Field(description="Names of the bodies.")
     padding: float = Field(description="Metres added around every geometry of every pair.")
-    provenance: Document
+    provenance: Document = Field(description="What the scene was read from, and by which versions.")
 
     @classmethod
     def of(cls, row: SceneRow, names: list[str]) -> Self:
@@ -88,9 +88,9 @@ class SceneDetail(SceneSummary):
 class PairInfo(BaseModel):
     """Names two geometries that must not touch."""
 
-    index: int
-    a: str
-    b: str
+    index: int = Field(description="Index of the pair among the scene's.")
+    a: str = Field(description="Name of the first geometry.")
+    b: str = Field(description="Name of the second geometry.")
 
 
 class PairForecast(PairInfo):
@@ -101,14 +101,14 @@ class PairForecast(PairInfo):
 
     frame: str = Field(description="The body in whose frame the separating plane is expressed.")
     chain_a: list[str] = Field(description="Names of the joints between the frame and `a`.")
-    chain_b: list[str]
+    chain_b: list[str] = Field(description="Names of the joints between the frame and `b`.")
     gram_a: int = Field(description="Number of rows of the side's Gram matrices: 2^k for k joints in its chain.")
-    gram_b: int
+    gram_b: int = Field(description="Number of rows of the Gram matrices of `b`'s side.")
     joints: int = Field(
         description="Number of joints with which the first plane tried moves: all of both chains, or 0 for a plane at rest."
     )
     N_a: int = Field(description="Dimension of the side's space of polynomials.")
-    N_b: int
+    N_b: int = Field(description="Dimension of the space of polynomials of `b`'s side.")
     rationals: int = Field(description="Number of polynomial identities: one for each vertex of both bodies.")
     seconds: float = Field(description="Rough time to certify the pair, in seconds, on one thread.")
     memory_bytes: int = Field(description="Memory, in bytes, of the largest program that may be tried for the pair.")
@@ -117,28 +117,28 @@ class PairForecast(PairInfo):
 class ScenePairs(BaseModel):
     """Holds the pairs that a certification goes through."""
 
-    pairs: list[PairForecast]
+    pairs: list[PairForecast] = Field(description="The pairs, in the scene's order.")
 
 
 class Substitution(BaseModel):
     """Describes a shape that was replaced by a larger one around it."""
 
-    geometry: str
-    substitution: str
+    geometry: str = Field(description="Name of the geometry.")
+    substitution: str = Field(description="What stands for what.")
     inflation: float = Field(description="Upper bound, in metres, on how far the replacement reaches outside the shape.")
 
 
 class IgnoredPair(BaseModel):
     """Names two geometries that are not certified, and says why."""
 
-    a: str
-    b: str
-    reason: str
+    a: str = Field(description="Name of the first geometry.")
+    b: str = Field(description="Name of the second geometry.")
+    reason: str = Field(description="Why the pair is not certified.")
 
 
 class LintReport(BaseModel):
     """Says what a reader should know about the scene before trusting a certificate for it."""
 
-    warnings: list[str]
-    substitutions: list[Substitution]
-    ignored: list[IgnoredPair]
+    warnings: list[str] = Field(description="Sentences about what was read in another way than one might expect.")
+    substitutions: list[Substitution] = Field(description="Shapes that were replaced by larger ones.")
+    ignored: list[IgnoredPair] = Field(description="Pairs that no proof is about.")

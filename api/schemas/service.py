@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, Field
 
@@ -17,14 +17,14 @@ from db.models import ApiKeyRow, AuditRow
 class Health(BaseModel):
     """Says that the process answers."""
 
-    status: Literal["ok"] = "ok"
+    status: Annotated[Literal["ok"], Field(description="Always `ok`.")] = "ok"
 
 
 class Readiness(BaseModel):
     """Says whether the service can do its work. A check is `ok` or says what is wrong."""
 
-    ready: bool
-    checks: dict[str, str]
+    ready: bool = Field(description="True where every check is `ok`.")
+    checks: dict[str, str] = Field(description="Name of a check -> `ok`, or what is wrong and what to do.")
 
 
 class NewKey(Request):

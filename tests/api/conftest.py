@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -76,9 +77,9 @@ def url(database: Database, client: TestClient) -> Iterator[str]:
     thread.join()
 
 
-@pytest.fixture
-def worker(client: TestClient, sqlite_url: str, queue: Queue) -> Iterator[None]:
-    """A thread that does what jobs ask for, as the workers do."""
+@contextmanager
+def working() -> Iterator[None]:
+    """A thread does what jobs ask for, as the workers do, on the database of the settings."""
     done = threading.Event()
 
     def serve() -> None:
@@ -90,12 +91,20 @@ def worker(client: TestClient, sqlite_url: str, queue: Queue) -> Iterator[None]:
             while piece := work():
                 coordinate(piece.job_id)
 
-    with surroundings(CIRIS_DATABASE_URL=sqlite_url, CIRIS_REDIS_URL=queue.url):
-        thread = threading.Thread(target=serve)
-        thread.start()
+    thread = threading.Thread(target=serve)
+    thread.start()
+    try:
         yield
+    finally:
         done.set()
         thread.join()
+
+
+@pytest.fixture
+def worker(client: TestClient, sqlite_url: str, queue: Queue) -> Iterator[None]:
+    """Somebody works on the client's database."""
+    with surroundings(CIRIS_DATABASE_URL=sqlite_url, CIRIS_REDIS_URL=queue.url), working():
+        yield
 
 
 @pytest.fixture

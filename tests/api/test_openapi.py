@@ -1,10 +1,9 @@
 """The OpenAPI document: operation ids are stable, errors are problems, examples hold."""
 
-import json
-import re
 from pathlib import Path
 from typing import Any
 
+import jsonschema_rs
 from fastapi.testclient import TestClient
 from pydantic import TypeAdapter
 
@@ -95,10 +94,12 @@ def test_every_operation_is_described_and_answers_errors_with_problems(client: T
     document = client.get("/openapi.json").json()
     for name, (_, operation) in operations(document).items():
         assert operation["description"], name
-        assert operation["responses"]["default"]["content"] == {
-            "application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}
-        }
-        assert "422" not in operation["responses"]
+        problem = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
+        assert operation["responses"]["default"]["content"] == problem
+        errors = {status: answer for status, answer in operation["responses"].items() if status >= "4" and status != "default"}
+        assert {"421", "429", "500"} <= set(errors), name
+        for status, answer in errors.items():
+            assert (name, status) == ("get_readiness", "503") or (answer["content"] == problem and "`" in answer["description"]), name
     assert "HTTPValidationError" not in document["components"]["schemas"]
 
 
@@ -139,17 +140,37 @@ def test_the_examples_work_on_the_scenes_that_they_name(client: TestClient, data
             assert answer.status_code == status, answer.text
 
 
-def test_every_field_of_planning_is_described(client: TestClient) -> None:
+def test_every_field_parameter_and_answer_is_described_and_every_field_has_an_example(client: TestClient) -> None:
     document = client.get("/openapi.json").json()
-    schemas, seen = document["components"]["schemas"], set()
-    waiting = [json.dumps(path) for name, path in document["paths"].items() if name.startswith("/v1/planning/")]
-    while waiting:
-        for name in set(re.findall(r"#/components/schemas/(\w+)", waiting.pop())) - seen - {"Problem"}:
-            seen.add(name)
-            waiting.append(json.dumps(schemas[name]))
-            for field, described in schemas[name].get("properties", {}).items():
-                assert described.get("description"), f"{name}.{field}"
-    assert {"ContainsRequest", "PathResponse", "Near", "Gap"} <= seen
+    for name, schema in document["components"]["schemas"].items():
+        if schema.get("type") != "object":
+            continue
+        assert schema["description"], name
+        for field, described in schema.get("properties", {}).items():
+            assert described.get("description"), f"{name}.{field}"
+            assert described["examples"] != [None] or described.get("type") == "null", f"{name}.{field} has no example"
+        assert schema.get("examples"), f"{name} has no example: `python -m tests.api.examples` makes them"
+    for name, (_, operation) in operations(document).items():
+        assert operation["summary"], name
+        for parameter in operation.get("parameters", ()):
+            assert parameter.get("description"), f"{name}: {parameter['name']}"
+        for status, answer in operation["responses"].items():
+            assert answer["description"] not in ("", "Successful Response"), f"{name}: {status}"
+        for content in operation.get("requestBody", {}).get("content", {}):
+            assert content in ("application/json", "multipart/form-data")
+    assert {tag for _, operation in operations(document).values() for tag in operation["tags"]} == {tag["name"] for tag in document["tags"]}
+
+
+def test_every_example_fits_its_schema(client: TestClient) -> None:
+    document = client.get("/openapi.json").json()
+    for name, schema in document["components"]["schemas"].items():
+        whole = jsonschema_rs.validator_for({"$ref": f"#/components/schemas/{name}", "components": document["components"]})
+        for example in schema.get("examples", ()):
+            assert whole.is_valid(example), f"{name}: {next(whole.iter_errors(example))}"
+        for field, described in schema.get("properties", {}).items():
+            one = jsonschema_rs.validator_for({**described, "components": document["components"]})
+            for example in described["examples"]:
+                assert one.is_valid(example), f"{name}.{field}: {example}"
 
 
 def test_every_operation_says_which_scope_it_needs(client: TestClient) -> None:

@@ -23,6 +23,18 @@ from tests.client.conftest import Ciris
 HOLE = re.compile(r"\{[\w.]+\}")
 
 
+def _check_documented(client: TestClient, method: str, path: str, problem: dict[str, Any]) -> None:
+    """Fails where the OpenAPI document does not say that the operation may answer like this."""
+    paths = client.app.openapi()["paths"]  # type: ignore[attr-defined]
+    plain = path.partition("?")[0]
+    routes = [route for route in paths if re.fullmatch(re.sub(r"\{\w+\}", "[^/]+", route), plain) and method.lower() in paths[route]]
+    if not routes:
+        return
+    responses = paths[min(routes, key=lambda route: route.count("{"))][method.lower()]["responses"]
+    said = responses.get(str(problem["status"]), {}).get("description", "")
+    assert f"`{problem['code']}`" in said or "another code" in said, f"{method} {path} may answer {problem['status']} {problem['code']}"
+
+
 @dataclass(frozen=True)
 class Trial:
     """Provokes errors as users do: with files in a directory, with commands and with requests."""
@@ -72,6 +84,7 @@ class Trial:
         """Sends a request and raises the problem that it is answered with."""
         client: TestClient = self.request.getfixturevalue("client")
         problem = client.request(method, path, **options).json()
+        _check_documented(client, method, path, problem)
         raise CirisError(problem["code"], problem["detail"], field=problem["field"], hint=problem["hint"])
 
     def ciris(self, *arguments: object, **variables: str) -> str:
