@@ -28,7 +28,7 @@ async def _while_writers_wait(database: Database, url: str, region: str, key: st
         held = database.writer.connect()
         held.begin()
         try:
-            posts = [asyncio.create_task(client.post("/v1/jobs", json=request)) for _ in range(WAITING)]
+            posts = [asyncio.create_task(client.post("/v1/jobs", json=request, timeout=120.0)) for _ in range(WAITING)]
             await asyncio.sleep(1.5)  # the keys that were read are too old by now
             seconds, statuses = [], []
             for path in READS * 3:
