@@ -13,6 +13,7 @@ from api.app import create_app
 from certifier.errors import CirisError
 from db import keys, logs
 from db.settings import settings
+from db.vault import vault
 
 SHUTDOWN_SECONDS = 2
 """When the service ends, open streams may delay its end by at most this many seconds."""
@@ -35,6 +36,7 @@ def main() -> None:
     logs.configure("api")
     try:
         keys.check_bind(settings())
+        vault()  # a key that is none is found out now
     except CirisError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)

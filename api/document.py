@@ -49,6 +49,7 @@ ALSO: dict[str, tuple[str, ...]] = {
     "get_job_motion": ("motion_not_found",),
     "download_motion_proof": ("motion_not_found", "proof_not_found"),
     "get_job_webhook": ("webhook_not_found",),
+    "resend_job_webhook": ("webhook_not_found", "webhook_waits", "busy"),
     "download_pair_proof": ("proof_not_found",),
     "get_job_cells": ("cells_not_found",),
     "get_region_cells": ("cells_not_found", "proof_not_found"),

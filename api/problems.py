@@ -39,7 +39,7 @@ _STATUS_OF_CODE = {
     ),
     "idempotency_conflict": HTTPStatus.CONFLICT,
     "job_not_retryable": HTTPStatus.CONFLICT,
-    **dict.fromkeys(("first_key", "has_dependents", "not_ended"), HTTPStatus.CONFLICT),
+    **dict.fromkeys(("first_key", "has_dependents", "not_ended", "webhook_waits"), HTTPStatus.CONFLICT),
     "storage_quota": HTTPStatus.FORBIDDEN,
     "ambiguous_id": HTTPStatus.CONFLICT,
     "too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,

@@ -392,6 +392,10 @@ def _parser() -> argparse.ArgumentParser:
             of_one.add_argument("--watch", action="store_true", help="print a line for every pair as it is settled")
         of_one.set_defaults(run=f"client.jobs:job_{verb}")
 
+    told = job.add_parser("webhook", parents=[remote, json], help="say how telling a job's receiver goes")
+    told.add_argument("job", metavar="ID", help="its id, or the first characters of it")
+    told.add_argument("--resend", action="store_true", help="call the receiver again")
+    told.set_defaults(run="client.jobs:job_webhook")
     gone = job.add_parser("rm", parents=[remote, together], help="delete a job that has ended")
     gone.add_argument("job", metavar="ID")
     gone.set_defaults(run="client.removal:job_rm")

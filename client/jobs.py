@@ -89,6 +89,22 @@ def job_retry(args: Namespace) -> int:
     return _say(job, args)
 
 
+def job_webhook(args: Namespace) -> int:
+    """Says how telling the receiver goes, and has it called again where the user asks for it."""
+    with connect(args.url) as client:
+        job = client.job(args.job)["id"]
+        hook = client.resend_webhook(job) if args.resend else client.webhook(job)
+    if args.json:
+        print_json(hook)
+        return OK
+    output.print_facts(
+        [("url", hook["url"]), ("state", hook["state"]), ("attempts", str(hook["attempts"])), ("next", hook["next_at"][:19])]
+    )
+    rows = [(one["at"][:19], f"{one['seconds']:.2f}", str(one["status"] or ""), one["error"] or "") for one in hook["deliveries"]]
+    output.print_table(("at", "seconds", "status", "error"), rows, right="seconds")
+    return OK
+
+
 def _say(job: Document, args: Namespace) -> int:
     if args.json:
         print_json(job)

@@ -438,7 +438,7 @@ class WebhookRow(Base):
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), unique=True)
     url: Mapped[str]
     secret: Mapped[str]
-    """``whsec_`` and the base64 of the bytes that sign the message."""
+    """``whsec_`` and the base64 of the bytes that sign the message, encrypted by db.vault together with the URL."""
     state: Mapped[str] = mapped_column(String(16), default=states.WebhookState.WAITING)
     attempts: Mapped[int] = mapped_column(default=0)
     """How often the receiver was called."""
@@ -446,3 +446,21 @@ class WebhookRow(Base):
     """The receiver is not called before this time."""
     error: Mapped[str | None]
     """Why the last attempt failed."""
+
+
+class DeliveryRow(Base):
+    """This row says how one attempt to call a webhook's receiver went."""
+
+    __tablename__ = "deliveries"
+    __table_args__ = (Index(None, "webhook_id", "id"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    webhook_id: Mapped[str] = mapped_column(ForeignKey("webhooks.id", ondelete="CASCADE"))
+    at: Mapped[datetime]
+    seconds: Mapped[float]
+    status: Mapped[int | None]
+    """The receiver's HTTP status; None where it gave none."""
+    answer: Mapped[str | None]
+    """How the body of its answer begins."""
+    error: Mapped[str | None]
+    """Why the attempt failed; None where it did not."""

@@ -64,6 +64,9 @@ class Settings(BaseSettings):
     """A worker touches this file every ten seconds while it is well, for health checks."""
     verify_timeout_seconds: float = 600.0
     """One check of a stored proof on request may take this many seconds."""
+    secret_key: str = Field(default="", repr=False)
+    """Base64 of 32 bytes that the secrets of webhooks are encrypted with. Several with commas between: the first one encrypts. Empty: the
+    service takes no webhooks. The embedded stack makes a key and keeps it in ``data_dir``."""
     webhook_private: bool = False
     """Webhooks may go to addresses that are not public, as in a private network."""
     time_limit_seconds: float = Field(default=3600.0, gt=0)

@@ -157,7 +157,11 @@ ITERATION: Table = _table(
 )
 WEBHOOK: Table = _table(
     WebhookState,
-    {WebhookState.WAITING: {WebhookState.DELIVERED, WebhookState.FAILED}},
+    {
+        WebhookState.WAITING: {WebhookState.DELIVERED, WebhookState.FAILED},
+        WebhookState.DELIVERED: {WebhookState.WAITING},
+        WebhookState.FAILED: {WebhookState.WAITING},
+    },
 )
 
 

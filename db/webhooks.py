@@ -7,15 +7,20 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from uuid import uuid4
 
-from sqlalchemy import select
+from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db.models import JobRow, WebhookRow
+from db.models import DeliveryRow, JobRow, WebhookRow
 from db.states import JOB, WebhookState, transition, unfinished
+from db.vault import is_sealed, vault
 
 BACKOFF_SECONDS = (10, 60, 300, 1800, 7200, 21600)
 """The service pauses this many seconds after each failed attempt but the last."""
+KEPT = 20
+"""So many attempts are remembered of each webhook, the last ones."""
+ANSWER = 500
+"""So many characters of a receiver's answer are kept."""
 
 
 @dataclass(frozen=True)
@@ -26,16 +31,31 @@ class Delivery:
     job: JobRow
 
 
+@dataclass(frozen=True)
+class Answered:
+    """Says how an attempt went. ``error`` says why it failed, and is empty where it did not."""
+
+    at: datetime
+    seconds: float
+    status: int | None
+    answer: str
+    error: str
+
+
 def add(session: Session, job_id: str, url: str, secret: str) -> None:
-    """Adds a webhook: the receiver at ``url`` is told when the job has ended."""
-    session.add(WebhookRow(id=str(uuid4()), job_id=job_id, url=url, secret=secret))
+    """Adds a webhook: the receiver at ``url`` is told when the job has ended.
+
+    Raises:
+        CirisError: no_secret_key, secret_key.
+    """
+    session.add(WebhookRow(id=str(uuid4()), job_id=job_id, url=url, secret=vault().seal(secret, url)))
 
 
 def copy(session: Session, job_id: str, other_id: str) -> None:
     """Adds to the other job the webhook of this job, if it has one."""
     row = session.scalar(select(WebhookRow).where(WebhookRow.job_id == job_id))
     if row is not None:
-        add(session, other_id, row.url, row.secret)
+        session.add(WebhookRow(id=str(uuid4()), job_id=other_id, url=row.url, secret=row.secret))
 
 
 def of_job(session: Session, job_id: str) -> WebhookRow:
@@ -69,14 +89,55 @@ def claim(session: Session, now: datetime, limit: int = 50) -> Sequence[Delivery
     return claimed
 
 
-def delivered(session: Session, webhook_id: str) -> None:
-    """Notes that the receiver has taken the message."""
-    transition(session, WebhookRow, WebhookState.DELIVERED, WebhookRow.id == webhook_id, error=None)
-
-
-def failed(session: Session, webhook_id: str, error: str) -> None:
-    """Notes that the attempt failed. After the last attempt the webhook is given up."""
+def settle(session: Session, webhook_id: str, answered: Answered) -> None:
+    """Notes how an attempt went. After the last attempt a webhook is given up."""
     row = session.get_one(WebhookRow, webhook_id)
-    row.error = error
-    if row.attempts > len(BACKOFF_SECONDS):
+    session.add(
+        DeliveryRow(
+            webhook_id=webhook_id,
+            at=answered.at,
+            seconds=answered.seconds,
+            status=answered.status,
+            answer=answered.answer[:ANSWER].replace("\0", "") or None,
+            error=answered.error or None,
+        )
+    )
+    session.flush()
+    old = select(DeliveryRow.id).where(DeliveryRow.webhook_id == webhook_id).order_by(DeliveryRow.id.desc()).offset(KEPT)
+    session.execute(delete(DeliveryRow).where(DeliveryRow.id.in_(session.scalars(old).all())))
+    row.error = answered.error or None
+    if not answered.error:
+        transition(session, WebhookRow, WebhookState.DELIVERED, WebhookRow.id == webhook_id)
+    elif row.attempts > len(BACKOFF_SECONDS):
         transition(session, WebhookRow, WebhookState.FAILED, WebhookRow.id == webhook_id)
+
+
+def deliveries(session: Session, webhook_id: str) -> Sequence[DeliveryRow]:
+    """Returns the attempts that are remembered, the last one first."""
+    return session.scalars(select(DeliveryRow).where(DeliveryRow.webhook_id == webhook_id).order_by(DeliveryRow.id.desc())).all()
+
+
+def send_again(session: Session, job: JobRow, now: datetime) -> WebhookRow:
+    """Has the receiver called again, at once and then as if for the first time, whatever became of it before.
+
+    The caller holds the job's lock.
+
+    Raises:
+        CirisError: webhook_not_found; webhook_waits, when the job has not ended.
+    """
+    row = of_job(session, job.id)
+    if job.state in unfinished(JOB):
+        problem = f"the job is {job.state}; its webhook is called when it has ended"
+        raise CirisError("webhook_waits", problem, field="job", hint="wait for the end of the job")
+    transition(session, WebhookRow, WebhookState.WAITING, WebhookRow.id == row.id)
+    session.refresh(row)
+    row.attempts, row.next_at, row.error = 0, now, None
+    return row
+
+
+def seal_all(session: Session) -> int:
+    """Encrypts the secrets that an earlier version has stored as they are. Returns how many."""
+    rows = [row for row in session.scalars(select(WebhookRow)) if not is_sealed(row.secret)]
+    for row in rows:
+        row.secret = vault().seal(row.secret, row.url)
+    return len(rows)

@@ -5,6 +5,7 @@ Its data directory holds:
 - ``ciris.sqlite3``, unless a database is given;
 - ``queue/``, the queue's append-only file, and ``queue.sock``;
 - ``logs/``;
+- ``secret.key``, with which secrets in the database are encrypted, unless a key is given;
 - ``stack.json``, which says where the API is while the stack runs;
 - ``stack.lock``, which the stack holds while it runs.
 """
@@ -34,6 +35,7 @@ from types import FrameType
 from certifier.errors import CirisError
 from db import keys, logs, migrate
 from db.settings import Settings
+from db.vault import kept_key
 from workers.processes import die_with_parent, give_way, queue_server_command, queue_url
 
 log = logging.getLogger(__name__)
@@ -176,6 +178,7 @@ def _environment(settings: Settings, data: Path, queue_socket: Path, port: int) 
         "CIRIS_PORT": str(port),
         "CIRIS_DATABASE_URL": settings.database,
         "CIRIS_REDIS_URL": settings.redis_url or queue_url(queue_socket),
+        "CIRIS_SECRET_KEY": settings.secret_key or kept_key(data / "secret.key"),
     }
 
 

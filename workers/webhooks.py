@@ -28,6 +28,7 @@ from db.models import JobRow
 from db.session import database
 from db.settings import settings
 from db.types import utcnow
+from db.vault import vault
 from workers.addresses import resolve
 
 log = logging.getLogger(__name__)
@@ -39,8 +40,13 @@ SECONDS = 15.0
 
 def run(stop: threading.Event) -> None:
     """Delivers until ``stop`` is set. A round that fails (the database is away) is logged, and the next one tries again."""
+    sealed = False
     while not stop.wait(settings().sweep_seconds):
         try:
+            if not sealed and vault().usable:
+                with database().write() as session:
+                    webhooks.seal_all(session)
+                sealed = True
             deliver_due()
         except Exception:
             log.exception("a round of webhooks failed")
@@ -57,9 +63,10 @@ def deliver_due() -> None:
 
 def _deliver(delivery: webhooks.Delivery) -> None:
     webhook = delivery.webhook
-    error = ""
+    at, began = utcnow(), time.monotonic()
+    status, answer, error = None, "", ""
     try:
-        status = _post(urlsplit(webhook.url), webhook.id, webhook.secret, _body(delivery.job))
+        status, answer = _post(urlsplit(webhook.url), webhook.id, vault().open(webhook.secret, webhook.url), _body(delivery.job))
         if not 200 <= status < 300:
             error = f"the receiver answered {status}"
     except (CirisError, OSError, HTTPException) as problem:
@@ -67,9 +74,7 @@ def _deliver(delivery: webhooks.Delivery) -> None:
     with bound_contextvars(job=delivery.job.id, webhook=webhook.id), database().write() as session:
         if error:
             log.warning("attempt %d to deliver a webhook failed: %s", webhook.attempts, error)
-            webhooks.failed(session, webhook.id, error)
-        else:
-            webhooks.delivered(session, webhook.id)
+        webhooks.settle(session, webhook.id, webhooks.Answered(at, time.monotonic() - began, status, answer, error))
 
 
 def _body(job: JobRow) -> bytes:
@@ -94,8 +99,8 @@ def signature(secret: str, webhook_id: str, timestamp: int, body: bytes) -> str:
     return f"v1,{base64.b64encode(signed.digest()).decode()}"
 
 
-def _post(url: SplitResult, webhook_id: str, secret: str, body: bytes) -> int:
-    """Posts the body, and returns the status of the answer."""
+def _post(url: SplitResult, webhook_id: str, secret: str, body: bytes) -> tuple[int, str]:
+    """Posts the body, and returns the status of the answer, and how the answer begins."""
     timestamp = int(time.time())
     headers = {
         "Content-Type": "application/json",
@@ -109,7 +114,8 @@ def _post(url: SplitResult, webhook_id: str, secret: str, body: bytes) -> int:
     limit.start()
     try:
         connection.request("POST", (url.path or "/") + (f"?{url.query}" if url.query else ""), body, headers)
-        return connection.getresponse().status
+        response = connection.getresponse()
+        return response.status, response.read(webhooks.ANSWER).decode(errors="replace")
     finally:
         limit.cancel()
         connection.close()

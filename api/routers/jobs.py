@@ -293,9 +293,22 @@ def _verdict(db: Database, job_id: str) -> tuple[str, dict[str, Any]]:
 
 @router.get("/{job_id}/webhook")
 def get_job_webhook(job_id: JobGiven, db: Db) -> Webhook:
-    """Returns the job's webhook: whether its receiver has been told that the job has ended."""
+    """Returns the job's webhook: whether its receiver has been told that the job has ended, and how the attempts went."""
     with db.read() as session:
-        return Webhook.of(webhooks.of_job(session, jobs.get(session, job_id).id))
+        row = webhooks.of_job(session, jobs.get(session, job_id).id)
+        return Webhook.of(row, webhooks.deliveries(session, row.id))
+
+
+@router.post("/{job_id}/webhook/resend", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
+@writing
+def resend_job_webhook(job_id: JobGiven, db: Db) -> Webhook:
+    """Has the receiver called again within seconds, and again as often as at first, whatever became of it before.
+
+    The message has the same `webhook-id`, so a receiver can tell that it knows it. The job must have ended.
+    """
+    with db.write() as session:
+        row = webhooks.send_again(session, jobs.lock(session, jobs.get(session, job_id).id), utcnow())
+        return Webhook.of(row, webhooks.deliveries(session, row.id))
 
 
 @router.get("/{job_id}/pairs")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from base64 import b64decode
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
@@ -17,8 +18,9 @@ from certifier.growth.options import LARGEST_TOLERANCE, MOST_CELLS, WHOLE_NUMBER
 from certifier.model import MAX_NAME
 from certifier.outcome import Outcome, Stage
 from certifier.seeding.options import Method
-from db.models import EventRow, JobRow, WebhookRow
+from db.models import DeliveryRow, EventRow, JobRow, WebhookRow
 from db.states import IterationState, JobKind, JobState, PairState, WebhookState
+from db.webhooks import KEPT
 
 DEFAULTS = GrowthOptions()
 
@@ -286,18 +288,40 @@ class JobPage(Page):
     jobs: list[Job] = Field(description="The jobs of this page.")
 
 
+class Delivery(BaseModel):
+    """Says how one attempt to call the receiver went."""
+
+    at: datetime = Field(description="When the attempt began.")
+    seconds: float = Field(description="How long it took.")
+    status: int | None = Field(description="The receiver's HTTP status; null where it gave none.")
+    answer: str | None = Field(description="How the body of its answer begins; null where it had none.")
+    error: str | None = Field(description="Why the attempt failed; null where it did not.")
+
+    @classmethod
+    def of(cls, row: DeliveryRow) -> Self:
+        return cls(at=row.at, seconds=row.seconds, status=row.status, answer=row.answer, error=row.error)
+
+
 class Webhook(BaseModel):
     """Says whether the receiver has been told that the job has ended."""
 
     url: str = Field(description="The address that is called.")
     state: WebhookState = Field(description="Whether the receiver has been told.")
-    attempts: int = Field(description="How often it was called.")
+    attempts: int = Field(description="How often it was called, since it was last asked for.")
     next_at: datetime = Field(description="The service does not try before this time.")
     error: str | None = Field(description="Why the last attempt failed.")
+    deliveries: list[Delivery] = Field(description=f"The last attempts, the newest first, at most {KEPT}.")
 
     @classmethod
-    def of(cls, row: WebhookRow) -> Self:
-        return cls(url=row.url, state=WebhookState(row.state), attempts=row.attempts, next_at=row.next_at, error=row.error)
+    def of(cls, row: WebhookRow, deliveries: Sequence[DeliveryRow]) -> Self:
+        return cls(
+            url=row.url,
+            state=WebhookState(row.state),
+            attempts=row.attempts,
+            next_at=row.next_at,
+            error=row.error,
+            deliveries=[Delivery.of(one) for one in deliveries],
+        )
 
 
 class Event(BaseModel):

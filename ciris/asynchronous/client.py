@@ -206,6 +206,14 @@ class AsyncClient:
         """Revokes the project's key of this name."""
         await self._send("DELETE", f"/v1/keys/{segment(name)}")
 
+    async def webhook(self, job_id: str) -> Document:
+        """Returns a job's webhook with the last attempts to call its receiver."""
+        return await self._json("GET", f"/v1/jobs/{segment(job_id)}/webhook")
+
+    async def resend_webhook(self, job_id: str) -> Document:
+        """Has the receiver of a job's webhook called again."""
+        return await self._json("POST", f"/v1/jobs/{segment(job_id)}/webhook/resend")
+
     async def cover(self, job_id: str) -> Document:
         """Returns what a cover has come to."""
         return await self._json("GET", f"/v1/jobs/{segment(job_id)}/cover")

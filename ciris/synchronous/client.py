@@ -203,6 +203,14 @@ class Client:
         """Revokes the project's key of this name."""
         self._send("DELETE", f"/v1/keys/{segment(name)}")
 
+    def webhook(self, job_id: str) -> Document:
+        """Returns a job's webhook with the last attempts to call its receiver."""
+        return self._json("GET", f"/v1/jobs/{segment(job_id)}/webhook")
+
+    def resend_webhook(self, job_id: str) -> Document:
+        """Has the receiver of a job's webhook called again."""
+        return self._json("POST", f"/v1/jobs/{segment(job_id)}/webhook/resend")
+
     def cover(self, job_id: str) -> Document:
         """Returns what a cover has come to."""
         return self._json("GET", f"/v1/jobs/{segment(job_id)}/cover")

@@ -27,6 +27,7 @@ from db.types import utcnow
 from tests.certifier.scenes import accepted, cube, planar_arm
 from tests.scenes import slider
 from tests.services import Queue
+from tests.workers.service import SECRET_KEY
 from tests.workers.service import environment as surroundings
 from workers.app import celery_app
 from workers.solver import work
@@ -60,6 +61,7 @@ def environment(monkeypatch: pytest.MonkeyPatch) -> Iterator[pytest.MonkeyPatch]
 def client(database: Database, queue: Queue, environment: pytest.MonkeyPatch) -> Iterator[TestClient]:
     queue.flush()
     environment.setenv("CIRIS_REDIS_URL", queue.url)
+    environment.setenv("CIRIS_SECRET_KEY", SECRET_KEY)
     with TestClient(create_app(database), base_url=BASE_URL) as client:
         yield client
 

@@ -49,6 +49,13 @@ SELDOM: dict[str, dict[str, Any]] = {
     "ScenePage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
     "Verification": {"error": {"code": "bad_proof", "message": "a plane does not separate its pair", "field": None, "hint": ""}},
     "Webhook": {"error": "the receiver answered 500"},
+    "Delivery": {
+        "at": "2026-05-01T08:00:00Z",
+        "seconds": 0.12,
+        "status": 500,
+        "answer": "Internal Server Error",
+        "error": "the receiver answered 500",
+    },
 }
 """What a short visit does not meet. The tests check it against the schemas, like the rest."""
 MOST, NUMBERS = 4, 16

@@ -40,6 +40,7 @@ OPERATIONS = {
     "get_job_motion": "GET /v1/jobs/{job_id}/motion",
     "download_motion_proof": "GET /v1/jobs/{job_id}/motion/proof",
     "get_job_webhook": "GET /v1/jobs/{job_id}/webhook",
+    "resend_job_webhook": "POST /v1/jobs/{job_id}/webhook/resend",
     "get_job_workers": "GET /v1/jobs/{job_id}/workers",
     "get_job_obstacles": "GET /v1/jobs/{job_id}/obstacles",
     "list_job_events": "GET /v1/jobs/{job_id}/events",

@@ -9,6 +9,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 from certifier.model import Scene
+from db import webhooks
+from db.session import Database
+from db.settings import settings
+from db.types import utcnow
 from tests.api.test_jobs import GROW
 
 SECRET = "whsec_" + base64.b64encode(bytes(range(32))).decode()
@@ -57,3 +61,32 @@ def test_what_cannot_be_called_is_refused(client: TestClient, scene: Scene, chan
     assert (answer.status_code, answer.json()["field"]) == (422, field)
     assert str(change.get("secret", "no secret")) not in answer.text
     assert client.get("/v1/jobs").json()["jobs"] == []
+
+
+def test_attempts_are_shown_and_repeated(client: TestClient, database: Database, scene: Scene) -> None:
+    job = client.post("/v1/jobs", json=GROW | {"webhook": HOOK}).json()["id"]
+    path = f"/v1/jobs/{job}/webhook"
+    assert client.get(path).json()["deliveries"] == []
+    early = client.post(f"{path}/resend")
+    assert (early.status_code, early.json()["code"]) == (409, "webhook_waits")
+    client.post(f"/v1/jobs/{job}/cancel")
+    with database.write() as session:
+        row = webhooks.of_job(session, job)
+        row.attempts = 7
+        webhooks.settle(session, row.id, webhooks.Answered(utcnow(), 0.25, 500, "no\0thing", "the receiver answered 500"))
+    shown = client.get(path).json()
+    assert (shown["state"], shown["deliveries"][0]["status"], shown["deliveries"][0]["answer"]) == ("failed", 500, "nothing")
+    again = client.post(f"{path}/resend")
+    assert (again.status_code, again.json()["state"], again.json()["attempts"]) == (202, "waiting", 0)
+    assert len(again.json()["deliveries"]) == 1
+
+
+def test_a_service_without_a_key_for_secrets_takes_no_webhooks_and_stores_nothing(
+    client: TestClient, environment: pytest.MonkeyPatch, scene: Scene
+) -> None:
+    environment.setenv("CIRIS_SECRET_KEY", "")
+    settings.cache_clear()
+    answer = client.post("/v1/jobs", json=GROW | {"webhook": HOOK})
+    assert (answer.status_code, answer.json()["code"], answer.json()["field"]) == (422, "no_secret_key", "webhook.secret")
+    assert client.get("/v1/jobs").json()["jobs"] == []
+    assert client.post("/v1/jobs", json=GROW).status_code == 201

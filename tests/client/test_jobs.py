@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from fastapi.testclient import TestClient
 
 from certifier.model import Scene
-from db import jobs, scenes
+from db import jobs, scenes, webhooks
 from db.session import Database
+from db.types import utcnow
 from tests.client.conftest import Ciris
 
 SEED = {"kind": "grow", "seed": {"q": [0.0]}, "random_seed": 0}
@@ -79,3 +81,18 @@ def test_what_is_unknown_or_ambiguous_is_said(
         assert said in done.error
     assert ciris("job", "show", waiting, "--json").json["id"] == waiting
     assert ciris("scene", "show", scene.hash[:8], "--json").json["name"] == scene.name
+
+
+def test_a_jobs_webhook_is_shown_and_called_again(ciris: Ciris, url: str, database: Database, scene: Scene, client: TestClient) -> None:
+    hook = {"url": "https://planner.example.org/done", "secret": "whsec_" + "A" * 32}
+    job = client.post("/v1/jobs", json={"kind": "grow", "scene": scene.name, "seed": {"q": [0.1]}, "webhook": hook}).json()["id"]
+    assert ciris("job", "webhook", job[:8], "--json", CIRIS_URL=url).json["state"] == "waiting"
+    assert "has ended" in ciris("job", "webhook", job[:8], "--resend").error
+    client.post(f"/v1/jobs/{job}/cancel")
+    with database.write() as session:
+        row = webhooks.of_job(session, job)
+        webhooks.settle(session, row.id, webhooks.Answered(utcnow(), 0.25, 204, "", ""))
+    told = ciris("job", "webhook", job[:8]).stdout
+    assert "delivered" in told
+    assert "204" in told
+    assert ciris("job", "webhook", job[:8], "--resend", "--json").json["state"] == "waiting"

@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 
 from db.models import DEFAULT_PROJECT, Base, IterationRow, JobRow, PairRow, ProjectRow, StepRow, WebhookRow
 from db.session import Database
-from db.states import JobState, PairState, StepState, sources, transition, unfinished
+from db.states import JobState, PairState, StepState, WebhookState, sources, transition, unfinished
 from tests.db.builders import a_running_job
 
 MODELS = {JobRow: JobState, PairRow: PairState, StepRow: StepState}
@@ -69,7 +69,8 @@ def test_every_state_can_be_reached_and_every_unfinished_one_can_end(model: type
     while more := {target for state in reached for target in table[state]} - reached:
         reached |= more
     assert reached == set(table)
-    ended = set(table) - unfinished(table)
+    # People may have a receiver told again, so for webhooks no state is the last one.
+    ended = {WebhookState.DELIVERED} if model is WebhookRow else set(table) - unfinished(table)
     assert ended
     ending = set(ended)
     while more := {state for state in table if table[state] & ending} - ending:

@@ -11,10 +11,12 @@ from db import keys, projects, retention
 from db.keys import Scope
 from db.models import JobRow
 from db.session import Database
+from db.vault import Vault
 from tests.db.builders import a_running_job, add_region
 from tests.errors.rows import Trial, rows
 from tests.errors.service import GROW, database, post, queued, write
 
+SET_IT = "set CIRIS_SECRET_KEY to what `openssl rand -base64 32` prints, the same for the API and the control worker"
 SAY_SO = "say dependents=delete (--dependents) to delete them too"
 
 
@@ -37,6 +39,14 @@ def a_region_of_a_job(t: Trial) -> str:
     with db.write() as session:
         session.execute(update(JobRow).values(state="cancelled"))
     return job_id
+
+
+def resent_too_soon(t: Trial) -> None:
+    t.request.getfixturevalue("scene")
+    client: TestClient = t.request.getfixturevalue("client")
+    hook = {"url": "https://example.org/", "secret": "whsec_" + "A" * 32}
+    job = client.post("/v1/jobs", json=GROW | {"webhook": hook}).json()["id"]
+    t.ask("POST", f"/v1/jobs/{job}/webhook/resend")
 
 
 def named_twice(session: Any) -> None:
@@ -98,6 +108,28 @@ TEAMS = [
             lambda t: t.ask("DELETE", f"/v1/jobs/{queued(t)}"),
         ),
         ("has_dependents", "dependents", "with {what} go {found}", SAY_SO, lambda t: t.ask("DELETE", f"/v1/jobs/{a_region_of_a_job(t)}")),
+    ),
+    *rows(
+        "db/vault.py",
+        ("no_secret_key", "webhook.secret", "this service has no key to keep secrets with", SET_IT, lambda t: Vault("").seal("a", "b")),
+        ("secret_key", "CIRIS_SECRET_KEY", "this is not the base64 of 32 bytes", SET_IT, lambda t: Vault("short")),
+        (
+            "secret_lost",
+            "CIRIS_SECRET_KEY",
+            "no key fits a secret",
+            "add the key of before, after a comma",
+            lambda t: Vault("").open("v1.AAAAAAAAAAAAAAAAAAAAAAAA", "b"),
+        ),
+    ),
+    *rows(
+        "db/webhooks.py",
+        (
+            "webhook_waits",
+            "job",
+            "the job is {state}; its webhook is called when it has ended",
+            "wait for the end of the job",
+            resent_too_soon,
+        ),
     ),
     *rows(
         "api/room.py",

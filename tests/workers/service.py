@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import os
 import signal
 import subprocess
@@ -28,6 +29,7 @@ from workers.processes import die_with_parent
 ROOT = Path(__file__).parents[2]
 PATIENCE_SECONDS = 180.0
 """For machines that are busy with other things; nothing is to take that long."""
+SECRET_KEY = base64.b64encode(bytes(range(32))).decode()
 Found = TypeVar("Found")
 
 
@@ -36,7 +38,7 @@ def environment(**variables: str) -> Iterator[None]:
     """The process's settings, database and Celery app as these variables say, for a while."""
     caches = (settings, database, celery_app, scenes.load)
     with pytest.MonkeyPatch.context() as patch:
-        for name, value in variables.items():
+        for name, value in {"CIRIS_SECRET_KEY": SECRET_KEY, **variables}.items():
             patch.setenv(name, value)
         for cache in caches:
             cache.cache_clear()

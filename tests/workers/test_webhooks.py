@@ -16,13 +16,16 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
+from sqlalchemy import text
 
 from certifier.errors import CirisError
 from db import jobs, webhooks
-from db.models import WebhookRow
+from db.models import Base, WebhookRow
 from db.session import database
+from db.settings import settings
 from db.states import JobState
 from db.types import utcnow
+from db.vault import vault
 from tests.db.builders import a_job
 from tests.workers.service import environment
 from workers import addresses
@@ -201,7 +204,61 @@ def test_a_retry_tells_the_same_receiver(service: None, receiver: Receiver) -> N
     with database().write() as session:
         again = jobs.retry(session, job_id).id
         assert jobs.retry(session, job_id).id == again
-    assert (row_of(again).url, row_of(again).secret, row_of(again).state) == (receiver.url, SECRET, "waiting")
+    row = row_of(again)
+    assert (row.url, row.state, vault().open(row.secret, row.url)) == (receiver.url, "waiting", SECRET)
+
+
+def test_the_database_does_not_hold_the_secret(service: None, receiver: Receiver) -> None:
+    """Neither as it is given, nor as the bytes that it stands for."""
+    a_webhook(receiver.url)
+    with database().read() as session:
+        stored = [str(tuple(row)) for table in Base.metadata.tables for row in session.execute(text(f'SELECT * FROM "{table}"'))]
+    assert any(receiver.url in row for row in stored)
+    for secret in (SECRET, SECRET.removeprefix("whsec_"), bytes(range(32)).hex(), str(bytes(range(32)))):
+        assert not any(secret in row for row in stored)
+
+
+def test_a_secret_that_an_earlier_version_stored_is_encrypted_when_the_worker_starts(service: None, receiver: Receiver) -> None:
+    job_id = a_webhook(receiver.url)
+    with database().write() as session:
+        webhooks.of_job(session, job_id).secret = SECRET
+        assert webhooks.seal_all(session) == 1
+        assert webhooks.seal_all(session) == 0
+    delivering.deliver_due()
+    row = row_of(job_id)
+    assert row.state == "delivered"
+    assert SECRET not in row.secret
+
+
+def test_without_the_key_a_receiver_is_not_told_and_the_attempt_says_why(service: None, receiver: Receiver) -> None:
+    job_id = a_webhook(receiver.url)
+    with environment(CIRIS_DATABASE_URL=settings().database_url, CIRIS_WEBHOOK_PRIVATE="1", CIRIS_SECRET_KEY=""):
+        delivering.deliver_due()
+        assert receiver.bodies == []
+        assert "no key fits" in (row_of(job_id).error or "")
+
+
+def test_attempts_are_remembered_and_a_receiver_is_told_again_when_somebody_asks(service: None, receiver: Receiver) -> None:
+    receiver.answers = [500, 204]
+    job_id = a_webhook(receiver.url)
+    delivering.deliver_due()
+    pass_time(webhooks.BACKOFF_SECONDS[0])
+    delivering.deliver_due()
+    with database().write() as session:
+        row = webhooks.of_job(session, job_id)
+        told = [(one.status, one.error) for one in webhooks.deliveries(session, row.id)]
+        assert told == [(204, None), (500, "the receiver answered 500")]
+        again = webhooks.send_again(session, jobs.lock(session, job_id), utcnow())
+        assert (again.state, again.attempts) == ("waiting", 0)
+    delivering.deliver_due()
+    assert row_of(job_id).state == "delivered"
+    assert [headers["webhook-id"] for headers in receiver.headers] == [row.id] * 3
+    for _ in range(webhooks.KEPT):
+        with database().write() as session:
+            webhooks.send_again(session, jobs.lock(session, job_id), utcnow())
+        delivering.deliver_due()
+    with database().read() as session:
+        assert len(webhooks.deliveries(session, row.id)) == webhooks.KEPT
 
 
 def test_private_addresses_are_not_called(database_url: str, receiver: Receiver) -> None:
