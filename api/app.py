@@ -75,6 +75,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     problems.install(app, render_problem)
     for module in (scenes, jobs, events, regions, cells, planning, plans, drawing, motions, project, service):
         app.include_router(module.router)
+    app.include_router(events.project)
     app.include_router(login.router)
     site.install(app)
     app.openapi = partial(document.describe, app)  # type: ignore[method-assign]

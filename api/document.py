@@ -42,6 +42,8 @@ ALSO: dict[str, tuple[str, ...]] = {
     "create_scene": ("bundle_too_large", "storage_quota", "bad_bundle", *CHILDREN),
     "delete_scene": ("has_dependents", "not_ended", "busy"),
     "create_job": ("idempotency_conflict", "quota_exceeded", "storage_quota", "region_not_found", "busy"),
+    "create_jobs": ("scene_not_found", "region_not_found", "idempotency_conflict", "quota_exceeded", "storage_quota", "busy"),
+    "cancel_jobs": ("job_not_found", "ambiguous_id", "busy"),
     "delete_job": ("has_dependents", "not_ended", "busy"),
     "cancel_job": ("busy",),
     "retry_job": ("job_not_retryable", "quota_exceeded", "busy"),

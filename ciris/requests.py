@@ -38,6 +38,8 @@ class GrowOptions(TypedDict, total=False):
     """Seed of every random choice."""
     priority: int
     """From -3 to 3; each step up doubles the job's share of the work."""
+    labels: Mapping[str, str]
+    """What the job is to be found by: name -> value."""
 
 
 class CoverOptions(TypedDict, total=False):
@@ -69,9 +71,11 @@ class CoverOptions(TypedDict, total=False):
     """Seconds after which the cover ends, with the regions by then."""
     priority: int
     """From -3 to 3; each step up doubles the job's share of the work."""
+    labels: Mapping[str, str]
+    """What the job is to be found by: name -> value."""
 
 
-_IN_JOB = (("deadline", "deadline_seconds"), ("priority", "priority"))
+_IN_JOB = (("deadline", "deadline_seconds"), ("priority", "priority"), ("labels", "labels"))
 _IN_OPTIONS = ("contraction", "cells", "pushes", "max_rounds", "random_seed")
 
 

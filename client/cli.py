@@ -265,6 +265,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="SECONDS",
         help="end after so long with the best region by then, once it is verified; default: none",
     )
+    grow.add_argument("--label", metavar="NAME=VALUE", action="append", default=[], help="what the job is to be found by; may be repeated")
     grow.add_argument("--pushes", type=int, help="how often the faces are pushed out again; default: more often for smaller arms")
     grow.add_argument("--rounds", type=int, help="rounds of the polytope step; default: a few for small arms, none for large ones")
     grow.add_argument("--random-seed", type=int, help="seed of every random choice; default 0")
@@ -378,6 +379,8 @@ def _parser() -> argparse.ArgumentParser:
     ls = job.add_parser("ls", parents=[remote, json], help="list jobs, newest first")
     ls.add_argument("--state", help="list only jobs in this state: queued, running, succeeded, failed, cancelled and others")
     ls.add_argument("--scene", help="list only the jobs of this scene")
+    ls.add_argument("--label", metavar="NAME=VALUE", action="append", default=[], help="list only the jobs with this label")
+    ls.add_argument("--search", metavar="TEXT", help="list only the jobs whose id, reason, labels or scene mention this")
     ls.add_argument("--most", type=int, default=50, metavar="N", help="list so many at most; default 50")
     ls.set_defaults(run="client.jobs:job_ls")
     for verb, about in (

@@ -14,7 +14,7 @@ from certifier.outcome import Outcome
 from certifier.verify.decimals import at_most_mm, exactly
 from client import output, service
 from client.files import ProofFile, check_writable
-from client.inputs import configuration, polytope_file, seed_of
+from client.inputs import configuration, labels, polytope_file, seed_of
 from client.output import Screen, print_json
 
 OK, NO = 0, 1
@@ -135,7 +135,7 @@ def grow(args: Namespace) -> int:
 
 def _request(args: Namespace, scene: dict[str, Any], seed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
     """Returns the request for a job that grows a region."""
-    request = {"kind": "grow", "scene": scene["id"], "seed": seed, "options": options}
+    request = {"kind": "grow", "scene": scene["id"], "seed": seed, "options": options, "labels": labels(args.label)}
     return request if args.deadline is None else {**request, "deadline_seconds": args.deadline}
 
 

@@ -158,3 +158,18 @@ def _document(path: str) -> dict[str, Any]:
     found = {name: next((document[key] for key in keys if key in document), None) for name, keys in names.items()}
     numbers = {name: np.array(value, dtype=float) for name, value in found.items() if value is not None}
     return numbers | ({"joints": np.array(space["joints"], dtype=str)} if space.get("joints") is not None else {})
+
+
+def labels(given: Sequence[str]) -> dict[str, str]:
+    """Returns the labels of options ``NAME=VALUE``.
+
+    Raises:
+        CirisError: bad_option.
+    """
+    found = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not name or not equals:
+            raise CirisError("bad_option", f"must be NAME=VALUE, not {text!r}", field="--label")
+        found[name] = value
+    return found

@@ -9,6 +9,7 @@ from certifier.errors import CirisError
 from ciris.answers import Document
 from client import output
 from client.follow import follow
+from client.inputs import labels
 from client.output import Screen, print_json
 from client.service import connect
 
@@ -20,8 +21,9 @@ WORST = 5
 
 
 def job_ls(args: Namespace) -> int:
+    wanted = labels(args.label)
     with connect(args.url) as client:
-        jobs = client.jobs(state=args.state, scene=args.scene, most=args.most)
+        jobs = client.jobs(state=args.state, scene=args.scene, labels=wanted, search=args.search, most=args.most)
         names = {scene["id"]: scene["name"] for scene in client.scenes()}
     if args.json:
         print_json(jobs)
@@ -121,6 +123,7 @@ def _print(job: dict[str, Any]) -> None:
         ("state", job["state"]),
         ("scene", job["scene"]),
         ("created", job["created_at"][:19]),
+        *([("labels", ", ".join(f"{name}={value}" for name, value in job["labels"].items()))] if job["labels"] else []),
         ("outcome", output.plain(job["outcome"])),
         *([("reason", job["reason"])] if job["reason"] else []),
         *([("error", str(CirisError.from_document(error)))] if error else []),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from sqlalchemy import select
@@ -38,3 +38,23 @@ def before(session: Session, job_id: str, seq: int, limit: int) -> Sequence[Even
 def since(session: Session, job_id: str, seq: int = 0, limit: int = 500) -> Sequence[EventRow]:
     """Returns the job's events after number ``seq``, in order, at most ``limit`` of them."""
     return session.scalars(select(EventRow).where(EventRow.job_id == job_id, EventRow.seq > seq).order_by(EventRow.seq).limit(limit)).all()
+
+
+def of_all(session: Session, after: int, limit: int, known: Collection[int] = ()) -> Sequence[EventRow]:
+    """Returns the events of all jobs of the session's project whose ids are larger than a number, in the order of their ids.
+
+    Ids are not in the order of commits: one that is smaller may come to be seen later.
+
+    Args:
+        known: ids that are left out.
+    """
+    query = select(EventRow).join(JobRow, JobRow.id == EventRow.job_id).where(EventRow.id > after)
+    if known:
+        query = query.where(EventRow.id.not_in(known))
+    return session.scalars(query.order_by(EventRow.id).limit(limit)).all()
+
+
+def last_id(session: Session) -> int:
+    """Returns the largest id of an event of the session's project; 0 without events."""
+    query = select(EventRow.id).join(JobRow, JobRow.id == EventRow.job_id).order_by(EventRow.id.desc()).limit(1)
+    return session.scalar(query) or 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
 from uuid import uuid4
@@ -11,7 +11,7 @@ from sqlalchemy import ColumnElement, and_, exists, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
 from certifier.errors import CirisError
-from db import events, leases, pages, webhooks
+from db import events, labels, leases, pages, webhooks
 from db.ids import expanded
 from db.models import GrowthRow, JobRow, SceneRow, StepRow
 from db.pages import Page
@@ -36,6 +36,7 @@ def create(
     attempt: int = 1,
     parent_id: str | None = None,
     number: int | None = None,
+    given_labels: Mapping[str, str] | None = None,
 ) -> tuple[JobRow, bool]:
     """Creates a queued job in the scene's project and returns it with True, or returns the job of the same idempotency key with False.
 
@@ -66,6 +67,7 @@ def create(
         if parent_id is None:
             _check_quota(session, key_id)
         job = lock(session, job_id)
+        labels.put(session, job_id, given_labels or {})
         events.emit(session, job, "job", {"state": job.state})
         return job, True
     job = session.scalars(select(JobRow).where(JobRow.idempotency_key == idempotency_key)).one()
@@ -119,6 +121,7 @@ def retry(session: Session, job_id: str, key_id: str | None = None) -> JobRow:
         priority=job.priority,
         retry_of=job.id,
         attempt=job.attempt + 1,
+        given_labels=labels.of_jobs(session, [job.id]).get(job.id),
     )
     if made:
         webhooks.copy(session, job.id, again.id)
@@ -161,6 +164,8 @@ def page(
     scene_id: str | None = None,
     ended: bool | None = None,
     parent_id: str | None = None,
+    given_labels: Mapping[str, str] | None = None,
+    search: str | None = None,
     after: str | None = None,
     limit: int = 50,
 ) -> Page[JobRow]:
@@ -173,12 +178,22 @@ def page(
     query = select(JobRow).where(*(column == value for column, value in filters.items() if value is not None))
     if ended is not None:
         query = query.where(JobRow.state.in_(unfinished(JOB)) != ended)
+    if given_labels:
+        query = query.where(labels.has(given_labels))
+    if search is not None:
+        query = query.where(labels.mentions(search))
     return pages.page(session, JobRow, query.where(JobRow.parent_id.is_not_distinct_from(parent_id)), after, limit)
 
 
 def children(session: Session, job_id: str) -> Sequence[JobRow]:
     """Returns the jobs that grow regions for a cover, or have, in order."""
     return session.scalars(select(JobRow).where(JobRow.parent_id == job_id).order_by(JobRow.number)).all()
+
+
+def unfinished_with(session: Session, given_labels: Mapping[str, str], limit: int) -> Sequence[str]:
+    """Returns the ids of unfinished jobs that have all of these labels, and that somebody asked for."""
+    wanted = (JobRow.state.in_(unfinished(JOB)), JobRow.parent_id.is_(None), labels.has(given_labels))
+    return session.scalars(select(JobRow.id).where(*wanted).order_by(JobRow.created_at).limit(limit)).all()
 
 
 def cancel(session: Session, job_id: str) -> JobRow:

@@ -209,6 +209,17 @@ class JobRow(Owned, Base):
     deadline_at: Mapped[datetime | None]
 
 
+class JobLabelRow(Base):
+    """A label of a job: whatever people want to find it by."""
+
+    __tablename__ = "job_labels"
+    __table_args__ = (Index(None, "name", "value"),)
+
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
+    name: Mapped[str] = mapped_column(String(64), primary_key=True)
+    value: Mapped[str] = mapped_column(String(200))
+
+
 class GrowthRow(Base):
     """This row holds what the growth of a job knows, or what a cover knows.
 

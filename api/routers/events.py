@@ -13,15 +13,18 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from api.access import READ, Db, presented_key
 from api.reading import ReadingRoute
 from api.schemas.common import MAX_INT, JobGiven, Listed
-from api.schemas.jobs import Event, EventList
+from api.schemas.jobs import Event, EventList, ProjectEvent, ProjectEventList
 from db import events, jobs
 from db.session import Database
 
 After = Annotated[int, Query(ge=0, le=MAX_INT, description="Return only events with a larger number than this.")]
 POLL_SECONDS = 0.3
 PAGE = 500
+LATE = 200
+"""An event whose id is smaller by so many may still come: workers commit in another order than that of the ids."""
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ], route_class=ReadingRoute)
+project = APIRouter(prefix="/v1/events", tags=["project"], dependencies=[READ], route_class=ReadingRoute)
 
 
 @router.get("/{job_id}/events")
@@ -80,3 +83,56 @@ def _next_page(db: Database, job_id: str, seq: int) -> tuple[list[Event], bool]:
     with db.read() as session:
         job = jobs.get(session, job_id)
         return [Event.of(row) for row in events.since(session, job_id, seq, PAGE)], not job.transitions[job.state]
+
+
+@project.get("")
+def list_project_events(
+    db: Db,
+    after: After = 0,
+    limit: Listed = PAGE,
+) -> ProjectEventList:
+    """Returns what happened to all jobs of the project after an event.
+
+    Workers write at the same time, so an event may come to be seen after one with a larger `id`. Whoever must not miss any asks again from
+    some hundred before the last `id`, or reads the stream, and leaves out what it has seen by `job` and `seq`.
+    """
+    with db.read() as session:
+        return ProjectEventList(events=[ProjectEvent.of(row) for row in events.of_all(session, after, limit)])
+
+
+@project.get("/stream", response_class=EventSourceResponse)
+async def stream_project_events(
+    db: Db,
+    request: Request,
+    after: Annotated[int | None, Query(ge=0, le=MAX_INT, description="Begin after this event; by default with what comes next.")] = None,
+    last_event_id: Annotated[
+        int | None, Header(ge=0, le=MAX_INT, description="The stream goes on after this event; used instead of `after`.")
+    ] = None,
+) -> AsyncIterator[ServerSentEvent]:
+    """Streams what happens to all jobs of the project.
+
+    It does not end by itself. It goes back a little where it goes on, so an event may come twice, with the same `job` and `seq`. It closes
+    when the caller's key is revoked.
+    """
+    begin = after if last_event_id is None else last_event_id
+    newest = await run_in_threadpool(_last_id, db) if begin is None else begin
+    seen: set[int] = set() if begin is not None else set(range(max(newest - LATE, 0), newest + 1))
+    keyring, given = request.app.state.keyring, presented_key(request.headers)
+    while await keyring.caller(given) is not None:
+        page = await run_in_threadpool(_of_all, db, max(newest - LATE, 0), seen)
+        for event in page:
+            yield ServerSentEvent(data=event.model_dump(mode="json"), event=event.kind, id=str(event.id))
+        seen.update(event.id for event in page)
+        newest = max([newest, *(event.id for event in page)])
+        seen = {one for one in seen if one > newest - LATE}
+        await asyncio.sleep(0 if len(page) == PAGE else POLL_SECONDS)
+
+
+def _of_all(db: Database, after: int, seen: set[int]) -> list[ProjectEvent]:
+    with db.read() as session:
+        return [ProjectEvent.of(row) for row in events.of_all(session, after, PAGE, seen)]
+
+
+def _last_id(db: Database) -> int:
+    with db.read() as session:
+        return events.last_id(session)

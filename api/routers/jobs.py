@@ -6,18 +6,15 @@ waits for a Redis that is down.
 
 from __future__ import annotations
 
-import hashlib
 import itertools
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from datetime import timedelta
 from typing import Annotated, Any
 
 from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 from pydantic import Field
 
-from api import checks, obstacles
+from api import obstacles, submission
 from api.access import READ, SUBMIT, Admin, Db, Submitter
 from api.announce import Announcements
 from api.reading import ReadingRoute
@@ -25,22 +22,20 @@ from api.room import KeptRoom
 from api.schemas.common import MAX_INT, Cursor, JobGiven, OfIteration, OfScene, PairGiven, WithDependents
 from api.schemas.covers import Cover, CoverRegion
 from api.schemas.jobs import (
-    CertifyPathRequest,
-    CertifyRequest,
-    CoverRequest,
-    GrowRequest,
+    MOST_TOGETHER,
+    CancelRequest,
     GrowthCurve,
     GrowthPoint,
     Iteration,
     IterationStates,
     Job,
+    JobList,
     JobPage,
-    JobRequest,
     NewJob,
+    NewJobs,
     PairCell,
     PairMatrix,
     PairStates,
-    RecertifyRequest,
     Webhook,
 )
 from api.schemas.motions import JobMotion
@@ -52,7 +47,7 @@ from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.proof.container import with_scene
-from db import audit, clock, jobs, leases, pages, pairs, proofs, regions, retention, scenes, steps, webhooks
+from db import audit, clock, jobs, labels, leases, pages, pairs, proofs, regions, retention, scenes, steps, webhooks
 from db.audit import Action
 from db.models import IterationRow, JobRow, PairRow, StepRow
 from db.session import Database
@@ -65,6 +60,20 @@ from planner.cover.state import CoverState
 MOST_PAIRS = 5000
 """One page of a pair matrix has so many results at most."""
 
+IdempotencyKey = Annotated[str | None, Header(min_length=1, max_length=200, description="The same key and body give the same job.")]
+Label = Annotated[
+    list[Annotated[str, Field(max_length=300, pattern=r"^[^=\x00]+=[^\x00]*$")]] | None,
+    Query(max_length=20, description="List only the jobs with this label, `name=value`; with all of several.", examples=[["team=welding"]]),
+]
+Search = Annotated[
+    str | None,
+    Query(
+        min_length=1,
+        max_length=200,
+        pattern=r"^[^\x00]*$",
+        description="List only the jobs whose id begins with this, or where it is in the reason, a label, or a name of the scene.",
+    ),
+]
 InIteration = Annotated[int, Query(ge=0, le=MAX_INT, description="The iteration whose result is meant.")]
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ], route_class=ReadingRoute)
@@ -84,36 +93,16 @@ def create_job(
     background: BackgroundTasks,
     announcements: Announcements,
     room: KeptRoom,
-    idempotency_key: Annotated[
-        str | None,
-        Header(min_length=1, max_length=200, description="The same key and body give the same job."),
-    ] = None,
+    idempotency_key: IdempotencyKey = None,
 ) -> Job:
     """Starts a job that grows a region, certifies a polytope or a motion, certifies a region of a changed scene again, or covers a scene.
 
     A repetition of the request with the same Idempotency-Key returns the same job. Another request with that key is refused (409).
     """
-    with db.read() as session:
-        scene_id = scenes.find(session, body.scene)
-    scene = scenes.load(db, scene_id)
-    options = _recertify(body, scene, db) if isinstance(body, RecertifyRequest) else _options(body, scene)
-    if body.webhook is not None:
-        checks.webhook(body.webhook)
+    asked = submission.checked(db, body)
     room.check(db, caller.project)
     with db.write() as session:
-        job, made = jobs.create(
-            session,
-            kind=body.kind,
-            scene_id=scene_id,
-            options=options,
-            deadline_at=clock.now(session) + timedelta(seconds=body.deadline_seconds) if body.deadline_seconds else None,
-            idempotency_key=idempotency_key and f"{caller.key_id or 'open'}:{idempotency_key}",
-            request_digest=_digest(scene_id, options, body),
-            key_id=caller.key_id,
-            priority=body.priority,
-        )
-        if made and body.webhook is not None:
-            webhooks.add(session, job.id, body.webhook.url, body.webhook.secret)
+        job, made = submission.submit(session, asked, caller, idempotency_key)
     if made:
         background.add_task(announcements.announce, job.id)
     else:
@@ -122,38 +111,55 @@ def create_job(
     return _described(db, [job])[0]
 
 
+@router.post("/batch", status_code=status.HTTP_201_CREATED)
+@writing
+def create_jobs(
+    body: NewJobs,
+    caller: Submitter,
+    db: Db,
+    background: BackgroundTasks,
+    announcements: Announcements,
+    room: KeptRoom,
+    idempotency_key: IdempotencyKey = None,
+) -> JobList:
+    """Starts several jobs at once: all of them, or none where something is wrong with one, which the error's field names.
+
+    With an Idempotency-Key a repetition returns the same jobs.
+    """
+    asked = [submission.checked(db, one, f"jobs[{i}]") for i, one in enumerate(body.jobs)]
+    room.check(db, caller.project)
+    with db.write() as session:
+        made = [submission.submit(session, one, caller, idempotency_key and f"{idempotency_key}:{i}") for i, one in enumerate(asked)]
+    for job, new in made:
+        if new:
+            background.add_task(announcements.announce, job.id)
+    return JobList(jobs=_described(db, [job for job, _ in made]))
+
+
+@router.post("/cancel", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
+@writing
+def cancel_jobs(body: CancelRequest, db: Db, background: BackgroundTasks, announcements: Announcements) -> JobList:
+    """Asks several jobs to end: those named, or those with all of the labels that have not ended. Regions certified before remain.
+
+    With labels, at most 100 are cancelled. Ask again until the answer is empty.
+    """
+    with db.read() as session:
+        ids = [jobs.get(session, job).id for job in body.jobs or ()]
+        ids += jobs.unfinished_with(session, body.labels, MOST_TOGETHER) if body.labels else ()
+    cancelled = []
+    for job_id in ids:  # one transaction each, so that no worker waits for the lock of all
+        with db.write() as session:
+            cancelled.append(jobs.cancel(session, job_id))
+        background.add_task(announcements.announce, job_id)
+    return JobList(jobs=_described(db, cancelled))
+
+
 def _described(db: Database, rows: Sequence[JobRow]) -> list[Job]:
-    """Describes jobs with the shares of their last regions."""
+    """Describes jobs with their labels and the shares of their last regions."""
     with db.read() as session:
         shares = regions.shares(session, [row.region_id for row in rows if row.region_id is not None])
-    return [Job.of(row, shares.get(row.region_id or "")) for row in rows]
-
-
-def _options(body: GrowRequest | CertifyRequest | CertifyPathRequest | CoverRequest, scene: Scene) -> dict[str, Any]:
-    """Returns the document of GrowthOptions, CoverOptions or a motion that the request asks for, its numbers checked against the scene."""
-    if isinstance(body, CoverRequest):
-        return checks.cover(scene, body.options).to_document()
-    if isinstance(body, CertifyPathRequest):
-        return checks.motion(scene, body)
-    if isinstance(body, GrowRequest):
-        return {"kind": "grow", "seed": checks.seed(scene, body.seed).to_document(), **body.options.model_dump()}
-    checks.polytope(scene, body.polytope)
-    return {"kind": "certify", "seed": body.polytope.model_dump(exclude_none=True), "cells": body.cells, "random_seed": body.random_seed}
-
-
-def _recertify(body: RecertifyRequest, scene: Scene, db: Database) -> dict[str, Any]:
-    """Does as :func:`_options` for a region of another scene."""
-    with db.read() as session:
-        row = regions.get(session, body.region)
-        region, digest, manifest, old = row.id, row.proof_digest, row.manifest, row.scene_id
-    checks.same_robot(scenes.load(db, old), scene)
-    polytope = {"C": manifest["halfspace_normals"], "d": manifest["halfspace_offsets"], "q": checks.kept(scene, manifest)}
-    return {"kind": "recertify", "seed": {**polytope, "region": region, "proof": digest}, "random_seed": body.random_seed}
-
-
-def _digest(scene_id: str, options: dict[str, Any], body: JobRequest) -> str:
-    document = [scene_id, options, body.priority, body.deadline_seconds, body.webhook and body.webhook.model_dump()]
-    return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
+        known = labels.of_jobs(session, [row.id for row in rows])
+    return [Job.of(row, shares.get(row.region_id or ""), known.get(row.id, {})) for row in rows]
 
 
 @router.get("")
@@ -164,6 +170,8 @@ def list_jobs(
     scene: OfScene = None,
     ended: Annotated[bool | None, Query(description="`true` lists the jobs that have ended, `false` the others.")] = None,
     parent: Annotated[str | None, Query(max_length=64, description="List the jobs that grow the regions of this cover.")] = None,
+    label: Label = None,
+    search: Search = None,
     after: Cursor = None,
     limit: Annotated[int, Query(ge=1, le=200, description="Return so many at most.")] = 50,
 ) -> JobPage:
@@ -171,7 +179,18 @@ def list_jobs(
     with db.read() as session:
         scene_id = scenes.find(session, scene) if scene else None
         parent_id = jobs.get(session, parent).id if parent else None
-        page = jobs.page(session, state=state, kind=kind, scene_id=scene_id, ended=ended, parent_id=parent_id, after=after, limit=limit)
+        page = jobs.page(
+            session,
+            state=state,
+            kind=kind,
+            scene_id=scene_id,
+            ended=ended,
+            parent_id=parent_id,
+            given_labels={name: value for name, _, value in (one.partition("=") for one in label or ())},
+            search=search,
+            after=after,
+            limit=limit,
+        )
     return JobPage(jobs=_described(db, page.rows), next=page.next)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector
 from api.schemas.covers import CoverRequestOptions
@@ -133,6 +133,11 @@ class WebhookRequest(Request):
         return secret
 
 
+LabelName = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[\w./-]+$")]
+LabelValue = Annotated[str, Field(max_length=200, pattern=r"^[^\x00]*$")]
+Labels = Annotated[dict[LabelName, LabelValue], Field(max_length=20)]
+
+
 class JobRequest(Request):
     """Holds what the requests for all kinds of job have in common."""
 
@@ -141,6 +146,7 @@ class JobRequest(Request):
     deadline_seconds: Real | None = Field(
         None, gt=0, le=30 * 86400, description="The job ends this many seconds after its creation, with the regions it has by then."
     )
+    labels: Labels = Field(default_factory=dict, description="Whatever the job is to be found by, at most 20: name -> value.")
     webhook: WebhookRequest | None = Field(None, description="Whom to tell when the job has ended; nobody by default.")
 
 
@@ -248,13 +254,15 @@ class Job(BaseModel):
     finished_at: datetime | None = Field(description="When it ended; null before.")
     deadline_at: datetime | None = Field(description="When it ends at the latest; null without a deadline.")
     ended: bool = Field(description="True once it has ended, however it did.")
+    labels: dict[str, str] = Field(description="What it is to be found by: name -> value.")
     progress: Progress = Field(description="How far the job is in its last iteration, and what its last region has come to.")
 
     @classmethod
-    def of(cls, row: JobRow, share: float | None) -> Self:
+    def of(cls, row: JobRow, share: float | None, labels: dict[str, str]) -> Self:
         """Describes a job.
 
         Args:
+            labels: the job's labels.
             share: the share of the proposal that its last region keeps; None without a region, or where there is none.
         """
         return cls(
@@ -276,6 +284,7 @@ class Job(BaseModel):
             finished_at=row.finished_at,
             deadline_at=row.deadline_at,
             ended=not row.transitions[row.state],
+            labels=labels,
             progress=Progress(
                 settled=None if row.pieces is None else row.pieces - row.open_pairs - row.running_pairs, total=row.pieces, share=share
             ),
@@ -286,6 +295,41 @@ class JobPage(Page):
     """Holds one page of jobs, newest first."""
 
     jobs: list[Job] = Field(description="The jobs of this page.")
+
+
+MOST_TOGETHER = 100
+"""One request creates, or cancels, so many jobs at most."""
+
+
+class NewJobs(Request):
+    """Asks for several jobs: all of them are made, or none."""
+
+    jobs: list[NewJob] = Field(min_length=1, max_length=MOST_TOGETHER, description="The jobs, of whatever kinds.")
+
+
+class JobList(BaseModel):
+    """Holds jobs."""
+
+    jobs: list[Job] = Field(description="The jobs, in the order of the request.")
+
+
+class CancelRequest(Request):
+    """Names the jobs to cancel, either by their ids or by labels."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"jobs": ["1f9b2a7c"]}, {"labels": {"team": "welding"}}]})
+
+    jobs: list[Annotated[str, Field(min_length=4, max_length=36)]] | None = Field(
+        None, min_length=1, max_length=MOST_TOGETHER, description="Ids of jobs, or their first characters."
+    )
+    labels: Labels | None = Field(
+        None, min_length=1, description=f"Cancel the jobs that have all of these labels and have not ended, at most {MOST_TOGETHER}."
+    )
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        if (self.jobs is None) == (self.labels is None):
+            raise ValueError("give either jobs or labels")
+        return self
 
 
 class Delivery(BaseModel):
@@ -335,6 +379,23 @@ class Event(BaseModel):
     @classmethod
     def of(cls, row: EventRow) -> Self:
         return cls(seq=row.seq, kind=row.kind, data=row.data, created_at=row.created_at)
+
+
+class ProjectEvent(Event):
+    """Describes something that happened to one of the jobs of a project. `job` and `seq` name it; it may come twice."""
+
+    id: int = Field(description="Pass this as `after`, or as Last-Event-ID, to go on after this event.")
+    job: str = Field(description="Id of the job.")
+
+    @classmethod
+    def of(cls, row: EventRow) -> Self:
+        return cls(id=row.id, job=row.job_id, seq=row.seq, kind=row.kind, data=row.data, created_at=row.created_at)
+
+
+class ProjectEventList(BaseModel):
+    """Holds events of all jobs of a project, in the order in which they were written."""
+
+    events: list[ProjectEvent] = Field(description="The events.")
 
 
 class EventList(BaseModel):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -128,9 +128,19 @@ class Client:
         response = self._send("POST", "/v1/jobs", json=request, headers=headers)
         return content(response), response.status_code == httpx2.codes.CREATED
 
-    def jobs(self, *, state: str | None = None, scene: str | None = None, parent: str | None = None, most: int = 50) -> list[Document]:
-        """Returns the newest jobs, at most so many, in one state, of one scene, or of one cover where that is given."""
-        wanted = given(state=state, scene=scene, parent=parent)
+    def jobs(
+        self,
+        *,
+        state: str | None = None,
+        scene: str | None = None,
+        parent: str | None = None,
+        labels: Mapping[str, str] | None = None,
+        search: str | None = None,
+        most: int = 50,
+    ) -> list[Document]:
+        """Returns the newest jobs, at most so many: in one state, of one scene, of one cover, with labels, or that mention a text."""
+        label = [f"{name}={value}" for name, value in labels.items()] if labels else None
+        wanted = given(state=state, scene=scene, parent=parent, label=label, search=search)
         found: list[Document] = []
         after = None
         while len(found) < most:
@@ -167,6 +177,15 @@ class Client:
     def cancel(self, job_id: str) -> Document:
         """Asks a job to end, and returns it."""
         return self._json("POST", f"/v1/jobs/{segment(job_id)}/cancel")
+
+    def create_jobs(self, requests: Sequence[Document]) -> list[Document]:
+        """Creates all of these jobs, at most 100, or none, and returns them."""
+        return self._json("POST", "/v1/jobs/batch", json={"jobs": list(requests)})["jobs"]
+
+    def cancel_jobs(self, *, jobs: Sequence[str] | None = None, labels: Mapping[str, str] | None = None) -> list[Document]:
+        """Asks several jobs to end, at most 100: those with these ids, or with all of these labels. Returns them."""
+        asked = given(jobs=None if jobs is None else list(jobs), labels=None if labels is None else dict(labels))
+        return self._json("POST", "/v1/jobs/cancel", json=asked)["jobs"]
 
     def retry(self, job_id: str) -> Document:
         """Creates a new job like one that failed or was cancelled, and returns it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -228,10 +228,19 @@ class Service:
         """Returns a job as it is now; the first characters of its id are enough."""
         return self._job(self.client.job(job_id))
 
-    def jobs(self, scene: str | Scene | None = None, *, state: str | None = None, most: int = 50) -> list[Job]:
-        """Returns the newest jobs, at most so many, of one scene or in one state where that is given."""
+    def jobs(
+        self,
+        scene: str | Scene | None = None,
+        *,
+        state: str | None = None,
+        labels: Mapping[str, str] | None = None,
+        search: str | None = None,
+        most: int = 50,
+    ) -> list[Job]:
+        """Returns the newest jobs, at most so many: of one scene, in one state, with labels, or that mention a text."""
         named = None if scene is None else scene_name(scene)
-        return [self._job(document) for document in self.client.jobs(scene=named, state=state, most=most)]
+        found = self.client.jobs(scene=named, state=state, labels=labels, search=search, most=most)
+        return [self._job(document) for document in found]
 
     def regions(self, scene: str | Scene | None = None) -> list[Region]:
         """Returns every region of a scene, or of all scenes, newest first. Those that you still have are not fetched again."""

@@ -170,7 +170,7 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     scene = ask("POST", "/v1/scenes", {"bundle": ("scene.zip", pack_bundle(path), "application/zip")})
     name, home, away = scene["name"], [0.4, 0.3], [0.6, 0.5]
     hook = {"url": "https://planner.example.org/ciris", "secret": "whsec_AAECAwQFBgcICQoLDA0ODxAREhMUFRYXGBkaGxwdHh8="}
-    seed = {"kind": "grow", "scene": name, "seed": {"q": home}, "options": {"stages": 1}}
+    seed = {"kind": "grow", "scene": name, "seed": {"q": home}, "options": {"stages": 1}, "labels": {"team": "welding"}}
     grown = service.ended(ask("POST", "/v1/jobs", {**seed, "webhook": hook}))
     certify = {"kind": "certify", "scene": name, "polytope": {"C": [[1, 0], [-1, 0], [0, 1], [0, -1]], "d": [0.3, -0.1, 0.3, -0.1]}}
     service.ended(ask("POST", "/v1/jobs", certify))
@@ -181,6 +181,9 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     other = ask("POST", "/v1/jobs", {"kind": "cover", "scene": name, "options": {"coverage": 0.6, "regions": 3}, "deadline_seconds": 40})
     service.ended(other)
     ask("GET", "/v1/jobs/{job_id}/cover", job_id=other["id"])
+    ask("POST", "/v1/jobs/batch", {"jobs": [{"kind": "grow", "scene": name, "seed": {"q": home}, "labels": {"batch": "7"}}]})
+    ask("POST", "/v1/jobs/cancel", {"labels": {"batch": "7"}})
+    ask("GET", "/v1/events", params={"limit": 3})
     ask("POST", "/v1/jobs", {"kind": "recertify", "scene": name, "region": grown["region"]})
     for part in ("", "/lint", "/model", "/pairs", "/dependents"):
         ask("GET", f"/v1/scenes/{{scene_id}}{part}", scene_id=name)
@@ -234,6 +237,7 @@ def offered(scene: str, home: list[float], away: list[float], region: str) -> di
     """Returns requests that show the fields that nobody needs at first. The tests check them against the schemas."""
     more = {
         "scene": scene,
+        "labels": {"team": "welding"},
         "priority": 1,
         "deadline_seconds": 600,
         "webhook": {"url": "https://example.org/", "secret": "whsec_" + "A" * 32},
@@ -266,6 +270,7 @@ def offered(scene: str, home: list[float], away: list[float], region: str) -> di
             {**more, "kind": "certify-path", "knots": knots, "control_points": curve},
             {**more, "kind": "cover", "options": {**covering, "cells": 1000, "stages": 1, "random_seed": 1}},
         ],
+        "/v1/jobs/cancel": [{"jobs": ["1f9b2a7c"]}],
         "/v1/planning/contains": [{"scene": scene, "s": [[0.2, 0.15]]}],
         "/v1/planning/nearest": [{"scene": scene, "s": [[0.2, 0.15]]}],
         "/v1/planning/segment": [{"scene": scene, "space": "s", "s": [[[0.2, 0.15], [0.3, 0.15]]]}],

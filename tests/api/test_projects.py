@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import itertools
 import time
 from typing import Any
@@ -25,7 +24,19 @@ from tests.scenes import slider
 
 ABOUT_THE_SERVICE = {"get_health", "get_readiness", "get_metrics"}
 """These say how the service is, in numbers, and name nothing of anybody."""
-OWN = {"get_project", "create_scene", "create_key", "list_keys", "revoke_key", "list_audit", "list_scenes", "list_jobs", "list_regions"}
+OWN = {
+    "get_project",
+    "list_project_events",
+    "stream_project_events",
+    "create_scene",
+    "create_key",
+    "list_keys",
+    "revoke_key",
+    "list_audit",
+    "list_scenes",
+    "list_jobs",
+    "list_regions",
+}
 """These name nothing, so they are about the caller's own project; tests of their own are below."""
 
 
@@ -53,12 +64,18 @@ def naming(schema: dict[str, Any], schemas: dict[str, Any], theirs: dict[str, st
     for one in chosen:
         described = schemas[one["$ref"].rpartition("/")[2]] if "$ref" in one else one
         for example in described.get("examples", []):
-            body = copy.deepcopy(example)
-            body["scene"] = theirs["scene_id"]
-            if "region" in body:
-                body["region"] = theirs["region_id"]
-            bodies.append(body)
-    return bodies
+            bodies.append(renamed(example, theirs))
+    return [body for body in bodies if any(one in str(body) for one in theirs.values())]
+
+
+def renamed(value: Any, theirs: dict[str, str], name: str = "") -> Any:
+    """Returns a body in which every scene, job and region is one of the others."""
+    if isinstance(value, dict):
+        return {key: renamed(part, theirs, key) for key, part in value.items()}
+    if isinstance(value, list):
+        return [renamed(part, theirs, name) for part in value]
+    ids = {"scene": "scene_id", "jobs": "job_id", "region": "region_id"}
+    return theirs[ids[name]] if name in ids and isinstance(value, str) else value
 
 
 def requests(document: dict[str, Any], theirs: dict[str, str]) -> list[tuple[str, str, str, dict[str, Any]]]:

@@ -152,6 +152,10 @@ TEAMS = [
         ),
     ),
     *rows(
+        "client/inputs.py",
+        ("bad_option", "--label", "must be NAME=VALUE, not {text}", "", lambda t: t.ciris("job", "ls", "--label", "team")),
+    ),
+    *rows(
         "client/keys.py",
         (
             "bad_option",
