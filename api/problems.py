@@ -17,6 +17,7 @@ from pydantic.json_schema import models_json_schema
 from starlette.exceptions import HTTPException
 
 from certifier.errors import CirisError
+from db.disk import lacks_room
 from db.session import UNAVAILABLE
 from db.states import JobKind
 
@@ -53,7 +54,7 @@ _STATUS_OF_CODE = {
     "scope_missing": HTTPStatus.FORBIDDEN,
     "too_many_requests": HTTPStatus.TOO_MANY_REQUESTS,
     "quota_exceeded": HTTPStatus.TOO_MANY_REQUESTS,
-    "busy": HTTPStatus.SERVICE_UNAVAILABLE,
+    **dict.fromkeys(("busy", "no_room"), HTTPStatus.SERVICE_UNAVAILABLE),
 }
 
 RETRY_SECONDS = 5
@@ -156,7 +157,10 @@ def _http(error: HTTPException) -> Problem:
     return problem_of(CirisError(code, error.detail, field=_PLACES.get(status), hint=_DESCRIBED), status)
 
 
-def _unavailable(_error: Exception) -> Problem:
+def _unavailable(error: Exception) -> Problem:
+    if lacks_room(error):
+        hint = "free some room on it; what was stored is safe, and /readyz says more"
+        return problem_of(CirisError("no_room", "the database's disk is full, or cannot be written", hint=hint))
     hint = "try again; what was committed is safe"
     return problem_of(CirisError("database_unavailable", "the database cannot be reached", hint=hint), HTTPStatus.SERVICE_UNAVAILABLE)
 
