@@ -10,6 +10,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from api.app import create_app
+from api.connections import BoundedProtocol, allow_files
 from certifier.errors import CirisError
 from db import keys, logs
 from db.settings import settings
@@ -40,9 +41,13 @@ def main() -> None:
     except CirisError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)
+    allow_files()
     config = uvicorn.Config(
         _frozen_app,
         factory=True,
+        http=BoundedProtocol,
+        ws="none",
+        forwarded_allow_ips=[str(network) for network in settings().trusted_proxies],
         host=settings().host,
         port=settings().port,
         timeout_graceful_shutdown=SHUTDOWN_SECONDS,

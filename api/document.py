@@ -23,7 +23,7 @@ UPLOAD = "Body_create_scene"
 
 ANYWHERE = ("unknown_host", "too_many_requests", "internal")
 WITH_KEY = ("key_needed", "scope_missing", "database_unavailable")
-CHANGING = ("cross_site",)
+CHANGING = ("cross_site", "no_room")
 WITH_BODY = ("malformed_json", "invalid_request", "too_large")
 PLACES = {
     "scene_id": ("scene_not_found", "ambiguous_id"),

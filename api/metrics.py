@@ -5,11 +5,14 @@ They count the rows of the database, the messages in the queues and the requests
 
 from __future__ import annotations
 
+import logging
 import mmap
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from db.statistics import Statistics
+
+log = logging.getLogger(__name__)
 
 OTHER = "other"
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", OTHER)
@@ -31,7 +34,9 @@ class Requests:
     """
 
     def __init__(self, file: Path | None = None) -> None:
-        self._file, self._cells = file, memoryview(_mapped(file)).cast("d")
+        mapped = None if file is None else _mapped(file)
+        self._file = None if mapped is None else file
+        self._cells = memoryview(mmap.mmap(-1, _BYTES) if mapped is None else mapped).cast("d")
 
     def note(self, method: str, status: int, seconds: float) -> None:
         """Counts one request. All methods outside ``METHODS`` count as ``OTHER``, however many a client invents."""
@@ -59,14 +64,21 @@ def _cell(method: str, status: int) -> int:
     return 2 * (row * len(STATUSES) + STATUSES.index(status))
 
 
-def _mapped(file: Path | None) -> mmap.mmap:
-    if file is None:
-        return mmap.mmap(-1, _BYTES)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with file.open("ab") as stream:
-        stream.truncate(_BYTES)
-    with file.open("r+b") as stream:
-        return mmap.mmap(stream.fileno(), _BYTES)
+def _mapped(file: Path) -> mmap.mmap | None:
+    """Returns the file in memory; None where it cannot be written, as on a full disk.
+
+    All of the file is written first. Whoever touches a mapped page that has no place on a full disk is ended by a signal.
+    """
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        counted = file.read_bytes()[:_BYTES] if file.exists() else b""
+        with file.open("r+b" if counted else "w+b") as stream:
+            stream.write(counted.ljust(_BYTES, b"\0"))
+            stream.flush()
+            return mmap.mmap(stream.fileno(), _BYTES)
+    except OSError as error:
+        log.warning("requests are counted for this process alone, because %s cannot be written: %s", file, error.strerror)
+        return None
 
 
 def render(statistics: Statistics, waiting: Mapping[str, int], requests: Requests) -> str:

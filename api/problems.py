@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
 from certifier.errors import CirisError
+from db.disk import lacks_room
 from db.session import UNAVAILABLE
 from db.states import JobKind
 
@@ -51,9 +52,8 @@ _STATUS_OF_CODE = {
     "scope_missing": HTTPStatus.FORBIDDEN,
     "too_many_requests": HTTPStatus.TOO_MANY_REQUESTS,
     "quota_exceeded": HTTPStatus.TOO_MANY_REQUESTS,
-    "busy": HTTPStatus.SERVICE_UNAVAILABLE,
+    **dict.fromkeys(("busy", "no_room", "database_unavailable"), HTTPStatus.SERVICE_UNAVAILABLE),
     "malformed_json": HTTPStatus.BAD_REQUEST,
-    "database_unavailable": HTTPStatus.SERVICE_UNAVAILABLE,
     "internal": HTTPStatus.INTERNAL_SERVER_ERROR,
 }
 
@@ -162,7 +162,10 @@ def _http(error: HTTPException) -> Problem:
     return problem_of(CirisError(code, error.detail, field=_PLACES.get(status), hint=_DESCRIBED), status)
 
 
-def _unavailable(_error: Exception) -> Problem:
+def _unavailable(error: Exception) -> Problem:
+    if lacks_room(error):
+        hint = "free some room on it; what was stored is safe, and /readyz says more"
+        return problem_of(CirisError("no_room", "the database's disk is full, or cannot be written", hint=hint))
     hint = "try again; what was committed is safe"
     return problem_of(CirisError("database_unavailable", "the database cannot be reached", hint=hint))
 

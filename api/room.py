@@ -1,4 +1,7 @@
-"""A project may store so many bytes. Each API process counts them now and then, and refuses more scenes and jobs when there is no room."""
+"""A project may store so many bytes, and all of them as many as the disk has room for.
+
+Each API process counts the bytes of projects now and then, and refuses more scenes and jobs when there is no room.
+"""
 
 from __future__ import annotations
 
@@ -33,11 +36,13 @@ class Room:
         return size
 
     def check(self, db: Database, project: str) -> None:
-        """Refuses to store more where a project has reached its limit.
+        """Refuses to store more where a project has reached its limit, or the disk.
 
         Raises:
-            CirisError: storage_quota.
+            CirisError: storage_quota, no_room.
         """
+        if trouble := db.disk.trouble():
+            raise CirisError("no_room", f"nothing new is stored now: {trouble}", hint="try again later, or delete what is not needed")
         with db.read() as session:
             most = projects.get(session, project).max_bytes
         if most is not None and self.stored(db, project) >= most:

@@ -30,6 +30,7 @@ from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import DisconnectionError, InterfaceError, OperationalError, TimeoutError
 from sqlalchemy.orm import DeclarativeBase, ORMExecuteState, Session, with_loader_criteria
 
+from db.disk import Disk
 from db.models import Owned
 from db.settings import settings
 
@@ -39,6 +40,8 @@ most of what it is used for.
 """
 BUSY_SECONDS = 30.0
 """A caller waits at most this long for a connection, and a writer at most this long for another writer (SQLite)."""
+INCREMENTAL = 2
+"""SQLite's number for giving room back when it is asked to."""
 SPARE_PAGES, PAGES_TOGETHER = 1000, 2000
 """SQLite may keep so many pages, of 4 KiB, that it does not use; so many are given back at a time."""
 IDLE_SECONDS = 1.0
@@ -77,6 +80,7 @@ class Database:
     """Holds one database: its engines for reading and for writing, and the two kinds of transaction.
 
     Attributes:
+        disk: the disk of an SQLite database; that of a PostgreSQL server is not looked at.
         project: sessions find the rows of this project only; None for all rows.
     """
 
@@ -84,6 +88,7 @@ class Database:
         parsed = make_url(url)
         self.sqlite = parsed.get_backend_name() == "sqlite"
         self.reader, self.writer = _sqlite(parsed) if self.sqlite else _postgresql(parsed)
+        self.disk = Disk(Path(parsed.database).absolute().parent if self.sqlite and parsed.database else None)
         self.project: str | None = None
         self._views: dict[str, Database] = {}
 
@@ -149,7 +154,7 @@ def _strict_json(value: Any) -> str:
 
 def _sqlite(url: URL) -> tuple[Engine, Engine]:
     if url.database:
-        Path(url.database).parent.mkdir(parents=True, exist_ok=True)
+        Path(url.database).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     engines = _engine(url, connect_args={"timeout": BUSY_SECONDS}), _engine(url, 1, connect_args={"timeout": BUSY_SECONDS})
     for engine, begin in zip(engines, ("BEGIN", "BEGIN IMMEDIATE"), strict=True):
         event.listen(engine, "connect", _configure_sqlite)
@@ -172,8 +177,10 @@ def _engine(url: URL, connections: int = CONNECTIONS, **options: Any) -> Engine:
 
 def _configure_sqlite(connection: Any, _record: Any) -> None:
     connection.isolation_level = None
-    # The first has an effect on a database without tables only.
-    for pragma in ("auto_vacuum=INCREMENTAL", "journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON"):
+    # This has an effect on a database without tables only, but is always a write, for which a disk may lack room.
+    if connection.execute("PRAGMA auto_vacuum").fetchone() != (INCREMENTAL,):
+        connection.execute(f"PRAGMA auto_vacuum={INCREMENTAL}")
+    for pragma in ("journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON"):
         connection.execute(f"PRAGMA {pragma}")
 
 

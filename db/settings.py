@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import socket
 from functools import cache
+from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import Field
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import BeforeValidator, Field
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 
 def _data_dir() -> Path:
@@ -23,6 +25,17 @@ def _cores() -> int:
 def _memory_of_a_process() -> int:
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // _cores()
 
+
+def _networks(given: object) -> object:
+    """Takes addresses and networks with commas between them apart. An IPv4 network counts in its IPv6 form too."""
+    if not isinstance(given, str):
+        return given
+    networks = [ip_network(word.strip()) for word in given.split(",") if word.strip()]
+    mapped = [ip_network(f"::ffff:{one.network_address}/{96 + one.prefixlen}") for one in networks if one.version == 4]
+    return (*networks, *mapped)
+
+
+Networks = Annotated[tuple[IPv4Network | IPv6Network, ...], NoDecode, BeforeValidator(_networks)]
 
 LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 
@@ -45,6 +58,10 @@ class Settings(BaseSettings):
     """The API binds to this port. The embedded stack takes a free one if this one is taken, unless the user asked for a port."""
     requests_per_second: float = Field(default=100.0, gt=0)
     """One key (or one address without a key) may make this many requests a second for long, and twice as many for a short while."""
+    trusted_proxies: Networks = (ip_network("127.0.0.0/8"), ip_network("::1/128"))
+    """The API believes ``X-Forwarded-For`` and ``X-Forwarded-Proto`` of these addresses and networks only, written with commas between
+    them. It takes the last address of the header that is not one of them for the caller's; empty: it believes nobody.
+    """
     api_processes: int = Field(default_factory=lambda: min(2, _cores()), ge=1)
     """The embedded stack runs this many processes of the API, all on one port."""
     requests_file: Path | None = None

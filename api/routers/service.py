@@ -26,11 +26,14 @@ async def get_health() -> Health:
 
 @router.get("/readyz", responses={503: {"model": Readiness, "description": "The service cannot reach something that it needs."}})
 def get_readiness(db: WholeDb, response: Response) -> Readiness:
-    """Says whether the service can reach the database and the queue.
+    """Says whether the service can reach the database and the queue, and whether the database's disk has room (SQLite).
 
-    Without the queue the service still accepts jobs, but they wait.
+    Without the queue the service still accepts jobs, but they wait. Without room it accepts none, begins nothing new, and goes on by
+    itself when there is some.
     """
     checks = {"database": _database(db), "queue": _queue()}
+    if db.sqlite:
+        checks["disk"] = db.disk.trouble() or "ok"
     ready = set(checks.values()) == {"ok"}
     if not ready:
         response.status_code = status.HTTP_503_SERVICE_UNAVAILABLE

@@ -11,9 +11,13 @@ import importlib
 import json
 import os
 import resource
+import select
 import signal
 import sys
+import threading
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
 from types import ModuleType
 
@@ -27,14 +31,50 @@ _CHUNK = 2**16
 
 
 def main() -> None:
-    module, connection = importlib.import_module(sys.argv[1]), Connection(int(sys.argv[2]))
-    if hasattr(module, "warm_up"):
-        module.warm_up()
+    connection = Connection(int(sys.argv[2]))
+    with _ending_with(connection):
+        module = importlib.import_module(sys.argv[1])
+        if hasattr(module, "warm_up"):
+            module.warm_up()
     try:
         while True:
             connection.send_bytes(_call(module, connection, connection.recv_bytes()))
     except (EOFError, ConnectionError):
         return
+
+
+@contextmanager
+def _ending_with(connection: Connection) -> Iterator[None]:
+    """Ends this process at once when the other end of the connection is closed while the block runs, which may compile for a minute.
+
+    Linux' signal at the death of a parent comes even while native code keeps Python's threads waiting. But it comes when the *thread*
+    ends that started the process. That one waits while the nursery loads, and may be gone later.
+    """
+    loaded, done = os.pipe()
+
+    def watch() -> None:
+        looking = select.poll()
+        looking.register(connection, 0)  # only whether it is closed: a request may wait already
+        looking.register(loaded, select.POLLIN)
+        if any(descriptor == connection.fileno() for descriptor, _ in looking.poll()):
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    watching = threading.Thread(target=watch, daemon=True)
+    watching.start()
+    _signal_at_death_of_parent(signal.SIGKILL)
+    try:
+        yield
+    finally:
+        _signal_at_death_of_parent(0)
+        os.close(done)
+        watching.join()  # this process forks, and has one thread then
+        os.close(loaded)
+
+
+def _signal_at_death_of_parent(number: int) -> None:
+    """Asks Linux for a signal when the thread ends that started this process; 0 for none. Elsewhere nothing happens."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
 
 
 def _call(module: ModuleType, connection: Connection, request: bytes) -> bytes:
@@ -93,10 +133,9 @@ def _confine(memory_bytes: int, nursery: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
     resource.setrlimit(resource.RLIMIT_FSIZE, (_MOST_WRITTEN, _MOST_WRITTEN))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != nursery:
-            os.kill(os.getpid(), signal.SIGKILL)
+    _signal_at_death_of_parent(signal.SIGKILL)
+    if os.getppid() != nursery:
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
 if __name__ == "__main__":

@@ -278,7 +278,7 @@ def test_a_job_is_accepted_while_redis_is_down(database: Database, scene: Scene,
 
 
 def test_the_service_is_ready_with_its_database_and_its_queue(client: TestClient) -> None:
-    assert client.get("/readyz").json() == {"ready": True, "checks": {"database": "ok", "queue": "ok"}}
+    assert client.get("/readyz").json() == {"ready": True, "checks": {"database": "ok", "queue": "ok", "disk": "ok"}}
 
 
 def test_the_schema_has_the_options_of_the_certifier() -> None:

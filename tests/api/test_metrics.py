@@ -80,3 +80,25 @@ def test_invented_methods_make_no_new_series(client: TestClient, scene: Scene) -
     found = samples(client.get("/metrics").text)
     assert found['ciris_http_requests_total{method="other",status="405"}'] == 5
     assert not any("METHOD" in name for name in found)
+
+
+def test_the_file_of_the_counts_has_its_place_on_the_disk(tmp_path: Path) -> None:
+    """A file with holes, as earlier versions left it, would end its process on a full disk."""
+    file = tmp_path / "requests" / "api"
+    Requests(file).note("GET", 200, 0.5)
+    whole = file.stat().st_size
+    assert file.stat().st_blocks * 512 >= whole
+    file.unlink()
+    with file.open("wb") as holes:
+        holes.truncate(whole)
+    assert file.stat().st_blocks * 512 < whole
+    Requests(file).note("GET", 200, 0.5)
+    assert file.stat().st_blocks * 512 >= whole
+    assert Requests(file).totals() == {("GET", 200): (1, 0.5)}
+
+
+def test_requests_are_counted_where_their_file_cannot_be_made(tmp_path: Path) -> None:
+    (tmp_path / "requests").write_text("no directory")
+    requests = Requests(tmp_path / "requests" / "api")
+    requests.note("GET", 200, 0.5)
+    assert requests.totals() == {("GET", 200): (1, 0.5)}

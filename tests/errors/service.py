@@ -308,6 +308,21 @@ REQUESTS = [
         ),
     ),
     *rows(
+        "api/connections.py",
+        ("too_slow", "body", "the request did not arrive in time", "send it faster, or in smaller parts", "tests/api/test_connections.py"),
+        ("busy", "", "the service has as many connections as it can hold", "try again in a while", "tests/api/test_connections.py"),
+    ),
+    *rows(
+        "api/problems.py",
+        (
+            "no_room",
+            "",
+            "the database's disk is full, or cannot be written",
+            "free some room on it; what was stored is safe, and /readyz says more",
+            "tests/workers/test_disk.py",
+        ),
+    ),
+    *rows(
         "api/children.py",
         ("busy", "", "too many requests of this kind wait already", "try again in a while", "many uploads or checks at the same time"),
     ),
@@ -459,9 +474,16 @@ WORKERS = [
         (
             "data_directory",
             "--data",
-            "{data} cannot be made",
-            "name a directory that you may write to",
+            "{data} cannot be used: {strerror}",
+            "name a directory that you may write to, on a disk with room",
             lambda t: run_stack(Settings(data_dir=t.write(file="") / "data")),
+        ),
+        (
+            "no_room",
+            "--data",
+            "the database in {data_dir} cannot be written: the disk is full or read-only",
+            "free some room there",
+            "tests/workers/test_disk.py",
         ),
         ("stack_failed", "", "the API at {url} does not answer", "see {...}", "a stack whose API does not come up"),
         (

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import update
 
 from db import keys, projects, retention
+from db.disk import Disk
 from db.keys import Scope
 from db.models import JobRow
 from db.session import Database
@@ -25,6 +27,16 @@ def full(t: Trial) -> None:
     t.request.getfixturevalue("scene")
     with database(t).write() as session:
         projects.get(session, "default").max_bytes = 1
+    post(t, GROW)
+
+
+def without_room(t: Trial) -> None:
+    """Asks for a job while the disk is nearly full."""
+    patch: pytest.MonkeyPatch = t.request.getfixturevalue("monkeypatch")
+    t.request.getfixturevalue("scene")
+    patch.setattr("db.disk.RESERVE_BYTES", 2**80)
+    patch.setattr("db.disk.LOOK_SECONDS", 0)
+    database(t).disk = Disk(t.directory)
     post(t, GROW)
 
 
@@ -140,6 +152,7 @@ TEAMS = [
             "delete jobs, regions or scenes, or have the limit raised: `ciris project set`",
             full,
         ),
+        ("no_room", "", "nothing new is stored now: {trouble}", "try again later, or delete what is not needed", without_room),
     ),
     *rows(
         "api/routers/project.py",

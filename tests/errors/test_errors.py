@@ -33,6 +33,7 @@ INSIDE = re.compile(r"\[Errno|Traceback|numpy|ndarray|\bnp\.|0x[0-9a-f]{6}|\bNon
 
 ABOUT_ALL = {
     "api/children.py",
+    "api/connections.py",
     "api/guard.py",
     "api/problems.py",
     "api/questions.py",

@@ -67,7 +67,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
 def redis_server(directory: Path, port: int, reachable: list[str]) -> ExitStack:
     """A queue server that the machines can reach."""
-    command = [*queue_server_command(directory / "queue", directory / "q"), "--port", str(port), "--protected-mode", "no"]
+    command = [*queue_server_command(directory / "q", directory / "queue"), "--port", str(port), "--protected-mode", "no"]
     process = subprocess.Popen([*command, "--bind", "127.0.0.1", *reachable], stdout=subprocess.DEVNULL, preexec_fn=die_with_parent)
     stack = ExitStack()
     stack.callback(process.wait)

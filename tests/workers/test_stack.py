@@ -6,21 +6,27 @@ import json
 import os
 import signal
 import socket
+import stat
 import subprocess
 import sys
+import time
 import urllib.request
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
+import yaml
 
 from certifier.errors import CirisError
+from certifier.scene import pack_bundle
 from db.leases import _started
 from db.settings import Settings
 from tests.workers.service import ROOT, eventually
 from workers.processes import die_with_parent
-from workers.stack import Child, _reserved_port
+from workers.stack import Child, _data_directory, _reserved_port
 
 COMMAND = [sys.executable, "-m", "workers.stack"]
 
@@ -113,10 +119,82 @@ def test_the_processes_of_the_api_share_the_port_and_count_together(stack: Stack
     eventually(lambda: answered("api") + answered("api-2") - told() in (0, -1), "one tells of both")
 
 
-def test_nothing_outlives_a_supervisor_that_is_killed(stack: Stack) -> None:
-    pids = stack.description["pids"]
+def descendants(pid: int) -> set[int]:
+    found: set[int] = set()
+    for file in Path("/proc").glob(f"{pid}/task/*/children"):
+        with suppress(FileNotFoundError, ProcessLookupError):
+            for child in map(int, file.read_text().split()):
+                found |= {child} | descendants(child)
+    return found
+
+
+def begin_a_job(stack: Stack) -> None:
+    """Has the service seed a region of an arm with IRIS, which takes the pool, a nursery and a child of the nursery."""
+    url, example = stack.description["url"], ROOT / "examples" / "iiwa_shelf"
+    scene = httpx.post(f"{url}/v1/scenes", files={"bundle": pack_bundle(example / "scene.yaml")}, timeout=120).json()["id"]
+    q = yaml.safe_load((example / "seed.yaml").read_text())["q"]
+    job = httpx.post(f"{url}/v1/jobs", json={"kind": "grow", "scene": scene, "seed": {"q": q}}, timeout=60)
+    assert job.status_code == 201, job.text
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc tells who is whose child")
+@pytest.mark.parametrize("loading", [True, False], ids=["while nurseries load", "while nurseries work"])
+def test_nothing_outlives_a_supervisor_that_is_killed(stack: Stack, loading: bool) -> None:
+    begin_a_job(stack)
+    solve = stack.description["pids"]["solve"]
+    if loading:
+        eventually(lambda: any(map(is_nursery, descendants(solve))), "a nursery loads")
+    else:
+        eventually(lambda: any(is_nursery(pid) and descendants(pid) for pid in descendants(solve)), "a nursery has a child")
+    pids = descendants(stack.process.pid)
     stack.process.kill()
-    eventually(lambda: gone(pids), "every child ends")
+    killed = time.monotonic()
+    while left := [pid for pid in pids if _started(pid) is not None]:
+        assert time.monotonic() - killed < 2, [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in left]
+        time.sleep(0.01)
+
+
+def is_nursery(pid: int) -> bool:
+    with suppress(FileNotFoundError, ProcessLookupError):
+        return b"certifier.isolation.nursery" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    return False
+
+
+def test_a_reaper_ends_what_was_named_last() -> None:
+    """It does on its own, as on macOS, where the kernel does not help."""
+    with ExitStack() as stack:
+        first, second = (stack.enter_context(subprocess.Popen(["sleep", "60"], start_new_session=True)) for _ in range(2))
+        lines = f"{first.pid}\n{second.pid}\n"
+        subprocess.run([sys.executable, "-m", "workers.reaper"], cwd=ROOT, input=lines, text=True, check=True)
+        assert second.wait(20) == -signal.SIGKILL
+        assert first.poll() is None
+        subprocess.run([sys.executable, "-m", "workers.reaper"], cwd=ROOT, input=f"{first.pid}\n\n", text=True, check=True)
+        assert first.poll() is None
+        first.kill()
+
+
+def test_a_data_directory_that_others_could_look_into_is_closed(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    old, fresh, foreign = tmp_path / "old", tmp_path / "fresh", tmp_path / "foreign"
+    for directory in (old, foreign):
+        directory.mkdir(mode=0o755)
+    (old / "stack.lock").touch()
+    (foreign / "thesis.tex").touch()
+    for directory, mode in ((old, 0o700), (fresh, 0o700), (foreign, 0o755)):
+        with _data_directory(directory):
+            (directory / "made").touch()
+        assert stat.S_IMODE(directory.stat().st_mode) == mode
+        assert stat.S_IMODE((directory / "made").stat().st_mode) == 0o600
+    (tmp_path / "after").touch()
+    assert stat.S_IMODE((tmp_path / "after").stat().st_mode) & 0o044
+    said = [record.getMessage() for record in caplog.records]
+    assert [str(old) in said[0], "its mode is 700 now" in said[0], str(foreign) in said[1], len(said)] == [True, True, True, 2]
+
+
+def test_a_child_is_started_though_its_log_cannot_be_opened(tmp_path: Path) -> None:
+    child = Child("talks", [sys.executable, "-c", ""], signal.SIGTERM)
+    child.start(dict(os.environ), tmp_path / "missing")
+    assert child.process is not None
+    assert child.process.wait(60) == 0
 
 
 def test_a_child_ends_by_its_signal_though_the_supervisor_ignores_it() -> None:

@@ -384,7 +384,7 @@ def test_leases_are_not_ended_by_time_right_after_nobody_could_renew_them() -> N
 
     assert could_renew(20, 40, 61) == [False, False, True]
     assert could_renew(200, 220, 240, 261) == [False, False, False, True]
-    holders.database_was_away()
+    holders.could_not_write()
     assert could_renew(262) == [False]
 
 
