@@ -34,7 +34,7 @@ class AccessLog:
             await self._app(scope, receive, noted)
         finally:
             seconds = time.perf_counter() - start
-            self._requests.note(scope["method"], status, seconds)
+            self._requests.note(scope["method"], status, seconds, stream=scope["path"].endswith("/stream"))
             caller = scope.get("state", {}).get("caller")
             fields = {
                 "method": scope["method"],

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import logging
 import mmap
+from bisect import bisect_left
 from collections.abc import Iterable, Mapping
+from itertools import accumulate
 from pathlib import Path
 
 from db.statistics import Statistics
@@ -17,7 +19,14 @@ log = logging.getLogger(__name__)
 OTHER = "other"
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", OTHER)
 STATUSES = range(100, 600)
-_BYTES = 16 * len(METHODS) * len(STATUSES)
+BUCKETS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0)
+"""Latencies are counted up to so many seconds."""
+_LATENCIES = 2 * len(METHODS) * len(STATUSES)
+_LATENCY_CELLS = len(BUCKETS) + 2
+"""For each method: a count for each bucket, one for what is beyond them, and the sum."""
+_BYTES = 8 * (_LATENCIES + len(METHODS) * _LATENCY_CELLS)
+AGES = (0, 1, 10, 60, 600, 3600)
+"""What waits is counted that is older than so many seconds."""
 MEDIA_TYPE = "text/plain; version=0.0.4"
 
 Samples = Mapping[tuple[tuple[str, str], ...], float]
@@ -38,18 +47,23 @@ class Requests:
         self._file = None if mapped is None else file
         self._cells = memoryview(mmap.mmap(-1, _BYTES) if mapped is None else mapped).cast("d")
 
-    def note(self, method: str, status: int, seconds: float) -> None:
-        """Counts one request. All methods outside ``METHODS`` count as ``OTHER``, however many a client invents."""
+    def note(self, method: str, status: int, seconds: float, *, stream: bool = False) -> None:
+        """Counts one request. All methods outside ``METHODS`` count as ``OTHER``, however many a client invents.
+
+        Args:
+            stream: the answer lasts as long as the client listens, so its time is no latency.
+        """
         cell = _cell(method, status)
         self._cells[cell] += 1
         self._cells[cell + 1] += seconds
+        if not stream:
+            latencies = _LATENCIES + _row(method) * _LATENCY_CELLS
+            self._cells[latencies + bisect_left(BUCKETS, seconds)] += 1
+            self._cells[latencies + len(BUCKETS) + 1] += seconds
 
     def totals(self) -> dict[tuple[str, int], tuple[int, float]]:
         """Returns (method, status) -> (how many requests, their seconds), summed over all processes."""
-        every = [self._cells]
-        if self._file is not None:
-            others = [path.read_bytes() for path in self._file.parent.iterdir() if path != self._file]
-            every += [memoryview(content).cast("d") for content in others if len(content) == _BYTES]
+        every = self._of_all()
         found = {}
         for method in METHODS:
             for status in STATUSES:
@@ -58,10 +72,31 @@ class Requests:
                     found[method, status] = int(count), sum(cells[cell + 1] for cells in every)
         return found
 
+    def latencies(self) -> dict[str, tuple[list[int], float]]:
+        """Returns method -> how many requests took at most as long as each bucket, and at last how many there were, and their seconds."""
+        every = self._of_all()
+        found = {}
+        for method in METHODS:
+            begin = _LATENCIES + _row(method) * _LATENCY_CELLS
+            counts = [int(sum(cells[begin + i] for cells in every)) for i in range(len(BUCKETS) + 1)]
+            if any(counts):
+                found[method] = list(accumulate(counts)), sum(cells[begin + len(BUCKETS) + 1] for cells in every)
+        return found
+
+    def _of_all(self) -> list[memoryview[float]]:
+        """Returns the cells of all processes."""
+        others: list[bytes] = []
+        if self._file is not None:
+            others = [path.read_bytes() for path in self._file.parent.iterdir() if path != self._file]
+        return [self._cells, *(memoryview(content).cast("d") for content in others if len(content) == _BYTES)]
+
+
+def _row(method: str) -> int:
+    return METHODS.index(method if method in METHODS else OTHER)
+
 
 def _cell(method: str, status: int) -> int:
-    row = METHODS.index(method) if method in METHODS else METHODS.index(OTHER)
-    return 2 * (row * len(STATUSES) + STATUSES.index(status))
+    return 2 * (_row(method) * len(STATUSES) + STATUSES.index(status))
 
 
 def _mapped(file: Path) -> mmap.mmap | None:
@@ -98,8 +133,26 @@ def render(statistics: Statistics, waiting: Mapping[str, int], requests: Request
         _family("ciris_queue_messages", "gauge", "Messages that wait, by queue.", _by("queue", waiting)),
         _family("ciris_http_requests_total", "counter", "Requests answered.", _requests(answered, 0)),
         _family("ciris_http_request_seconds_total", "counter", "Time that they took.", _requests(answered, 1)),
+        _histogram("ciris_http_latency_seconds", "Time until a request was answered, without streams.", requests.latencies()),
+        _family("ciris_open_pieces", "gauge", "Pieces that wait, of iterations begun longer ago than.", _ages(statistics)),
+        _family("ciris_oldest_open_piece_seconds", "gauge", "Age of what waits longest.", {(): max(statistics.waiting, default=0.0)}),
     ]
     return "".join(families)
+
+
+def _ages(statistics: Statistics) -> Samples:
+    older = {age: sum(pieces for seconds, pieces in statistics.waiting.items() if seconds >= age) for age in AGES}
+    return {(("seconds", f"{age:g}"),): count for age, count in older.items()}
+
+
+def _histogram(name: str, text: str, latencies: Mapping[str, tuple[list[int], float]]) -> str:
+    lines = [f"# HELP {name} {text}", f"# TYPE {name} histogram"]
+    for method, (counts, seconds) in latencies.items():
+        for bound, count in zip((*BUCKETS, "+Inf"), counts, strict=True):
+            lines.append(f"{name}_bucket{_labels((('method', method), ('le', str(bound))))} {count}")
+        lines.append(f"{name}_sum{_labels((('method', method),))} {seconds}")
+        lines.append(f"{name}_count{_labels((('method', method),))} {counts[-1]}")
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _by(label: str, values: Mapping[str, float]) -> Samples:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from db.models import JobRow, PairRow, RegionRow, StepRow, WebhookRow
+from db import clock
+from db.models import IterationRow, JobRow, PairRow, RegionRow, StepRow, WebhookRow
 from db.states import JobState, PairState, StepKind, WebhookState
 
 
@@ -18,6 +19,7 @@ class Statistics:
     Attributes:
         pair_seconds: seconds spent on pairs, summed by the state that resulted.
         step_seconds: seconds spent on steps, summed by kind.
+        waiting: seconds since an iteration began -> how many of its pieces are open, for iterations that run.
     """
 
     jobs: dict[str, int]
@@ -26,6 +28,7 @@ class Statistics:
     step_seconds: dict[str, float]
     webhooks: dict[str, int]
     regions: int
+    waiting: dict[float, int]
 
 
 def collect(session: Session) -> Statistics:
@@ -34,6 +37,13 @@ def collect(session: Session) -> Statistics:
     pairs = session.execute(select(PairRow.state, func.count(), func.sum(PairRow.seconds)).group_by(PairRow.state)).all()
     steps = dict(session.execute(select(StepRow.kind, func.sum(StepRow.seconds)).group_by(StepRow.kind)).all())
     webhooks = dict(session.execute(select(WebhookRow.state, func.count()).group_by(WebhookRow.state)).all())
+    begun = func.max(IterationRow.started_at)
+    open_jobs = select(JobRow.open_pairs, begun).join(IterationRow, IterationRow.job_id == JobRow.id).where(JobRow.open_pairs > 0)
+    waiting: dict[float, int] = {}
+    now = clock.now(session)
+    for pieces, at in session.execute(open_jobs.group_by(JobRow.id)):
+        age = max((now - at).total_seconds(), 0.0)
+        waiting[age] = waiting.get(age, 0) + pieces
     counted = {state: count for state, count, _ in pairs}
     seconds = {state: total for state, _, total in pairs}
     return Statistics(
@@ -43,4 +53,5 @@ def collect(session: Session) -> Statistics:
         step_seconds={kind: steps.get(kind) or 0.0 for kind in StepKind},
         webhooks={state: webhooks.get(state, 0) for state in WebhookState},
         regions=session.scalar(select(func.count()).select_from(RegionRow)) or 0,
+        waiting=waiting,
     )

@@ -9,9 +9,11 @@ import random
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from pathlib import Path
@@ -113,7 +115,7 @@ class Connection:
         return int(head.split(maxsplit=2)[1]), await self._reader.readexactly(length)
 
 
-async def visit(url: str, scene: str, job: str, key: str, until: float, tally: Tally) -> None:
+async def visit(url: str, scene: str, job: str, key: str, until: float, tally: Tally, posts: float = POSTS) -> None:
     """One client: looks at its last job and at what else there is, and posts another job now and then."""
     box = {"C": [[1, 0], [-1, 0], [0, 1], [0, -1]], "d": [0.01] * 4}
     certify = json.dumps({"kind": "certify", "scene": scene, "polytope": box}).encode()
@@ -123,7 +125,7 @@ async def visit(url: str, scene: str, job: str, key: str, until: float, tally: T
     while time.monotonic() < until:
         paths = {"job": f"/v1/jobs/{job}", "events": f"/v1/jobs/{job}/events", "pairs": f"/v1/jobs/{job}/pairs"}
         paths |= {"jobs": "/v1/jobs?limit=20", "regions": f"/v1/regions?scene={scene}&limit=20"}
-        kind = "post" if choice.random() < POSTS else choice.choices(list(paths), [6, 1, 1, 1, 1])[0]
+        kind = "post" if choice.random() < posts else choice.choices(list(paths), [6, 1, 1, 1, 1])[0]
         start = time.perf_counter()
         if kind == "post":
             status, answer = await connection.ask("POST", "/v1/jobs", certify)
@@ -152,3 +154,64 @@ def test_two_hundred_clients_while_the_workers_compute(service: tuple[str, list[
     print("\n".join(line for line in metrics.splitlines() if line.startswith(("ciris_jobs", "ciris_pairs", "ciris_queue"))))
     assert set(tally.statuses) <= {200, 201}
     assert tally.quantile(0.99) < P99_SECONDS
+
+
+WRITERS = 8
+HELD_SECONDS, FREE_SECONDS = 5.0, 0.5
+"""Somebody holds SQLite's lock so long, then lets the writers have it for so long, again and again."""
+
+
+@contextmanager
+def lock_held_most_of_the_time(url: str) -> Iterator[None]:
+    over = threading.Event()
+
+    def hold() -> None:
+        database = Database(url)
+        while not over.is_set():
+            with database.writer.connect() as connection, connection.begin():
+                over.wait(HELD_SECONDS)
+            over.wait(FREE_SECONDS)
+        database.close()
+
+    thread = threading.Thread(target=hold)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+async def write(url: str, scene: str, key: str, until: float, tally: Tally) -> None:
+    """A client that does nothing but post jobs, one after the other."""
+    certify = {"kind": "certify", "scene": scene, "polytope": {"C": [[1, 0], [-1, 0], [0, 1], [0, -1]], "d": [0.01] * 4}}
+    connection = Connection(url, key)
+    await connection.open()
+    while time.monotonic() < until:
+        start = time.perf_counter()
+        status, _ = await connection.ask("POST", "/v1/jobs", json.dumps(certify).encode())
+        tally.seconds.setdefault("post", []).append(time.perf_counter() - start)
+        tally.statuses[status] += 1
+
+
+async def readers_and_writers(url: str, scene: str, job: str, made: list[str]) -> tuple[Tally, Tally]:
+    reading, writing, until = Tally(), Tally(), time.monotonic() + SECONDS
+    readers = (visit(url, scene, job, key, until, reading, posts=0.0) for key in made)
+    await asyncio.gather(*readers, *(write(url, scene, key, until, writing) for key in made[:WRITERS]))
+    return reading, writing
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("service", ["sqlite"], indirect=True)
+def test_two_hundred_readers_do_not_wait_for_eight_writers_who_wait(service: tuple[str, list[str]], tmp_path: Path) -> None:
+    url, made = service
+    with Client(url, made[0]) as client:
+        scene = client.add_scene(EXAMPLES / "planar_2dof" / "scene.yaml")["id"]
+        job, _ = client.create_job({"kind": "grow", "scene": scene, "seed": {"q": [0.4, 0.3]}, "options": {"stages": 1}})
+    with lock_held_most_of_the_time(f"sqlite:///{tmp_path / 'data' / 'ciris.sqlite3'}"):
+        reading, writing = asyncio.run(readers_and_writers(url, scene, job["id"], made))
+    print(f"readers: {reading.describe()}\nwriters: {writing.describe()}")
+    assert set(reading.statuses) == {200}
+    assert set(writing.statuses) == {201}
+    assert writing.quantile(0.5) > 1.0, "the writers did not wait"
+    assert reading.quantile(0.99) < P99_SECONDS

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import re
+from datetime import timedelta
 from pathlib import Path
 
 from fastapi.testclient import TestClient
 
-from api.metrics import Requests, render
+from api.metrics import BUCKETS, Requests, render
 from certifier.model import Scene
+from db.models import IterationRow
 from db.session import Database
 from db.statistics import collect
+from db.types import utcnow
 from tests.api.test_jobs import GROW
+from tests.db.builders import a_running_job
 
 SAMPLE = re.compile(r'([a-z_]+)(?:\{((?:[a-z]+="[^"\\]*",?)*)\})? (-?[0-9.e+-]+)')
 
@@ -26,7 +30,7 @@ def samples(text: str) -> dict[str, float]:
             continue
         match = SAMPLE.fullmatch(line)
         assert match, line
-        assert match[1] in announced
+        assert match[1] in announced or re.sub("_(bucket|sum|count)$", "", match[1]) in announced
         assert line.rpartition(" ")[0] not in found, "twice"
         found[line.rpartition(" ")[0]] = float(match[3])
     return found
@@ -102,3 +106,30 @@ def test_requests_are_counted_where_their_file_cannot_be_made(tmp_path: Path) ->
     requests = Requests(tmp_path / "requests" / "api")
     requests.note("GET", 200, 0.5)
     assert requests.totals() == {("GET", 200): (1, 0.5)}
+
+
+def test_latencies_are_counted_in_buckets_and_streams_are_not(tmp_path: Path) -> None:
+    first, second = (Requests(tmp_path / "requests" / name) for name in ("api", "api-2"))
+    for seconds in (0.001, 0.005, 0.3, 100.0):
+        first.note("GET", 200, seconds)
+    second.note("GET", 200, 0.02)
+    second.note("GET", 200, 500.0, stream=True)
+    counts, total = second.latencies()["GET"]
+    assert dict(zip((*BUCKETS, "+Inf"), counts, strict=True)) | {0.005: 2, 0.025: 3, 0.25: 3, 0.5: 4, 30.0: 4, "+Inf": 5} == dict(
+        zip((*BUCKETS, "+Inf"), counts, strict=True)
+    )
+    assert abs(total - 100.326) < 1e-9
+    assert "POST" not in first.latencies()
+    again = Requests(tmp_path / "requests" / "api")
+    assert again.latencies() == second.latencies()
+
+
+def test_the_age_of_what_waits_is_told(db: Database) -> None:
+    with db.write() as session:
+        job = a_running_job(session, pair_count=3)
+        session.get_one(IterationRow, (job.id, 0)).started_at = utcnow() - timedelta(seconds=90)
+        a_running_job(session, pair_count=2)
+    with db.read() as session:
+        found = samples(render(collect(session), {}, Requests()))
+    assert [found[f'ciris_open_pieces{{seconds="{age}"}}'] for age in (0, 60, 600)] == [5, 3, 0]
+    assert 90 <= found["ciris_oldest_open_piece_seconds"] < 120
