@@ -119,11 +119,11 @@ def certify(client: Client, scene: Document, given: PolytopeFile, screen: Screen
 
 
 def _wait(client: Client, job_id: str, screen: Screen, watch: bool) -> Document:
-    ready = client.ready()
-    if not ready["ready"]:
-        wrong = "; ".join(f"{name}: {state}" for name, state in ready["checks"].items() if state != "ok")
-        screen.line(f"warning: the job waits until the service is ready ({wrong})")
     try:
+        ready = client.ready()
+        if not ready["ready"]:
+            wrong = "; ".join(f"{name}: {state}" for name, state in ready["checks"].items() if state != "ok")
+            screen.line(f"warning: the job waits until the service is ready ({wrong})")
         return follow(client, job_id, screen, watch)
     except (KeyboardInterrupt, CirisError):
         screen.line(f"job {job_id} goes on while the service runs: {client.url}/jobs/{job_id}")

@@ -144,7 +144,7 @@ def test_a_data_directory_that_cannot_be_made_is_said_in_one_line(spawn: Ciris, 
     (tmp_path / "file").write_text("")
     done = spawn("up", "--data", tmp_path / "file")
     assert (done.status, done.raw) == (2, b"")
-    assert "cannot be made" in done.error
+    assert "cannot be used: File exists" in done.error
 
 
 def test_certifying_here_prints_the_stable_document(spawn: Ciris, files: Path) -> None:

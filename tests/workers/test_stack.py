@@ -20,6 +20,7 @@ import httpx
 import pytest
 import yaml
 
+from api.metrics import METHODS, STATUSES
 from certifier.errors import CirisError
 from certifier.scene import pack_bundle
 from db.leases import _started
@@ -110,7 +111,8 @@ def test_the_processes_of_the_api_share_the_port_and_count_together(stack: Stack
 
     def answered(name: str) -> float:
         file = stack.data / "requests" / name
-        return sum(memoryview(file.read_bytes()).cast("d")[::2]) if file.exists() else 0.0
+        counts = 2 * len(METHODS) * len(STATUSES)
+        return sum(memoryview(file.read_bytes()).cast("d")[:counts:2]) if file.exists() else 0.0
 
     def told() -> float:
         return sum(float(line.split()[1]) for line in ask("/metrics").splitlines() if line.startswith("ciris_http_requests_total{"))
@@ -150,7 +152,7 @@ def test_nothing_outlives_a_supervisor_that_is_killed(stack: Stack, loading: boo
     stack.process.kill()
     killed = time.monotonic()
     while left := [pid for pid in pids if _started(pid) is not None]:
-        assert time.monotonic() - killed < 2, [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in left]
+        assert time.monotonic() - killed < 5, [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in left]
         time.sleep(0.01)
 
 
