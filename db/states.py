@@ -114,6 +114,15 @@ class WebhookState(StrEnum):
     """The service has given up; ``error`` says why."""
 
 
+class WorkerState(StrEnum):
+    RUNNING = "running"
+    """The worker takes work."""
+    PAUSED = "paused"
+    """The worker finishes what it holds, and takes no more until somebody resumes it."""
+    DRAINING = "draining"
+    """The worker finishes what it holds, and then ends. Nothing takes that back."""
+
+
 Table = Mapping[str, frozenset[str]]
 
 
@@ -158,6 +167,13 @@ ITERATION: Table = _table(
 WEBHOOK: Table = _table(
     WebhookState,
     {WebhookState.WAITING: {WebhookState.DELIVERED, WebhookState.FAILED}},
+)
+WORKER: Table = _table(
+    WorkerState,
+    {
+        WorkerState.RUNNING: {WorkerState.PAUSED, WorkerState.DRAINING},
+        WorkerState.PAUSED: {WorkerState.RUNNING, WorkerState.DRAINING},
+    },
 )
 
 

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from db import work, workers
 from db.models import JobRow, PairRow, RegionRow, StepRow, WebhookRow
+from db.settings import settings
 from db.states import JobState, PairState, StepKind, WebhookState
 
 
@@ -18,6 +20,8 @@ class Statistics:
     Attributes:
         pair_seconds: seconds spent on pairs, summed by the state that resulted.
         step_seconds: seconds spent on steps, summed by kind.
+        workers: the workers that live, by kind and state.
+        workers_wanted: how many solving processes would be busy now if there were enough.
     """
 
     jobs: dict[str, int]
@@ -26,6 +30,8 @@ class Statistics:
     step_seconds: dict[str, float]
     webhooks: dict[str, int]
     regions: int
+    workers: dict[tuple[str, str], int]
+    workers_wanted: int
 
 
 def collect(session: Session) -> Statistics:
@@ -43,4 +49,6 @@ def collect(session: Session) -> Statistics:
         step_seconds={kind: steps.get(kind) or 0.0 for kind in StepKind},
         webhooks={state: webhooks.get(state, 0) for state in WebhookState},
         regions=session.scalar(select(func.count()).select_from(RegionRow)) or 0,
+        workers=workers.counts(session),
+        workers_wanted=work.busy_solvers(session, batch_seconds=settings().batch_seconds),
     )

@@ -56,6 +56,7 @@ class Child:
 
     Attributes:
         background: True for a child that computes; on a busy machine the other children answer first.
+        may_end: True for a worker. Its status 0 says that somebody has drained it, and then it is not started again.
         own: environment variables of this child alone.
     """
 
@@ -63,6 +64,7 @@ class Child:
     command: list[str]
     stop_signal: int
     background: bool = False
+    may_end: bool = False
     own: dict[str, str] = field(default_factory=dict)
     process: subprocess.Popen[bytes] | None = None
     started: float = 0.0
@@ -92,6 +94,10 @@ class Child:
     @property
     def dead(self) -> bool:
         return self.process is None or self.process.poll() is not None
+
+    @property
+    def drained(self) -> bool:
+        return self.may_end and self.process is not None and self.process.poll() == os.EX_OK
 
     def wait_longer(self) -> bool:
         """Says whether it is too early to start the dead child again. The waits double while it keeps dying young."""
@@ -158,8 +164,8 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
 def _children(settings: Settings, data: Path, queue_socket: Path) -> list[Child]:
     """Returns the child processes, in the order of starting."""
     children = [
-        Child("control", [sys.executable, "-P", "-m", "workers", "control"], signal.SIGQUIT),
-        Child("solve", [sys.executable, "-P", "-m", "workers", "solve"], signal.SIGQUIT, background=True),
+        Child("control", [sys.executable, "-P", "-m", "workers", "control"], signal.SIGQUIT, may_end=True),
+        Child("solve", [sys.executable, "-P", "-m", "workers", "solve"], signal.SIGQUIT, background=True, may_end=True),
     ]
     for name in ["api", *(f"api-{i}" for i in range(2, settings.api_processes + 1))]:
         counts = {"CIRIS_REQUESTS_FILE": str(data / "requests" / name)}
@@ -182,7 +188,7 @@ def _environment(settings: Settings, data: Path, queue_socket: Path, port: int) 
 def _supervise(children: list[Child], environment: dict[str, str], data: Path, url: str, stopping: Callable[[], bool]) -> None:
     while not stopping():
         for child in children:
-            if child.dead and not child.wait_longer():
+            if child.dead and not child.drained and not child.wait_longer():
                 log.warning("starting %s again", child.name)
                 child.start(environment, data / "logs")
                 _describe(data, url, children)
