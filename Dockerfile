@@ -1,5 +1,5 @@
 # One image for every role: migrate, api, control worker, solve worker (docker-compose.yml says which command is which).
-FROM python:3.12-slim-bookworm AS build
+FROM python:3.12.14-slim-bookworm@sha256:782412e85d0f0984994c290652577d4018aff08145c85b262bb63dc0c7522254 AS build
 WORKDIR /src
 RUN python -m venv /venv
 COPY requirements/runtime.lock requirements/
@@ -15,12 +15,13 @@ COPY ciris ciris
 COPY client client
 RUN /venv/bin/pip install --no-cache-dir --no-deps --no-build-isolation .
 
-FROM python:3.12-slim-bookworm
+FROM python:3.12.14-slim-bookworm@sha256:782412e85d0f0984994c290652577d4018aff08145c85b262bb63dc0c7522254
 # Drake needs glib. A worker must not be process 1: its children take an init as their parent for a dead worker.
 RUN apt-get update && apt-get install --yes --no-install-recommends libglib2.0-0 tini && rm -rf /var/lib/apt/lists/*
 RUN useradd --create-home --uid 10001 ciris
 COPY --from=build /venv /venv
-ENV PATH=/venv/bin:$PATH PYTHONUNBUFFERED=1
+# All but /tmp may be read-only: compiled kernels are kept there.
+ENV PATH=/venv/bin:$PATH PYTHONUNBUFFERED=1 NUMBA_CACHE_DIR=/tmp/numba
 USER ciris
 WORKDIR /home/ciris
 ENTRYPOINT ["tini", "--"]

@@ -29,6 +29,7 @@ PLACES = {
     "scene_id": ("scene_not_found", "ambiguous_id"),
     "job_id": ("job_not_found", "ambiguous_id"),
     "region_id": ("region_not_found", "ambiguous_id"),
+    "worker_id": ("worker_not_found", "ambiguous_id"),
     "pair": ("pair_not_found",),
     "scene": ("scene_not_found", "ambiguous_id"),
     "job": ("job_not_found", "ambiguous_id"),
@@ -71,6 +72,9 @@ ALSO: dict[str, tuple[str, ...]] = {
     "get_graph": CHILDREN,
     "create_key": ("first_key", "key_name", "busy"),
     "revoke_key": ("key_not_found", "busy"),
+    "pause_worker": ("worker_draining", "workers_shared", "busy"),
+    "resume_worker": ("worker_draining", "workers_shared", "busy"),
+    "drain_worker": ("workers_shared", "busy"),
 }
 """What else may be wrong, by operation."""
 
@@ -99,6 +103,7 @@ TAGS = [
     {"name": "regions", "description": "Certified regions and their proofs."},
     {"name": "planning", "description": "Questions of planners about regions."},
     {"name": "project", "description": "The caller's project, its keys, and who changed what."},
+    {"name": "workers", "description": "The workers that live, what they do, and what they shall do."},
     {"name": "service", "description": "How the service is."},
 ]
 

@@ -130,6 +130,8 @@ def render(statistics: Statistics, waiting: Mapping[str, int], requests: Request
         _family("ciris_step_seconds", "gauge", "Time spent on the stored steps, by kind.", _by("kind", statistics.step_seconds)),
         _family("ciris_webhooks", "gauge", "Webhooks by state.", _by("state", statistics.webhooks)),
         _family("ciris_regions", "gauge", "Certified regions.", {(): statistics.regions}),
+        _family("ciris_workers", "gauge", "Workers that live, by kind and state.", _workers(statistics)),
+        _family("ciris_workers_wanted", "gauge", "Solving processes that would be busy now.", {(): statistics.workers_wanted}),
         _family("ciris_queue_messages", "gauge", "Messages that wait, by queue.", _by("queue", waiting)),
         _family("ciris_http_requests_total", "counter", "Requests answered.", _requests(answered, 0)),
         _family("ciris_http_request_seconds_total", "counter", "Time that they took.", _requests(answered, 1)),
@@ -157,6 +159,10 @@ def _histogram(name: str, text: str, latencies: Mapping[str, tuple[list[int], fl
 
 def _by(label: str, values: Mapping[str, float]) -> Samples:
     return {((label, name),): value for name, value in values.items()}
+
+
+def _workers(statistics: Statistics) -> Samples:
+    return {(("kind", kind), ("state", state)): count for (kind, state), count in statistics.workers.items()}
 
 
 def _requests(answered: Mapping[tuple[str, int], tuple[float, float]], part: int) -> Samples:

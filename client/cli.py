@@ -403,6 +403,20 @@ def _parser() -> argparse.ArgumentParser:
     gone.add_argument("job", metavar="ID")
     gone.set_defaults(run="client.removal:job_rm")
 
+    worker = _group(verbs.add_parser("worker", help="list, show, pause, resume and drain workers of the service"))
+    worker.add_parser("ls", parents=[remote, json], help="list the workers that live, with what they do").set_defaults(
+        run="client.workers:ls"
+    )
+    for verb, about in (
+        ("show", "show a worker and what each of its processes does"),
+        ("pause", "let a worker finish what it holds and take no more"),
+        ("resume", "let a paused worker take work again"),
+        ("drain", "let a worker finish what it holds and end; what supervises it may start another, but `ciris up` does not"),
+    ):
+        of_one = worker.add_parser(verb, parents=[remote, json], help=about)
+        of_one.add_argument("worker", metavar="ID", help="its id, or the first characters of it")
+        of_one.set_defaults(run=f"client.workers:{verb}")
+
     region = _group(verbs.add_parser("region", help="list, show, export and delete regions"))
     gone = region.add_parser("rm", parents=[remote], help="delete a region")
     gone.add_argument("region", metavar="ID")

@@ -1,4 +1,7 @@
-"""The audit log says who changed keys and limits, and who deleted what. It is written with the change, in the same transaction."""
+"""The audit log says who changed keys and limits, deleted what, and paused or drained workers.
+
+It is written with the change, in the same transaction.
+"""
 
 from __future__ import annotations
 
@@ -26,6 +29,9 @@ class Action(StrEnum):
     SCENE_DELETED = "scene_deleted"
     JOB_DELETED = "job_deleted"
     REGION_DELETED = "region_deleted"
+    WORKER_PAUSED = "worker_paused"
+    WORKER_RESUMED = "worker_resumed"
+    WORKER_DRAINED = "worker_drained"
 
 
 def note(session: Session, project: str, who: str, action: Action, what: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
 from typing import Any
 from uuid import uuid4
@@ -261,6 +261,12 @@ def is_coordinated(job: JobRow, now: datetime) -> bool:
     if job.coordinator is None or job.coordinator_until is None or job.coordinator_until < now:
         return False
     return leases.is_alive(job.coordinator) is not False
+
+
+def coordinated_by(session: Session, processes: Collection[str]) -> Sequence[JobRow]:
+    """Returns the unfinished jobs whose next transition one of these processes has begun to compute, oldest first."""
+    mine = (JobRow.coordinator.in_(processes), JobRow.state.in_(unfinished(JOB)))
+    return session.scalars(select(JobRow).where(*mine).order_by(JobRow.created_at, JobRow.id)).all()
 
 
 def awaiting_coordination(session: Session, now: datetime) -> list[str]:

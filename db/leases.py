@@ -12,6 +12,7 @@ import os
 import signal
 import socket
 import threading
+from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from pathlib import Path
 from typing import TypeVar
 from uuid import uuid4
 
-from sqlalchemy import BindParameter, ColumnElement, Select, bindparam, select, update
+from sqlalchemy import BindParameter, ColumnElement, Select, bindparam, func, select, update
 from sqlalchemy.orm import Session
 
 from db import clock
@@ -191,6 +192,21 @@ def lost(session: Session, model: type[Row], *, by_time: bool) -> list[Lost]:
 def of_job(session: Session, model: type[Row], job_id: str) -> Sequence[Row]:
     """Returns the rows of a job that are held now, in their order."""
     return session.scalars(select(model).where(model.job_id == job_id, model.state == RUNNING).order_by(model.id)).all()
+
+
+def of_workers(session: Session, model: type[Row], processes: Collection[str]) -> Sequence[Row]:
+    """Returns the rows that processes of these workers hold now, as far as the session's project has them, in their order."""
+    jobs = select(model).join(JobRow, JobRow.id == model.job_id)  # which leaves out what belongs to other projects
+    return session.scalars(jobs.where(model.state == RUNNING, model.parent.in_(processes)).order_by(model.id)).all()
+
+
+def count_of_workers(session: Session) -> Counter[str]:
+    """Returns how many leases the processes of each worker hold, by the worker's process, whatever the project."""
+    counts: Counter[str] = Counter()
+    for model in (PairRow, StepRow):
+        held = select(model.parent, func.count(model.lease_token.distinct())).where(model.state == RUNNING).group_by(model.parent)
+        counts.update({parent or "": count for parent, count in session.execute(held)})
+    return counts
 
 
 def release(session: Session, model: type[Row], lost: Lost) -> list[Row]:

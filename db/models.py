@@ -475,3 +475,29 @@ class DeliveryRow(Base):
     """How the body of its answer begins."""
     error: Mapped[str | None]
     """Why the attempt failed; None where it did not."""
+
+
+class WorkerRow(Base):
+    """A worker is a process that takes messages from a queue. It writes its row itself, and tells again and again that it lives."""
+
+    __tablename__ = "workers"
+
+    id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    process: Mapped[str] = mapped_column(unique=True)
+    """``host:pid:start``. Leases name it as the parent of the process that holds them."""
+    kind: Mapped[str] = mapped_column(String(16))
+    """The queue that it serves: control or solve."""
+    version: Mapped[str]
+    """Version of ciris."""
+    processes: Mapped[int]
+    """So many pieces of work it does at the same time."""
+    cores: Mapped[int]
+    memory_bytes: Mapped[int] = mapped_column(BigInteger)
+    wanted: Mapped[str] = mapped_column(String(16), default=states.WorkerState.RUNNING)
+    """What people want of it, a value of WorkerState."""
+    state: Mapped[str] = mapped_column(String(16))
+    """What it does, as it said last, a value of WorkerState."""
+    created_at: Mapped[datetime]
+    """When it began, by the database's clock."""
+    seen_at: Mapped[datetime]
+    """When it said last that it lives, by the database's clock."""

@@ -16,9 +16,9 @@ from sqlalchemy import Select, tuple_
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db.models import ApiKeyRow, AuditRow, JobRow, RegionRow, SceneRow
+from db.models import ApiKeyRow, AuditRow, JobRow, RegionRow, SceneRow, WorkerRow
 
-Row = TypeVar("Row", ApiKeyRow, AuditRow, JobRow, RegionRow, SceneRow)
+Row = TypeVar("Row", ApiKeyRow, AuditRow, JobRow, RegionRow, SceneRow, WorkerRow)
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def page(session: Session, model: type[Row], query: Select[Row], after: str | No
     return Page(rows[:limit], _cursor(rows[limit - 1]) if len(rows) > limit else None)
 
 
-def _cursor(row: ApiKeyRow | AuditRow | JobRow | RegionRow | SceneRow) -> str:
+def _cursor(row: ApiKeyRow | AuditRow | JobRow | RegionRow | SceneRow | WorkerRow) -> str:
     return base64.urlsafe_b64encode(f"{row.created_at.isoformat()} {row.id}".encode()).decode()
 
 

@@ -174,7 +174,7 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
     first = select(*columns).where(*is_open, ahead).order_by(PairRow.deaths, PairRow.id).limit(MOST_TOGETHER)
     rows = session.execute(first).all()
     fresh = [row for row in rows if row.deaths == 0]
-    seconds = batch_seconds * min(max(job.open_pairs / FEW, 1.0), LONGER)
+    seconds = batch_length(job.open_pairs, batch_seconds)
     chosen = fresh[: len(batch(((row.pair_index, row.forecast_seconds) for row in fresh), seconds))] or rows[:1]
     pairs = tuple(Claimed(row.pair_index, row.part, row.attempts + 1, row.deaths) for row in chosen)
     jobs.charge(session, job, sum(row.forecast_seconds for row in chosen))
@@ -184,6 +184,11 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
     if fresh:
         job.next_pair = chosen[-1].id + 1
     return Claim(token, job.id, job.scene_id, chosen[0].iteration, pairs)
+
+
+def batch_length(open_pairs: int, batch_seconds: float) -> float:
+    """Returns the seconds of a batch of a job with so many open pairs."""
+    return batch_seconds * min(max(open_pairs / FEW, 1.0), LONGER)
 
 
 def release(session: Session, job: JobRow, lost: leases.Lost) -> list[PairRow]:

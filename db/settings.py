@@ -12,18 +12,16 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+from db import machine
+
 
 def _data_dir() -> Path:
     home = os.environ.get("XDG_DATA_HOME")
     return (Path(home) if home else Path.home() / ".local" / "share") / "ciris"
 
 
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def _memory_of_a_process() -> int:
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // _cores()
+    return machine.memory_bytes() // machine.cores()
 
 
 def _networks(given: object) -> object:
@@ -62,12 +60,12 @@ class Settings(BaseSettings):
     """The API believes ``X-Forwarded-For`` and ``X-Forwarded-Proto`` of these addresses and networks only, written with commas between
     them. It takes the last address of the header that is not one of them for the caller's; empty: it believes nobody.
     """
-    api_processes: int = Field(default_factory=lambda: min(2, _cores()), ge=1)
+    api_processes: int = Field(default_factory=lambda: min(2, machine.cores()), ge=1)
     """The embedded stack runs this many processes of the API, all on one port."""
     requests_file: Path | None = None
     """File in which one of several API processes on one port counts its requests; the others' files are in the same directory."""
-    solve_processes: int = Field(default_factory=_cores, ge=1)
-    """This many processes solve pairs, one thread each."""
+    solve_processes: int = Field(default_factory=machine.cores, ge=1)
+    """This many processes solve pairs, one thread each. Default: the cores that they may use (db.machine)."""
 
     batch_seconds: float = 0.5
     """Pairs are certified together until their forecasts sum to this many seconds."""
@@ -91,7 +89,7 @@ class Settings(BaseSettings):
     child_memory_bytes: int = 16 << 30
     """The process that runs a seeding or a check on request may have an address space of this many bytes."""
     pair_memory_bytes: int = Field(default_factory=_memory_of_a_process)
-    """A job with a pair that needs more bytes of memory than this is refused. Default: this machine's memory, divided by its cores."""
+    """A job with a pair that needs more bytes of memory than this is refused. Default: the memory there is, divided by the cores."""
     max_jobs_per_key: int = Field(default=1000, ge=1)
     """One API key may have this many unfinished jobs. Where the service asks for no key, all callers share the limit."""
 

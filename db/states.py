@@ -114,6 +114,15 @@ class WebhookState(StrEnum):
     """The service has given up; ``error`` says why."""
 
 
+class WorkerState(StrEnum):
+    RUNNING = "running"
+    """The worker takes work."""
+    PAUSED = "paused"
+    """The worker finishes what it holds, and takes no more until somebody resumes it."""
+    DRAINING = "draining"
+    """The worker finishes what it holds, and then ends. Nothing takes that back."""
+
+
 Table = Mapping[str, frozenset[str]]
 
 
@@ -161,6 +170,13 @@ WEBHOOK: Table = _table(
         WebhookState.WAITING: {WebhookState.DELIVERED, WebhookState.FAILED},
         WebhookState.DELIVERED: {WebhookState.WAITING},
         WebhookState.FAILED: {WebhookState.WAITING},
+    },
+)
+WORKER: Table = _table(
+    WorkerState,
+    {
+        WorkerState.RUNNING: {WorkerState.PAUSED, WorkerState.DRAINING},
+        WorkerState.PAUSED: {WorkerState.RUNNING, WorkerState.DRAINING},
     },
 )
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from db import clock
+from db import clock, work, workers
 from db.models import IterationRow, JobRow, PairRow, RegionRow, StepRow, WebhookRow
+from db.settings import settings
 from db.states import JobState, PairState, StepKind, WebhookState
 
 
@@ -20,6 +21,8 @@ class Statistics:
         pair_seconds: seconds spent on pairs, summed by the state that resulted.
         step_seconds: seconds spent on steps, summed by kind.
         waiting: seconds since an iteration began -> how many of its pieces are open, for iterations that run.
+        workers: the workers that live, by kind and state.
+        workers_wanted: how many solving processes would be busy now if there were enough.
     """
 
     jobs: dict[str, int]
@@ -29,6 +32,8 @@ class Statistics:
     webhooks: dict[str, int]
     regions: int
     waiting: dict[float, int]
+    workers: dict[tuple[str, str], int]
+    workers_wanted: int
 
 
 def collect(session: Session) -> Statistics:
@@ -54,4 +59,6 @@ def collect(session: Session) -> Statistics:
         webhooks={state: webhooks.get(state, 0) for state in WebhookState},
         regions=session.scalar(select(func.count()).select_from(RegionRow)) or 0,
         waiting=waiting,
+        workers=workers.counts(session),
+        workers_wanted=work.busy_solvers(session, batch_seconds=settings().batch_seconds),
     )

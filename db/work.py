@@ -11,18 +11,22 @@ The queries are built once, with the time and the job as parameters, because bui
 
 from __future__ import annotations
 
+import math
 from functools import cache
 
-from sqlalchemy import ColumnElement, Select, and_, bindparam, exists, func, or_, select
+from sqlalchemy import ColumnElement, Select, and_, bindparam, case, exists, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
-from db import jobs, pairs, steps
-from db.models import JobRow, StepRow
-from db.states import JobState, StepKind, StepState
+from db import jobs, leases, pairs, steps
+from db.models import JobRow, PairRow, StepRow
+from db.states import JobState, PairState, StepKind, StepState
 from db.types import Utc, utcnow
 
 URGENT = (StepKind.PROPOSE, StepKind.STEP, StepKind.SCOUT, StepKind.MOTION)
 """The job waits for these steps. It does not wait for the acceptance of a region."""
+
+ROUNDING = 1e-9
+"""Sums of fractions of batches may be too large by so much."""
 
 
 def next_job(session: Session) -> str | None:
@@ -45,6 +49,26 @@ def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds:
     if claimed is None and job.state == JobState.RUNNING:
         claimed = pairs.claim(session, job, lease_seconds=lease_seconds, batch_seconds=batch_seconds)
     return claimed
+
+
+def busy_solvers(session: Session, *, batch_seconds: float) -> int:
+    """Returns how many solving processes would be busy now if there were enough: one for each piece that is claimed or could be.
+
+    Open pairs count as the pieces in which they would be claimed, so that a job of many short pairs does not ask for many processes.
+    """
+    batches = 0
+    for job_id, count in session.execute(
+        select(JobRow.id, JobRow.open_pairs).where(JobRow.state == JobState.RUNNING, JobRow.open_pairs > 0)
+    ):
+        seconds = pairs.batch_length(count, batch_seconds)
+        share = case((PairRow.forecast_seconds < seconds, PairRow.forecast_seconds / seconds), else_=1.0)
+        full = session.scalar(select(func.sum(share)).where(PairRow.job_id == job_id, PairRow.state == PairState.OPEN)) or 0.0
+        batches += max(1, math.ceil(max(full, count / pairs.MOST_TOGETHER) - ROUNDING))
+    urgent = steps.is_open(StepRow, JobRow.id, URGENT)
+    steps_open = session.scalar(select(func.count()).select_from(StepRow).join(JobRow, urgent).where(JobRow.state == JobState.RUNNING))
+    regions = session.scalar(select(func.count()).select_from(JobRow).where(_has_region()), {"now": utcnow()})
+    held = leases.count_of_workers(session).total()
+    return held + batches + (steps_open or 0) + (regions or 0)
 
 
 def served_by_now(session: Session) -> float:

@@ -26,8 +26,10 @@ def main() -> None:
     from db import logs
     from db.session import database
     from db.settings import settings
+    from db.workers import WorkerKind
     from workers.app import CONTROL, SOLVE, celery_app
     from workers.heartbeat import Heartbeat
+    from workers.presence import Presence
     from workers.processes import die_with_parent
     from workers.tasks import register
 
@@ -50,8 +52,11 @@ def main() -> None:
 
             prepare(SEEDING)
 
+    presence = Presence(WorkerKind(queue), stop)
+
     @worker_ready.connect(weak=False)
-    def sweep(**_: Any) -> None:
+    def begin(sender: Any, **_: Any) -> None:
+        threading.Thread(target=presence.run, args=(sender,), name="presence", daemon=True).start()
         if queue == CONTROL:
             from workers import sweeper, webhooks
 
@@ -71,6 +76,7 @@ def main() -> None:
         ]
     )
     stop.set()
+    presence.leave()
 
 
 if __name__ == "__main__":

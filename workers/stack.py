@@ -67,6 +67,7 @@ class Child:
 
     Attributes:
         background: True for a child that computes; on a busy machine the other children answer first.
+        may_end: True for a worker. Its status 0 says that somebody has drained it, and then it is not started again.
         own: environment variables of this child alone.
     """
 
@@ -74,6 +75,7 @@ class Child:
     command: list[str]
     stop_signal: int
     background: bool = False
+    may_end: bool = False
     own: dict[str, str] = field(default_factory=dict)
     process: subprocess.Popen[bytes] | None = None
     started: float = 0.0
@@ -110,6 +112,10 @@ class Child:
     @property
     def dead(self) -> bool:
         return self.process is None or self.process.poll() is not None
+
+    @property
+    def drained(self) -> bool:
+        return self.may_end and self.process is not None and self.process.poll() == os.EX_OK
 
     def wait_longer(self) -> bool:
         """Says whether it is too early to start the dead child again. The waits double while it keeps dying young."""
@@ -188,8 +194,8 @@ def _groups(children: list[Child]) -> list[int]:
 def _children(settings: Settings, data: Path, queue_socket: Path) -> list[Child]:
     """Returns the child processes, in the order of starting."""
     children = [
-        Child("control", [sys.executable, "-P", "-m", "workers", "control"], signal.SIGQUIT),
-        Child("solve", [sys.executable, "-P", "-m", "workers", "solve"], signal.SIGQUIT, background=True),
+        Child("control", [sys.executable, "-P", "-m", "workers", "control"], signal.SIGQUIT, may_end=True),
+        Child("solve", [sys.executable, "-P", "-m", "workers", "solve"], signal.SIGQUIT, background=True, may_end=True),
     ]
     for name in ["api", *(f"api-{i}" for i in range(2, settings.api_processes + 1))]:
         counts = {"CIRIS_REQUESTS_FILE": str(data / "requests" / name)}
@@ -216,7 +222,7 @@ def _supervise(
     disk, trouble, described = Disk(data), "", True
     while not stopping():
         for child in children:
-            if child.dead and not child.wait_longer():
+            if child.dead and not child.drained and not child.wait_longer():
                 log.warning("starting %s again", child.name)
                 child.start(environment, data / "logs")
                 reaper.watch(_groups(children))

@@ -14,7 +14,7 @@ from typing import Any
 from kombu.exceptions import OperationalError
 from sqlalchemy.orm import Session
 
-from db import clock, events, jobs, leases, pairs, projects, retention, work
+from db import clock, events, jobs, leases, pairs, projects, retention, work, workers
 from db.models import JobRow, PairRow, StepRow
 from db.session import database
 from db.settings import settings
@@ -71,7 +71,17 @@ def sweep(*, by_time: bool = True) -> None:
         send_coordinate(job_id)
     if is_open and waiting(SOLVE) == 0:
         send_work()
+    forget_gone()
     expire()
+
+
+def forget_gone() -> None:
+    """Deletes the rows of workers that have ended without a word."""
+    with database().read() as session:
+        ids = workers.gone(session)
+    if ids:
+        with database().write() as session:
+            workers.forget(session, ids)
 
 
 def expire() -> None:

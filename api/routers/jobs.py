@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 from pydantic import Field
 
-from api import obstacles, submission
+from api import held, obstacles, submission
 from api.access import READ, SUBMIT, Admin, Db, Submitter
 from api.announce import Announcements
 from api.reading import ReadingRoute
@@ -39,7 +39,7 @@ from api.schemas.jobs import (
     Webhook,
 )
 from api.schemas.motions import JobMotion
-from api.schemas.progress import JobWorkers, Obstacles, Work, Worker
+from api.schemas.progress import JobWorkers, Obstacles
 from api.schemas.scenes import PairInfo
 from api.schemas.service import Dependents
 from api.writing import writing
@@ -51,7 +51,7 @@ from db import audit, clock, jobs, labels, leases, pages, pairs, proofs, regions
 from db.audit import Action
 from db.models import IterationRow, JobRow, PairRow, StepRow
 from db.session import Database
-from db.states import IterationState, JobKind, JobState, PairState, StepKind
+from db.states import IterationState, JobKind, JobState, PairState
 from db.types import utcnow
 from planner.cover.options import CoverOptions
 from planner.cover.result import said
@@ -470,35 +470,9 @@ def get_job_workers(job_id: JobGiven, db: Db) -> JobWorkers:
     """Returns which processes hold which work of a job at this moment."""
     with db.read() as session:
         job = jobs.get(session, job_id)
-        held, begun = leases.of_job(session, PairRow, job.id), leases.of_job(session, StepRow, job.id)
+        rows, begun = leases.of_job(session, PairRow, job.id), leases.of_job(session, StepRow, job.id)
         decided = jobs.is_coordinated(job, clock.now(session))
-    return JobWorkers(workers=[*_certifying(held), *(_doing(step) for step in begun), *([_deciding(job)] if decided else [])])
-
-
-def _certifying(rows: Sequence[PairRow]) -> list[Worker]:
-    """Describes the processes that hold pairs, each with all pairs that it has claimed together."""
-    claims: dict[str | None, list[PairRow]] = {}
-    for row in rows:
-        claims.setdefault(row.lease_token, []).append(row)
-    return [
-        Worker(
-            process=held[0].worker or "",
-            work=Work.PAIRS,
-            iteration=held[0].iteration,
-            pairs=sorted({row.pair_index for row in held}),
-            until=held[0].lease_until,
-        )
-        for held in claims.values()
-    ]
-
-
-def _doing(step: StepRow) -> Worker:
-    work = Work.SEED if step.kind == StepKind.PROPOSE else Work(step.kind)
-    return Worker(process=step.worker or "", work=work, iteration=None, pairs=[], until=step.lease_until)
-
-
-def _deciding(job: JobRow) -> Worker:
-    return Worker(process=job.coordinator or "", work=Work.DECIDE, iteration=None, pairs=[], until=job.coordinator_until)
+    return JobWorkers(workers=[*held.certifying(rows), *map(held.doing, begun), *([held.deciding(job)] if decided else [])])
 
 
 @router.get("/{job_id}/obstacles")

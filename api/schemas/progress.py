@@ -40,9 +40,10 @@ class Work(StrEnum):
     """It decides what the job does next."""
 
 
-class Worker(BaseModel):
-    """Describes a process that holds work of the job."""
+class HeldWork(BaseModel):
+    """Describes a piece of a job's work that a process holds."""
 
+    job: str = Field(description="The job's id.")
     process: str = Field(description="Name of the process: host, process number, and when it began, with colons between.")
     work: Work = Field(description="What the process does.")
     iteration: int | None = Field(description="Iteration of the pairs; null where the work is no pairs.")
@@ -59,6 +60,7 @@ class JobWorkers(BaseModel):
                 {
                     "workers": [
                         {
+                            "job": "1f9b2a7c-5b0e-4b58-9c39-2f1d6a3c8e10",
                             "process": "solver-1.2f9a01c3:4711:8812734",
                             "work": "pairs",
                             "iteration": 3,
@@ -71,7 +73,7 @@ class JobWorkers(BaseModel):
         }
     )
 
-    workers: list[Worker] = Field(description="The processes, in no order.")
+    workers: list[HeldWork] = Field(description="The processes, in no order.")
 
 
 class Obstacle(BaseModel):

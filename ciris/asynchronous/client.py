@@ -231,6 +231,26 @@ class AsyncClient:
         """Has the receiver of a job's webhook called again."""
         return await self._json("POST", f"/v1/jobs/{segment(job_id)}/webhook/resend")
 
+    async def workers(self) -> list[Document]:
+        """Returns the workers that live, with what they do at this moment, those that began last first."""
+        return await self._all("workers")
+
+    async def worker(self, worker_id: str) -> Document:
+        """Returns the worker with this id, with what it does at this moment."""
+        return await self._json("GET", f"/v1/workers/{segment(worker_id)}")
+
+    async def pause_worker(self, worker_id: str) -> Document:
+        """Asks a worker to finish what it holds and to take no more until it is resumed. It learns of it within seconds."""
+        return await self._json("POST", f"/v1/workers/{segment(worker_id)}/pause")
+
+    async def resume_worker(self, worker_id: str) -> Document:
+        """Asks a paused worker to take work again."""
+        return await self._json("POST", f"/v1/workers/{segment(worker_id)}/resume")
+
+    async def drain_worker(self, worker_id: str) -> Document:
+        """Asks a worker to finish what it holds and then to end. Nothing takes that back."""
+        return await self._json("POST", f"/v1/workers/{segment(worker_id)}/drain")
+
     async def cover(self, job_id: str) -> Document:
         """Returns what a cover has come to."""
         return await self._json("GET", f"/v1/jobs/{segment(job_id)}/cover")

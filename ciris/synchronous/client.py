@@ -230,6 +230,26 @@ class Client:
         """Has the receiver of a job's webhook called again."""
         return self._json("POST", f"/v1/jobs/{segment(job_id)}/webhook/resend")
 
+    def workers(self) -> list[Document]:
+        """Returns the workers that live, with what they do at this moment, those that began last first."""
+        return self._all("workers")
+
+    def worker(self, worker_id: str) -> Document:
+        """Returns the worker with this id, with what it does at this moment."""
+        return self._json("GET", f"/v1/workers/{segment(worker_id)}")
+
+    def pause_worker(self, worker_id: str) -> Document:
+        """Asks a worker to finish what it holds and to take no more until it is resumed. It learns of it within seconds."""
+        return self._json("POST", f"/v1/workers/{segment(worker_id)}/pause")
+
+    def resume_worker(self, worker_id: str) -> Document:
+        """Asks a paused worker to take work again."""
+        return self._json("POST", f"/v1/workers/{segment(worker_id)}/resume")
+
+    def drain_worker(self, worker_id: str) -> Document:
+        """Asks a worker to finish what it holds and then to end. Nothing takes that back."""
+        return self._json("POST", f"/v1/workers/{segment(worker_id)}/drain")
+
     def cover(self, job_id: str) -> Document:
         """Returns what a cover has come to."""
         return self._json("GET", f"/v1/jobs/{segment(job_id)}/cover")

@@ -22,8 +22,9 @@ from tests.api.test_openapi import operations
 from tests.db.builders import a_running_job, add_region
 from tests.scenes import slider
 
-ABOUT_THE_SERVICE = {"get_health", "get_readiness", "get_metrics"}
-"""These say how the service is, in numbers, and name nothing of anybody."""
+WORKERS = {"list_workers", "get_worker", "pause_worker", "resume_worker", "drain_worker"}
+ABOUT_THE_SERVICE = {"get_health", "get_readiness", "get_metrics", *WORKERS}
+"""These say how the service is, in numbers, and name nothing of anybody. ``test_workers.py`` tests that of the workers."""
 OWN = {
     "get_project",
     "list_project_events",

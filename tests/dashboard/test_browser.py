@@ -111,7 +111,7 @@ def test_the_proof_is_checked_again_from_the_page(page: Any, url: str, region: s
     assert "guarantee: exact" in page.locator("#statement").text_content()
 
 
-@pytest.mark.parametrize("path", ["/", "/scenes/slider", "/regions/{region}", "/login"])
+@pytest.mark.parametrize("path", ["/", "/scenes/slider", "/regions/{region}", "/login", "/workers"])
 def test_axe_finds_no_barrier(page: Any, url: str, region: str, barriers: Any, path: str) -> None:
     page.goto(url + path.format(region=region))
     assert barriers(page) == []
@@ -123,7 +123,7 @@ def test_no_page_is_wider_than_a_phone(browser: Any, url: str, region: str, sche
     page = context.new_page()
     page.goto(url)
     job, scene = (page.locator(f"a[href^='/{kind}/']").first.get_attribute("href") for kind in ("jobs", "scenes"))
-    for path in ("/", job, scene, f"/regions/{region}"):
+    for path in ("/", job, scene, "/workers", f"/regions/{region}"):
         page.goto(f"{url}{path}")
         if path.startswith("/regions/"):
             page.get_by_role("button", name="Verify here").click()

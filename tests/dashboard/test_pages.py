@@ -27,7 +27,16 @@ ROOT = Path(dashboard.__file__).parent
 @pytest.fixture
 def paths(client: TestClient, region: str) -> list[str]:
     job = client.get("/v1/jobs").json()["jobs"][0]
-    return ["/", "/live", f"/jobs/{job['id']}", f"/jobs/{job['id']}/live", f"/regions/{region}", f"/scenes/{job['scene']}"]
+    return [
+        "/",
+        "/live",
+        "/workers",
+        "/workers/live",
+        f"/jobs/{job['id']}",
+        f"/jobs/{job['id']}/live",
+        f"/regions/{region}",
+        f"/scenes/{job['scene']}",
+    ]
 
 
 def test_every_page_works_offline_and_under_a_strict_policy(client: TestClient, paths: list[str]) -> None:

@@ -22,8 +22,9 @@ from tests.errors.scenes import SCENES
 from tests.errors.service import SERVICE
 from tests.errors.sites import Site, sites
 from tests.errors.teams import TEAMS
+from tests.errors.workers import WORKERS
 
-TABLE = [*SCENES, *BUNDLES, *REGIONS, *MOTIONS, *COVERS, *DRAWING, *SERVICE, *COMMANDS, *PYTHON, *PROOFS, *TEAMS]
+TABLE = [*SCENES, *BUNDLES, *REGIONS, *MOTIONS, *COVERS, *DRAWING, *SERVICE, *COMMANDS, *PYTHON, *PROOFS, *TEAMS, *WORKERS]
 
 DEMANDS = re.compile(r"\bmust\b|\bat most\b|\bonly\b")
 """Words of a message that says by itself what has to be."""

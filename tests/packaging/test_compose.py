@@ -60,6 +60,30 @@ def test_nothing_is_published_beyond_this_machine() -> None:
 
 def test_the_image_copies_every_package() -> None:
     dockerfile, ignored = (ROOT / "Dockerfile").read_text(), (ROOT / ".dockerignore").read_text().split()
-    for room in ("certifier", "db", "planner", "workers", "api", "client", "dashboard"):
+    for room in ("certifier", "db", "planner", "workers", "api", "ciris", "client", "dashboard"):
         assert f"COPY {room} {room}\n" in dockerfile
         assert f"!{room}" in ignored
+
+
+def test_every_container_is_contained_and_its_log_ends() -> None:
+    for name, service in SERVICES.items():
+        assert service["read_only"] is True, name
+        assert service["cap_drop"] == ["ALL"], name
+        assert service["security_opt"] == ["no-new-privileges:true"], name
+        assert service["logging"]["driver"] == "json-file"
+        assert set(service["logging"]["options"]) == {"max-size", "max-file"}
+        assert not {"privileged", "cap_add"} & set(service)
+    for name in (*OURS, "postgres"):
+        assert "/tmp" in SERVICES[name]["tmpfs"], "the only place to write to, besides volumes"
+
+
+def test_nobody_is_root() -> None:
+    assert {name: SERVICES[name]["user"] for name in ("postgres", "valkey")} == {"postgres": "postgres", "valkey": "valkey"}
+    assert "\nUSER ciris\n" in (ROOT / "Dockerfile").read_text()
+
+
+def test_images_of_others_are_named_by_digest() -> None:
+    images = [SERVICES[name]["image"] for name in ("postgres", "valkey")]
+    images += re.findall(r"^FROM (\S+)", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
+    assert len(images) == 4
+    assert all(re.search(r":[\w.-]+@sha256:[0-9a-f]{64}$", image) for image in images)

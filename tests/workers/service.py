@@ -61,7 +61,7 @@ def eventually(look: Callable[[], Found | None], what: str, seconds: float = PAT
     return found
 
 
-COMMANDS = {"control": ["workers", "control"], "solve": ["workers", "solve"], "api": ["api"]}
+COMMANDS = {"control": ["workers", "control"], "solve": ["workers", "solve"], "solve-2": ["workers", "solve"], "api": ["api"]}
 
 
 class Service:
@@ -80,6 +80,13 @@ class Service:
                 stderr=log,
                 preexec_fn=partial(die_with_parent, signal.SIGKILL),
             )
+
+    def pid(self, name: str) -> int:
+        return self._workers[name].pid
+
+    def status(self, name: str) -> int | None:
+        """The status with which a worker ended by itself; None while it runs."""
+        return self._workers[name].poll()
 
     def kill(self, name: str) -> None:
         """Kills a whole worker, as the kernel does when memory runs out."""

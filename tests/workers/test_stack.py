@@ -95,6 +95,23 @@ def test_what_dies_is_started_again_and_a_stop_leaves_nothing(stack: Stack) -> N
     assert not (stack.data / "stack.json").exists()
 
 
+def test_a_worker_that_was_drained_is_not_started_again(stack: Stack) -> None:
+    def ask(path: str, method: str = "GET") -> Any:
+        with urllib.request.urlopen(urllib.request.Request(f"{stack.description['url']}{path}", method=method), timeout=20) as answer:
+            return json.load(answer)
+
+    def solver() -> str | None:
+        return next((worker["id"] for worker in ask("/v1/workers")["workers"] if worker["kind"] == "solve"), None)
+
+    before = stack.description["pids"]
+    ask(f"/v1/workers/{eventually(solver, 'the worker says that it lives')}/drain", "POST")
+    eventually(lambda: gone({"solve": before["solve"]}), "it ends")
+    time.sleep(3)
+    assert stack.description["pids"] == before
+    assert solver() is None
+    assert not gone({"control": before["control"]})
+
+
 def test_an_address_of_ipv6_is_served(tmp_path: Path) -> None:
     stack = Stack(tmp_path / "data", CIRIS_HOST="::1")
     try:

@@ -1,0 +1,38 @@
+"""This module describes what processes hold at this moment: pairs, steps and decisions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from api.schemas.progress import HeldWork, Work
+from db.models import JobRow, PairRow, StepRow
+from db.states import StepKind
+
+
+def certifying(rows: Sequence[PairRow]) -> list[HeldWork]:
+    """Describes pairs that are held, those together that a process has claimed together."""
+    claims: dict[str | None, list[PairRow]] = {}
+    for row in rows:
+        claims.setdefault(row.lease_token, []).append(row)
+    return [
+        HeldWork(
+            job=held[0].job_id,
+            process=held[0].worker or "",
+            work=Work.PAIRS,
+            iteration=held[0].iteration,
+            pairs=sorted({row.pair_index for row in held}),
+            until=held[0].lease_until,
+        )
+        for held in claims.values()
+    ]
+
+
+def doing(step: StepRow) -> HeldWork:
+    """Describes a step that is held."""
+    work = Work.SEED if step.kind == StepKind.PROPOSE else Work(step.kind)
+    return HeldWork(job=step.job_id, process=step.worker or "", work=work, iteration=None, pairs=[], until=step.lease_until)
+
+
+def deciding(job: JobRow) -> HeldWork:
+    """Describes the decision about a job that somebody is making."""
+    return HeldWork(job=job.id, process=job.coordinator or "", work=Work.DECIDE, iteration=None, pairs=[], until=job.coordinator_until)

@@ -1,0 +1,32 @@
+"""This is the page of the workers: what each of them does, and buttons for those who may ask something of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter, Request, Response
+
+from api.access import Db, Reader
+from api.pages.rendering import page
+from api.routers import workers
+from api.schemas.common import Cursor
+from db.keys import Scope
+from db.models import DEFAULT_PROJECT
+
+router = APIRouter()
+
+
+@router.get("/workers")
+def workers_page(request: Request, caller: Reader, db: Db, after: Cursor = None) -> Response:
+    return page(request, "workers.html", _crew(caller, db, after))
+
+
+@router.get("/workers/live")
+def workers_live(request: Request, caller: Reader, db: Db, after: Cursor = None) -> Response:
+    return page(request, "workers_live.html", _crew(caller, db, after))
+
+
+def _crew(caller: Reader, db: Db, after: str | None) -> dict[str, Any]:
+    found = workers.list_workers(db, after)
+    may_ask = caller.scope.includes(Scope.ADMIN) and caller.project == DEFAULT_PROJECT
+    return {"workers": found.workers, "next": found.next, "after": after, "may_ask": may_ask}

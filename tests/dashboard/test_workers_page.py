@@ -1,0 +1,60 @@
+"""The page of the workers, in a browser: what it says, its buttons, and who sees them."""
+
+from __future__ import annotations
+
+import os
+import time
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.access import KEYS_SECONDS
+from db import keys, leases, projects, work, workers
+from db.keys import Scope
+from db.session import Database
+from db.states import WorkerState
+from db.workers import Made, WorkerKind
+from tests.db.builders import a_running_job
+
+
+@pytest.fixture
+def busy(database: Database) -> str:
+    """The id of a job of which a worker certifies a pair; this process's parent stands for the worker."""
+    with database.write() as session:
+        workers.tell(session, Made(leases._name(os.getppid()), WorkerKind.SOLVE, "1.2", 4, 8, 2**34), WorkerState.RUNNING)
+        job = a_running_job(session)
+        assert work.claim(session, job.id, lease_seconds=60, batch_seconds=0.5) is not None
+        return job.id
+
+
+def test_the_page_shows_what_workers_do_and_pauses_them(page: Any, url: str, busy: str, database: Database, barriers: Any) -> None:
+    page.goto(url)
+    page.get_by_role("link", name="Workers").click()
+    row = page.get_by_role("row").nth(1)
+    assert "1 of 4" in row.text_content()
+    assert row.get_by_role("link", name=busy[:8]).get_attribute("href") == f"/jobs/{busy}"
+    assert barriers(page) == []
+    row.get_by_role("button", name="Pause").click()
+    page.get_by_text("to be paused").wait_for()
+    with database.read() as session:
+        assert workers.page(session).rows[0].wanted == "paused"
+    page.get_by_role("button", name="Resume").click()
+    page.get_by_role("button", name="Pause").wait_for()
+    page.get_by_role("button", name="Drain").click()
+    page.get_by_text("to be draining").wait_for()
+    assert page.get_by_role("button", name="Pause").count() == 0
+
+
+def test_only_those_who_run_the_service_have_buttons(client: TestClient, busy: str, database: Database) -> None:
+    with database.write() as session:
+        projects.add(session, "others")
+        made = [keys.add(session, "k", scope, project) for scope, project in ((Scope.ADMIN, "default"), (Scope.ADMIN, "others"))]
+        made.append(keys.add(session, "reader", Scope.READ))
+    time.sleep(KEYS_SECONDS)
+    buttons = []
+    for key in made:
+        answer = client.get("/workers", headers={"Authorization": f"Bearer {key}"})
+        assert "1 of 4" in answer.text
+        buttons.append("data-post" in answer.text)
+    assert buttons == [True, False, False]

@@ -1,0 +1,140 @@
+"""The manifests for Kubernetes: they fit its schemas, nothing in them is privileged, and they speak of what exists."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import kubernetes_validate
+import pytest
+import yaml
+
+from db.settings import Settings
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "deploy" / "kubernetes"
+SCHEMAS = "1.37"
+COMPOSE = yaml.safe_load((ROOT / "docker-compose.yml").read_text())["services"]
+OURS = ["migrate", "api", "control", "solve"]
+
+
+def documents() -> list[dict[str, Any]]:
+    """Every manifest that kustomize is given."""
+    listed = yaml.safe_load((FOLDER / "kustomization.yaml").read_text())["resources"]
+    assert {*listed, "kustomization.yaml"} == {path.name for path in FOLDER.iterdir()}
+    return [document for name in listed for document in yaml.safe_load_all((FOLDER / name).read_text())]
+
+
+DOCUMENTS = documents()
+PODS = {d["metadata"]["name"]: d["spec"]["template"] for d in DOCUMENTS if "template" in d.get("spec", {})}
+CONTAINERS = {name: pod["spec"]["containers"][0] for name, pod in PODS.items()}
+
+
+def texts(value: Any) -> Iterator[str]:
+    if isinstance(value, dict):
+        for part in value.values():
+            yield from texts(part)
+    elif isinstance(value, list):
+        for part in value:
+            yield from texts(part)
+    else:
+        yield str(value)
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda document: f"{document['kind']}-{document['metadata']['name']}")
+def test_a_manifest_fits_its_schema(document: dict[str, Any]) -> None:
+    kubernetes_validate.validate(document, SCHEMAS, strict=True)
+
+
+def test_the_schemas_would_find_a_mistake() -> None:
+    wrong = yaml.safe_load(yaml.safe_dump(next(d for d in DOCUMENTS if d["kind"] == "Deployment")))
+    wrong["spec"]["template"]["spec"]["containers"][0]["readOnlyRootFilesystem"] = True
+    with pytest.raises(kubernetes_validate.ValidationError):
+        kubernetes_validate.validate(wrong, SCHEMAS, strict=True)
+
+
+def test_there_is_all_that_compose_runs() -> None:
+    assert set(PODS) == set(COMPOSE)
+    assert all(len(pod["spec"]["containers"]) == 1 and "initContainers" not in pod["spec"] for pod in PODS.values())
+
+
+@pytest.mark.parametrize("name", PODS)
+def test_nothing_is_privileged_and_everything_is_limited(name: str) -> None:
+    pod, container = PODS[name]["spec"], CONTAINERS[name]
+    assert pod["automountServiceAccountToken"] is pod["enableServiceLinks"] is False
+    assert pod["securityContext"]["runAsNonRoot"] is True
+    assert pod["securityContext"]["runAsUser"] > 0
+    assert pod["securityContext"]["seccompProfile"] == {"type": "RuntimeDefault"}
+    assert container["securityContext"] == {
+        "allowPrivilegeEscalation": False,
+        "readOnlyRootFilesystem": True,
+        "capabilities": {"drop": ["ALL"]},
+    }
+    assert not {"hostNetwork", "hostPID", "hostIPC"} & set(pod)
+    assert not any("hostPath" in volume for volume in pod.get("volumes", []))
+    assert {"cpu", "memory"} <= set(container["resources"]["requests"])
+    assert "memory" in container["resources"]["limits"]
+
+
+def test_images_of_others_are_those_of_compose_by_digest() -> None:
+    for name in ("postgres", "valkey"):
+        assert CONTAINERS[name]["image"] == COMPOSE[name]["image"]
+        assert re.search(r":[\w.-]+@sha256:[0-9a-f]{64}$", COMPOSE[name]["image"])
+    assert {CONTAINERS[name]["image"] for name in OURS} == {"ciris"}, "kustomize puts the digest of the user's own there"
+
+
+def test_the_commands_are_those_of_compose_and_keep_the_images_init() -> None:
+    for name, container in CONTAINERS.items():
+        assert "command" not in container, "it would take the place of tini"
+        assert container["args"] == COMPOSE[name]["command"]
+    assert 'ENTRYPOINT ["tini", "--"]' in (ROOT / "Dockerfile").read_text()
+    assert all(find_spec(CONTAINERS[name]["args"][2]) for name in OURS)
+
+
+def test_the_user_is_that_of_the_image() -> None:
+    assert "useradd --create-home --uid 10001 ciris" in (ROOT / "Dockerfile").read_text()
+    assert {PODS[name]["spec"]["securityContext"]["runAsUser"] for name in OURS} == {10001}
+
+
+def test_workers_end_by_sigquit_and_are_looked_after() -> None:
+    for name in ("control", "solve"):
+        container = CONTAINERS[name]
+        assert container["lifecycle"]["preStop"]["exec"]["command"] == ["sh", "-c", "kill -s QUIT 1"]
+        assert "$CIRIS_HEARTBEAT_FILE" in container["livenessProbe"]["exec"]["command"][2]
+        assert PODS[name]["spec"]["terminationGracePeriodSeconds"] >= 30
+    assert (CONTAINERS["api"]["readinessProbe"]["httpGet"]["path"], CONTAINERS["api"]["livenessProbe"]["httpGet"]["path"]) == (
+        "/readyz",
+        "/healthz",
+    )
+
+
+def test_a_scaler_may_set_the_number_of_solve_workers() -> None:
+    solve = next(d for d in DOCUMENTS if d["metadata"]["name"] == "solve")
+    assert "replicas" not in solve["spec"]
+    assert CONTAINERS["solve"]["resources"]["limits"]["cpu"] == "2", "the number of its processes"
+
+
+def test_settings_exist_and_secrets_are_referred_to() -> None:
+    config = next(d for d in DOCUMENTS if d["kind"] == "ConfigMap")["data"]
+    named = set(config) | {entry["name"] for name in OURS for entry in CONTAINERS[name]["env"]}
+    assert {name for name in named if name.startswith("CIRIS_")} <= {f"CIRIS_{name.upper()}" for name in Settings.model_fields}
+    assert not any(document["kind"] == "Secret" for document in DOCUMENTS)
+    for container in CONTAINERS.values():
+        for entry in container.get("env", []):
+            if "PASSWORD" in entry["name"]:
+                assert set(entry["valueFrom"]) == {"secretKeyRef"}
+    addresses = [text for text in texts(DOCUMENTS) if "://" in text]
+    assert addresses
+    assert all("@" not in text or ":$(POSTGRES_PASSWORD)@" in text for text in addresses)
+
+
+def test_the_example_of_a_scaler_fits_its_schema() -> None:
+    blocks = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "operations.md").read_text(), re.DOTALL)
+    scalers = {d["kind"]: d for block in blocks for d in yaml.safe_load_all(block)}
+    assert set(scalers) == {"ScaledObject", "HorizontalPodAutoscaler"}
+    kubernetes_validate.validate(scalers["HorizontalPodAutoscaler"], SCHEMAS, strict=True)
+    assert {scaler["spec"]["scaleTargetRef"]["name"] for scaler in scalers.values()} == {"solve"}
+    assert all("ciris_workers_wanted" in " ".join(texts(scaler)) for scaler in scalers.values())

@@ -1,0 +1,140 @@
+"""Workers that come and go, on a real queue and both databases: what they say of themselves, and pausing, resuming, draining, dying."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from certifier.model import Scene
+from db import machine, workers
+from db.leases import _name
+from db.models import WorkerRow
+from db.session import database
+from db.states import WorkerState
+from tests.services import Queue
+from tests.workers.options import box_around
+from tests.workers.service import Service, ended, events_of, eventually, job_of, pairs_of, running_service, submit
+from workers.app import SOLVE, celery_app, send_work, waiting
+
+pytestmark = pytest.mark.lengthy
+
+LINGER_SECONDS = 3.0
+"""What must not happen is waited for so long."""
+
+
+@pytest.fixture
+def crew(queue: Queue, database_url: str, tmp_path: Path) -> Iterator[Service]:
+    """A control worker and a solve worker with two processes, which may be paused and killed."""
+    queue.flush()
+    with running_service(database_url, queue.url, tmp_path) as running:
+        for name in ("control", "solve"):
+            seen(running, name)
+        yield running
+
+
+def row_of(crew: Service, name: str) -> WorkerRow | None:
+    with database().read() as session:
+        return next((row for row in workers.page(session).rows if row.process == _name(crew.pid(name))), None)
+
+
+def seen(crew: Service, name: str, state: WorkerState = WorkerState.RUNNING) -> WorkerRow:
+    """The row of a worker, once it says that it is in this state."""
+
+    def look() -> WorkerRow | None:
+        row = row_of(crew, name)
+        return row if row is not None and row.state == state else None
+
+    return eventually(look, f"{name} is {state}", 60)
+
+
+def ask(crew: Service, name: str, state: WorkerState) -> None:
+    row = row_of(crew, name)
+    assert row is not None
+    with database().write() as session:
+        workers.ask(session, row.id, state)
+
+
+def unacknowledged() -> int:
+    """How many messages workers have taken and not acknowledged."""
+    with celery_app().connection_for_read() as connection:
+        return int(connection.default_channel.client.hlen("unacked"))
+
+
+def test_workers_say_what_they_are_and_leave(crew: Service) -> None:
+    solve, control = seen(crew, "solve"), seen(crew, "control")
+    assert (solve.kind, solve.processes, solve.cores) == ("solve", 2, machine.cores())
+    assert (control.kind, control.processes) == ("control", 1)
+    assert (solve.wanted, solve.state, solve.memory_bytes) == ("running", "running", machine.memory_bytes())
+    os.kill(crew.pid("solve"), signal.SIGQUIT)
+    eventually(lambda: crew.status("solve") is not None, "the worker ends")
+    assert row_of(crew, "solve") is None, "it took its row with it"
+
+
+def test_a_worker_that_was_killed_is_forgotten(crew: Service) -> None:
+    crew.kill("solve")
+    eventually(lambda: row_of(crew, "solve") is None, "the sweeper forgets it", 30)
+    assert row_of(crew, "control") is not None
+
+
+def test_a_paused_worker_takes_nothing_and_loses_no_message(crew: Service, planar: Scene) -> None:
+    ask(crew, "solve", WorkerState.PAUSED)
+    seen(crew, "solve", WorkerState.PAUSED)
+    job = submit(planar, box_around(np.zeros(2), 0.1))
+    eventually(lambda: waiting(SOLVE) == 1, "the control worker has decided")
+    send_work(5)
+    time.sleep(LINGER_SECONDS)
+    assert {row.state for row in pairs_of(job)} == {"open"}
+    assert (waiting(SOLVE), unacknowledged()) == (6, 0), "the messages stay where they are"
+    with celery_app().connection_for_read() as connection:
+        connection.default_channel.client.client_kill_filter(_type="normal", skipme=True)
+    time.sleep(LINGER_SECONDS)
+    assert {row.state for row in pairs_of(job)} == {"open"}, "it connects to Redis anew, and consumes from nothing then"
+    ask(crew, "solve", WorkerState.RUNNING)
+    assert ended(job).outcome == "certified"
+    seen(crew, "solve")
+
+
+def test_what_a_paused_worker_leaves_the_others_do(crew: Service, planar: Scene) -> None:
+    crew.start("solve-2")
+    seen(crew, "solve-2")
+    ask(crew, "solve", WorkerState.PAUSED)
+    seen(crew, "solve", WorkerState.PAUSED)
+    job = submit(planar, box_around(np.zeros(2), 0.1))
+    assert ended(job).outcome == "certified"
+    assert {row.parent for row in pairs_of(job)} == {_name(crew.pid("solve-2"))}
+
+
+def test_a_drained_worker_finishes_what_it_holds_and_ends_well(crew: Service, arm: tuple[Scene, np.ndarray]) -> None:
+    scene, s = arm
+    job = submit(scene, box_around(s, 0.05))
+    held = eventually(lambda: [row.id for row in pairs_of(job) if row.state == "running"], "it holds something")
+    ask(crew, "solve", WorkerState.PAUSED)
+    ask(crew, "solve", WorkerState.DRAINING)
+    eventually(lambda: crew.status("solve") is not None, "it ends")
+    assert crew.status("solve") == 0
+    assert row_of(crew, "solve") is None
+    done = [row for row in pairs_of(job) if row.id in held]
+    assert {(row.state, row.attempts) for row in done} == {("certified", 1)}
+    assert unacknowledged() == 0
+    crew.start("solve-2")
+    assert ended(job).outcome == "certified"
+    assert not [event for event in events_of(job) if event.kind == "lost"], "nothing was taken from anybody"
+
+
+def test_processes_that_die_are_replaced_while_the_worker_tells_of_itself(crew: Service, planar: Scene) -> None:
+    """Each is forked anew from a process with a thread that uses the database."""
+    for round in range(3):
+        for child in crew.children("solve"):
+            os.kill(child, signal.SIGKILL)
+        job = submit(planar, box_around(np.zeros(2), 0.1 + 0.01 * round))
+        assert ended(job).outcome == "certified"
+    assert crew.status("solve") is None
+    began = seen(crew, "solve").seen_at
+    eventually(lambda: seen(crew, "solve").seen_at > began, "it tells that it lives", 30)
+    assert job_of(job).state == "succeeded"

@@ -1,0 +1,110 @@
+"""A worker says in the database that it lives and what it does, and does what people want of it: it runs, pauses or drains.
+
+A paused worker takes no message from its queue, and a draining one ends with status 0 when it has finished what it holds. Messages that
+it leaves are there for the other workers: the one who claims a piece and leaves more sends the next message, whoever that is.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import time
+from importlib.metadata import version
+from typing import Any
+
+from celery.worker import state as celery_state
+
+from db import machine, workers
+from db.leases import this_worker
+from db.session import UNAVAILABLE, Database
+from db.settings import settings
+from db.states import WorkerState
+from db.workers import Made, WorkerKind
+
+log = logging.getLogger(__name__)
+
+LOOK_SECONDS = 2.0
+"""The worker looks each time this many seconds have passed what is wanted of it."""
+CHANGE_SECONDS = 0.1
+"""It looks again after so many seconds whether it does what it was asked to do a moment ago."""
+TELL_SECONDS = 10.0
+"""It says this often that it lives."""
+
+
+class Presence:
+    """Tells of this worker, and listens for it, in a thread of its own.
+
+    The solve worker starts its processes by forking. A process must not be forked while a thread uses the database: it would inherit
+    SQLite's locks as the thread had them. So a fork waits for the end of a visit to the database, and finds no connection.
+
+    Args:
+        ended: set when the worker ends.
+    """
+
+    def __init__(self, kind: WorkerKind, ended: threading.Event) -> None:
+        processes = settings().solve_processes if kind is WorkerKind.SOLVE else 1
+        self._made = Made(this_worker(), kind, version("ciris"), processes, machine.cores(), machine.memory_bytes())
+        self._ended = ended
+        self._state = self._wanted = WorkerState.RUNNING
+        self._told: float | None = None
+        self._database = Database(settings().database)
+        self._visit = threading.Lock()
+        os.register_at_fork(before=self._before_fork, after_in_parent=self._visit.release, after_in_child=self._visit.release)
+
+    def run(self, consumer: Any) -> None:
+        """Tells and listens until the worker ends.
+
+        Args:
+            consumer: Celery's, which takes the messages.
+        """
+        while not self._ended.is_set():
+            try:
+                with self._visit:
+                    self._wanted = self._look()
+            except UNAVAILABLE as error:
+                log.warning("the database cannot be reached; this worker goes on as it is (%s): %s", self._state, type(error).__name__)
+            except Exception:
+                log.exception("this worker could not tell of itself; trying again")
+            if self._state is WorkerState.DRAINING and not celery_state.reserved_requests:
+                log.info("this worker holds nothing any more, and ends")
+                celery_state.should_stop = os.EX_OK
+                return
+            if self._wanted is not self._state:
+                consumer.call_soon(self._change, consumer)
+            self._ended.wait(LOOK_SECONDS if self._wanted is self._state else CHANGE_SECONDS)
+
+    def leave(self) -> None:
+        """Takes the worker out of the database. If that fails, it is forgotten after a while."""
+        try:
+            with self._visit, self._database.write() as session:
+                workers.leave(session, self._made.process)
+        except UNAVAILABLE as error:
+            log.warning("the database cannot be reached; this worker is forgotten later: %s", type(error).__name__)
+
+    def _look(self) -> WorkerState:
+        """Returns what is wanted, and says what the worker does where that is due."""
+        if self._told is not None and time.monotonic() - self._told < TELL_SECONDS:
+            with self._database.read() as session:
+                wanted = workers.wanted(session, self._made.process)
+            if wanted is not None:
+                return wanted
+        with self._database.write() as session:
+            wanted = workers.tell(session, self._made, self._state)
+        self._told = time.monotonic()
+        return wanted
+
+    def _change(self, consumer: Any) -> None:
+        """Does what is wanted, in the thread that takes the messages. While that thread reconnects to Redis, it does nothing."""
+        if self._wanted is self._state or consumer.task_consumer is None:
+            return
+        if self._wanted is WorkerState.RUNNING:
+            consumer.add_task_queue(self._made.kind.value)
+        elif self._state is WorkerState.RUNNING:
+            consumer.cancel_task_queue(self._made.kind.value)
+        log.info("this worker was %s and is %s now", self._state, self._wanted)
+        self._state, self._told = self._wanted, None
+
+    def _before_fork(self) -> None:
+        self._visit.acquire()
+        self._database.close()
