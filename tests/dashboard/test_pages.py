@@ -134,6 +134,7 @@ def matrix() -> PairMatrix:
             cell(1, 1, PairState.RUNNING),
             cell(2, 1, PairState.OPEN),
         ],
+        next=None,
     )
 
 
