@@ -12,7 +12,7 @@ from fastapi import FastAPI
 from api.app import create_app
 from api.connections import BoundedProtocol, allow_files
 from certifier.errors import CirisError
-from db import keys, logs
+from db import keys, logs, traces
 from db.settings import settings
 from db.vault import vault
 
@@ -42,6 +42,7 @@ def main() -> None:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)
     allow_files()
+    traces.configure("api")
     config = uvicorn.Config(
         _frozen_app,
         factory=True,
@@ -57,6 +58,7 @@ def main() -> None:
     )
     server = uvicorn.Server(config)
     server.run(sockets=None if settings().requests_file is None else [_shared_socket()])
+    traces.end()
     if not server.started:
         sys.exit(NOT_STARTED)
 

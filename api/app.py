@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, MutableMapping
 from contextlib import asynccontextmanager
 from functools import partial
+from typing import Any
 
 from anyio import to_thread
 from fastapi import FastAPI
@@ -42,6 +43,9 @@ THREADS = CONNECTIONS - AT_ONCE - READERS - WRITERS - SMALL - LARGE - 1
 """All other requests share this many threads: those connections that children, reading and writing routes, questions and keys leave."""
 
 
+UNTRACED = frozenset({"/healthz", "/readyz", "/metrics"})
+
+
 def create_app(db: Database | None = None) -> FastAPI:
     """Makes the service on this database; the default is the database of the settings."""
     app = FastAPI(
@@ -53,6 +57,7 @@ def create_app(db: Database | None = None) -> FastAPI:
         generate_unique_id_function=_operation_id,
         separate_input_output_schemas=False,
         lifespan=_lifespan,
+        telemetry={"metrics": False, "logs": False, "operation_spans": False, "exclude": _untraced},
     )
     app.state.database = db or database()
     app.state.requests = Requests(settings().requests_file)
@@ -88,6 +93,12 @@ async def _lifespan(_app: FastAPI) -> AsyncIterator[None]:
     to_thread.current_default_thread_limiter().total_tokens = THREADS
     expect_bundles()
     yield
+
+
+def _untraced(scope: MutableMapping[str, Any]) -> bool:
+    """Leaves out of the traces what machines ask all the time, what is sent for as long as somebody listens, and what a page is made of."""
+    path = scope["path"]
+    return path in UNTRACED or path.endswith("/stream") or path.startswith("/static/")
 
 
 def _operation_id(route: APIRoute) -> str:

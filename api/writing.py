@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from functools import partial, wraps
 from typing import ParamSpec, TypeVar
 
@@ -38,7 +39,8 @@ def writing(endpoint: Callable[Given, Answer]) -> Callable[Given, Awaitable[Answ
         turn = object()
         _waiting.add(turn)
         try:
-            return await asyncio.get_running_loop().run_in_executor(_threads, partial(endpoint, *arguments, **options))
+            asked = partial(copy_context().run, endpoint, *arguments, **options)
+            return await asyncio.get_running_loop().run_in_executor(_threads, asked)
         finally:
             _waiting.discard(turn)
 

@@ -11,7 +11,7 @@ from sqlalchemy import ColumnElement, and_, exists, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
 from certifier.errors import CirisError
-from db import events, labels, leases, pages, webhooks
+from db import events, labels, leases, pages, traces, webhooks
 from db.ids import expanded
 from db.models import GrowthRow, JobRow, SceneRow, StepRow
 from db.pages import Page
@@ -62,6 +62,7 @@ def create(
         "attempt": attempt,
         "parent_id": parent_id,
         "number": number,
+        "traceparent": traces.here(),
     }
     if insert_new(session, JobRow, [new]):
         if parent_id is None:

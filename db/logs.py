@@ -16,6 +16,8 @@ import sys
 import structlog
 from structlog.types import EventDict
 
+from db import traces
+
 _SECRETS = (
     (re.compile(r"(ciris_[0-9a-f]{12}_)[\w-]+"), r"\1***"),
     (re.compile(r"(whsec_)[\w+/=-]+"), r"\1***"),
@@ -39,6 +41,7 @@ def configure(process: str) -> None:
     formatter = structlog.stdlib.ProcessorFormatter(
         foreign_pre_chain=[
             structlog.contextvars.merge_contextvars,
+            _traced,
             structlog.stdlib.add_log_level,
             structlog.stdlib.add_logger_name,
             structlog.stdlib.ExtraAdder(allow=REQUEST_FIELDS),
@@ -57,6 +60,12 @@ def configure(process: str) -> None:
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
     logging.captureWarnings(True)
     logging.getLogger("alembic").setLevel(logging.WARNING)  # below WARNING it logs every migration
+
+
+def _traced(_logger: object, _method: str, event: EventDict) -> EventDict:
+    if (traceparent := traces.here()) is not None:
+        event["trace"] = traces.trace_id(traceparent)
+    return event
 
 
 def _render(_logger: object, _method: str, event: EventDict) -> str:

@@ -207,6 +207,8 @@ class JobRow(Owned, Base):
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
     deadline_at: Mapped[datetime | None]
+    traceparent: Mapped[str | None] = mapped_column(String(55))
+    """Of the request that created the job (db.traces); None where nobody traces."""
 
 
 class JobLabelRow(Base):

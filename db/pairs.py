@@ -61,6 +61,7 @@ class Claim:
     token: str
     job_id: str
     scene_id: str
+    traceparent: str | None
     iteration: int
     pairs: tuple[Claimed, ...]
 
@@ -183,7 +184,7 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
     job.running_pairs += len(chosen)
     if fresh:
         job.next_pair = chosen[-1].id + 1
-    return Claim(token, job.id, job.scene_id, chosen[0].iteration, pairs)
+    return Claim(token, job.id, job.scene_id, job.traceparent, chosen[0].iteration, pairs)
 
 
 def batch_length(open_pairs: int, batch_seconds: float) -> float:

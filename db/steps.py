@@ -24,6 +24,7 @@ class Claim:
     step_id: int
     job_id: str
     scene_id: str
+    traceparent: str | None
     kind: StepKind
     input: dict[str, Any]
     attempt: int
@@ -47,7 +48,7 @@ def claim(session: Session, job: JobRow, kinds: Collection[StepKind], *, lease_s
         return None
     attempt, deaths = step.attempts + 1, step.deaths
     token = leases.take(session, StepRow, [step.id], seconds=lease_seconds)
-    return Claim(token, step.id, job.id, job.scene_id, StepKind(step.kind), step.input, attempt, deaths)
+    return Claim(token, step.id, job.id, job.scene_id, job.traceparent, StepKind(step.kind), step.input, attempt, deaths)
 
 
 def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any], seconds: float) -> bool:

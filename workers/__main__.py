@@ -20,10 +20,10 @@ def main() -> None:
     queue = parser.parse_args().queue
     os.environ.update(ONE_THREAD)  # must come before numpy is imported
 
-    from celery.signals import setup_logging, worker_process_init, worker_ready
+    from celery.signals import setup_logging, worker_process_init, worker_process_shutdown, worker_ready
 
     from certifier.isolation.child import prepare
-    from db import logs
+    from db import logs, traces
     from db.session import database
     from db.settings import settings
     from db.workers import WorkerKind
@@ -51,6 +51,11 @@ def main() -> None:
             from workers.steps import SEEDING
 
             prepare(SEEDING)
+        traces.configure(queue)
+
+    @worker_process_shutdown.connect(weak=False)
+    def before_end(**_: Any) -> None:
+        traces.end()
 
     presence = Presence(WorkerKind(queue), stop)
 
@@ -58,6 +63,7 @@ def main() -> None:
     def begin(sender: Any, **_: Any) -> None:
         threading.Thread(target=presence.run, args=(sender,), name="presence", daemon=True).start()
         if queue == CONTROL:
+            traces.configure(queue)
             from workers import sweeper, webhooks
 
             for loop in (sweeper.run, webhooks.run):
@@ -77,6 +83,7 @@ def main() -> None:
     )
     stop.set()
     presence.leave()
+    traces.end()
 
 
 if __name__ == "__main__":

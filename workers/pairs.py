@@ -15,7 +15,7 @@ from certifier.growth.options import GrowthOptions
 from certifier.jobs.pairs import CertifyPart, part_certifier
 from certifier.outcome import Outcome
 from certifier.pair.result import PairResult
-from db import jobs, leases, pairs, subtrees
+from db import jobs, leases, pairs, subtrees, traces
 from db.models import IterationRow, PairRow
 from db.session import database
 from db.settings import settings
@@ -52,8 +52,11 @@ def _certify_and_save(claim: pairs.Claim, certify: CertifyPair) -> bool:
     results: dict[tuple[int, int], PairResult] = {}
     since = time.monotonic()
     for place, pair in enumerate(claim.pairs, start=1):
-        with bound_contextvars(pair=pair.index):
+        place_of = {"iteration": claim.iteration, "pair": pair.index, "part": pair.part, "attempt": pair.attempt}
+        traced = traces.span("certify", claim.traceparent, job=claim.job_id, **place_of)
+        with bound_contextvars(pair=pair.index), traced as span:
             result = results[pair.index, pair.part] = certify(claim, pair)
+            traces.note(span, outcome=result.outcome.value)
         failed = result.outcome is not Outcome.CERTIFIED
         if failed or place == len(claim.pairs) or time.monotonic() - since >= SAVE_SECONDS:
             saved = persistently(partial(_save, claim, results))

@@ -28,7 +28,7 @@ from certifier.jobs.region import REST, certified_region, growth_point, versions
 from certifier.jobs.share import SampledProposal
 from certifier.model import Array, Polytope, Scene
 from certifier.step.step import step as polytope_step
-from db import jobs, leases, pairs, proofs, regions, steps
+from db import jobs, leases, pairs, proofs, regions, steps, traces
 from db.models import IterationRow, JobRow, StepRow
 from db.session import database
 from db.settings import settings
@@ -60,7 +60,8 @@ def carry_out(claim: steps.Claim) -> bool:
     wanted = [JobState.RUNNING, JobState.CANCELLING] if claim.kind == StepKind.ACCEPT else [JobState.RUNNING]
     start = time.perf_counter()
     bound = bound_contextvars(job=claim.job_id, step=claim.kind.value)
-    with bound, leases.kept(database(), StepRow, claim.token, settings().lease_seconds, wanted):
+    traced = traces.span(claim.kind.value, claim.traceparent, job=claim.job_id, attempt=claim.attempt)
+    with bound, traced as span, leases.kept(database(), StepRow, claim.token, settings().lease_seconds, wanted):
         try:
             state, done = StepState.DONE, _do(claim)
         except CirisError as error:
@@ -69,6 +70,7 @@ def carry_out(claim: steps.Claim) -> bool:
             log.exception("the step failed")
             problem = CirisError("internal_error", f"the step {claim.kind} went wrong in the service", hint=IN_LOG)
             state, done = StepState.FAILED, Done(problem.to_document())
+        traces.note(span, state=state.value)
         saved = persistently(lambda: _save(claim, state, done, time.perf_counter() - start))
     if saved and claim.kind == StepKind.ACCEPT and state == StepState.FAILED:
         send_work()  # a region that was certified earlier may be accepted instead

@@ -22,7 +22,7 @@ from certifier.growth.refusal import DEADLINE
 from certifier.outcome import Outcome
 from certifier.pair.forecast import PairCost, forecast
 from certifier.pair.result import Weakness
-from db import clock, jobs, leases, pairs, steps, subtrees, work
+from db import clock, jobs, leases, pairs, steps, subtrees, traces, work
 from db.models import IterationRow, JobRow
 from db.settings import settings
 from db.states import JOB, STEP, IterationState, JobKind, JobState, StepKind, StepState, unfinished
@@ -47,6 +47,7 @@ class Turn:
     """Holds what a coordinator starts from."""
 
     job_id: str
+    traceparent: str | None
     kind: str
     number: int
     scene_id: str
@@ -60,17 +61,23 @@ def coordinate(job_id: str) -> None:
     """Takes the job as far as it goes without waiting for a worker. It does no harm to call it too often or at any time."""
     goes_on = True
     while goes_on and (turn := _begin(job_id)) is not None:
-        try:
-            transition = _decide(turn)
-        except CirisError as error:
-            decision = partial(_give_up, turn, error)
-        except Exception:
-            log.exception("the next step could not be decided")
-            problem = CirisError("internal_error", "deciding what is next went wrong in the service", hint=IN_LOG)
-            decision = partial(_give_up, turn, problem)
-        else:
-            decision = partial(_save, turn, transition)
-        goes_on = persistently(decision)
+        with traces.span("coordinate", turn.traceparent, job=job_id, turn=turn.number):
+            goes_on = _take(turn)
+
+
+def _take(turn: Turn) -> bool:
+    """Decides what is next and saves that. Says whether something may have to be decided before any work is done."""
+    try:
+        transition = _decide(turn)
+    except CirisError as error:
+        decision = partial(_give_up, turn, error)
+    except Exception:
+        log.exception("the next step could not be decided")
+        problem = CirisError("internal_error", "deciding what is next went wrong in the service", hint=IN_LOG)
+        decision = partial(_give_up, turn, problem)
+    else:
+        decision = partial(_save, turn, transition)
+    return persistently(decision)
 
 
 def _decide(turn: Turn) -> Transition | cover.Transition | motions.Action:
@@ -117,7 +124,7 @@ def _begin(job_id: str) -> Turn | None:
             return None
         job.coordinator, job.coordinator_until = leases.this_worker(), now + timedelta(seconds=COORDINATION_SECONDS)
         job.coordinator_attempts += 1
-        return Turn(job_id, job.kind, job.turn, job.scene_id, job.options, job.deadline_at, growth, report)
+        return Turn(job_id, job.traceparent, job.kind, job.turn, job.scene_id, job.options, job.deadline_at, growth, report)
 
 
 def _is_late(session: Session, job: JobRow, now: datetime) -> bool:
@@ -286,3 +293,5 @@ def _finish(session: Session, job: JobRow, afterwards: Afterwards) -> None:
     else:
         end = ending(job.kind, finish.outcome, finish.reason, job.error or failed)
         jobs.finish(session, job, end.state, outcome=end.outcome, reason=end.reason, error=end.error)
+    whole = partial(traces.past, f"job {job.kind}", job.traceparent, job.created_at, job.finished_at or utcnow())
+    afterwards.append(partial(whole, job=job.id, state=job.state, reason=job.reason or ""))

@@ -23,7 +23,7 @@ from urllib.parse import SplitResult, urlsplit
 from structlog.contextvars import bound_contextvars
 
 from certifier.errors import CirisError
-from db import webhooks
+from db import traces, webhooks
 from db.models import JobRow
 from db.session import database
 from db.settings import settings
@@ -66,7 +66,8 @@ def _deliver(delivery: webhooks.Delivery) -> None:
     at, began = utcnow(), time.monotonic()
     status, answer, error = None, "", ""
     try:
-        status, answer = _post(urlsplit(webhook.url), webhook.id, vault().open(webhook.secret, webhook.url), _body(delivery.job))
+        with traces.span("webhook", delivery.job.traceparent, job=delivery.job.id, webhook=webhook.id, attempt=webhook.attempts):
+            status, answer = _post(urlsplit(webhook.url), webhook.id, vault().open(webhook.secret, webhook.url), _body(delivery.job))
         if not 200 <= status < 300:
             error = f"the receiver answered {status}"
     except (CirisError, OSError, HTTPException) as problem:
@@ -108,6 +109,7 @@ def _post(url: SplitResult, webhook_id: str, secret: str, body: bytes) -> tuple[
         "webhook-id": webhook_id,
         "webhook-timestamp": str(timestamp),
         "webhook-signature": signature(secret, webhook_id, timestamp, body),
+        **traces.headers(),
     }
     connection = _Pinned(url)
     limit = threading.Timer(SECONDS, connection.abandon)

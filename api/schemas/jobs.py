@@ -18,6 +18,7 @@ from certifier.growth.options import LARGEST_TOLERANCE, MOST_CELLS, WHOLE_NUMBER
 from certifier.model import MAX_NAME
 from certifier.outcome import Outcome, Stage
 from certifier.seeding.options import Method
+from db import traces
 from db.models import DeliveryRow, EventRow, JobRow, WebhookRow
 from db.states import IterationState, JobKind, JobState, PairState, WebhookState
 from db.webhooks import KEPT
@@ -255,6 +256,7 @@ class Job(BaseModel):
     deadline_at: datetime | None = Field(description="When it ends at the latest; null without a deadline.")
     ended: bool = Field(description="True once it has ended, however it did.")
     labels: dict[str, str] = Field(description="What it is to be found by: name -> value.")
+    trace: str | None = Field(description="Id of the OpenTelemetry trace that has all work on the job; null where nobody traces.")
     progress: Progress = Field(description="How far the job is in its last iteration, and what its last region has come to.")
 
     @classmethod
@@ -285,6 +287,7 @@ class Job(BaseModel):
             deadline_at=row.deadline_at,
             ended=not row.transitions[row.state],
             labels=labels,
+            trace=traces.trace_id(row.traceparent),
             progress=Progress(
                 settled=None if row.pieces is None else row.pieces - row.open_pairs - row.running_pairs, total=row.pieces, share=share
             ),

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 THIRD_PARTIES = {
     "certifier": {"flint", "numba", "numpy", "pydrake", "scipy", "yaml"},
     "certifier.verify": {"flint", "numpy"},
-    "db": {"alembic", "cryptography", "numpy", "pydantic", "pydantic_settings", "sqlalchemy", "structlog"},
+    "db": {"alembic", "cryptography", "numpy", "opentelemetry", "pydantic", "pydantic_settings", "sqlalchemy", "structlog"},
     "planner": {"flint", "numpy", "pydrake", "scipy"},
     "ciris": {"httpx2", "numpy"},
     "client": {"flint", "httpx2", "numpy", "pydrake", "yaml"},
