@@ -38,6 +38,7 @@ SELDOM: dict[str, dict[str, Any]] = {
         "error": {"code": "seed_in_collision", "message": "arm/upper/bar and world/post touch at the seed", "field": "seed.q", "hint": ""},
         "retry_of": "1f9b2a7c-5b0e-4b58-9c39-2f1d6a3c8e10",
         "parent": "5d0c1e42-0f7a-4a39-8a0e-6b1f1a9f2c11",
+        "trace": "0af7651916cd43dd8448eb211c80319c",
     },
     "HeldWork": {"job": "1f9b2a7c-5b0e-4b58-9c39-2f1d6a3c8e10"},
     "JobMotion": {"tube": 0.012},

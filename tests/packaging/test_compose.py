@@ -6,6 +6,7 @@ from pathlib import Path
 
 import yaml
 
+from db import traces
 from db.settings import Settings
 
 ROOT = Path(__file__).parents[2]
@@ -35,7 +36,7 @@ def test_the_commands_exist() -> None:
 
 
 def test_the_settings_exist() -> None:
-    names = {f"CIRIS_{name.upper()}" for name in Settings.model_fields}
+    names = {f"CIRIS_{name.upper()}" for name in Settings.model_fields} | set(traces.ENDPOINTS)
     assert {name for service in OURS for name in SERVICES[service]["environment"]} <= names
 
 

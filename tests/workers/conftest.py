@@ -49,6 +49,13 @@ def queue() -> Iterator[Queue]:
         yield server
 
 
+@pytest.fixture(scope="module")
+def own_queue() -> Iterator[Queue]:
+    """A queue without the shared workers, for tests that count its messages or start workers of their own."""
+    with queue_server() as server:
+        yield server
+
+
 @pytest.fixture(scope="session", params=["sqlite", "postgresql"])
 def service(request: pytest.FixtureRequest, queue: Queue, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     """Real workers on either database, shared by the tests that leave them as they were."""

@@ -29,10 +29,10 @@ LINGER_SECONDS = 3.0
 
 
 @pytest.fixture
-def crew(queue: Queue, database_url: str, tmp_path: Path) -> Iterator[Service]:
+def crew(own_queue: Queue, database_url: str, tmp_path: Path) -> Iterator[Service]:
     """A control worker and a solve worker with two processes, which may be paused and killed."""
-    queue.flush()
-    with running_service(database_url, queue.url, tmp_path) as running:
+    own_queue.flush()
+    with running_service(database_url, own_queue.url, tmp_path) as running:
         for name in ("control", "solve"):
             seen(running, name)
         yield running

@@ -118,8 +118,10 @@ def attributes(span: Span) -> dict[str, Any]:
     return {field.key: getattr(field.value, field.value.WhichOneof("value")) for field in span.attributes}
 
 
-def test_one_trace_has_the_way_from_the_request_to_the_proof(database_url: str, queue: Queue, tmp_path: Path, collector: Collector) -> None:
-    with traced_service(database_url, queue, tmp_path, collector.url) as (service, client):
+def test_one_trace_has_the_way_from_the_request_to_the_proof(
+    database_url: str, own_queue: Queue, tmp_path: Path, collector: Collector
+) -> None:
+    with traced_service(database_url, own_queue, tmp_path, collector.url) as (service, client):
         made = post(client, a_job(client), traceparent=f"00-{TRACE}-{CALLER}-01")
         assert made["trace"] == TRACE
         job = ended(client, made["id"])
@@ -153,16 +155,16 @@ def test_one_trace_has_the_way_from_the_request_to_the_proof(database_url: str, 
     assert not {span.name for _, span in collector.spans} & {"GET /healthz"}
 
 
-def test_a_caller_who_does_not_sample_is_not_traced(database_url: str, queue: Queue, tmp_path: Path, collector: Collector) -> None:
-    with traced_service(database_url, queue, tmp_path, collector.url) as (_, client):
+def test_a_caller_who_does_not_sample_is_not_traced(database_url: str, own_queue: Queue, tmp_path: Path, collector: Collector) -> None:
+    with traced_service(database_url, own_queue, tmp_path, collector.url) as (_, client):
         made = post(client, a_job(client), traceparent=f"00-{TRACE}-{CALLER}-00")
         assert ended(client, made["id"])["outcome"] == "certified"
         time.sleep(1.0)
     assert TRACE not in {span.trace_id.hex() for _, span in collector.spans}
 
 
-def test_a_collector_that_is_away_disturbs_nothing(database_url: str, queue: Queue, tmp_path: Path) -> None:
-    with traced_service(database_url, queue, tmp_path, f"http://127.0.0.1:{free_port()}") as (service, client):
+def test_a_collector_that_is_away_disturbs_nothing(database_url: str, own_queue: Queue, tmp_path: Path) -> None:
+    with traced_service(database_url, own_queue, tmp_path, f"http://127.0.0.1:{free_port()}") as (service, client):
         made = post(client, a_job(client))
         assert ended(client, made["id"])["outcome"] == "certified"
         began = time.monotonic()

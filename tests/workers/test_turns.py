@@ -22,7 +22,7 @@ from db.session import database
 from db.settings import settings
 from db.types import utcnow
 from tests.scenes import slider
-from tests.services import Queue, queue_server
+from tests.services import Queue
 from tests.workers.options import box_around, grow_box
 from tests.workers.record import check_record
 from tests.workers.service import environment, events_of, job_of, pairs_of, submit
@@ -36,18 +36,11 @@ ELSEWHERE = "elsewhere:1:1"
 WHOLE = grow_box([0.0], 0.9, contraction="whole", cells=600)
 
 
-@pytest.fixture(scope="module")
-def queue() -> Iterator[Queue]:
-    """A queue from which nobody else takes messages."""
-    with queue_server() as server:
-        yield server
-
-
 @pytest.fixture(autouse=True)
-def _here(database_url: str, queue: Queue) -> Iterator[None]:
+def _here(database_url: str, own_queue: Queue) -> Iterator[None]:
     """This process is the service."""
-    queue.flush()
-    with environment(CIRIS_DATABASE_URL=database_url, CIRIS_REDIS_URL=queue.url):
+    own_queue.flush()
+    with environment(CIRIS_DATABASE_URL=database_url, CIRIS_REDIS_URL=own_queue.url):
         yield
 
 
@@ -341,23 +334,23 @@ def test_a_certified_polytope_becomes_a_region_even_after_a_cancel(job_id: str) 
         assert regions.get(session, job.region_id or "").guarantee == "exact"
 
 
-def test_a_solver_that_leaves_work_sends_for_another(job_id: str, queue: Queue) -> None:
-    queue.flush()
+def test_a_solver_that_leaves_work_sends_for_another(job_id: str, own_queue: Queue) -> None:
+    own_queue.flush()
     with environment(CIRIS_BATCH_SECONDS="1e-9"):
         for left in (1, 1, 0):
-            queue.flush()
+            own_queue.flush()
             assert work()
             assert waiting(SOLVE) == left
 
 
-def test_the_sweeper_sends_lost_messages_again(job_id: str, queue: Queue) -> None:
-    queue.flush()
+def test_the_sweeper_sends_lost_messages_again(job_id: str, own_queue: Queue) -> None:
+    own_queue.flush()
     sweeper.sweep()
     assert waiting(SOLVE) == 1
     sweeper.sweep()
     assert waiting(SOLVE) == 1
     work_all()
-    queue.flush()
+    own_queue.flush()
     sweeper.sweep()
     assert (waiting(SOLVE), waiting(CONTROL)) == (0, 1)
 
@@ -397,9 +390,9 @@ def test_leases_are_not_ended_by_time_right_after_nobody_could_renew_them() -> N
     ],
 )
 def test_a_job_that_cannot_fit_is_refused_before_anything_is_computed(
-    database_url: str, queue: Queue, limit: str, value: str, deadline: float | None, message: str
+    database_url: str, own_queue: Queue, limit: str, value: str, deadline: float | None, message: str
 ) -> None:
-    with environment(CIRIS_DATABASE_URL=database_url, CIRIS_REDIS_URL=queue.url, **{limit: value}):
+    with environment(CIRIS_DATABASE_URL=database_url, CIRIS_REDIS_URL=own_queue.url, **{limit: value}):
         job_id = submit(slider(), box_around([0.0], 0.1))
         left = None if deadline is None else utcnow() + timedelta(seconds=deadline)
         with database().read() as session:
@@ -454,15 +447,15 @@ def work_all_pairs_and_forge_a_later_region(job_id: str) -> None:
         session.add(StepRow(job_id=job_id, turn=good.turn + 1, kind="accept", input={**good.input, "iteration": 1, "proofs": {}}))
 
 
-def test_without_redis_a_job_is_kept_and_sent_by_the_sweeper(queue: Queue) -> None:
-    queue.stop()
+def test_without_redis_a_job_is_kept_and_sent_by_the_sweeper(own_queue: Queue) -> None:
+    own_queue.stop()
     try:
         job_id = submit(slider(), box_around([0.0], 0.1))
         assert not send_coordinate(job_id)
         assert job_of(job_id).state == "queued"
     finally:
-        queue.start()
-    queue.flush()
+        own_queue.start()
+    own_queue.flush()
     sweeper.sweep()
     assert waiting(CONTROL) == 1
     with database().read() as session:
