@@ -107,6 +107,18 @@ def job_webhook(args: Namespace) -> int:
     return OK
 
 
+def job_webhooks(args: Namespace) -> int:
+    """Lists whom jobs tell that they have ended, and whether that went well."""
+    with connect(args.url) as client:
+        found = client.webhooks(args.state)
+    if args.json:
+        print_json(found)
+        return OK
+    rows = [(one["job"][:SHORT], one["state"], str(one["attempts"]), one["url"], one["error"] or "") for one in found]
+    output.print_table(("job", "state", "attempts", "url", "error"), rows, right="attempts")
+    return OK
+
+
 def _say(job: Document, args: Namespace) -> int:
     if args.json:
         print_json(job)

@@ -43,13 +43,13 @@ def create(
     The caller commits and then sends ``coordinate`` for the job. If sending fails, the sweeper sends it later.
 
     Raises:
-        CirisError: idempotency_conflict, when the key was used for a different request; quota_exceeded, when the API key has as
-            many unfinished jobs as it may.
+        CirisError: scene_not_found, when the scene was deleted a moment ago; idempotency_conflict, when the key was used for a
+            different request; quota_exceeded, when the API key has as many unfinished jobs as it may.
     """
     job_id = str(uuid4())
     new = {
         "id": job_id,
-        "project": session.scalars(select(SceneRow.project).where(SceneRow.id == scene_id)).one(),
+        "project": _project_of(session, scene_id),
         "kind": kind,
         "scene_id": scene_id,
         "options": options,
@@ -80,6 +80,15 @@ def create(
             hint="use a new key for a new request",
         )
     return job, False
+
+
+def _project_of(session: Session, scene_id: str) -> str:
+    """Returns the scene's project. Nobody deletes the scene until the caller has committed."""
+    query = select(SceneRow.project).where(SceneRow.id == scene_id).with_for_update(read=True, key_share=True)
+    project = session.scalar(query)
+    if project is None:
+        raise CirisError("scene_not_found", f"the scene {scene_id} was deleted", field="scene", hint="add it again")
+    return project
 
 
 def _check_quota(session: Session, key_id: str | None) -> None:

@@ -78,6 +78,7 @@ def delete_scene(session: Session, scene_id: str, *, dependents: bool) -> None:
     """
     if scenes.find(session, scene_id) != scene_id:
         raise CirisError("scene_not_found", f"no scene has the id {scene_id!r}", field="scene", hint="give all of its id to delete it")
+    session.execute(select(SceneRow.id).where(SceneRow.id == scene_id).with_for_update())  # nobody creates a job for it now
     which = _of_scene(scene_id)
     found = _counted(session, which)
     _check(found, found.jobs, f"scene {scene_id}", dependents)

@@ -11,6 +11,7 @@ from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
+from db import pages
 from db.models import DeliveryRow, JobRow, WebhookRow
 from db.states import JOB, WebhookState, transition, unfinished
 from db.vault import is_sealed, vault
@@ -68,6 +69,22 @@ def of_job(session: Session, job_id: str) -> WebhookRow:
     if row is None:
         raise CirisError("webhook_not_found", f"job {job_id!r} has no webhook", field="job", hint="give one when you create a job")
     return row
+
+
+def page(session: Session, state: str | None, after: str | None, limit: int) -> tuple[Sequence[WebhookRow], str | None]:
+    """Returns one page of webhooks, those of the newest jobs first, and what to pass as ``after`` for the next page.
+
+    Args:
+        state: return only the webhooks in this state.
+
+    Raises:
+        CirisError: cursor.
+    """
+    query = select(JobRow).join(WebhookRow, WebhookRow.job_id == JobRow.id)
+    told = pages.page(session, JobRow, query if state is None else query.where(WebhookRow.state == state), after, limit)
+    rows = session.scalars(select(WebhookRow).where(WebhookRow.job_id.in_([job.id for job in told.rows])))
+    of = {row.job_id: row for row in rows}
+    return [of[job.id] for job in told.rows], told.next
 
 
 def claim(session: Session, now: datetime, limit: int = 50) -> Sequence[Delivery]:

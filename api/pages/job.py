@@ -11,9 +11,11 @@ from fastapi import APIRouter, Request, Response
 
 from api.access import Db
 from api.pages.rendering import page
-from api.routers import jobs, regions, scenes
+from api.routers import jobs, regions, scenes, webhooks
 from api.schemas.common import MAX_INT
 from api.schemas.jobs import Iteration, Job, PairMatrix
+from api.schemas.webhooks import Webhook
+from certifier.errors import CirisError
 from db import pairs
 from db.session import Database
 from db.states import JobKind
@@ -45,7 +47,17 @@ def _job(db: Database, job_id: str) -> dict[str, Any]:
         "begun": begun,
         "progress": None if last is None else progress(last),
         "regions": regions.list_regions(db, job=job_id).regions,
+        "webhook": _webhook(db, job.id),
     }
+
+
+def _webhook(db: Database, job_id: str) -> Webhook | None:
+    try:
+        return webhooks.get_job_webhook(job_id, db)
+    except CirisError as error:
+        if error.code != "webhook_not_found":
+            raise
+        return None
 
 
 def elapsed(job: Job) -> float | None:

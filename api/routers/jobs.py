@@ -36,7 +36,6 @@ from api.schemas.jobs import (
     PairCell,
     PairMatrix,
     PairStates,
-    Webhook,
 )
 from api.schemas.motions import JobMotion
 from api.schemas.progress import JobWorkers, Obstacles
@@ -47,7 +46,7 @@ from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.proof.container import with_scene
-from db import audit, clock, jobs, labels, leases, pages, pairs, proofs, regions, retention, scenes, steps, webhooks
+from db import audit, clock, jobs, labels, leases, pages, pairs, proofs, regions, retention, scenes, steps
 from db.audit import Action
 from db.models import IterationRow, JobRow, PairRow, StepRow
 from db.session import Database
@@ -308,26 +307,6 @@ def _verdict(db: Database, job_id: str) -> tuple[str, dict[str, Any]]:
             hint = "a certify-path job has one when it has ended before its deadline"
             raise CirisError("motion_not_found", message, field="job", hint=hint)
         return job.id, verdict
-
-
-@router.get("/{job_id}/webhook")
-def get_job_webhook(job_id: JobGiven, db: Db) -> Webhook:
-    """Returns the job's webhook: whether its receiver has been told that the job has ended, and how the attempts went."""
-    with db.read() as session:
-        row = webhooks.of_job(session, jobs.get(session, job_id).id)
-        return Webhook.of(row, webhooks.deliveries(session, row.id))
-
-
-@router.post("/{job_id}/webhook/resend", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
-@writing
-def resend_job_webhook(job_id: JobGiven, db: Db) -> Webhook:
-    """Has the receiver called again within seconds, and again as often as at first, whatever became of it before.
-
-    The message has the same `webhook-id`, so a receiver can tell that it knows it. The job must have ended.
-    """
-    with db.write() as session:
-        row = webhooks.send_again(session, jobs.lock(session, jobs.get(session, job_id).id), utcnow())
-        return Webhook.of(row, webhooks.deliveries(session, row.id))
 
 
 @router.get("/{job_id}/pairs")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from base64 import b64decode
-from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
@@ -19,9 +18,8 @@ from certifier.model import MAX_NAME
 from certifier.outcome import Outcome, Stage
 from certifier.seeding.options import Method
 from db import traces
-from db.models import DeliveryRow, EventRow, JobRow, WebhookRow
-from db.states import IterationState, JobKind, JobState, PairState, WebhookState
-from db.webhooks import KEPT
+from db.models import EventRow, JobRow
+from db.states import IterationState, JobKind, JobState, PairState
 
 DEFAULTS = GrowthOptions()
 
@@ -333,42 +331,6 @@ class CancelRequest(Request):
         if (self.jobs is None) == (self.labels is None):
             raise ValueError("give either jobs or labels")
         return self
-
-
-class Delivery(BaseModel):
-    """Says how one attempt to call the receiver went."""
-
-    at: datetime = Field(description="When the attempt began.")
-    seconds: float = Field(description="How long it took.")
-    status: int | None = Field(description="The receiver's HTTP status; null where it gave none.")
-    answer: str | None = Field(description="How the body of its answer begins; null where it had none.")
-    error: str | None = Field(description="Why the attempt failed; null where it did not.")
-
-    @classmethod
-    def of(cls, row: DeliveryRow) -> Self:
-        return cls(at=row.at, seconds=row.seconds, status=row.status, answer=row.answer, error=row.error)
-
-
-class Webhook(BaseModel):
-    """Says whether the receiver has been told that the job has ended."""
-
-    url: str = Field(description="The address that is called.")
-    state: WebhookState = Field(description="Whether the receiver has been told.")
-    attempts: int = Field(description="How often it was called, since it was last asked for.")
-    next_at: datetime = Field(description="The service does not try before this time.")
-    error: str | None = Field(description="Why the last attempt failed.")
-    deliveries: list[Delivery] = Field(description=f"The last attempts, the newest first, at most {KEPT}.")
-
-    @classmethod
-    def of(cls, row: WebhookRow, deliveries: Sequence[DeliveryRow]) -> Self:
-        return cls(
-            url=row.url,
-            state=WebhookState(row.state),
-            attempts=row.attempts,
-            next_at=row.next_at,
-            error=row.error,
-            deliveries=[Delivery.of(one) for one in deliveries],
-        )
 
 
 class Event(BaseModel):

@@ -222,6 +222,10 @@ class Client:
         """Revokes the project's key of this name."""
         self._send("DELETE", f"/v1/keys/{segment(name)}")
 
+    def webhooks(self, state: str | None = None) -> list[Document]:
+        """Returns the webhooks of jobs, those of the newest jobs first; only those in one state: waiting, delivered or failed."""
+        return self._all("webhooks", state=state)
+
     def webhook(self, job_id: str) -> Document:
         """Returns a job's webhook with the last attempts to call its receiver."""
         return self._json("GET", f"/v1/jobs/{segment(job_id)}/webhook")

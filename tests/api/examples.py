@@ -55,6 +55,7 @@ SELDOM: dict[str, dict[str, Any]] = {
     "Verification": {"error": {"code": "bad_proof", "message": "a plane does not separate its pair", "field": None, "hint": ""}},
     "WorkerPage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
     "Webhook": {"error": "the receiver answered 500"},
+    "WebhookPage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
     "Delivery": {
         "at": "2026-05-01T08:00:00Z",
         "seconds": 0.12,
@@ -205,7 +206,7 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     for part in ("", "/configurations", "/pairs", "/pairs/0/cells"):
         ask("GET", f"/v1/regions/{{region_id}}{part.replace('/0/', '/{pair}/')}", region_id=grown["region"], pair=0)
     ask("POST", "/v1/regions/{region_id}/verify", region_id=grown["region"])
-    for route in ("/v1/scenes", "/v1/jobs", "/v1/regions"):
+    for route in ("/v1/scenes", "/v1/jobs", "/v1/regions", "/v1/webhooks"):
         ask("GET", route, params={"limit": 2})
     for question, more in (
         ("contains", {"q": [home]}),

@@ -43,6 +43,7 @@ OPERATIONS = {
     "get_job_cover": "GET /v1/jobs/{job_id}/cover",
     "get_job_motion": "GET /v1/jobs/{job_id}/motion",
     "download_motion_proof": "GET /v1/jobs/{job_id}/motion/proof",
+    "list_webhooks": "GET /v1/webhooks",
     "get_job_webhook": "GET /v1/jobs/{job_id}/webhook",
     "resend_job_webhook": "POST /v1/jobs/{job_id}/webhook/resend",
     "get_job_workers": "GET /v1/jobs/{job_id}/workers",

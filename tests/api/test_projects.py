@@ -37,6 +37,7 @@ OWN = {
     "list_scenes",
     "list_jobs",
     "list_regions",
+    "list_webhooks",
 }
 """These name nothing, so they are about the caller's own project; tests of their own are below."""
 
@@ -138,7 +139,7 @@ def test_the_walk_would_find_what_is_shown(client: TestClient, theirs: dict[str,
 
 def test_lists_and_pages_are_empty_for_the_others(client: TestClient, theirs: dict[str, str]) -> None:
     ids = [theirs[name] for name in ("scene_id", "job_id", "region_id")]
-    for path in ("/v1/scenes", "/v1/jobs", "/v1/regions", "/", "/scenes", "/live"):
+    for path in ("/v1/scenes", "/v1/jobs", "/v1/regions", "/v1/webhooks", "/", "/scenes", "/live"):
         mine, other = (client.get(path, headers=bearer(theirs[who])) for who in ("key", "stranger"))
         assert mine.status_code == other.status_code == 200
         assert any(one in mine.text for one in ids), path

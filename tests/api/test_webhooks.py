@@ -81,6 +81,24 @@ def test_attempts_are_shown_and_repeated(client: TestClient, database: Database,
     assert len(again.json()["deliveries"]) == 1
 
 
+def test_the_webhooks_of_jobs_are_listed(client: TestClient, database: Database, scene: Scene) -> None:
+    made = [client.post("/v1/jobs", json=GROW | {"webhook": HOOK}).json()["id"] for _ in range(3)]
+    client.post("/v1/jobs", json=GROW)
+    with database.write() as session:
+        row = webhooks.of_job(session, made[1])
+        row.attempts = 7
+        webhooks.settle(session, row.id, webhooks.Answered(utcnow(), 0.25, 500, "", "the receiver answered 500"))
+    first = client.get("/v1/webhooks", params={"limit": 2})
+    rest = client.get("/v1/webhooks", params={"limit": 2, "after": first.json()["next"]}).json()
+    assert [one["job"] for one in first.json()["webhooks"] + rest["webhooks"]] == made[::-1]
+    assert rest["next"] is None
+    assert SECRET.removeprefix("whsec_") not in first.text
+    failed = client.get("/v1/webhooks", params={"state": "failed"}).json()["webhooks"]
+    assert [(one["job"], one["error"]) for one in failed] == [(made[1], "the receiver answered 500")]
+    assert client.get("/v1/webhooks", params={"state": "lost"}).status_code == 422
+    assert client.get("/v1/webhooks", params={"after": "x"}).json()["code"] == "cursor"
+
+
 def test_a_service_without_a_key_for_secrets_takes_no_webhooks_and_stores_nothing(
     client: TestClient, environment: pytest.MonkeyPatch, scene: Scene
 ) -> None:

@@ -92,6 +92,9 @@ def test_a_jobs_webhook_is_shown_and_called_again(ciris: Ciris, url: str, databa
     with database.write() as session:
         row = webhooks.of_job(session, job)
         webhooks.settle(session, row.id, webhooks.Answered(utcnow(), 0.25, 204, "", ""))
+    assert [one["job"] for one in ciris("job", "webhooks", "--state", "delivered", "--json").json] == [job]
+    assert ciris("job", "webhooks", "--state", "failed", "--json").json == []
+    assert "https://planner.example.org/done" in ciris("job", "webhooks").stdout
     told = ciris("job", "webhook", job[:8]).stdout
     assert "delivered" in told
     assert "204" in told

@@ -11,9 +11,10 @@ from typing import Any
 import pytest
 
 from certifier.model import Scene
-from db import jobs, scenes
+from db import jobs, scenes, webhooks
 from db.session import Database
 from db.states import JobState
+from db.types import utcnow
 from tests.dashboard.job_scenes import begin, certified, large_job, new_job, settle, too_close
 from tests.scenes import slider
 
@@ -298,3 +299,25 @@ def test_a_large_job_does_not_lag(page: Any, url: str, database: Database) -> No
     print(json.dumps(figures, indent=1))
     assert figures["first view"]["seconds"] < 3
     assert all(figure["task_ms"] < 200 for figure in figures.values())
+
+
+def test_a_webhook_is_shown_and_its_receiver_called_again(page: Any, url: str, database: Database, job_id: str, barriers: Any) -> None:
+    with database.write() as session:
+        webhooks.add(session, job_id, "https://planner.example.org/done", "whsec_" + "A" * 32)
+    page.goto(f"{url}/jobs/{job_id}")
+    section = page.get_by_role("region", name="Webhook")
+    section.get_by_text("https://planner.example.org/done").wait_for()
+    assert section.get_by_role("button").count() == 0, "it has not ended"
+    finish(database, job_id)
+    with database.write() as session:
+        row = webhooks.of_job(session, job_id)
+        row.attempts = 7
+        webhooks.settle(session, row.id, webhooks.Answered(utcnow(), 0.25, 500, "no room", "the receiver answered 500"))
+    section.get_by_text("the receiver answered 500: no room").wait_for()
+    assert barriers(page) == []
+    section.get_by_role("button", name="Send again").click()
+    section.get_by_text("waiting", exact=True).wait_for()
+    with database.read() as session:
+        assert (webhooks.of_job(session, job_id).state, webhooks.of_job(session, job_id).attempts) == ("waiting", 0)
+    page.reload()
+    section.get_by_text("the receiver answered 500: no room").wait_for()

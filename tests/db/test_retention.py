@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from datetime import timedelta
 from pathlib import Path
 
@@ -194,3 +195,38 @@ def test_scenes_of_the_same_name_keep_their_names(db: Database) -> None:
         assert scenes.find(session, "slider") == second
         retention.delete_scene(session, second, dependents=False)
         assert scenes.find(session, "slider") == first
+
+
+@pytest.mark.parametrize("first", ["create", "delete"])
+def test_a_job_is_created_before_its_scene_is_deleted_or_not_at_all(db: Database, first: str) -> None:
+    """Two transactions at once: the second one waits for the first."""
+    with db.write() as session:
+        scene_id = a_scene(session).id
+    done: dict[str, str] = {}
+    entered, others = threading.Event(), threading.Event()
+
+    def create(session: Session) -> None:
+        jobs.create(session, kind="grow", scene_id=scene_id, options={})
+
+    def delete(session: Session) -> None:
+        retention.delete_scene(session, scene_id, dependents=False)
+
+    def act(name: str) -> None:
+        try:
+            with db.write() as session:
+                {"create": create, "delete": delete}[name](session)
+                if name == first:
+                    entered.set()
+                    others.wait(1.0)
+            done[name] = "ok"
+        except CirisError as error:
+            done[name] = error.code
+        others.set()
+
+    one, other = threading.Thread(target=act, args=(first,)), threading.Thread(target=act, args=(({"create", "delete"} - {first}).pop(),))
+    one.start()
+    entered.wait()
+    other.start()
+    one.join()
+    other.join()
+    assert done == ({"create": "ok", "delete": "not_ended"} if first == "create" else {"delete": "ok", "create": "scene_not_found"})

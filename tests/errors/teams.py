@@ -8,7 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import update
 
-from db import keys, projects, retention
+from db import jobs, keys, projects, retention
 from db.disk import Disk
 from db.keys import Scope
 from db.models import JobRow
@@ -94,6 +94,16 @@ TEAMS = [
             "there is no project {name}",
             "`ciris project add NAME` makes one",
             lambda t: write(t, lambda session: keys.add(session, "planner", Scope.READ, "nobody")),
+        ),
+    ),
+    *rows(
+        "db/jobs.py",
+        (
+            "scene_not_found",
+            "scene",
+            "the scene {scene_id} was deleted",
+            "add it again",
+            lambda t: write(t, lambda session: jobs.create(session, kind="grow", scene_id="0" * 64, options={})),
         ),
     ),
     *rows(
