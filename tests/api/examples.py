@@ -55,6 +55,7 @@ SELDOM: dict[str, dict[str, Any]] = {
     "Verification": {"error": {"code": "bad_proof", "message": "a plane does not separate its pair", "field": None, "hint": ""}},
     "WorkerPage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
     "Webhook": {"error": "the receiver answered 500"},
+    "WebhookSummary": {"error": "the receiver answered 500"},
     "WebhookPage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
     "Delivery": {
         "at": "2026-05-01T08:00:00Z",
