@@ -15,7 +15,7 @@ from db import jobs, webhooks
 from db.states import WebhookState
 from db.types import utcnow
 
-router = APIRouter(prefix="/v1", tags=["webhooks"], dependencies=[READ], route_class=ReadingRoute)
+router = APIRouter(prefix="/v1", tags=["jobs"], dependencies=[READ], route_class=ReadingRoute)
 
 InState = Annotated[WebhookState | None, Query(description="List only the webhooks in this state.")]
 
