@@ -14,6 +14,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
+from api.schemas.patterns import SAID
 from certifier.errors import CirisError
 from db.disk import lacks_room
 from db.session import UNAVAILABLE
@@ -148,7 +149,7 @@ def respond(render: Render, request: Request, error: Exception) -> Response:
 
 def _validation(error: RequestValidationError) -> Problem:
     found = error.errors()
-    problems = [FieldProblem(field=_field(e["loc"]), message=_sentence(e)) for e in found]
+    problems = [FieldProblem(field=_field((*e["loc"], "kind") if e["type"] in _TAGS else e["loc"]), message=_sentence(e)) for e in found]
     if any(e["type"] == "json_invalid" for e in found):
         return problem_of(CirisError("malformed_json", "the body is not JSON", field="body", hint=_DESCRIBED))
     # Of the types that a field may have, the one that was meant is the one of which most was right.
@@ -188,6 +189,10 @@ _EXPLANATIONS: dict[type, Callable[[Any], Problem]] = {
 _TYPE = re.compile(r"(constrained-)?(list|str|int|float|bool|dict|tuple)(\[.*\])?$")
 
 
+_TAGS = {"union_tag_not_found", "union_tag_invalid"}
+"""A request whose `kind` is missing or unknown; jobs alone have kinds."""
+
+
 def _field(loc: Sequence[str | int]) -> str:
     """Returns the name of a field as the client wrote it: ``("body", "grow", "seed", "q", 3)`` -> ``"seed.q[3]"``.
 
@@ -202,5 +207,9 @@ def _field(loc: Sequence[str | int]) -> str:
 def _sentence(error: dict[str, Any]) -> str:
     if error["type"] == "extra_forbidden":
         return "there is no such field"
+    if error["type"] == "string_pattern_mismatch":
+        return SAID[error["ctx"]["pattern"]]
+    if error["type"] in _TAGS:
+        return f"it must be one of {', '.join(JobKind)}"
     message = str(error["msg"]).removeprefix("Value error, ").replace(" after validation", "")
     return message[:1].lower() + message[1:]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from argparse import Namespace
+from collections.abc import Sequence
 from typing import Any
 
 from certifier.errors import CirisError
@@ -49,13 +50,17 @@ def _waypoints(path: str) -> list[list[float]]:
     return read.motion["q"].tolist()
 
 
+def _components(sizes: Sequence[int]) -> str:
+    return f"{len(sizes)}, with {', '.join(map(str, sizes))} regions" if sizes else "-"
+
+
 def _print(found: dict[str, Any]) -> None:
     coverage = found["coverage"]
     facts = [
         ("ended", found["reason"]),
         ("covered", "-" if coverage is None else f"{output.share(coverage)} of the free configurations"),
         ("regions", f"{len(found['regions'])} of this cover, {sum(found['components'] or [])} of the scene"),
-        ("components", ", ".join(map(str, found["components"] or [])) or "-"),
+        ("components", _components(found["components"] or [])),
         *((f"connect[{i}]", "in no region" if part is None else f"in component {part}") for i, part in enumerate(found["connect"] or [])),
         *((f"path[{i}]", f"covered up to {100 * part:.4g} %") for i, part in enumerate(found["paths"] or [])),
         *(("obstacle", text) for text in found["obstacles"] or []),

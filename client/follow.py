@@ -7,7 +7,7 @@ from typing import Any
 from certifier.outcome import Outcome, Stage
 from ciris.answers import Document
 from ciris.synchronous.client import Client
-from client.output import Screen, plain, q_volume, seconds, share
+from client.output import Screen, number, plain, q_volume, seconds, share
 
 _STEPS = {"propose": "seeding", "step": "polytope step", "accept": "assembling and verifying the region", "motion": "certifying the motion"}
 _LOOK = "scout"
@@ -67,7 +67,8 @@ class Teller:
 
     def _tell_cover(self, data: dict[str, Any]) -> None:
         grows = ", ".join(data["growing"])
-        state = f"{share(data['coverage'])} covered by {data['regions']} regions in {len(data['components'])} components"
+        regions, components = number(data["regions"], "region"), number(len(data["components"]), "component")
+        state = f"{share(data['coverage'])} covered by {regions} in {components}"
         self._screen.status(f"{state}{f'; growing {grows}' if grows else ''}", data["coverage"]["value"])
         self._kept = state
 

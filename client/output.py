@@ -97,6 +97,11 @@ def plain(outcome: str | None) -> str:
     return "-" if outcome is None else outcome.replace("_", " ")
 
 
+def number(count: int, of: str) -> str:
+    """Returns ``1 region``, ``2 regions`` and so on."""
+    return f"{count} {of}{'' if count == 1 else 's'}"
+
+
 def seconds(value: float | None, whole: bool = False) -> str:
     """Returns a duration, in seconds, as a text for people."""
     if value is None:

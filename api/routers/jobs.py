@@ -19,6 +19,7 @@ from api.access import READ, SUBMIT, Admin, Db, Submitter
 from api.announce import Announcements
 from api.reading import ReadingRoute
 from api.room import KeptRoom
+from api.schemas import patterns
 from api.schemas.common import MAX_INT, Cursor, JobGiven, OfIteration, OfScene, PairGiven, WithDependents
 from api.schemas.covers import Cover, CoverRegion
 from api.schemas.jobs import (
@@ -61,7 +62,7 @@ MOST_PAIRS = 5000
 
 IdempotencyKey = Annotated[str | None, Header(min_length=1, max_length=200, description="The same key and body give the same job.")]
 Label = Annotated[
-    list[Annotated[str, Field(max_length=300, pattern=r"^[^=\x00]+=[^\x00]*$")]] | None,
+    list[Annotated[str, Field(max_length=300, pattern=patterns.LABEL)]] | None,
     Query(max_length=20, description="List only the jobs with this label, `name=value`; with all of several.", examples=[["team=welding"]]),
 ]
 Search = Annotated[
@@ -69,7 +70,7 @@ Search = Annotated[
     Query(
         min_length=1,
         max_length=200,
-        pattern=r"^[^\x00]*$",
+        pattern=patterns.ANY,
         description="List only the jobs whose id begins with this, or where it is in the reason, a label, or a name of the scene.",
     ),
 ]

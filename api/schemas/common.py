@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from fastapi import Path, Query
 from pydantic import BaseModel, ConfigDict, Field
 
+from api.schemas import patterns
 from certifier.growth.options import WHOLE_NUMBERS
 
 MAX_INT = 2**31 - 1
@@ -17,7 +18,7 @@ Vector = Annotated[list[Real], Field(min_length=1, max_length=64)]
 RandomSeed = Annotated[
     int, Field(ge=WHOLE_NUMBERS["random_seed"][0], le=WHOLE_NUMBERS["random_seed"][1], description="Seed of every random choice.")
 ]
-SceneName = Annotated[str, Field(min_length=1, max_length=255, pattern=r"^[^\x00]+$", description="The id or the name of a scene.")]
+SceneName = Annotated[str, Field(min_length=1, max_length=255, pattern=patterns.SOMETHING, description="The id or the name of a scene.")]
 Document = dict[str, Any]
 
 Rows = Annotated[list[Vector], Field(max_length=2000)]

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from api.schemas import patterns
 from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector
 from api.schemas.covers import CoverRequestOptions
 from api.schemas.motions import GivenMotion
@@ -118,9 +119,9 @@ class WebhookRequest(Request):
         }
     )
 
-    url: str = Field(max_length=2000, pattern=r"^https?://", description="URL to call, http:// or https://, at a public address.")
+    url: str = Field(max_length=2000, pattern=patterns.WEBHOOK_URL, description="URL to call, http:// or https://, at a public address.")
     secret: str = Field(
-        pattern=r"^whsec_[A-Za-z0-9+/]{32,88}={0,2}$",
+        pattern=patterns.WEBHOOK_SECRET,
         description="`whsec_` and the base64 of 24 to 64 random bytes. The service signs the message with them and never shows them again.",
     )
 
@@ -132,8 +133,8 @@ class WebhookRequest(Request):
         return secret
 
 
-LabelName = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[\w./-]+$")]
-LabelValue = Annotated[str, Field(max_length=200, pattern=r"^[^\x00]*$")]
+LabelName = Annotated[str, Field(min_length=1, max_length=64, pattern=patterns.LABEL_NAME)]
+LabelValue = Annotated[str, Field(max_length=200, pattern=patterns.ANY)]
 Labels = Annotated[dict[LabelName, LabelValue], Field(max_length=20)]
 
 

@@ -7,8 +7,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, Field
 
+from api.schemas import patterns
 from api.schemas.common import Page, Request
-from db import projects
 from db.audit import Action
 from db.keys import Scope
 from db.models import ApiKeyRow, AuditRow
@@ -30,9 +30,7 @@ class Readiness(BaseModel):
 class NewKey(Request):
     """Asks for an API key of the caller's project."""
 
-    name: str = Field(
-        pattern=f"^{projects.NAME.pattern}$", description="No other key of the project may have this name.", examples=["planner"]
-    )
+    name: str = Field(pattern=patterns.KEY_NAME, description="No other key of the project may have this name.", examples=["planner"])
     scope: Scope = Field(description="What the key allows; each scope includes those before it: read, submit, admin.")
 
 

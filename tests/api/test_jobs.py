@@ -70,7 +70,7 @@ REFUSED: list[tuple[dict[str, Any], int, str, str | None]] = [
     (GROW | {"options": {"max_rounds": -1}}, 422, "invalid_request", "options.max_rounds"),
     (GROW | {"options": {"rounds": 1}}, 422, "invalid_request", "options.rounds"),
     (GROW | {"deadline_seconds": 0}, 422, "invalid_request", "deadline_seconds"),
-    (GROW | {"kind": "conquer"}, 422, "invalid_request", "body"),
+    (GROW | {"kind": "conquer"}, 422, "invalid_request", "kind"),
     (CERTIFY | {"polytope": {"C": [[1, 2]], "d": [1]}}, 422, "polytope_shape", "polytope.C[0]"),
     (CERTIFY | {"polytope": {"C": [[1]], "d": [1, 2]}}, 422, "polytope_shape", "polytope.d"),
     (CERTIFY | {"polytope": {"C": [[1]], "d": [-1], "center": [0]}}, 422, "center_outside", "polytope.center"),

@@ -1,5 +1,6 @@
 """The OpenAPI document: operation ids are stable, errors are problems, examples hold."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from pydantic import TypeAdapter
 
 from api import checks
 from api.problems import Problem
+from api.schemas import patterns
 from api.schemas.jobs import NewJob, WebhookRequest
 from api.schemas.planning import ContainsRequest, NearestRequest, PathRequest, SegmentRequest
 from api.schemas.plans import PlanRequest
@@ -191,3 +193,20 @@ def test_every_operation_says_which_scope_it_needs(client: TestClient) -> None:
         scopes = {scope for entry in operation.get("security", []) for scope in entry["key"]}
         assert scopes or name in ("get_health", "get_readiness"), name
         assert scopes <= set(Scope)
+
+
+def test_every_pattern_is_said_in_words(client: TestClient) -> None:
+    """What a text must match is in the document as a pattern, and in the answer to one that does not as a sentence."""
+
+    def patterns_in(part: Any) -> Iterator[str]:
+        if isinstance(part, dict):
+            if isinstance(part.get("pattern"), str):
+                yield part["pattern"]
+            yield from part.get("patternProperties", {})
+            for value in part.values():
+                yield from patterns_in(value)
+        elif isinstance(part, list):
+            for value in part:
+                yield from patterns_in(value)
+
+    assert set(patterns_in(client.get("/openapi.json").json())) == set(patterns.SAID)

@@ -1,5 +1,7 @@
 """Every error is problem+json, and other web sites are kept out."""
 
+from typing import Any
+
 import pytest
 from fastapi.testclient import TestClient
 
@@ -33,6 +35,20 @@ def test_a_body_that_is_not_json_is_a_bad_request(client: TestClient) -> None:
 def test_every_wrong_field_is_listed(client: TestClient) -> None:
     problem = client.post("/v1/jobs", json={"kind": "grow", "seed": {"q": []}, "options": {"a": 1}}).json()
     assert {error["field"] for error in problem["errors"]} == {"scene", "seed.q", "options.a"}
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body", "field", "said"),
+    [
+        ("GET", "/v1/jobs?label=red", None, "label[0]", "it must be a label, NAME=VALUE"),
+        ("POST", "/v1/jobs", {"scene": "slider"}, "kind", "it must be one of grow, certify, recertify, certify-path, cover"),
+        ("POST", "/v1/jobs", {"kind": "dance"}, "kind", "it must be one of grow, certify, recertify, certify-path, cover"),
+        ("POST", "/v1/jobs/batch", {"jobs": [{}]}, "jobs[0].kind", "it must be one of grow, certify, recertify, certify-path, cover"),
+    ],
+)
+def test_what_is_wrong_is_said_in_words(client: TestClient, method: str, path: str, body: Any, field: str, said: str) -> None:
+    answer = client.request(method, path, json=body)
+    assert (answer.status_code, answer.json()["field"], answer.json()["detail"]) == (422, field, said)
 
 
 def test_an_unexpected_error_tells_nothing_of_the_inside(database: Database, client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
