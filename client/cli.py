@@ -181,7 +181,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     limits = project.add_parser("set", parents=[database], help="set a project's limits; 0 for none")
     limits.add_argument("name", metavar="NAME")
-    limits.add_argument("--max-bytes", metavar="N", help="take no more scenes and jobs once so many bytes are stored")
+    limits.add_argument("--max-bytes", metavar="N", help="take no more scenes and jobs once so many bytes are stored; 0: no limit")
     limits.add_argument("--keep-days", metavar="DAYS", help="so many days after their end, delete what jobs have besides their regions")
     limits.set_defaults(run="client.commands:in_database", module="db.projects", words=_limits)
 

@@ -79,9 +79,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _at_least_none(text: str) -> float:
-    number = float(text)
+    try:
+        number = float(text)
+    except ValueError:
+        number = -1.0
     if not 0 <= number <= 2**62:
-        raise argparse.ArgumentTypeError(f"{text} is not a number from 0 on")
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 0 on; 0 takes the limit away")
     return number
 
 
@@ -99,7 +102,7 @@ def _run(session: Session, given: argparse.Namespace) -> list[str]:
             if given.keep_days is not None:
                 row.keep_days = given.keep_days or None
             audit.note(session, row.name, COMMAND_LINE, Action.LIMITS_SET, f"max_bytes {row.max_bytes}, keep_days {row.keep_days}")
-            return []
+            return command_line.listed([_described(row)], as_json=False)
         case _:
             return command_line.listed([_described(row) for row in all_of(session)], as_json=given.json)
 

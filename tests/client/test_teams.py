@@ -65,6 +65,10 @@ def test_projects_on_the_command_line(tmp_path: Path, monkeypatch: pytest.Monkey
         with pytest.raises(SystemExit) as ended:
             projects.main(wrong)
         assert ended.value.code == 2
+    capsys.readouterr()
+    with pytest.raises(SystemExit):
+        projects.main(["set", "welding", "--max-bytes", "none"])
+    assert "none is not a number from 0 on; 0 takes the limit away" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         keys.main(["revoke", "planner"])  # that of the default project
 
