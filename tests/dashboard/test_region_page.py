@@ -64,6 +64,7 @@ def test_the_sweep_stays_inside_and_can_be_paused(opened: Any, planar: Scene, fa
         opened.wait_for_timeout(120)
         assert (d - C @ planar.to_s(shown(opened))).min() > -2e-3
     opened.get_by_role("button", name="Pause").click()
+    opened.get_by_role("button", name="Sweep through the region").wait_for()
     stopped = shown(opened)
     assert np.abs(stopped - before).max() > 1e-3
     opened.wait_for_timeout(200)

@@ -110,6 +110,7 @@ def _namespace(machine: int, ports: dict[str, int]) -> Iterator[Machine]:
         hosts = {}
         for link, first in ((REDIS, 1), (DATABASE, 5)):
             here, there = f"ci{machine}{link[0]}h", f"ci{machine}{link[0]}m"
+            _ip("link", "delete", here, check=False)
             _ip("link", "add", here, "type", "veth", "peer", "name", there, "netns", name)
             hosts[link] = NETWORK.format(machine=machine, host=first)
             _ip("address", "add", f"{hosts[link]}/30", "dev", here)

@@ -19,9 +19,9 @@ from db import migrate
 from tests.services import free_port, postgres_server
 from tests.workers import links
 from tests.workers.links import DATABASE, REDIS, Machine
-from tests.workers.options import box_around
+from tests.workers.options import box_around, grow_box
 from tests.workers.record import check_record, region_of
-from tests.workers.service import PATIENCE_SECONDS, Service, ended, environment, events_of, eventually, pairs_of, submit
+from tests.workers.service import PATIENCE_SECONDS, Service, ended, environment, events_of, eventually, job_of, pairs_of, submit
 from workers.processes import die_with_parent, queue_server_command
 
 pytestmark = pytest.mark.slow
@@ -154,3 +154,25 @@ def test_the_link_to_the_database_is_cut_while_pairs_are_held(arm: tuple[Scene, 
     site.first.restore(DATABASE)
     check_certified(job_id)
     both_work(arm, site, 0.0105)
+
+
+@pytest.mark.parametrize("link", [REDIS, DATABASE])
+def test_a_region_of_cells_is_the_same_though_a_link_is_cut_again_and_again(planar: Scene, site: Site, link: str) -> None:
+    options = grow_box([0.4, 0.3], 0.4, contraction="whole", cells=600)
+    undisturbed = submit(planar, options)
+    assert ended(undisturbed).outcome == "certified"
+    job_id, cuts = submit(planar, options), 0
+    while not job_of(job_id).finished_at:
+        held = [row for row in pairs_of(job_id) if row.state == "running" and row.pair_index in work_of(job_id, site.first)]
+        if not held:
+            time.sleep(0.01)
+            continue
+        site.first.cut(link)
+        time.sleep(2.0)
+        site.first.restore(link)
+        cuts += 1
+        time.sleep(1.0)
+    check_record(job_id)
+    assert cuts > 0
+    print(f"{cuts} cuts")
+    assert region_of(job_id) == region_of(undisturbed)

@@ -1,5 +1,5 @@
 // A region to walk about in: the robot swept through it, sliders that stay inside, the ends of each joint, slices, cells.
-import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import { get, said } from "../common/api";
 import type { PairProof, Partition } from "../common/cells";
 import { shortNames, type SceneModel } from "../common/kinematics";
@@ -124,12 +124,15 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
   );
 }
 
-/** Moves q from sample to sample while it plays, straight in s, in which the region is convex. Who prefers less motion sees it go in steps. */
+/**
+ * Moves q from sample to sample while it plays, straight in s, in which the region is convex. Who prefers less motion sees it go in steps.
+ * It is a layout effect because its cleanup then runs with the render that says that the robot is paused: no frame moves the robot after that.
+ */
 function usePlay(space: Space, samples: number[][], q: number[], setQ: (q: number[]) => void): [boolean, (play: boolean) => void] {
   const [playing, setPlaying] = useState(false);
   const from = useRef(q);
   from.current = q;
-  useEffect(() => {
+  useLayoutEffect(() => {
     if (!playing || samples.length === 0) return;
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     let [begin, began, next, frame] = [toS(space, from.current), performance.now(), 0, 0];
