@@ -7,6 +7,9 @@ While another process writes on SQLite, a writer looks again and again, at longe
 process share one connection, and queue for it instead. A committed transaction survives the end of the process. With
 ``synchronous=NORMAL`` a power cut may take back the last transactions, but never leaves half of one.
 
+What is written goes to SQLite's log first. Copying the log into the database waits for the disk, so a thread of the control worker does
+it (``Database.checkpoint``), and writers do it only where the log has become very long. A copy never waits for a writer that waits too.
+
 A session of a project finds the rows of this project only, whatever it looks for: its condition is added to every statement here.
 
 PostgreSQL gives every statement its own view of the database unless told otherwise. So reading there needs no transaction, and no
@@ -44,6 +47,11 @@ INCREMENTAL = 2
 """SQLite's number for giving room back when it is asked to."""
 SPARE_PAGES, PAGES_TOGETHER = 1000, 2000
 """SQLite may keep so many pages, of 4 KiB, that it does not use; so many are given back at a time."""
+LOG_BYTES = 4 * 2**20
+"""A longer log of SQLite is copied into the database. Its file is cut to this length when it begins again."""
+LONG_LOG_BYTES, LONG_LOG_PAGES = 4 * LOG_BYTES, 16_000
+"""Writers wait while a log longer than this is begun again, if that is quick. With so many pages a writer copies the log itself."""
+QUICK_SECONDS = 0.5
 IDLE_SECONDS = 1.0
 """A connection to PostgreSQL that was idle for this many seconds is tested before it is used: the server may have been restarted."""
 SILENCE_SECONDS = 20
@@ -90,6 +98,7 @@ class Database:
         self.reader, self.writer = _sqlite(parsed) if self.sqlite else _postgresql(parsed)
         self.disk = Disk(Path(parsed.database).absolute().parent if self.sqlite and parsed.database else None)
         self.project: str | None = None
+        self._log = Path(f"{parsed.database}-wal") if self.sqlite and parsed.database else None
         self._views: dict[str, Database] = {}
 
     def of(self, project: str) -> Database:
@@ -127,6 +136,33 @@ class Database:
             script = f"BEGIN IMMEDIATE; PRAGMA incremental_vacuum({PAGES_TOGETHER}); COMMIT"
             with closing(self.writer.raw_connection()) as connection:
                 connection.cursor().executescript(script)
+
+    def checkpoint(self) -> None:
+        """Copies SQLite's log into the database where it is long, so that the log begins again. This lasts as long as the disk needs.
+
+        Nobody waits meanwhile. Writers that never rest would keep the log from beginning again; so they wait for a short copy once
+        the log is very long, and no longer than QUICK_SECONDS for those who read.
+        """
+        if self._log_bytes() <= LOG_BYTES:
+            return
+        with closing(self.reader.raw_connection()) as connection:
+            cursor, began = connection.cursor(), time.monotonic()
+            cursor.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
+            if self._log_bytes() <= LONG_LOG_BYTES or time.monotonic() - began > QUICK_SECONDS:
+                return
+            # It holds the writers' lock while it waits for those who still read the log.
+            cursor.execute(f"PRAGMA busy_timeout={int(1000 * QUICK_SECONDS)}")
+            try:
+                cursor.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+            finally:
+                cursor.execute(f"PRAGMA busy_timeout={int(1000 * BUSY_SECONDS)}")
+
+    def _log_bytes(self) -> int:
+        """Returns the length of SQLite's log; 0 where there is none."""
+        try:
+            return self._log.stat().st_size if self._log is not None else 0
+        except FileNotFoundError:
+            return 0
 
     def close(self) -> None:
         self.reader.dispose()
@@ -180,7 +216,13 @@ def _configure_sqlite(connection: Any, _record: Any) -> None:
     # This has an effect on a database without tables only, but is always a write, for which a disk may lack room.
     if connection.execute("PRAGMA auto_vacuum").fetchone() != (INCREMENTAL,):
         connection.execute(f"PRAGMA auto_vacuum={INCREMENTAL}")
-    for pragma in ("journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON"):
+    for pragma in (
+        "journal_mode=WAL",
+        "synchronous=NORMAL",
+        "foreign_keys=ON",
+        f"wal_autocheckpoint={LONG_LOG_PAGES}",
+        f"journal_size_limit={LOG_BYTES}",
+    ):
         connection.execute(f"PRAGMA {pragma}")
 
 

@@ -90,13 +90,26 @@ def vault() -> Vault:
 
 
 def kept_key(path: Path) -> str:
-    """Returns the key in this file, which it makes with a new key if there is none. Only the file's owner may read it."""
+    """Returns the key in this file, which it makes with a new key if there is none. Only the file's owner may read it.
+
+    A disk without room leaves no file, or the empty one that an earlier version has left: no secret was ever encrypted with that.
+
+    Raises:
+        CirisError: no_room, when the key cannot be written.
+    """
+    if kept := path.read_text().strip() if path.exists() else "":
+        return kept
+    key, partial = base64.b64encode(secrets.token_bytes(_KEY)).decode(), path.with_name(f"{path.name}.partial")
     try:
-        with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-            file.write(base64.b64encode(secrets.token_bytes(_KEY)).decode() + "\n")
-    except FileExistsError:
-        pass
-    return path.read_text().strip()
+        with open(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w") as file:
+            file.write(key + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(path)
+    except OSError as error:
+        problem, hint = f"the key of secrets, {path}, cannot be written: {error.strerror}", "free some room there"
+        raise CirisError("no_room", problem, field="--data", hint=hint) from None
+    return key
 
 
 def _key(text: str) -> bytes:

@@ -1,7 +1,7 @@
 """``python -m workers control`` or ``python -m workers solve`` runs one Celery worker, with the settings of the environment.
 
-The control worker coordinates jobs in threads, runs the sweeper and delivers webhooks. The solve worker runs
-``CIRIS_SOLVE_PROCESSES`` processes. Each computes in one thread, because the pairs already run in parallel.
+The control worker coordinates jobs in threads, runs the sweeper, delivers webhooks and copies SQLite's log into its database. The solve
+worker runs ``CIRIS_SOLVE_PROCESSES`` processes. Each computes in one thread, because the pairs already run in parallel.
 """
 
 from __future__ import annotations
@@ -64,9 +64,9 @@ def main() -> None:
         threading.Thread(target=presence.run, args=(sender,), name="presence", daemon=True).start()
         if queue == CONTROL:
             traces.configure(queue)
-            from workers import sweeper, webhooks
+            from workers import checkpoints, sweeper, webhooks
 
-            for loop in (sweeper.run, webhooks.run):
+            for loop in (sweeper.run, webhooks.run, checkpoints.run):
                 threading.Thread(target=loop, args=(stop,), name=loop.__module__, daemon=True).start()
 
     app.worker_main(

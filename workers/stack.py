@@ -157,8 +157,8 @@ def run_stack(settings: Settings, *, port: int | None = None, ready: Callable[[s
         host = f"[{settings.host}]" if settings.family == socket.AF_INET6 else settings.host
         url = f"http://{host}:{bound}"
         children = _children(settings, data, sockets / SOCKET)
-        environment = _environment(settings, data, sockets / SOCKET, bound)
         _migrate(settings)
+        environment = _environment(settings, data, sockets / SOCKET, bound)
         keys.check_bind(settings)
         reaper = Reaper()
         try:

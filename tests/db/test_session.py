@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 from sqlalchemy import func, select, text
 from sqlalchemy.exc import OperationalError
 
-from db import jobs, session
-from db.models import EventRow
-from db.session import CONNECTIONS, Database
+from db import jobs, proofs, session
+from db.models import EventRow, ProofRow
+from db.session import BUSY_SECONDS, CONNECTIONS, LONG_LOG_BYTES, Database
 from tests.db.builders import a_running_job
 from tests.services import Postgres
 
@@ -94,3 +96,50 @@ def test_more_threads_than_connections_all_write_and_none_sees_half_of_it(db: Da
             writer.result()
     with db.read() as opened:
         assert opened.scalar(select(func.count()).where(EventRow.kind == "pairs")) == 4 * CONNECTIONS
+
+
+@pytest.fixture
+def long_log(tmp_path: Path, migrated_sqlite: Path) -> Iterator[tuple[Database, Path]]:
+    """A database whose log is so long that writers wait while it is begun again, and the log."""
+    path = tmp_path / "logged.sqlite3"
+    path.write_bytes(migrated_sqlite.read_bytes())
+    db, log = Database(f"sqlite:///{path}"), path.with_name(f"{path.name}-wal")
+    written = store(db, 0, LONG_LOG_BYTES // 2**20 + 1)
+    assert log.stat().st_size > LONG_LOG_BYTES, "no writer has copied it"
+    yield db, log
+    with db.read() as opened:
+        assert set(opened.scalars(select(ProofRow.digest))) >= written
+    db.close()
+
+
+def store(db: Database, first: int, count: int) -> set[str]:
+    written: set[str] = set()
+    for i in range(first, first + count):
+        with db.write() as opened:
+            written |= set(proofs.put(opened, [bytes([i]) * 2**20]).values())
+    return written
+
+
+def test_a_long_log_is_copied_and_begins_again(long_log: tuple[Database, Path]) -> None:
+    db, log = long_log
+    db.checkpoint()
+    assert log.stat().st_size == 0
+    store(db, 100, 1)
+    before = log.stat().st_size
+    db.checkpoint()
+    assert log.stat().st_size == before, "a short log is left alone"
+
+
+def test_writers_wait_for_no_reader_of_a_long_log(long_log: tuple[Database, Path]) -> None:
+    db, log = long_log
+    with db.read() as opened:
+        opened.execute(select(ProofRow.digest)).first()
+        began = time.monotonic()
+        with ThreadPoolExecutor(1) as pool:
+            copying = pool.submit(db.checkpoint)
+            store(db, 100, 2)
+            copying.result()
+        assert time.monotonic() - began < BUSY_SECONDS / 3
+        assert log.stat().st_size > LONG_LOG_BYTES, "what the reader sees is still there"
+    db.checkpoint()
+    assert log.stat().st_size == 0

@@ -64,11 +64,18 @@ def test_what_is_no_key_is_refused(wrong: str) -> None:
         Vault(wrong)
 
 
+def test_an_empty_file_that_a_full_disk_has_left_gets_a_key(tmp_path: Path) -> None:
+    path = tmp_path / "secret.key"
+    path.touch(mode=0o600)
+    assert Vault(kept_key(path)).usable
+
+
 def test_a_kept_key_is_made_once_and_read_by_its_owner_alone(tmp_path: Path) -> None:
     path = tmp_path / "secret.key"
     key = kept_key(path)
     assert kept_key(path) == key
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert Vault(key).open(Vault(key).seal("x", "y"), "y") == "x"
+    assert list(tmp_path.iterdir()) == [path]
     urlsafe = key.replace("+", "-").replace("/", "_")
     assert Vault(urlsafe).open(Vault(key).seal("x", "y"), "y") == "x"

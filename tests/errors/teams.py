@@ -13,7 +13,7 @@ from db.disk import Disk
 from db.keys import Scope
 from db.models import JobRow
 from db.session import Database
-from db.vault import Vault
+from db.vault import Vault, kept_key
 from tests.db.builders import a_running_job, add_region
 from tests.errors.rows import Trial, rows
 from tests.errors.service import GROW, database, post, queued, write
@@ -141,6 +141,13 @@ TEAMS = [
             "no key fits a secret",
             "add the key of before, after a comma",
             lambda t: Vault("").open("v1.AAAAAAAAAAAAAAAAAAAAAAAA", "b"),
+        ),
+        (
+            "no_room",
+            "--data",
+            "the key of secrets, {path}, cannot be written: {strerror}",
+            "free some room there",
+            lambda t: kept_key(t.directory / "absent" / "secret.key"),
         ),
     ),
     *rows(
