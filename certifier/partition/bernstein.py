@@ -1,5 +1,7 @@
 """Polynomials in Bernstein form are proved positive on a polytope, one box of it after the other.
 
+Long loops index reshaped arrays with loop variables alone, because Numba looks whether a sum is negative, and then there is no vector code.
+
 A control point is a place in [0, 4)^k, of k own coordinates. The denominator is a product of one factor in each own coordinate, so its
 control values are products, and so are those of the denominator times an own coordinate. ``den`` (2, k, 4) holds the factors: those of the
 denominator, and those times the coordinate.
@@ -22,6 +24,10 @@ LOWEST = 32
 """So many of the lowest control points say which faces these are."""
 BLOCK = 2
 """Control values are computed in blocks over so many coordinates, which fill the registers."""
+BATCH = 8
+"""The polynomials of so many vertices are computed side by side."""
+LARGE = 1e300
+"""All control values are less than this."""
 STEPS, ZERO = 40, 1e-10
 """Multipliers are given up after STEPS control points, or where the square of the distance of their rows' hull from 0 is below ZERO."""
 EARLY, HOPELESS = 16, 4.0
@@ -38,27 +44,25 @@ OUTSIDE = 1e-7
 
 @njit(cache=True)
 def elevate(values: Array, first: Array, last: Array) -> Array:
-    """Returns the Bernstein coefficients of a polynomial of degree 2 in each of k coordinates times a linear form in each, (4^k,).
+    """Returns the Bernstein coefficients of polynomials of degree 2 in each of k coordinates times a linear form in each, (4^k B,).
 
     Args:
-        values: (3^k,) coefficients; the first coordinate is the slowest.
+        values: (3^k B,) coefficients of B polynomials; the first coordinate is the slowest, and the polynomial is the fastest.
         first, last: (k,) the linear forms' values at the two ends of each coordinate.
     """
-    k = len(first)
-    left, right = 1, 3**k
-    for i in range(k):
+    left, right = 1, len(values)
+    for i in range(len(first)):
         right //= 3
-        out = np.empty(left * 4 * right)
+        f, out = values.reshape(left, 3, right), np.empty((left, 4, right))
+        a0, a1, a2 = first[i], 2 / 3.0 * first[i], 1 / 3.0 * first[i]
+        b1, b2, b3 = 1 / 3.0 * last[i], 2 / 3.0 * last[i], last[i]
         for x in range(left):
-            for j in range(4):
-                for y in range(right):
-                    t = 0.0
-                    if j < 3:
-                        t += (3 - j) / 3.0 * first[i] * values[(x * 3 + j) * right + y]
-                    if j > 0:
-                        t += j / 3.0 * last[i] * values[(x * 3 + j - 1) * right + y]
-                    out[(x * 4 + j) * right + y] = t
-        values = out
+            for y in range(right):
+                out[x, 0, y] = a0 * f[x, 0, y]
+                out[x, 1, y] = a1 * f[x, 1, y] + b1 * f[x, 0, y]
+                out[x, 2, y] = a2 * f[x, 2, y] + b2 * f[x, 1, y]
+                out[x, 3, y] = b3 * f[x, 2, y]
+        values = out.reshape(out.size)
         left *= 4
     return values
 
@@ -96,47 +100,76 @@ def polynomials(X: Array, vertices: Array, base: Array, own: Array, outside: Arr
         own, outside: (k, 4), (o, 4) what the own coordinates s_i and the outside coordinates, which are in [-1, 1], add to it.
         ends: (4, k) both ends of the own coordinates and their weights.
     """
-    N, k, o, V = len(X), len(own), len(outside), len(vertices)
-    first, last = ends[2].copy(), ends[3].copy()
+    k, o, V = len(own), len(outside), len(vertices)
     c = np.empty((V, 1 + o, 4**k))
-    p, values = np.empty((N, 4)), np.empty(N)
-    for v in range(V):
-        for a in range(N):
-            for e in range(4):
-                p[a, e] = X[a, e, 0] * vertices[v, 0] + X[a, e, 1] * vertices[v, 1] + X[a, e, 2] * vertices[v, 2] + X[a, e, 3]
-            values[a] = p[a, 0] * base[0] + p[a, 1] * base[1] + p[a, 2] * base[2] + p[a, 3] * base[3]
-        c[v, 0] = elevate(values, first, last)
+    first, last = ends[2].copy(), ends[3].copy()
+    for begin in range(0, V, BATCH):
+        B = min(BATCH, V - begin)
+        p = np.empty((4, len(X), B))
+        for e in range(4):
+            for a in range(len(X)):
+                for v in range(B):
+                    x, y, z = vertices[begin + v]
+                    p[e, a, v] = X[a, e, 0] * x + X[a, e, 1] * y + X[a, e, 2] * z + X[a, e, 3]
+        total = elevate(_along(p, base), first, last)
         for i in range(k):
-            for a in range(N):
-                values[a] = p[a, 0] * own[i, 0] + p[a, 1] * own[i, 1] + p[a, 2] * own[i, 2] + p[a, 3] * own[i, 3]
             first[i] *= ends[0, i]
             last[i] *= ends[1, i]
-            c[v, 0] += elevate(values, first, last)
+            total += elevate(_along(p, own[i]), first, last)
             first[i], last[i] = ends[2, i], ends[3, i]
+        _spread(total, c[begin : begin + B, 0])
         for i in range(o):
-            for a in range(N):
-                values[a] = p[a, 0] * outside[i, 0] + p[a, 1] * outside[i, 1] + p[a, 2] * outside[i, 2] + p[a, 3] * outside[i, 3]
-            c[v, 1 + i] = elevate(values, first, last)
+            _spread(elevate(_along(p, outside[i]), first, last), c[begin : begin + B, 1 + i])
     return c
 
 
 @njit(cache=True)
-def halve(A: Array, axis: int, k: int, low: Array, high: Array) -> None:
-    """Writes the Bernstein coefficients of both halves of a coordinate, by de Casteljau's algorithm, for every row of A, (q, 4^k).
+def _spread(values: Array, rows: Array) -> None:
+    """Writes the values of B polynomials, (N B,), into rows of their own, (B, N)."""
+    B, N = rows.shape
+    columns = values.reshape(N, B)
+    for v in range(B):
+        row = rows[v]
+        for a in range(N):
+            row[a] = columns[a, v]
 
-    ``low`` or ``high`` may be A itself.
+
+@njit(cache=True)
+def _along(p: Array, plane: Array) -> Array:
+    """Returns the scalar products of homogeneous points (4, N, B) with a plane (4,), flat."""
+    q, values = p.reshape(4, -1), np.empty(p[0].size)
+    for a in range(len(values)):
+        values[a] = q[0, a] * plane[0] + q[1, a] * plane[1] + q[2, a] * plane[2] + q[3, a] * plane[3]
+    return values
+
+
+@njit(cache=True)
+def halve(A: Array, axis: int, k: int, low: Array) -> None:
+    """Halves a coordinate by de Casteljau's algorithm: ``low`` gets the Bernstein coefficients of the lower half, A those of the upper one.
+
+    Args:
+        A, low: (q, 4^k).
     """
-    q, N = A.shape
     stride = 4 ** (k - 1 - axis)
-    for r in range(q):
-        for block in range(0, N, 4 * stride):
-            for b in range(block, block + stride):
-                c0, c1, c2, c3 = A[r, b], A[r, b + stride], A[r, b + 2 * stride], A[r, b + 3 * stride]
-                d0, d1, d2 = 0.5 * (c0 + c1), 0.5 * (c1 + c2), 0.5 * (c2 + c3)
-                e0, e1 = 0.5 * (d0 + d1), 0.5 * (d1 + d2)
-                f0 = 0.5 * (e0 + e1)
-                low[r, b], low[r, b + stride], low[r, b + 2 * stride], low[r, b + 3 * stride] = c0, d0, e0, f0
-                high[r, b], high[r, b + stride], high[r, b + 2 * stride], high[r, b + 3 * stride] = f0, e1, d2, c3
+    blocks = A.size // (4 * stride)
+    high, out = A.reshape(blocks, 4, stride), low.reshape(blocks, 4, stride)
+    if stride == 1:
+        for b in range(blocks):
+            c0, c1, c2, c3 = high[b, 0, 0], high[b, 1, 0], high[b, 2, 0], high[b, 3, 0]
+            d0, d1, d2 = 0.5 * (c0 + c1), 0.5 * (c1 + c2), 0.5 * (c2 + c3)
+            e0, e1 = 0.5 * (d0 + d1), 0.5 * (d1 + d2)
+            f0 = 0.5 * (e0 + e1)
+            out[b, 0, 0], out[b, 1, 0], out[b, 2, 0], out[b, 3, 0] = c0, d0, e0, f0
+            high[b, 0, 0], high[b, 1, 0], high[b, 2, 0] = f0, e1, d2
+        return
+    for b in range(blocks):
+        for y in range(stride):
+            c0, c1, c2, c3 = high[b, 0, y], high[b, 1, y], high[b, 2, y], high[b, 3, y]
+            d0, d1, d2 = 0.5 * (c0 + c1), 0.5 * (c1 + c2), 0.5 * (c2 + c3)
+            e0, e1 = 0.5 * (d0 + d1), 0.5 * (d1 + d2)
+            f0 = 0.5 * (e0 + e1)
+            out[b, 0, y], out[b, 1, y], out[b, 2, y], out[b, 3, y] = c0, d0, e0, f0
+            high[b, 0, y], high[b, 1, y], high[b, 2, y] = f0, e1, d2
 
 
 @njit(cache=True)
@@ -158,31 +191,53 @@ def _expanded(den: Array, slopes: Array, begin: int, end: int, base: float) -> t
     product[0], linear[0] = 1.0, base
     n = 1
     for i in range(begin, end):
+        d0, d1, d2, d3 = den[0, i, 0], den[0, i, 1], den[0, i, 2], den[0, i, 3]
+        s0, s1, s2, s3 = slopes[i] * den[1, i, 0], slopes[i] * den[1, i, 1], slopes[i] * den[1, i, 2], slopes[i] * den[1, i, 3]
         for b in range(n - 1, -1, -1):
             p, q = product[b], linear[b]
-            for x in range(4):
-                product[4 * b + x] = p * den[0, i, x]
-                linear[4 * b + x] = q * den[0, i, x] + p * (slopes[i] * den[1, i, x])
+            product[4 * b], product[4 * b + 1], product[4 * b + 2], product[4 * b + 3] = p * d0, p * d1, p * d2, p * d3
+            linear[4 * b], linear[4 * b + 1] = q * d0 + p * s0, q * d1 + p * s1
+            linear[4 * b + 2], linear[4 * b + 3] = q * d2 + p * s2, q * d3 + p * s3
         n *= 4
     return product, linear
 
 
 @njit(cache=True, fastmath=True)
-def _block(
-    z0: float, c: Array, begin: int, p: float, q: float, product: Array, linear: Array, slopes: Array, k: int, values: Array
-) -> float:
-    """Fills in the control values of one block, over the last own coordinates, and returns the least of them."""
-    n = len(values)
-    for y in range(n):
-        values[y] = z0 * c[0, begin + y] - (q * product[y] + p * linear[y])
-    for i in range(c.shape[0] - 1):
-        slope = slopes[k + i] * p
+def _least(z0: float, c: Array, p: Array, q: Array, product: Array, linear: Array, slopes: Array) -> tuple[float, int]:
+    """Returns the least control value, and the first place of it.
+
+    Every place in a block has a lane of its own, because LLVM makes vector code of independent lanes but not of one minimum.
+
+    Args:
+        c: (1 + o, B, n) of f, in blocks over the last own coordinates.
+        p, q, product, linear: (B,), (B,), (n,), (n,) control values of the denominator and of the faces.
+        slopes: (o,) of the faces in the outside coordinates.
+    """
+    o, blocks, n = c.shape[0] - 1, c.shape[1], c.shape[2]
+    values, least, where = np.empty(n), np.full(n, LARGE), np.zeros(n, np.int64)
+    for b in range(blocks):
+        if o == 0:
+            for y in range(n):
+                t = z0 * c[0, b, y] - (q[b] * product[y] + p[b] * linear[y])
+                less = t < least[y]
+                least[y], where[y] = t if less else least[y], b if less else where[y]
+            continue
         for y in range(n):
-            values[y] -= abs(z0 * c[1 + i, begin + y] - slope * product[y])
-    least = np.inf
-    for y in range(n):
-        least = min(least, values[y])
-    return float(least)
+            values[y] = z0 * c[0, b, y] - (q[b] * product[y] + p[b] * linear[y])
+        for i in range(1, o):
+            slope = slopes[i - 1] * p[b]
+            for y in range(n):
+                values[y] -= abs(z0 * c[i, b, y] - slope * product[y])
+        slope = slopes[o - 1] * p[b]
+        for y in range(n):
+            t = values[y] - abs(z0 * c[o, b, y] - slope * product[y])
+            less = t < least[y]
+            least[y], where[y] = t if less else least[y], b if less else where[y]
+    lane = 0
+    for y in range(1, n):
+        if least[y] < least[lane] or (least[y] == least[lane] and where[y] < where[lane]):
+            lane = y
+    return least[lane], where[lane] * n + lane
 
 
 @njit(cache=True)
@@ -196,7 +251,7 @@ def lowest(z: Array, c: Array, den: Array, constant: Array, own: Array, outside:
         constant, own, outside, rest: (m,), (m, k), (m, o), (m, r) of the faces g_j, in the coordinates of the piece.
         slopes: (k + o,) is overwritten with those of sum_j z_j g_j.
     """
-    N, m, k, o = c.shape[1], len(constant), den.shape[1], c.shape[0] - 1
+    m, k, o = len(constant), den.shape[1], c.shape[0] - 1
     slopes[:] = 0.0
     base = 0.0
     for j in range(m):
@@ -209,22 +264,30 @@ def lowest(z: Array, c: Array, den: Array, constant: Array, own: Array, outside:
     for i in range(rest.shape[1]):
         t = 0.0
         for j in range(m):
-            t += z[1 + j] * rest[j, i]
+            if z[1 + j] != 0.0:
+                t += z[1 + j] * rest[j, i]
         base += abs(t)
-    if not np.isfinite(z[0] + base + np.abs(slopes).sum()):
+    size = 0.0
+    for i in range(k + o):
+        size += abs(slopes[i])
+    if not np.isfinite(z[0] + base + size):
         return -np.inf, 0
     first = max(k - BLOCK, 0)
-    products, linears = _expanded(den, slopes, 0, first, base)
+    p, q = _expanded(den, slopes, 0, first, base)
     product, linear = _expanded(den, slopes, first, k, 0.0)
-    n = len(product)
-    values = np.empty(n)
-    least, block = np.inf, 0
-    for b in range(N // n):
-        t = _block(z[0], c, b * n, products[b], linears[b], product, linear, slopes, k, values)
-        if t < least:
-            least, block = t, b
-    _block(z[0], c, block * n, products[block], linears[block], product, linear, slopes, k, values)
-    return least, block * n + int(values.argmin())
+    return _least(z[0], c.reshape(1 + o, len(p), len(product)), p, q, product, linear, slopes[k:])
+
+
+@njit(cache=True)
+def _range(values: Array) -> tuple[float, float]:
+    """Returns the least and the largest of 4^k values."""
+    n = min(len(values), 64)
+    rows, low, high = values.reshape(-1, n), values[:n].copy(), values[:n].copy()
+    for b in range(1, len(rows)):
+        for y in range(n):
+            low[y] = min(low[y], rows[b, y])
+            high[y] = max(high[y], rows[b, y])
+    return float(low.min()), float(high.max())
 
 
 @njit(cache=True)
@@ -232,21 +295,27 @@ def steepest(c: Array, k: int) -> int:
     """Returns the coordinate to halve: the one in which f bends and varies most."""
     N, o = c.shape[1], c.shape[0] - 1
     most, axis = -1.0, 0
+    lanes = np.empty(max(N // 4, 1))
     for i in range(k):
         stride = 4 ** (k - 1 - i)
-        t = 0.0
-        for block in range(0, N, 4 * stride):
-            for b in range(block, block + stride):
-                d0, d1, d2 = (
-                    c[0, b + stride] - c[0, b],
-                    c[0, b + 2 * stride] - c[0, b + stride],
-                    c[0, b + 3 * stride] - c[0, b + 2 * stride],
-                )
-                t = max(t, 2 * max(abs(d1 - d0), abs(d2 - d1)) + 0.3 * max(max(abs(d0), abs(d1)), abs(d2)))
+        blocks = N // (4 * stride)
+        f = c[0].reshape(blocks, 4, stride)
+        if stride == 1:
+            for b in range(blocks):
+                d0, d1, d2 = f[b, 1, 0] - f[b, 0, 0], f[b, 2, 0] - f[b, 1, 0], f[b, 3, 0] - f[b, 2, 0]
+                lanes[b] = 2 * max(abs(d1 - d0), abs(d2 - d1)) + 0.3 * max(max(abs(d0), abs(d1)), abs(d2))
+            t = _range(lanes[:blocks])[1]
+        else:
+            lanes[:stride] = 0.0
+            for b in range(blocks):
+                for y in range(stride):
+                    d0, d1, d2 = f[b, 1, y] - f[b, 0, y], f[b, 2, y] - f[b, 1, y], f[b, 3, y] - f[b, 2, y]
+                    lanes[y] = max(lanes[y], 2 * max(abs(d1 - d0), abs(d2 - d1)) + 0.3 * max(max(abs(d0), abs(d1)), abs(d2)))
+            t = _range(lanes[:stride])[1]
         if t > most:
             most, axis = t, i
     for i in range(o):
-        low, high = c[1 + i].min(), c[1 + i].max()
+        low, high = _range(c[1 + i])
         t = (high - low) + 0.3 * max(abs(low), abs(high))
         if t > most:
             most, axis = t, k + i
@@ -280,37 +349,72 @@ def evaluate(c: Array, spot: Array, ends: Array) -> float:
 
 
 @njit(cache=True)
-def choose(c: Array, den: Array, constant: Array, own: Array, outside: Array, rest: Array, scale: Array, z: Array, chosen: Array) -> int:
+def _alone(c: Array, values: Array) -> float:
+    """Fills in the least values that f has in the outside coordinates, (N,), and returns the least of them."""
+    values[:] = c[0]
+    for i in range(1, len(c)):
+        for a in range(len(values)):
+            values[a] -= abs(c[i, a])
+    return _range(values)[0]
+
+
+@njit(cache=True)
+def leasts(c: Array) -> Array:
+    """Returns the least value of each f, (V,), of c (V, 1 + o, N)."""
+    least, values = np.empty(len(c)), np.empty(c.shape[2])
+    for v in range(len(c)):
+        least[v] = _alone(c[v], values)
+    return least
+
+
+@njit(cache=True)
+def _first(values: Array, value: float) -> int:
+    """Returns the first place of a value that is among the values."""
+    for place in range(len(values)):
+        if values[place] == value:
+            return place
+    return 0
+
+
+@njit(cache=True)
+def choose(
+    f: Array, c: Array, den: Array, constant: Array, own: Array, outside: Array, scale: Array, z: Array, limit: float, chosen: Array
+) -> int:
     """Fills in the faces that may help most, those with multipliers in z first, and returns how many there are, which is 1 at least.
 
     A face helps where f is negative, if it is negative there as well.
 
     Args:
-        c, den, constant, own, outside, rest: as for :func:`lowest`.
+        f: (N,) the least values of f in the outside coordinates.
+        c, den, constant: as for :func:`lowest`.
+        own, outside: (k, m), (o, m) of the faces.
         scale: (1 + m,) the magnitude of f and of each face.
+        limit: f is looked at where it is not larger than this.
         chosen: gets their numbers.
     """
     N, m, k, o = c.shape[1], len(constant), den.shape[1], c.shape[0] - 1
-    values = c[0].copy()
-    for i in range(o):
-        values -= np.abs(c[1 + i])
-    bad, T = np.zeros(LOWEST, np.int64), np.empty((LOWEST, 1 + k))
-    count, limit = 0, 0.5 * values.min()
+    gain, used, t, T = np.zeros(m), np.zeros(m, np.bool_), np.empty(m), np.empty(1 + k)
+    count = 0
     for a in range(N):
-        if values[a] <= limit and count < LOWEST:
-            bad[count] = a
-            _at(den, a, T[count])
-            count += 1
-    gain, used = np.zeros(m), np.zeros(m, np.bool_)
+        if f[a] > limit:
+            continue
+        _at(den, a, T)
+        t[:] = constant
+        for e in range(o):
+            sign = -1.0 if c[1 + e, a] > 0 else 1.0
+            for j in range(m):
+                t[j] += sign * outside[e, j]
+        for j in range(m):
+            t[j] *= T[0]
+        for e in range(k):
+            for j in range(m):
+                t[j] += own[e, j] * T[1 + e]
+        for j in range(m):
+            gain[j] -= min(t[j], 0.0)
+        count += 1
+        if count == LOWEST:
+            break
     for j in range(m):
-        for i in range(count):
-            t = constant[j]
-            for e in range(o):
-                t += -outside[j, e] if c[1 + e, bad[i]] > 0 else outside[j, e]
-            t *= T[i, 0]
-            for e in range(k):
-                t += own[j, e] * T[i, 1 + e]
-            gain[j] -= min(t, 0.0)
         gain[j] /= scale[1 + j]
     n = 0
     for j in range(m):
@@ -318,11 +422,26 @@ def choose(c: Array, den: Array, constant: Array, own: Array, outside: Array, re
             chosen[n] = j
             used[j] = True
             n += 1
-    for j in np.argsort(-gain):
-        if n < FACES and gain[j] > 0 and not used[j]:
-            chosen[n] = j
-            n += 1
+    first = n
+    for j in range(m):
+        if gain[j] > 0 and not used[j]:
+            n = _ranked(gain, chosen, first, n, j, FACES)
     return max(n, 1)
+
+
+@njit(cache=True)
+def _ranked(gain: Array, chosen: Array, first: int, n: int, j: int, most: int) -> int:
+    """Puts a number where it belongs among those from ``first`` on, of which the one with the largest gain is first."""
+    place = n
+    while place > first and gain[chosen[place - 1]] < gain[j]:
+        place -= 1
+    if place >= most:
+        return n
+    n = min(n + 1, most)
+    for i in range(n - 1, place, -1):
+        chosen[i] = chosen[i - 1]
+    chosen[place] = j
+    return n
 
 
 @njit(cache=True)
@@ -335,6 +454,7 @@ def multipliers(
     rest: Array,
     scale: Array,
     needed: Array,
+    place: int,
     z: Array,
     spot: Array,
 ) -> int:
@@ -344,6 +464,7 @@ def multipliers(
         c, den, constant, own, outside, rest: as for :func:`lowest`.
         scale: (1 + m,) the magnitude of f and of each face.
         needed: (1 + m,) control values have to be larger than z times this.
+        place: of the least control value of f, which is not as large as needed.
         z: (1 + m,) gets z_0 = 1 and the multipliers, in single precision; or z_0 = 0, where the faces alone do.
         spot: (k + o + r,) gets the mean of the control points whose rows come to 0, when REFUTED: at it no face is negative, and f is not
             positive, as far as control points tell. The own coordinates are as they are, the others in [-1, 1].
@@ -359,10 +480,11 @@ def multipliers(
     z[:] = 0.0
     z[0] = 1.0
     n = 0
-    for _ in range(STEPS):
-        least, place = lowest(z, c, den, constant, own, outside, rest, slopes)
-        if least > (z * needed).sum():
-            return PROVED
+    for step in range(STEPS):
+        if step:
+            least, place = lowest(z, c, den, constant, own, outside, rest, slopes)
+            if least > _dot(z, needed):
+                return PROVED
         _at(den, place, T)
         row[0] = c[0, place]
         for i in range(k):
@@ -384,33 +506,39 @@ def multipliers(
             for i in range(r):
                 t += spot[k + o + i] * rest[j, i] * T[0]
             row[1 + j] = -t
-        for i in range(o + r):
-            spot[k + i] *= T[0]
-        for j in range(D):
-            row[j] /= scale[j]
         free = unused(origin, n)
-        points[free] = row
-        where[free, : k + o + r] = spot
+        for i in range(k):
+            where[free, i] = spot[i]
+        for i in range(k, k + o + r):
+            where[free, i] = spot[i] * T[0]
         where[free, k + o + r] = T[0]
-        n = _joined(points, G, w, origin, n, free)
+        for j in range(D):
+            points[free, j] = row[j] / scale[j]
+        n = _joined(points, G, w, origin, n, free, -1)
         # Coordinates that came out negative get rows of their own, until none does.
         for _ in range(2 * D):
-            x[:] = 0.0
+            for j in range(D):
+                x[j] = 0.0
             for i in range(n):
                 for j in range(D):
                     x[j] += w[i] * points[origin[i], j]
-            low, negative = -1e-9 * np.abs(x).max(), -1
+            size = 0.0
+            for j in range(D):
+                size = max(size, abs(x[j]))
+            low, negative = -1e-9 * size, -1
             for j in range(D):
                 if x[j] < low:
                     low, negative = x[j], j
             if negative < 0 or n > 2 * D:
                 break
             free = unused(origin, n)
-            points[free] = 0.0
+            for j in range(D):
+                points[free, j] = 0.0
             points[free, negative] = 1.0
-            where[free] = 0.0
-            n = _joined(points, G, w, origin, n, free)
-        if x @ x < ZERO:
+            for i in range(k + o + r + 1):
+                where[free, i] = 0.0
+            n = _joined(points, G, w, origin, n, free, negative)
+        if _dot(x, x) < ZERO:
             total = 0.0
             spot[:] = 0.0
             for i in range(n):
@@ -426,7 +554,9 @@ def multipliers(
         for j in range(D):
             z[j] = max(x[j], 0.0) / scale[j]
         # The multipliers are stored in single precision.
-        largest = z[1:].max()
+        largest = z[1]
+        for j in range(1, m):
+            largest = max(largest, z[1 + j])
         positive = z[0] > SLIGHT * largest
         unit = z[0] if positive else largest
         z[0] = 1.0 if positive else 0.0
@@ -436,28 +566,65 @@ def multipliers(
 
 
 @njit(cache=True)
-def _joined(points: Array, G: Array, w: Array, origin: Array, n: int, slot: int) -> int:
-    """Adds the point in a slot to the n points of a hull, moves their weights, and returns how many are left."""
-    D = points.shape[1]
-    for i in range(n):
-        t = 0.0
-        for j in range(D):
-            t += points[origin[i], j] * points[slot, j]
-        G[i, n] = G[n, i] = t
-    G[n, n] = points[slot] @ points[slot]
+def _dot(a: Array, b: Array) -> float:
+    """Returns a scalar product; for few elements this is faster than BLAS, which needs Python's lock."""
+    t = 0.0
+    for j in range(len(a)):
+        t += a[j] * b[j]
+    return t
+
+
+@njit(cache=True)
+def _joined(points: Array, G: Array, w: Array, origin: Array, n: int, slot: int, axis: int) -> int:
+    """Adds the point in a slot to the n points of a hull, moves their weights, and returns how many are left.
+
+    Args:
+        axis: the point is the unit vector of this coordinate, or -1.
+    """
+    if axis < 0:
+        for i in range(n):
+            t = 0.0
+            for j in range(points.shape[1]):
+                t += points[origin[i], j] * points[slot, j]
+            G[i, n] = G[n, i] = t
+        G[n, n] = points[slot] @ points[slot]
+    else:
+        for i in range(n):
+            G[i, n] = G[n, i] = points[origin[i], axis]
+        G[n, n] = 1.0
     origin[n] = slot
     w[n] = 1.0 if n == 0 else 0.0
     return weigh(G, w, origin, n + 1)
 
 
 @njit(cache=True)
-def _violated(values: Array, chosen: Array, n: int) -> int:
+def _violated(gain: Array, chosen: Array, n: int, worst: Array) -> int:
     """Adds the faces that are violated most to the chosen ones, and returns how many these are then."""
-    for j in np.argsort(values)[:MORE]:
-        if values[j] < 0 and n < len(chosen) and not (chosen[:n] == j).any():
+    count = 0
+    for j in range(len(gain)):
+        if gain[j] > 0:
+            count = _ranked(gain, worst, 0, count, j, MORE)
+    for j in worst[:count]:
+        if n < len(chosen) and not (chosen[:n] == j).any():
             chosen[n] = j
             n += 1
     return n
+
+
+@njit(cache=True)
+def _parts(chosen: Array, n: int, local: Array, own: Array, outside: Array, rest: Array) -> tuple[Array, Array, Array, Array]:
+    """Returns the constants and slopes of the first n chosen faces, one row for each, of those that stand in columns."""
+    constant, to_own, to_outside, to_rest = np.empty(n), np.empty((n, len(own))), np.empty((n, len(outside))), np.empty((n, len(rest)))
+    for x in range(n):
+        j = chosen[x]
+        constant[x] = local[j]
+        for i in range(len(own)):
+            to_own[x, i] = own[i, j]
+        for i in range(len(outside)):
+            to_outside[x, i] = outside[i, j]
+        for i in range(len(rest)):
+            to_rest[x, i] = rest[i, j]
+    return constant, to_own, to_outside, to_rest
 
 
 @njit(cache=True)
@@ -488,8 +655,9 @@ def prove(
     be when the face is moved in. Such a piece is halved in this joint, unless f alone will do.
 
     Args:
-        c, den, constant, own, outside, rest: as for :func:`lowest`.
+        c, den: as for :func:`lowest`.
         ends: as for :func:`evaluate`.
+        constant, own, outside, rest: (m,), (k, m), (o, m), (r, m) of the faces, in the coordinates of the cell.
         precision: control values must be larger than this multiple of the magnitude of what they are made of.
         most: give up after this many pieces.
         codes, counts, faces, values: streams of the proof (certifier.proof.partition), written from ``lengths`` on.
@@ -501,14 +669,14 @@ def prove(
     Returns:
         PROVED, REFUTED or UNDECIDED.
     """
-    N, m, k, o, r = c.shape[1], len(constant), den.shape[1], c.shape[0] - 1, rest.shape[1]
+    N, m, k, o, r = c.shape[1], len(constant), den.shape[1], c.shape[0] - 1, rest.shape[0]
     D = 1 + m
     stack_den, stack_z = np.empty((DEPTH, 2, k, 4)), np.empty((DEPTH, D))
     center, half = np.zeros((DEPTH, o)), np.ones((DEPTH, o))
     stack[0], stack_den[0], stack_z[0, :], stack_z[0, 0] = c, den, 0.0, 1.0
-    slopes, local, g_out = np.zeros(k + o), np.zeros(m), np.zeros((m, o))
+    slopes, local, g_out, f = np.zeros(k + o), np.zeros(m), np.zeros((o, m)), np.empty(N)
     scale, whole, least, some, enough, few = np.zeros(D), np.zeros(D), np.zeros(D), np.zeros(D), np.zeros(D), np.zeros(D)
-    values_at, chosen, reach = np.zeros(m), np.zeros(m, np.int64), np.zeros(k)
+    gain, chosen, held, worst, reach = np.zeros(m), np.zeros(m, np.int64), np.zeros(m, np.int64), np.zeros(MORE, np.int64), np.zeros(k)
     z, spot = np.zeros(D), np.zeros(k + o + r)
     level, done = np.zeros(DEPTH, np.int64), 0.0
     top, count = 1, 0
@@ -517,29 +685,36 @@ def prove(
         top -= 1
         count += 1
         cc, now = stack[top], stack_den[top]
-        size, weight = max(cc[0].max(), -cc[0].min()), 1.0
+        low, high = _range(cc[0])
+        size, weight = max(high, -low), 1.0
         wide = -1
         for i in range(k):
-            if now[0, i].min() < 0:
-                wide = i
-            largest = np.abs(now[0, i]).max()
+            largest, reach[i] = 0.0, 0.0
+            for x in range(4):
+                if now[0, i, x] < 0:
+                    wide = i
+                largest = max(largest, abs(now[0, i, x]))
+                reach[i] = max(reach[i], abs(now[1, i, x]))
             weight *= largest
-            reach[i] = np.abs(now[1, i]).max() / largest
-        for j in range(m):
-            local[j] = constant[j]
-            for i in range(o):
-                local[j] += outside[j, i] * center[top, i]
-                g_out[j, i] = outside[j, i] * half[top, i]
+            reach[i] /= largest
+        local[:] = constant
+        for i in range(o):
+            for j in range(m):
+                local[j] += outside[i, j] * center[top, i]
+                g_out[i, j] = outside[i, j] * half[top, i]
         scale[0] = size
-        for j in range(m):
-            t = abs(local[j])
-            for i in range(k):
-                t += abs(own[j, i]) * reach[i]
-            for i in range(o):
-                t += abs(g_out[j, i])
-            for i in range(r):
-                t += abs(rest[j, i])
-            scale[1 + j] = t * weight
+        bound = scale[1:]
+        bound[:] = np.abs(local)
+        for i in range(k):
+            for j in range(m):
+                bound[j] += abs(own[i, j]) * reach[i]
+        for i in range(o):
+            for j in range(m):
+                bound[j] += abs(g_out[i, j])
+        for i in range(r):
+            for j in range(m):
+                bound[j] += abs(rest[i, j])
+        bound *= weight
         z[:] = stack_z[top]
         if wide >= 0:
             z[1:] = 0.0
@@ -547,18 +722,33 @@ def prove(
             whole[:] = scale
         # The verifier's bound of rounding errors is about the whole cell.
         least[:] = precision * np.maximum(scale, WHOLE * whole)
-        found = lowest(z, cc, now, local, own, g_out, rest, slopes)[0] > (z * least).sum()
-        if not found and z[1:].any():
+        least_of_f = _alone(cc, f)
+        n = 0
+        for j in range(m):
+            if z[1 + j] != 0.0:
+                held[n] = j
+                n += 1
+        found = False
+        if n:
+            some[0] = z[0]
+            for x in range(n):
+                some[1 + x] = z[1 + held[x]]
+            parts = _parts(held, n, local, own, g_out, rest)
+            found = lowest(some[: 1 + n], cc, now, *parts, slopes)[0] > _dot(z, least)
+        if not found:
             z[:] = 0.0
             z[0] = 1.0
-            found = lowest(z, cc, now, local, own, g_out, rest, slopes)[0] > least[0]
+            found = least_of_f > least[0]
+        n = 0
         if not found and m and wide < 0:
-            n = choose(cc, now, local, own, g_out, rest, scale, stack_z[top], chosen)
+            n = choose(f, cc, now, local, own, g_out, scale, stack_z[top], 0.5 * least_of_f, chosen)
+            place = _first(f, least_of_f)
             for _ in range(ATTEMPTS):
-                some[0], some[1 : 1 + n] = scale[0], scale[1 + chosen[:n]]
-                enough[0], enough[1 : 1 + n] = least[0], least[1 + chosen[:n]]
-                parts = (local[chosen[:n]], own[chosen[:n]], g_out[chosen[:n]], rest[chosen[:n]])
-                kind = multipliers(cc, now, *parts, some[: 1 + n], enough[: 1 + n], few[: 1 + n], spot)
+                some[0], enough[0] = scale[0], least[0]
+                for x in range(n):
+                    some[1 + x], enough[1 + x] = scale[1 + chosen[x]], least[1 + chosen[x]]
+                parts = _parts(chosen, n, local, own, g_out, rest)
+                kind = multipliers(cc, now, *parts, some[: 1 + n], enough[: 1 + n], place, few[: 1 + n], spot)
                 if kind == PROVED:
                     z[:] = 0.0
                     z[0] = few[0]
@@ -574,22 +764,27 @@ def prove(
                     break
                 for i in range(o):
                     spot[k + i] = center[top, i] + half[top, i] * spot[k + i]
+                gain[:] = constant
+                for i in range(k):
+                    for j in range(m):
+                        gain[j] += own[i, j] * spot[i]
+                for i in range(o):
+                    for j in range(m):
+                        gain[j] += outside[i, j] * spot[k + i]
+                for i in range(r):
+                    for j in range(m):
+                        gain[j] += rest[i, j] * spot[k + o + i]
+                inside = True
                 for j in range(m):
-                    t = constant[j]
-                    for i in range(k):
-                        t += own[j, i] * spot[i]
-                    for i in range(o):
-                        t += outside[j, i] * spot[k + i]
-                    for i in range(r):
-                        t += rest[j, i] * spot[k + o + i]
-                    values_at[j] = min(t * weight / scale[1 + j] + OUTSIDE, 0.0)
-                if values_at.min() >= 0:
+                    gain[j] = -(gain[j] * weight / bound[j] + OUTSIDE)
+                    inside = inside and gain[j] <= 0
+                if inside:
                     if evaluate(c, spot, ends) < 0:
                         point[:] = spot
                         return REFUTED
                     break
                 before = n
-                n = _violated(values_at, chosen, n)
+                n = _violated(gain, chosen, n, worst)
                 if n == before:
                     break
         if found:
@@ -627,8 +822,10 @@ def prove(
         level[top + 1] = level[top]
         stack_den[top + 1] = now
         if axis < k:
-            halve(cc, axis, k, stack[top + 1], cc)
-            halve(now[:, axis], 0, 1, stack_den[top + 1, :, axis], now[:, axis])
+            halve(cc, axis, k, stack[top + 1])
+            upper, lower = now[:, axis].copy(), np.empty((2, 4))
+            halve(upper, 0, 1, lower)
+            stack_den[top + 1, :, axis], now[:, axis] = lower, upper
         else:
             i = axis - k
             stack[top + 1] = cc

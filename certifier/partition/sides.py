@@ -104,12 +104,12 @@ class Side:
         offset = d - C[:, outside] @ mid[outside] - C[:, rest] @ mid[rest]
         g = (
             np.ascontiguousarray(offset),
-            np.ascontiguousarray(-C[:, own]),
-            np.ascontiguousarray(-C[:, outside] * half[outside]),
-            np.ascontiguousarray(-C[:, rest] * half[rest]),
+            np.ascontiguousarray(-C[:, own].T),
+            np.ascontiguousarray((-C[:, outside] * half[outside]).T),
+            np.ascontiguousarray((-C[:, rest] * half[rest]).T),
         )
         found: dict[int, Streams] = {}
-        for vertex in np.argsort((c[:, 0] - np.abs(c[:, 1:]).sum(axis=1)).min(axis=1)):
+        for vertex in np.argsort(bernstein.leasts(c)):
             codes, counts, numbers, values = _room()
             lengths, point, halvings = np.zeros(3, np.int64), np.zeros(len(mid)), np.zeros(len(own) + len(outside), np.int64)
             out = (codes, counts, numbers, values, lengths, point, halvings)

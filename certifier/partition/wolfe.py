@@ -14,25 +14,24 @@ NOTHING = 1e-12
 """A weight below this counts as 0."""
 
 
-@njit(cache=True)
-def _solved(A: Array) -> Array:
-    """Returns A^-1 times ones for a positive definite matrix, by Cholesky's method; A is overwritten."""
-    m = len(A)
-    x = np.ones(m)
+@njit(cache=True, inline="always")
+def _solve(A: Array, x: Array, m: int) -> None:
+    """Fills in A^-1 times ones for a positive definite matrix of m rows, by Cholesky's method; the lower half of A is overwritten."""
     for j in range(m):
         for i in range(j, m):
             t = A[i, j]
             for a in range(j):
                 t -= A[i, a] * A[j, a]
             A[i, j] = np.sqrt(max(t, 1e-300)) if i == j else t / A[j, j]
+        t = 1.0
         for a in range(j):
-            x[j] -= A[j, a] * x[a]
-        x[j] /= A[j, j]
+            t -= A[j, a] * x[a]
+        x[j] = t / A[j, j]
     for j in range(m - 1, -1, -1):
+        t = x[j]
         for a in range(j + 1, m):
-            x[j] -= A[a, j] * x[a]
-        x[j] /= A[j, j]
-    return x
+            t -= A[a, j] * x[a]
+        x[j] = t / A[j, j]
 
 
 @njit(cache=True)
@@ -47,19 +46,27 @@ def weigh(G: Array, w: Array, rows: Array, m: int) -> int:
     Returns:
         How many points are left.
     """
+    A, best = np.empty((m, m)), np.empty(m)
     while m > 1:
         trace = 0.0
         for i in range(m):
             trace += G[i, i]
-        A = np.empty((m, m))
+        shift = trace / m
         for i in range(m):
-            for j in range(m):
-                A[i, j] = G[i, j] + trace / m
+            for j in range(i + 1):
+                A[i, j] = G[i, j] + shift
             A[i, i] += 1e-13 * trace
-        best = _solved(A)
-        best /= best.sum()
-        if best.min() > NOTHING:
-            w[:m] = best
+        _solve(A, best, m)
+        total = 0.0
+        for i in range(m):
+            total += best[i]
+        positive = True
+        for i in range(m):
+            best[i] /= total
+            positive = positive and best[i] > NOTHING
+        if positive:
+            for i in range(m):
+                w[i] = best[i]
             return m
         share = 1.0
         for i in range(m):
