@@ -5,8 +5,9 @@ Let i be one of the k *own* joints, those between the frame F and the side's bod
     s_i = ((1 - t) w0 l + t w1 u) / ((1 - t) w0 + t w1),   t in [0, 1],
 
 runs over the range. A factor T0 + T1 s_i + T2 s_i^2 of the kinematics, times the square of the denominator, has the control matrices
-w0^2 (T0 + T1 l + T2 l^2), w0 w1 (T0 + T1 (l + u)/2 + T2 l u) and w1^2 (T0 + T1 u + T2 u^2). Their tensor product along the path is X_FB's.
-Times the linear forms (w0, w1) for 1 and (w0 l, w1 u) for s_i, everything is of degree 3 in each own joint: 4^k control points alpha, of
+w0^2 (T0 + T1 l + T2 l^2), w0 w1 (T0 + T1 (l + u)/2 + T2 l u) and w1^2 (T0 + T1 u + T2 u^2). Times the linear forms (w0, w1) for 1 or
+(w0 l, w1 u) for s_i, it is of degree 3 and has four control matrices. The tensor product of such along the path, with the form for s_i at
+no joint or at one, is X_FB's or s_i X_FB's. So there are 4^k control points alpha, of
 
     D = den,   T_i = den s_i,   C_0 = den f's part without tau,   C_o = den f's part with tau_o,
 
@@ -29,12 +30,15 @@ is rounded once. A computed number is a sum of products of inputs in which each 
 operations, has m roundings at most. Absolute values change none of that. So it is wrong by at most ((1 + u)^K - 1) times its *size*, which
 is the same expression in absolute values. The kinematics have
 
-    K(l l) = K(w w) = K((l + u)/2) = 1,  K(control matrix) <= 7,  K(X) <= 7 + 11 (k - 1) <= 73 for k <= 7 (each product adds 7 + 1 + 3),
-    K(vertex) <= K(X) + 4,  K(b - r kappa) <= 2,  K(Z_0 + sum Z_o m_o) <= 17,  K(a'p + b - r kappa) <= 17 + 77 + 4 = 98,
-    degree 3: at most 5 for every own joint (w l, product, sum, division, sum), hence K(C), K(D), K(T) <= 98 + 35 = 133,
-    64 halvings of 3 roundings each: K <= 325,
+    K(l l) = K(w w) = K((l + u)/2) = 1,  K(control matrix) <= 7,  of degree 3: K <= 7 + 5 = 12 (w l, product, sum, division),
+    K(b - r kappa) <= 2,  K(Z_0 + sum Z_o m_o) <= 17; times a joint's matrices for 1 and s_i: each time 12 + 4 + 1 more,
+    vertices: each joint 12 + 4 more; for k <= 7 joints, of which at most 3 are multiplied to the rows and 4 to the vertices, and a sum of
+    4 (1 + 4) products at last: K(C) <= (17 + 3 17) + 4 16 + 20 = 152,
+    K(D), K(T) <= 7 12 + 7 = 91, products of one factor for each own joint, the entries [3][3] of the matrices,
+    64 halvings, sums of 4 products, hence of 4 roundings each: K(C) <= 408,  K(D), K(T) <= 347,
     L and S of M multipliers: M + 1; times m_o (64 halvings), and the sum over n <= 64 joints: M + 1 + 65 + 66 = M + 132,
-    times D: M + 457; the sum of at most 8 + 14 + 2 terms: M + 481.
+    times D and T, factor by factor, with a product and a sum for each, and S_i's own product: M + 132 + 7 (12 + 2) + 1 + 256 = M + 487,
+    then C_0 is added, and 14 sums of two terms are subtracted at most: M + 503.
 
 So K = M + 512 holds with room, and (1 + u)^K - 1 <= 1.01 K u. The size is not computed for every alpha: the largest of each factor's
 entries gives an upper bound that holds for all of them, and for all pieces of a cell, as halving takes means. The bound 2 K u size leaves a
@@ -43,17 +47,20 @@ factor 1.9 for the roundings of the size itself.
 Products may underflow: each is then wrong by 2^-1074 more. Every magnitude from which the sizes of C, D and T are made is at least 2^-40,
 and no product has more than 20 factors, so its size is at least 2^-800. An underflow is therefore less than u times the size, and counts as
 one of the roundings, of which every product was given one. What underflows in L and S is less than u times the 2^-40 that is added to the
-size of what multiplies D. Overflow makes something that is not finite, which is refused.
+size of what multiplies D. Overflow makes something that is not finite, which is refused; with a zero of the matrices that halve, it may
+make others so as well. Zeros round nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
 from certifier.model import Array, Volume
+from certifier.verify.bernstein import HALVES, combined, half_of, products, raised
 from certifier.verify.kinematics import ExactKinematics
 from certifier.verify.streams import Sums
 
@@ -88,34 +95,63 @@ class Control:
 
     Attributes:
         c: (B, V, 1 + kB, N) C_0 and the C_o.
-        dt: (B, 1 + kA, N) D and the T_i.
+        factors: (B, kA, 4) the factors of D, of one own joint each.
+        others: (B, kA, 4) what takes a factor's place in T_i.
         mid: (B, kB) m_o.
         half: (B, kB) h_o.
         c_size: (B, V, 1 + kB) sizes of c.
-        dt_size: (B, 1 + kA) sizes of dt.
+        dt_size: (B, 1 + kA) sizes of D and the T_i.
         mid_size: (B, kB) sizes of m_o and h_o.
     """
 
     c: Array
-    dt: Array
+    factors: Array
+    others: Array
     mid: Array
     half: Array
     c_size: Array
     dt_size: Array
     mid_size: Array
 
-    def part(self, box: int, vertices: np.ndarray) -> Control:
-        """Returns some vertices on one of the pieces."""
-        one = slice(box, box + 1)
-        c, c_size = self.c[one, vertices], self.c_size[one, vertices]
-        return Control(c, self.dt[one], self.mid[one], self.half[one], c_size, self.dt_size[one], self.mid_size[one])
+    @property
+    def dt(self) -> Array:
+        """Returns D and the T_i, (B, 1 + kA, N)."""
+        B, own = self.factors.shape[:2]
+        return combined(np.broadcast_to(np.eye(1 + own), (B, 1 + own, 1 + own)), self.factors, self.others, self.den)
+
+    @cached_property
+    def den(self) -> list[Array]:
+        """Returns D's factors for no own joint, for the last one, for the last two multiplied, and so on; D, (B, N), is the last."""
+        return products(self.factors)
+
+    def single(self) -> Control:
+        """Returns B V pieces of one vertex each; those of a piece's vertices follow each other."""
+        B, V = self.c.shape[:2]
+        alone = {name: getattr(self, name).reshape(B * V, 1, *getattr(self, name).shape[2:]) for name in ("c", "c_size")}
+        return Control(**alone, **{name: np.repeat(getattr(self, name), V, axis=0) for name in _ARRAYS if name not in alone})
+
+    def some(self, pieces: slice) -> Control:
+        """Returns some of the pieces."""
+        return Control(*(getattr(self, name)[pieces] for name in _ARRAYS))
+
+    @classmethod
+    def together(cls, parts: Sequence[Control], places: np.ndarray) -> Control:
+        """Returns the pieces of all parts, each in its place."""
+        first = parts[0]
+        found = cls(*(np.empty((len(places), *getattr(first, name).shape[1:])) for name in _ARRAYS))
+        begin = 0
+        for part in parts:
+            end = begin + len(part.c)
+            for name in _ARRAYS:
+                getattr(found, name)[places[begin:end]] = getattr(part, name)
+            begin = end
+        return found
 
     def halves(self, axis: int) -> tuple[Control, Control]:
         """Returns the lower and the upper half along an axis: first the own joints, then the outside ones."""
-        own = self.dt.shape[1] - 1
+        own = self.factors.shape[1]
         if axis < own:
-            (c_low, c_high), (dt_low, dt_high) = _casteljau(self.c, axis, own), _casteljau(self.dt, axis, own)
-            return self._with(c_low, dt_low, self.mid, self.half), self._with(c_high, dt_high, self.mid, self.half)
+            return self._half(axis, False), self._half(axis, True)
         o = axis - own
         step = 0.5 * self.c[:, :, 1 + o]
         low, high = self.c.copy(), self.c.copy()
@@ -126,10 +162,16 @@ class Control:
         half[:, o] *= 0.5
         mid_low[:, o] -= half[:, o]
         mid_high[:, o] += half[:, o]
-        return self._with(low, self.dt, mid_low, half), self._with(high, self.dt, mid_high, half)
+        return replace(self, c=low, mid=mid_low, half=half), replace(self, c=high, mid=mid_high, half=half)
 
-    def _with(self, c: Array, dt: Array, mid: Array, half: Array) -> Control:
-        return Control(c, dt, mid, half, self.c_size, self.dt_size, self.mid_size)
+    def _half(self, axis: int, upper: bool) -> Control:
+        factors, others, own = self.factors.copy(), self.others.copy(), self.factors.shape[1]
+        for values in (factors, others):
+            values[:, axis] = values[:, axis] @ HALVES[upper].T
+        return replace(self, c=half_of(self.c, axis, own, upper), factors=factors, others=others)
+
+
+_ARRAYS = tuple(field.name for field in fields(Control))
 
 
 class Side:
@@ -166,7 +208,7 @@ class Side:
     @property
     def entries(self) -> int:
         """Returns how many control values one vertex has in one cell."""
-        return (1 + len(self._play)) * 4 ** len(self.own)
+        return (1 + len(self.outside)) * 4 ** len(self.own)
 
     def control(self, lower: Array, upper: Array, plane: Array, vertices: slice) -> Control:
         """Returns the control values of some vertices on B cells.
@@ -176,7 +218,6 @@ class Side:
             upper: (B, k) largest values of the joints in play.
             plane: (B, 5, 1 + k) Z, and below it kappa, which bounds |a| on the cells.
         """
-        B, k = len(lower), len(self.own)
         l, u = lower[:, self.own], upper[:, self.own]
         w = np.stack([_weight(l, self._turns), _weight(u, self._turns)])
         mid, half = _mid_half(lower[:, self.outside], upper[:, self.outside])
@@ -184,28 +225,43 @@ class Side:
         Z[:, 3] -= self._radius * plane[:, 4]
         slopes = Z[:, :, [1 + o for o in self.outside]]
         constant = Z[:, :, 0] + np.einsum("bro,bo->br", slopes, mid)
-        own = Z[:, :, [1 + i for i in self.own]]
+        own = Z[:, :, [1 + self.own[i] for i in self._path]]
         rows = np.concatenate([constant[:, None], own.swapaxes(1, 2), (slopes * half[:, None]).swapaxes(1, 2)], axis=1)
-        X = self._pose(_control_matrices(self._terms, l, u, w))
+        matrices = _control_matrices(self._terms, l, u, w)
+        one, s = raised(matrices, w), raised(matrices, np.stack([w[0] * l, w[1] * u]))
         h = self._vertices[vertices]
-        q = np.moveaxis((rows[:, None] @ X) @ h.T, 1, 3).swapaxes(1, 2)  # (B, V, 1 + k, 3^k)
-        D = X[..., 3, 3]
-        one, s = w, np.stack([w[0] * l, w[1] * u])
-        c = _elevated(q.reshape(*q.shape[:3], *[3] * k), one, s, k)
-        dt = D.reshape(B, 1, 1, *[3] * k)
-        for i in range(k):
-            dt = np.concatenate([_times(dt, 3 + i, one[:, :, i]), _times(dt[:, :, :1], 3 + i, s[:, :, i])], axis=2)
-        dt = dt.reshape(B, 1 + k, -1)
-        return Control(c, dt, mid, half, *self._sizes(l, u, w, lower, upper, plane, h))
+        c = self._values_of(rows, one, s, h)
+        return Control(c, one[..., 3, 3], s[..., 3, 3], mid, half, *self._sizes(l, u, w, lower, upper, plane, h))
 
-    def _pose(self, matrices: Array) -> Array:
-        """Returns the control matrices of X_FB, (B, 3^k, 4, 4), whose axes are the own joints in ascending order."""
-        B, k = len(matrices), len(self._path)
-        X = np.broadcast_to(self._fixed, (B, 1, 4, 4))
-        for number, i in enumerate(self._path):
-            X = matrices[:, i] if number == 0 else (X[:, :, None] @ matrices[:, None, i]).reshape(B, -1, 4, 4)
-        X = X.reshape(B, *[3] * k, 4, 4).transpose(0, *(1 + np.argsort(self._path)), 1 + k, 2 + k) if k else X
-        return X.reshape(B, 3**k, 4, 4)
+    def _values_of(self, rows: Array, one: Array, s: Array, h: Array) -> Array:
+        """Returns c: the rows times the matrices of the path times the vertices.
+
+        The first joints of the path are multiplied to the rows and the last ones to the vertices, so that the tables stay small until the
+        two are multiplied.
+
+        Args:
+            rows: (B, 1 + kA + kB, 4) what is multiplied by 1, by the own s_i in the order of the path, and by the tau_o.
+            one: (B, kA, 4, 4, 4) the control matrices of degree 3 of each own joint.
+            s: (B, kA, 4, 4, 4) the same times s_i.
+            h: (V, 4).
+        """
+        B, (V, k) = len(rows), (len(h), len(self._path))
+        first, last = self._path[: k // 2], self._path[k // 2 :]
+        left = rows[:, :, None]
+        for i in first:
+            left = _next_left(left, one[:, i], s[:, i])
+        right = np.broadcast_to(h.T if k else self._fixed @ h.T, (B, 1, 4, V))[..., None]
+        for i in reversed(last):
+            right = _next_right(right, one[:, i], s[:, i])
+        left = _in_order(left, 2, first)
+        right = _in_order(right, 4, last).swapaxes(2, 3).swapaxes(1, 2)  # (B, V, 1 + joints of last, 4, M)
+        shape = left.shape[2], right.shape[-1]
+        own, outside = left[:, : 1 + len(last)], left[:, None, 1 + len(last) :]
+        own = own.swapaxes(1, 2).reshape(B, 1, shape[0], -1)
+        c = np.empty((B, V, 1 + outside.shape[2], *shape))
+        np.matmul(own, right.reshape(B, V, -1, shape[1]), out=c[:, :, 0])
+        np.matmul(outside, right[:, :, :1], out=c[:, :, 1:])
+        return _in_order(c.reshape(B, V, -1, 4**k), 3, sorted(first) + sorted(last))
 
     def _sizes(self, l: Array, u: Array, w: Array, lower: Array, upper: Array, plane: Array, h: Array) -> tuple[Array, ...]:
         k = len(self.own)
@@ -247,16 +303,53 @@ class Side:
         slope, slope_size = sums.slope, sums.slope_size
         constant = -sums.offset + slope[..., other] @ box.mid[other] - np.abs(slope[..., other]) @ box.half[other]
         constant = constant + (slope[..., outside] * control.mid[:, None]).sum(axis=-1)
-        F = np.concatenate([constant[..., None], slope[..., own]], axis=-1) @ control.dt
-        F += z0[..., None] * control.c[:, :, 0]
-        tilt = slope[..., outside] * control.half[:, None]
-        for o in range(len(outside)):
-            F -= np.abs(z0[..., None] * control.c[:, :, 1 + o] + tilt[..., o, None] * control.dt[:, None, 0])
+        c = control.c if z0.all() else z0[..., None, None] * control.c
+        if sums.count.any():
+            weights = np.concatenate([constant[..., None], slope[..., own]], axis=-1)
+            F = combined(weights, control.factors, control.others, control.den)
+            F += c[:, :, 0]
+            tilt = slope[..., outside] * control.half[:, None]
+            for o in range(len(outside)):
+                term = tilt[..., o, None] * control.den[-1][:, None]
+                term += c[:, :, 1 + o]
+                F -= np.abs(term, out=term)
+        else:
+            F = c[:, :, 0].copy()
+            for o in range(len(outside)):
+                F -= np.abs(c[:, :, 1 + o])
         constant_size = sums.offset_size + 2.0 * (slope_size[..., other] @ box.size[other])
         constant_size = constant_size + 2.0 * (slope_size[..., outside] * control.mid_size[:, None]).sum(axis=-1)
         size = z0 * control.c_size.sum(axis=-1) + (LEAST + constant_size) * control.dt_size[:, None, 0]
         size = size + (slope_size[..., own] * control.dt_size[:, None, 1:]).sum(axis=-1)
         return F, rounding(size, sums.count)
+
+
+def _next_left(left: Array, one: Array, s: Array) -> Array:
+    """Multiplies rows, (B, R, M, 4), by the next joint of the path, and returns (B, R - 1, 4 M, 4). Row 1 is of this joint's s_i."""
+    B, R, M, _ = left.shape
+    by_one, by_s = (x.swapaxes(1, 2).reshape(B, 4, 16) for x in (one, s))
+    found = np.concatenate([left[:, :1], left[:, 2:]], axis=1) @ by_one[:, None]
+    found[:, 0] += left[:, 1] @ by_s
+    return found.reshape(B, R - 1, 4 * M, 4)
+
+
+def _next_right(right: Array, one: Array, s: Array) -> Array:
+    """Multiplies the joint of the path before them by columns, (B, T, 4, V, M), and returns (B, T + 1, 4, V, 4 M). Column 1 has its s_i."""
+    B, T, _, V, M = right.shape
+    columns = right.reshape(B, T, 4, V * M)
+    by_one, by_s = one.reshape(B, 1, 16, 4) @ columns, s.reshape(B, 1, 16, 4) @ columns[:, :1]
+    found = np.concatenate([by_one[:, :1], by_s, by_one[:, 1:]], axis=1)
+    return found.reshape(B, T + 1, 4, 4, V, M).transpose(0, 1, 3, 4, 2, 5).reshape(B, T + 1, 4, V, 4 * M)
+
+
+def _in_order(a: Array, axis: int, joints: Sequence[int]) -> Array:
+    """Returns values whose axis stands for an axis of 4 for each of the joints, in ascending order of these."""
+    if list(joints) == sorted(joints):
+        return a
+    k, shape = len(joints), a.shape
+    split = a.reshape(*shape[:axis], *[4] * k, *shape[axis + 1 :])
+    order = [*range(axis), *(axis + np.argsort(joints)), *range(axis + k, split.ndim)]
+    return split.transpose(order).reshape(shape)
 
 
 def _weight(s: Array, turns: np.ndarray) -> Array:
@@ -279,35 +372,3 @@ def _control_matrices(terms: Array, l: Array, u: Array, w: Array) -> Array:
         return found
 
     return np.stack([at(l, l * l, w[0] * w[0]), at(0.5 * (l + u), l * u, w[0] * w[1]), at(u, u * u, w[1] * w[1])], axis=2)
-
-
-def _elevated(q: Array, one: Array, s: Array, k: int) -> Array:
-    """Returns, (B, V, R, 4^k), q_0 + sum_i q_i s_i in the first row and the further rows after it, all times the linear forms.
-
-    Args:
-        q: (B, V, 1 + k + ..., 3, ..., 3) control values of degree 2: q_0, the q_i, and the further rows.
-        one: (2, B, k) the linear forms of 1.
-        s: (2, B, k) the linear forms of s_i.
-    """
-    for i in range(k):
-        axis = 3 + i
-        first = _times(q[:, :, :1], axis, one[:, :, i]) + _times(q[:, :, 1:2], axis, s[:, :, i])
-        q = np.concatenate([first, _times(q[:, :, 2:], axis, one[:, :, i])], axis=2)
-    return q.reshape(*q.shape[:3], -1)
-
-
-def _times(a: Array, axis: int, b: Array) -> Array:
-    """Returns the product, of degree 3 along an axis, of values of degree 2 and the linear form b, (2, B)."""
-    a0, a1, a2 = np.moveaxis(a, axis, 0)
-    b0, b1 = b.reshape(2, -1, *[1] * (a.ndim - 2))
-    return np.stack([a0 * b0, (2.0 * a1 * b0 + a0 * b1) / 3.0, (a2 * b0 + 2.0 * a1 * b1) / 3.0, a2 * b1], axis=axis)
-
-
-def _casteljau(a: Array, axis: int, k: int) -> tuple[Array, Array]:
-    """Returns the control values, (..., 4^k), of the lower and the upper half along an axis of those of degree 3."""
-    c0, c1, c2, c3 = np.moveaxis(a.reshape(*a.shape[:-1], *[4] * k), a.ndim - 1 + axis, 0)
-    d0, d1, d2 = 0.5 * (c0 + c1), 0.5 * (c1 + c2), 0.5 * (c2 + c3)
-    e0, e1 = 0.5 * (d0 + d1), 0.5 * (d1 + d2)
-    f = 0.5 * (e0 + e1)
-    low, high = (np.stack(values, axis=a.ndim - 1 + axis).reshape(a.shape) for values in ([c0, d0, e0, f], [f, e1, d2, c3]))
-    return low, high

@@ -20,7 +20,9 @@ then.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,8 +37,14 @@ from certifier.verify.kinematics import ExactKinematics, exact
 from certifier.verify.streams import Cells, Cuts, Multipliers, Pieces
 from certifier.verify.volume import check_volume
 
-TOGETHER = 1 << 18
-"""About so many control values are computed at once."""
+TOGETHER = 1 << 19
+"""About so many control values are computed at once. NumPy's calls are cheap then; up to 2 PIECE_DEPTH times as many may wait."""
+CORNERS = 1 << 18
+"""About so many corners of cells are looked at at once."""
+_BARE, _END = -2, -1
+"""Pieces that are halved no more have these axes: those with z0 = 1 and without multipliers, and others."""
+_TINY = 2.0**-1000
+"""Values of D that are not positive count as this: they bound no distance."""
 _DOWN, _UP = 1 - 2.0**-40, 1 + 2.0**-40
 """These factors round a few operations down and up."""
 
@@ -133,9 +141,9 @@ class CellCheck:
         least, with_plane = np.inf, np.flatnonzero(~cells.empty)
         choices = self._proof.choices[cells.plane[with_plane]]
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
-            for choice, sides in self._sides.items():
+            for choice in self._sides:
                 same = with_plane[choices == choice]
-                together = max(1, TOGETHER // max(*(side.vertices * side.entries for side in sides), 2 ** len(self._play)))
+                together = max(1, CORNERS >> len(self._play))
                 for first in range(0, len(same), together):
                     least = min(least, self._gap(cells, same[first : first + together], choice))
         return least
@@ -166,17 +174,20 @@ class CellCheck:
         for i, side in enumerate(self._sides[choice]):
             start = self._pieces.start(plane, choice, i)
             name = ", ".join(self._proof.volumes[i].geometries)
-            step = max(1, TOGETHER // side.entries)
             margin = np.full(len(some), np.inf)
-            for first in range(0, side.vertices, step):
-                part = slice(first, first + step)
-                control = side.control(lower, upper, Z, part)
-                margin = np.minimum(margin, self._side_margins(side, name, control, number, start[:, part], first))
+            step, vertices = max(1, TOGETHER // (side.vertices * side.entries)), max(1, TOGETHER // side.entries)
+            for first, vertex in itertools.product(range(0, len(some), step), range(0, side.vertices, vertices)):
+                part, these = slice(first, first + step), slice(vertex, vertex + vertices)
+                control = side.control(lower[part], upper[part], Z[part], these)
+                found = self._side_margins(side, name, control, number[part], start[part, these], vertex)
+                margin[part] = np.minimum(margin[part], found)
             margins += margin
         return float((margins / norms).min() * _DOWN)
 
     def _side_margins(self, side: Side, name: str, control: Control, number: np.ndarray, start: np.ndarray, vertex: int) -> Array:
         """Checks some vertices of a volume in B cells and returns, (B,), t with f >= t, infinite where a cell misses the polytope.
+
+        Pieces that have been halved equally often are halved together, each along its axis.
 
         Args:
             name: what the volume stands for, for errors.
@@ -184,51 +195,78 @@ class CellCheck:
             start: (B, V) where the vertices' trees begin.
             vertex: number of the first one.
         """
-        divided = self._pieces.kind(start) >= 0
-        margins = self._margins(side, name, control, number, np.where(divided, -1, start), vertex)
-        for box in np.flatnonzero(divided.any(axis=1)).tolist():
-            vertices = np.flatnonzero(divided[box])
-            parts: dict[int, int] = {}
-            for at in start[box, vertices]:
-                parts |= self._pieces.upper_parts(int(at))
-            pending = [(0, control.part(box, vertices), start[box, vertices], vertices)]
-            while pending:
-                depth, piece, at, which = pending.pop()
-                kind = self._pieces.kind(at)
-                ends = np.flatnonzero(kind < 0)
-                if ends.size:
-                    found = self._margins(side, name, piece.part(0, ends), number[box : box + 1], at[None, ends], vertex + which[ends])
-                    margins[box] = min(margins[box], found[0])
-                for axis in np.unique(kind[kind >= 0]).tolist():
-                    if depth == limits.PIECE_DEPTH:
-                        most = limits.PIECE_DEPTH
-                        raise ProofError("proof_too_large", f"{self._proof.title}: a piece is halved more than {most} times")
-                    same = np.flatnonzero(kind == axis)
-                    low, high = piece.part(0, same).halves(axis)
-                    upper = np.array([parts[int(x)] for x in at[same]])
-                    pending += [(depth + 1, high, upper, which[same]), (depth + 1, low, at[same] + 1, which[same])]
+        margins, together = np.full(len(number), np.inf), max(1, TOGETHER // side.entries)
+        cells, vertices = (x.reshape(-1) for x in np.indices(start.shape))
+        pending = [(0, self._sorted([control.single()], number, start.reshape(-1), cells, vertices))]
+        self._pieces.find_upper_parts(start)
+        while pending:
+            depth, batch = pending.pop()
+            halves: list[tuple[Control, np.ndarray, np.ndarray, np.ndarray]] = []
+            for axis in np.unique(batch.axis).tolist():
+                part = batch.some(slice(*np.searchsorted(batch.axis, [axis, axis + 1])))
+                if axis < 0:
+                    np.minimum.at(margins, part.cell, self._margins(side, name, part, number, vertex))
+                    continue
+                if depth == limits.PIECE_DEPTH:
+                    most = limits.PIECE_DEPTH
+                    raise ProofError("proof_too_large", f"{self._proof.title}: a piece is halved more than {most} times")
+                low, high = part.control.halves(axis)
+                halves.append((low, part.at + 1, part.cell, part.vertex))
+                halves.append((high, self._pieces.upper_part(part.at), part.cell, part.vertex))
+            if halves:
+                controls, *rest = zip(*halves, strict=True)
+                batch = self._sorted(controls, number, *map(np.concatenate, rest))
+                parts = [slice(i, i + together) for i in range(0, len(batch.at), together)]
+                pending += [(depth + 1, batch.some(part)) for part in reversed(parts)]  # those that are halved no more come first
         return margins
 
-    def _margins(self, side: Side, name: str, control: Control, number: np.ndarray, at: np.ndarray, vertex: int | np.ndarray) -> Array:
-        """Checks pieces, (B, V), given by their places in the stream, -1 where there is none; returns the least t of each cell, (B,)."""
-        here = at >= 0
-        z0 = here & (self._pieces.kind(at) == PLANE)
-        sums = self._multipliers.of_pieces(number[:, None], np.where(here, self._pieces.rank(at), -1))
-        F, bound = side.values(control, z0.astype(float), sums, self._box)
-        F -= bound[..., None]
-        proved = ~here | ((F > 0).all(axis=-1) & np.isfinite(F).all(axis=-1))
-        for box, v in np.argwhere(~proved):
-            which = vertex[v] if isinstance(vertex, np.ndarray) else vertex + v
+    def _sorted(self, controls: Sequence[Control], number: np.ndarray, at: np.ndarray, cell: np.ndarray, vertex: np.ndarray) -> _Batch:
+        """Returns pieces sorted by what becomes of them, so that those of which the same becomes are slices of arrays."""
+        kind = self._pieces.kind(at)
+        bare = (kind == PLANE) & (self._multipliers.count(number[cell], self._pieces.rank(at)) == 0)
+        axis = np.where(bare, _BARE, np.where(kind < 0, _END, kind)).astype(int)
+        order = np.argsort(axis, kind="stable")
+        return _Batch(Control.together(controls, np.argsort(order)), *(x[order] for x in (axis, at, cell, vertex)))
+
+    def _margins(self, side: Side, name: str, batch: _Batch, number: np.ndarray, vertex: int) -> Array:
+        """Checks P pieces that are halved no more, and returns of each, (P,), t with f >= t, infinite where it misses the polytope."""
+        z0, number, rank = self._pieces.kind(batch.at) == PLANE, number[batch.cell], self._pieces.rank(batch.at)
+        sums = self._multipliers.of_pieces(number[:, None], rank[:, None])
+        F, bound = (x[:, 0] for x in side.values(batch.control, z0[:, None].astype(float), sums, self._box))
+        F -= bound[:, None]
+        finite = F.max(axis=1) < np.inf
+        D = batch.control.den[-1] + rounding(batch.control.dt_size[:, :1], np.zeros(1))
+        F /= D if (batch.control.factors > 0).all() else np.maximum(D, _TINY)
+        t = F.min(axis=1)
+        for i in np.flatnonzero(~((t > 0) & finite)):
+            where = f"cell {number[i]}, vertex {vertex + batch.vertex[i]} of {name}, piece {rank[i]}"
             what = "the multipliers do not prove that it is on its side of the plane there, or that the piece misses the polytope"
-            raise self._refused(f"cell {number[box]}, vertex {which} of {name}, piece {self._pieces.rank(at[box, v])}", what)
-        D = control.dt[:, None, 0]
-        D = D + rounding(control.dt_size[:, :1, None], np.zeros(1))
-        t = np.where((D > 0) & z0[..., None], F / np.where(D > 0, D, 1.0), np.inf)
-        margins: Array = t.min(axis=(1, 2)) * _DOWN
-        return margins
+            raise self._refused(where, what)
+        return np.where(z0, t * _DOWN, np.inf)
 
     def _refused(self, where: str, why: str) -> ProofError:
         return ProofError("proof_cell", f"{self._proof.title}: {where}: {why}")
+
+
+class _Batch(NamedTuple):
+    """Holds P pieces of one vertex each.
+
+    Attributes:
+        control: of the pieces.
+        axis: (P,) along which each is halved, _BARE or _END; ascending.
+        at: (P,) where they are in the stream.
+        cell: (P,) number of the cell, among those that are checked together.
+        vertex: (P,) number of the vertex, in the same manner.
+    """
+
+    control: Control
+    axis: np.ndarray
+    at: np.ndarray
+    cell: np.ndarray
+    vertex: np.ndarray
+
+    def some(self, pieces: slice) -> _Batch:
+        return _Batch(self.control.some(pieces), self.axis[pieces], self.at[pieces], self.cell[pieces], self.vertex[pieces])
 
 
 def _norms(plane: Array, lower: Array, upper: Array) -> tuple[Array, Array]:

@@ -138,6 +138,7 @@ class Pieces:
         if len(self._bounds) != 1 + self._first[-1] or self._bounds[-1] != len(pieces):
             raise malformed(proof, f"the pieces are not {self._first[-1]} trees, one for each vertex of each plane")
         self._rank = np.cumsum(pieces < 0, dtype=np.int32)
+        self._upper = np.zeros(len(pieces), dtype=np.int32)
 
     def start(self, plane: np.ndarray, choice: int, side: int) -> np.ndarray:
         """Returns, (B, V), where the trees of a volume's vertices begin in the stream of pieces, for planes of these numbers, (B,).
@@ -161,23 +162,29 @@ class Pieces:
         begin = self._bounds[self._first[plane]]
         return np.where(begin > 0, self._rank[begin - 1] if self._rank.size else 0, 0)
 
-    def upper_parts(self, start: int) -> dict[int, int]:
-        """Returns, for every node that is halved of the tree that begins there, where its upper part begins; the lower one is next.
+    def find_upper_parts(self, start: np.ndarray) -> None:
+        """Finds where the upper parts begin in the trees that begin there, which :meth:`upper_part` then returns.
 
         Raises:
-            ProofError: the tree is too large.
+            ProofError: a tree is too large.
         """
-        end = int(self._bounds[np.searchsorted(self._bounds, start, "right")])
-        if end - start > limits.TREE:
-            raise ProofError("proof_too_large", f"{self._proof.title}: a vertex has more than {limits.TREE} nodes of pieces")
-        found: dict[int, int] = {}
-        heads: list[int] = []
-        for at in range(end - 1, start - 1, -1):
-            if self._proof.pieces[at] >= 0:
-                heads.pop()
-                found[at] = heads.pop()
-            heads.append(at)
-        return found
+        begins = start[self.kind(start) >= 0]
+        for begin, end in zip(begins.tolist(), self._bounds[np.searchsorted(self._bounds, begins, "right")].tolist(), strict=True):
+            if end - begin > limits.TREE:
+                raise ProofError("proof_too_large", f"{self._proof.title}: a vertex has more than {limits.TREE} nodes of pieces")
+            kinds = self._proof.pieces[begin:end].tolist()
+            found = [0] * len(kinds)
+            heads: list[int] = []
+            for i in reversed(range(len(kinds))):
+                if kinds[i] >= 0:
+                    heads.pop()
+                    found[i] = begin + heads.pop()
+                heads.append(i)
+            self._upper[begin:end] = found
+
+    def upper_part(self, at: np.ndarray) -> np.ndarray:
+        """Returns where the upper parts of nodes that are halved begin; the lower ones are next."""
+        return self._upper[at]
 
 
 @dataclass(frozen=True)
@@ -224,12 +231,13 @@ class Multipliers:
         leaves = proof.nodes[proof.nodes < 0]
         self._empty_before = np.cumsum(leaves == EMPTY, dtype=np.int32) - (leaves == EMPTY)
 
-    def of_pieces(self, number: np.ndarray, rank: np.ndarray) -> Sums:
-        """Returns the sums of pieces of leaves, (...), each given by its leaf's number and its rank among all pieces.
+    def count(self, number: np.ndarray, rank: np.ndarray) -> np.ndarray:
+        """Returns how many multipliers pieces of leaves have, (...), given as in :meth:`of_pieces`."""
+        return self._counts[rank + self._empty_before[number]]
 
-        A rank of -1 stands for a piece without multipliers.
-        """
-        return self._sums(np.where(rank < 0, -1, rank + self._empty_before[number]))
+    def of_pieces(self, number: np.ndarray, rank: np.ndarray) -> Sums:
+        """Returns the sums of pieces of leaves, (...), each given by its leaf's number and its rank among all pieces."""
+        return self._sums(rank + self._empty_before[number])
 
     def of_empty(self, number: np.ndarray, rank: np.ndarray) -> Sums:
         """Returns the sums of EMPTY leaves, (...), each given by its number and the number of pieces before it."""
@@ -237,14 +245,12 @@ class Multipliers:
 
     def _sums(self, at: np.ndarray) -> Sums:
         flat, C, d = at.reshape(-1), self._ground.C, self._ground.d
-        count = np.where(flat < 0, 0, self._counts[flat] if self._counts.size else 0).astype(np.int64)
+        count = self._counts[flat].astype(np.int64)
         sums: Array = np.zeros((len(flat), C.shape[1] + 1))
         sizes = np.zeros_like(sums)
         end = np.cumsum(count)
-        for part in np.split(np.arange(len(flat)), np.flatnonzero(np.diff(end // _MULTIPLIED)) + 1):
-            part = part[count[part] > 0]
-            if not part.size:
-                continue
+        some = np.flatnonzero(count)
+        for part in np.split(some, np.flatnonzero(np.diff(end[some] // _MULTIPLIED)) + 1) if some.size else ():
             first = end[part] - count[part]
             index = np.repeat(self._start[flat[part]] - (first - first[0]), count[part]) + np.arange(count[part].sum())
             face, weight = self._proof.faces[index], self._proof.multipliers[index].astype(float)[:, None]

@@ -165,6 +165,18 @@ def test_any_number_of_processes_finds_the_same_error(monkeypatch):
     assert "cell 2," in errors.pop()
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_any_number_of_values_together_finds_the_same(name, monkeypatch):
+    """To rounding: how BLAS adds up may depend on how much there is."""
+    true = proof(name)
+    gap = verify_separation(true).gap
+    for number in (1, 100):
+        monkeypatch.setattr(partition, "TOGETHER", number)
+        monkeypatch.setattr(partition, "CORNERS", number)
+        assert verify_separation(true).gap == pytest.approx(gap, rel=1e-9)
+        refused(replace(true, planes=-true.planes), "proof_cell")
+
+
 def refused(changed: PartitionProof, code: str | None = None, processes: int = 1) -> ProofError:
     with pytest.raises(ProofError) as refusal:
         verify_separation(changed, processes)
