@@ -499,6 +499,8 @@ class WorkerRow(Base):
     """What people want of it, a value of WorkerState."""
     state: Mapped[str] = mapped_column(String(16))
     """What it does, as it said last, a value of WorkerState."""
+    trouble: Mapped[str | None]
+    """What fails of what it does again and again, as it said last; None where all goes well."""
     created_at: Mapped[datetime]
     """When it began, by the database's clock."""
     seen_at: Mapped[datetime]

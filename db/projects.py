@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
@@ -23,6 +23,8 @@ from db.session import insert_new
 
 NAME = re.compile(r"\w[\w.@-]{0,63}")
 """Projects and keys have such names."""
+MOST_DAYS = 36_500
+"""A project keeps things for at most so many days. An earlier version took more: then nothing expires."""
 
 
 def add(session: Session, name: str) -> ProjectRow:
@@ -59,7 +61,12 @@ def all_of(session: Session) -> Sequence[ProjectRow]:
 
 def some_expires(session: Session) -> bool:
     """Says whether a project deletes what is old."""
-    return session.scalar(select(ProjectRow.name).where(ProjectRow.keep_days.is_not(None)).limit(1)) is not None
+    return session.scalar(select(ProjectRow.name).where(expires()).limit(1)) is not None
+
+
+def expires() -> ColumnElement[bool]:
+    """Returns the condition that a project deletes what is old."""
+    return ProjectRow.keep_days <= MOST_DAYS
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -72,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     setting = verbs.add_parser("set", help="set a project's limits; 0 for none")
     setting.add_argument("name")
     setting.add_argument("--max-bytes", type=_at_least_none, help="what the project stores may take so many bytes")
-    setting.add_argument("--keep-days", type=_at_least_none, help="jobs without a region are deleted so many days after their end")
+    setting.add_argument("--keep-days", type=_days, help="jobs without a region are deleted so many days after their end")
     given = parser.parse_args(arguments)
     for line in command_line.on_database(given.data, partial(_run, given=given)):
         print(line)
@@ -86,6 +93,13 @@ def _at_least_none(text: str) -> float:
     if not 0 <= number <= 2**62:
         raise argparse.ArgumentTypeError(f"{text} is not a number from 0 on; 0 takes the limit away")
     return number
+
+
+def _days(text: str) -> float:
+    days = _at_least_none(text)
+    if days > MOST_DAYS:
+        raise argparse.ArgumentTypeError(f"{text} is more than {MOST_DAYS}; 0 keeps everything")
+    return days
 
 
 def _run(session: Session, given: argparse.Namespace) -> list[str]:

@@ -14,7 +14,7 @@ from sqlalchemy import ColumnElement, Select, Text, cast, delete, exists, func, 
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db import jobs, proofs, regions, scenes
+from db import jobs, projects, proofs, regions, scenes
 from db.models import (
     EventRow,
     JobRow,
@@ -108,7 +108,7 @@ def expire(session: Session, now: datetime) -> int:
     A job without regions goes. Of one with regions, only these and its own row stay.
     """
     done = 0
-    for project in session.scalars(select(ProjectRow).where(ProjectRow.keep_days.is_not(None))):
+    for project in session.scalars(select(ProjectRow).where(projects.expires())):
         before = now - timedelta(days=project.keep_days or 0.0)
         # A cover goes when all of its jobs may go.
         other = JobRow.__table__.alias()

@@ -22,6 +22,7 @@ class Statistics:
         step_seconds: seconds spent on steps, summed by kind.
         waiting: seconds since an iteration began -> how many of its pieces are open, for iterations that run.
         workers: the workers that live, by kind and state.
+        workers_in_trouble: how many workers say that something of what they do again and again fails.
         workers_wanted: how many solving processes would be busy now if there were enough.
     """
 
@@ -33,6 +34,7 @@ class Statistics:
     regions: int
     waiting: dict[float, int]
     workers: dict[tuple[str, str], int]
+    workers_in_trouble: int
     workers_wanted: int
 
 
@@ -60,5 +62,6 @@ def collect(session: Session) -> Statistics:
         regions=session.scalar(select(func.count()).select_from(RegionRow)) or 0,
         waiting=waiting,
         workers=workers.counts(session),
+        workers_in_trouble=workers.in_trouble(session),
         workers_wanted=work.busy_solvers(session, batch_seconds=settings().batch_seconds),
     )

@@ -32,6 +32,7 @@ def main() -> None:
     from workers.presence import Presence
     from workers.processes import die_with_parent
     from workers.tasks import register
+    from workers.troubles import Troubles
 
     app = celery_app()
     register(app, queue)
@@ -57,7 +58,8 @@ def main() -> None:
     def before_end(**_: Any) -> None:
         traces.end()
 
-    presence = Presence(WorkerKind(queue), stop)
+    troubles = Troubles()
+    presence = Presence(WorkerKind(queue), stop, troubles)
 
     @worker_ready.connect(weak=False)
     def begin(sender: Any, **_: Any) -> None:
@@ -67,7 +69,7 @@ def main() -> None:
             from workers import checkpoints, sweeper, webhooks
 
             for loop in (sweeper.run, webhooks.run, checkpoints.run):
-                threading.Thread(target=loop, args=(stop,), name=loop.__module__, daemon=True).start()
+                threading.Thread(target=loop, args=(stop, troubles), name=loop.__module__, daemon=True).start()
 
     app.worker_main(
         [

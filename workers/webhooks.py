@@ -30,6 +30,7 @@ from db.settings import settings
 from db.types import utcnow
 from db.vault import vault
 from workers.addresses import resolve
+from workers.troubles import Troubles
 
 log = logging.getLogger(__name__)
 
@@ -38,18 +39,16 @@ SECONDS = 15.0
 """A receiver that has not answered within this many seconds has failed, even if it is still sending."""
 
 
-def run(stop: threading.Event) -> None:
+def run(stop: threading.Event, troubles: Troubles) -> None:
     """Delivers until ``stop`` is set. A round that fails (the database is away) is logged, and the next one tries again."""
     sealed = False
     while not stop.wait(settings().sweep_seconds):
-        try:
+        with troubles.noting("telling the receivers of webhooks"):
             if not sealed and vault().usable:
                 with database().write() as session:
                     webhooks.seal_all(session)
                 sealed = True
             deliver_due()
-        except Exception:
-            log.exception("a round of webhooks failed")
 
 
 def deliver_due() -> None:

@@ -70,6 +70,9 @@ def test_projects_on_the_command_line(tmp_path: Path, monkeypatch: pytest.Monkey
         projects.main(["set", "welding", "--max-bytes", "none"])
     assert "none is not a number from 0 on; 0 takes the limit away" in capsys.readouterr().err
     with pytest.raises(SystemExit):
+        projects.main(["set", "welding", "--keep-days", "1000000"])
+    assert "1000000 is more than 36500; 0 keeps everything" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
         keys.main(["revoke", "planner"])  # that of the default project
 
 

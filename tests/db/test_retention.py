@@ -138,6 +138,18 @@ def test_what_is_old_expires_where_the_project_says_so(db: Database) -> None:
         assert set(session.scalars(select(ProofRow.digest))) == {proofs.digest(b"of a region")}
 
 
+@pytest.mark.parametrize("days", [projects.MOST_DAYS + 1, 1e6, 2.0**62])
+def test_a_project_that_keeps_things_for_ever_stops_nobody(db: Database, days: float) -> None:
+    """An earlier version took such numbers, and no date is so long ago."""
+    with db.write() as session:
+        an_ended_job(session, with_region=False)
+        projects.add(session, "others").keep_days = days
+        session.flush()
+        assert not projects.some_expires(session)
+        projects.get(session, "default").keep_days = 7.0
+        assert retention.expire(session, utcnow() + timedelta(days=8)) == 1
+
+
 def test_a_cover_expires_after_its_jobs(db: Database) -> None:
     with db.write() as session:
         projects.get(session, "default").keep_days = 7.0

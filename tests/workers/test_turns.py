@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import timedelta
+from functools import partial
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -30,6 +32,7 @@ from workers import admission, sweeper, transaction
 from workers.app import CONTROL, SOLVE, send_coordinate, waiting
 from workers.scenes import load_scene
 from workers.solver import Piece, work
+from workers.troubles import Troubles
 from workers.turns import coordinate
 
 ELSEWHERE = "elsewhere:1:1"
@@ -379,6 +382,54 @@ def test_leases_are_not_ended_by_time_right_after_nobody_could_renew_them() -> N
     assert could_renew(200, 220, 240, 261) == [False, False, False, True]
     holders.could_not_write()
     assert could_renew(262) == [False]
+
+
+def lose_a_lease(job_id: str) -> None:
+    """A worker of another machine holds all pairs, and its leases have run out."""
+    with database().write() as session:
+        pairs.claim(session, jobs.lock(session, job_id), lease_seconds=60, batch_seconds=60)
+        session.execute(update(PairRow).values(worker=ELSEWHERE, lease_until=utcnow() - timedelta(seconds=1)))
+
+
+@pytest.mark.parametrize("chore", ["forget_gone", "expire", "shrink"])
+def test_tidying_up_that_fails_keeps_nothing_from_being_taken_back(job_id: str, monkeypatch: pytest.MonkeyPatch, chore: str) -> None:
+    done = []
+
+    def fails() -> None:
+        done.append(chore)
+        raise OverflowError
+
+    for name in ("forget_gone", "expire", "shrink"):
+        monkeypatch.setattr(sweeper, name, fails if name == chore else partial(done.append, name))
+    holders, troubles, now = sweeper.Holders(), Troubles(), utcnow()
+    lose_a_lease(job_id)
+    for seconds in range(0, 61, 20):
+        assert {row.state for row in pairs_of(job_id)} == {"running"}, "their holders may renew them"
+        monkeypatch.setattr(sweeper, "utcnow", partial(add, now, timedelta(seconds=seconds)))
+        sweeper.do_round(holders, troubles)
+    assert {row.state for row in pairs_of(job_id)} == {"open"}
+    assert sorted(done) == sorted(["forget_gone", "expire", "shrink"] * 4)
+    assert (troubles.said() or "").endswith("failed: OverflowError")
+    monkeypatch.setattr(sweeper, chore, list)
+    sweeper.do_round(holders, troubles)
+    assert troubles.said() is None
+
+
+def test_a_database_that_is_away_for_the_sweep_takes_no_lease_back(job_id: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    holders, troubles, now = sweeper.Holders(), Troubles(), utcnow()
+    lose_a_lease(job_id)
+    for seconds in range(0, 61, 20):
+        with monkeypatch.context() as away:
+            away.setattr(sweeper, "utcnow", partial(add, now, timedelta(seconds=seconds)))
+            if seconds == 40:
+                away.setattr(sweeper, "release_lost", partial(raise_, OperationalError("SELECT 1", {}, Away())))
+            sweeper.do_round(holders, troubles)
+        assert (troubles.said() is not None) == (seconds == 40)
+    assert {row.state for row in pairs_of(job_id)} == {"running"}
+
+
+def raise_(error: Exception, **_: object) -> None:
+    raise error
 
 
 @pytest.mark.parametrize(
