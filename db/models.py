@@ -429,9 +429,10 @@ class EventRow(Base):
     """An event says what happened to a job."""
 
     __tablename__ = "events"
-    __table_args__ = (UniqueConstraint("job_id", "seq"),)
+    __table_args__ = (UniqueConstraint("job_id", "seq"), {"sqlite_autoincrement": True})
 
     id: Mapped[int] = mapped_column(primary_key=True)
+    """No id comes again after a deletion, because clients ask for what is after the last one that they have seen."""
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"))
     seq: Mapped[int]
     """The event's number within the job: 1, 2, 3 ..."""

@@ -80,6 +80,17 @@ def test_an_interrupted_stream_goes_on_where_it_was(url: str, database: Database
     assert [line for line in nothing_new.text.splitlines() if line.startswith("event: ")] == ["event: end"]
 
 
+@pytest.mark.parametrize("path", ["/v1/jobs/{job_id}/events/stream", "/v1/events/stream"])
+def test_a_stream_that_is_to_go_on_beyond_the_last_event_tells_the_next_one(url: str, database: Database, job_id: str, path: str) -> None:
+    """Such a number is of a database that was put back to a backup, or nobody's."""
+    beyond = {"Last-Event-ID": str(2**31 - 1)}
+    with httpx2.stream("GET", url + path.format(job_id=job_id), headers=beyond, timeout=20) as response:
+        lines = response.iter_lines()
+        add(database, job_id, 7)
+        while json.loads(read(lines)["data"])["seq"] != 2:
+            pass
+
+
 def test_an_open_stream_does_not_keep_the_server_from_stopping(database: Database, job_id: str, url: str) -> None:
     with httpx2.stream("GET", f"{url}/v1/jobs/{job_id}/events/stream", timeout=60) as response:
         read(response.iter_lines())

@@ -116,6 +116,18 @@ def test_events_of_all_jobs_of_the_project_are_listed(client: TestClient, databa
     assert answer.json() == {"events": []}
 
 
+def test_no_event_is_lost_after_a_job_was_deleted(client: TestClient, database: Database, scene: Scene) -> None:
+    def made() -> str:
+        return str(client.post("/v1/jobs", json=GROW).json()["id"])
+
+    gone = made()
+    client.post(f"/v1/jobs/{gone}/cancel")
+    last = client.get("/v1/events").json()["events"][-1]["id"]
+    assert client.delete(f"/v1/jobs/{gone}").status_code == 204
+    job = made()
+    assert [event["job"] for event in client.get("/v1/events", params={"after": last}).json()["events"]] == [job]
+
+
 def test_one_stream_tells_of_all_jobs_also_of_late_ones(url: str, client: TestClient, database: Database, scene: Scene) -> None:
     before = labelled(client)
 
