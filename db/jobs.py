@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
 from typing import Any
@@ -19,6 +20,9 @@ from db.session import insert_new
 from db.settings import settings
 from db.states import JOB, STEP, JobKind, JobState, StepKind, transition, unfinished
 from db.types import utcnow
+
+ROW_BYTES = 1000
+"""A job counts as so many bytes besides its options and labels."""
 
 
 def create(
@@ -62,6 +66,7 @@ def create(
         "attempt": attempt,
         "parent_id": parent_id,
         "number": number,
+        "bytes": ROW_BYTES + len(json.dumps([options, dict(given_labels or {})])),
         "traceparent": traces.here(),
     }
     if insert_new(session, JobRow, [new]):

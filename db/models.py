@@ -143,7 +143,12 @@ class JobRow(Owned, Base):
     """A job is one request to grow a region, to certify a polytope or a motion, or to cover a scene; or a region of a cover."""
 
     __tablename__ = "jobs"
-    __table_args__ = (Index(None, "state"), Index(None, "project", "created_at", "id"), UniqueConstraint("parent_id", "number"))
+    __table_args__ = (
+        Index(None, "state"),
+        Index(None, "project", "created_at", "id"),
+        Index(None, "project", "bytes"),
+        UniqueConstraint("parent_id", "number"),
+    )
     transitions: ClassVar[states.Table] = states.JOB
 
     id: Mapped[str] = mapped_column(String(36), primary_key=True)
@@ -207,6 +212,8 @@ class JobRow(Owned, Base):
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
     deadline_at: Mapped[datetime | None]
+    bytes: Mapped[int] = mapped_column(BigInteger, default=0)
+    """What counts of the row for its project: the options and labels, and something for the rest (db.jobs). They never change."""
     traceparent: Mapped[str | None] = mapped_column(String(55))
     """Of the request that created the job (db.traces); None where nobody traces."""
 

@@ -161,9 +161,14 @@ def _bytes(session: Session, mine: Select[str]) -> int:
 
 
 def stored(session: Session, project: str) -> int:
-    """Returns how many bytes of scenes, proofs and cells a project stores."""
+    """Returns how many bytes of scenes, jobs, proofs and cells a project stores."""
     documents = select(func.sum(func.length(cast(SceneRow.document, Text)))).where(SceneRow.project == project)
-    return int(session.scalar(documents) or 0) + _bytes(session, select(JobRow.id).where(JobRow.project == project))
+    asked = select(func.sum(JobRow.bytes)).where(JobRow.project == project)
+    return (
+        int(session.scalar(documents) or 0)
+        + int(session.scalar(asked) or 0)
+        + _bytes(session, select(JobRow.id).where(JobRow.project == project))
+    )
 
 
 def _check(found: Dependents, number: int, what: str, dependents: bool) -> None:

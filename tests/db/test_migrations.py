@@ -182,6 +182,21 @@ def test_ids_of_events_go_on_from_the_largest_one_and_never_come_again(empty_dat
     database.close()
 
 
+def test_jobs_of_before_their_bytes_were_counted_count(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.write() as session:
+        job_id = a_job(session, given_labels={"team": "welding"}).id
+    database.close()
+    migrate.downgrade(empty_database_url, "0022")
+    migrate.upgrade(empty_database_url)
+    assert migrate.drift(empty_database_url) == []
+    database = Database(empty_database_url)
+    with database.read() as session:
+        assert jobs.get(session, job_id).bytes == jobs.ROW_BYTES + len('{"random_seed": 0}') + len("teamwelding")
+    database.close()
+
+
 def claimed(database: Database, job_id: str) -> pairs.Claim:
     with database.write() as session:
         claim = work.claim(session, job_id, lease_seconds=60, batch_seconds=0.5)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from datetime import timedelta
 from pathlib import Path
 
 import pytest
-from sqlalchemy import func, select
+from sqlalchemy import func, select, text
 
 from certifier.errors import CirisError
 from db import jobs, pairs, projects, proofs, regions, retention, scenes, subtrees
@@ -177,6 +178,33 @@ def test_bytes_are_counted_by_project(db: Database) -> None:
     with db.read() as session:
         assert retention.stored(session, "default") == 0
         assert retention.stored(session, "others") > len(b"of a pair" + b"of a region" + b"cells") + 500, "the scene counts, too"
+
+
+def test_what_jobs_were_asked_for_counts(db: Database) -> None:
+    options = {"seed": {"contain": [[0.125] * 7] * 2000}}
+    labels = {f"name{number}": "v" * 200 for number in range(20)}
+    with db.write() as session:
+        scene = a_scene(session)
+        before = retention.stored(session, "default")
+        job, _ = jobs.create(session, kind="grow", scene_id=scene.id, options=options, given_labels=labels)
+        counted = retention.stored(session, "default") - before
+        assert 0 < counted - len(json.dumps(options)) - len(json.dumps(labels)) <= jobs.ROW_BYTES + 10
+        jobs.cancel(session, job.id)
+        retention.delete_job(session, job.id, dependents=False)
+        assert retention.stored(session, "default") == before
+
+
+def test_counting_jobs_reads_no_row_of_them(db: Database) -> None:
+    """Their options may be long."""
+    counting = "SELECT sum(bytes) FROM jobs WHERE project = 'default'"
+    with db.read() as session:
+        if db.sqlite:
+            (step,) = session.execute(text(f"EXPLAIN QUERY PLAN {counting}")).all()
+            assert "COVERING INDEX ix_jobs_project_bytes" in step[-1]
+        else:
+            session.execute(text("SET enable_seqscan = off"))
+            plan = session.scalars(text(f"EXPLAIN {counting}")).all()
+            assert any("Index Only Scan using ix_jobs_project_bytes" in line for line in plan)
 
 
 def test_the_file_of_an_sqlite_database_shrinks(tmp_path: Path, migrated_sqlite: Path) -> None:
