@@ -124,12 +124,13 @@ def create_jobs(
 ) -> JobList:
     """Starts several jobs at once: all of them, or none where something is wrong with one, which the error's field names.
 
-    With an Idempotency-Key a repetition returns the same jobs.
+    A repetition of the request with the same Idempotency-Key returns the same jobs. Another batch with that key is refused (409). Keys of
+    single jobs are others.
     """
     asked = [submission.checked(db, one, f"jobs[{i}]") for i, one in enumerate(body.jobs)]
     room.check(db, caller.project)
     with db.write() as session:
-        made = [submission.submit(session, one, caller, idempotency_key and f"{idempotency_key}:{i}") for i, one in enumerate(asked)]
+        made = submission.submit_all(session, asked, caller, idempotency_key)
     for job, new in made:
         if new:
             background.add_task(announcements.announce, job.id)

@@ -95,6 +95,6 @@ class Project(BaseModel):
 
     name: str = Field(description="The project's name.")
     scope: Scope = Field(description="What the caller's key allows.")
-    bytes: int = Field(description="Bytes of scenes, proofs and cells that the project stores, as of some seconds ago.")
+    bytes: int = Field(description="Bytes of scenes, jobs, proofs and cells that the project stores, as of some seconds ago.")
     max_bytes: int | None = Field(description="From so many bytes on, the service takes no more scenes and jobs; null for no limit.")
     keep_days: float | None = Field(description="So many days after their end jobs lose what they have besides regions; null for never.")
