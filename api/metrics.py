@@ -133,6 +133,7 @@ def render(statistics: Statistics, waiting: Mapping[str, int], requests: Request
         _family("ciris_workers", "gauge", "Workers that live, by kind and state.", _workers(statistics)),
         _family("ciris_workers_in_trouble", "gauge", "Workers of whose regular tasks one fails.", {(): statistics.workers_in_trouble}),
         _family("ciris_workers_wanted", "gauge", "Solving processes that would be busy now.", {(): statistics.workers_wanted}),
+        _family("ciris_decisions_due", "gauge", "Jobs that wait for a control worker.", {(): statistics.decisions_due}),
         _family("ciris_queue_messages", "gauge", "Messages that wait, by queue.", _by("queue", waiting)),
         _family("ciris_http_requests_total", "counter", "Requests answered.", _requests(answered, 0)),
         _family("ciris_http_request_seconds_total", "counter", "Time that they took.", _requests(answered, 1)),

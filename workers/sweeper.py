@@ -20,11 +20,14 @@ from db.models import JobRow, PairRow, StepRow
 from db.session import database
 from db.settings import settings
 from db.types import utcnow
-from workers.app import SOLVE, send_coordinate, send_work, waiting
+from workers.app import CONTROL, SOLVE, send_coordinate, send_work, waiting
 from workers.transaction import writing
 from workers.troubles import Troubles
 
 log = logging.getLogger(__name__)
+
+ASKED = 100
+"""While so many messages wait for the control worker, it is asked for nothing more: it may be paused, and what is due stays due."""
 
 
 def run(stop: threading.Event, troubles: Troubles) -> None:
@@ -79,7 +82,7 @@ def sweep(*, by_time: bool = True) -> None:
     with database().read() as session:
         due = jobs.awaiting_coordination(session, clock.now(session))
         is_open = work.next_job(session) is not None
-    for job_id in due:
+    for job_id in due[: max(ASKED - waiting(CONTROL), 0)]:
         send_coordinate(job_id)
     if is_open and waiting(SOLVE) == 0:
         send_work()

@@ -358,6 +358,16 @@ def test_the_sweeper_sends_lost_messages_again(job_id: str, own_queue: Queue) ->
     assert (waiting(SOLVE), waiting(CONTROL)) == (0, 1)
 
 
+def test_a_paused_control_worker_is_asked_so_often_and_no_more(own_queue: Queue, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweeper, "ASKED", 3)
+    for _ in range(5):
+        submit(slider(), box_around([0.0], 0.1))
+    own_queue.flush()
+    for _ in range(4):
+        sweeper.sweep()
+        assert waiting(CONTROL) == 3
+
+
 def test_the_sweeper_frees_what_a_lost_worker_held_and_says_why(job_id: str) -> None:
     with database().write() as session:
         pairs.claim(session, jobs.lock(session, job_id), lease_seconds=60, batch_seconds=60)
