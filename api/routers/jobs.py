@@ -205,7 +205,7 @@ def get_job(job_id: JobGiven, db: Db) -> Job:
 
 @router.get("/{job_id}/dependents")
 def get_job_dependents(job_id: JobGiven, db: Db) -> Dependents:
-    """Returns what is deleted with a job: its regions and proofs, and the jobs that a cover has made."""
+    """Returns what is deleted with a job: its regions and proofs, its webhook where it waits, and the jobs that a cover has made."""
     with db.read() as session:
         return Dependents(**asdict(retention.of_job(session, job_id)))
 
@@ -213,7 +213,7 @@ def get_job_dependents(job_id: JobGiven, db: Db) -> Dependents:
 @router.delete("/{job_id}", status_code=status.HTTP_204_NO_CONTENT)
 @writing
 def delete_job(job_id: JobGiven, caller: Admin, db: Db, dependents: WithDependents = "keep") -> None:
-    """Deletes a job that has ended. Where it has regions or other jobs, the request has to say that they are deleted, too."""
+    """Deletes a job that has ended. Where it has regions, other jobs or a waiting webhook, the request has to say that they go, too."""
     with db.write() as session:
         retention.delete_job(session, job_id, dependents=dependents == "delete")
         audit.note(session, caller.project, str(caller), Action.JOB_DELETED, job_id)

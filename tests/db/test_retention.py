@@ -12,9 +12,9 @@ from sqlalchemy import func, select, text
 
 from certifier.errors import CirisError
 from db import jobs, pairs, projects, proofs, regions, retention, scenes, subtrees
-from db.models import Base, JobRow, LibraryRow, ProofRow, RegionRow, SceneRow
+from db.models import Base, JobRow, LibraryRow, ProofRow, RegionRow, SceneRow, WebhookRow
 from db.session import Database, Session
-from db.states import JobState
+from db.states import JobState, WebhookState, transition
 from db.types import utcnow
 from tests.db.builders import a_running_job, a_scene, add_region, all_pairs, certified
 
@@ -149,6 +149,30 @@ def test_a_project_that_keeps_things_for_ever_stops_nobody(db: Database, days: f
         assert not projects.some_expires(session)
         projects.get(session, "default").keep_days = 7.0
         assert retention.expire(session, utcnow() + timedelta(days=8)) == 1
+
+
+def test_a_webhook_that_waits_is_not_dropped_without_a_word(db: Database) -> None:
+    with db.write() as session:
+        projects.get(session, "default").keep_days = 7.0
+        job_id = an_ended_job(session, with_region=False)
+        session.add(WebhookRow(id="w", job_id=job_id, url="https://example.org/", secret="sealed"))
+        session.flush()
+        assert (retention.of_job(session, job_id).webhooks, retention.of_scene(session, "slider").webhooks) == (1, 1)
+        with pytest.raises(CirisError, match=rf"with job {job_id} go 1 waiting webhook and 0\.0 MB") as refused:
+            retention.delete_job(session, job_id, dependents=False)
+        assert refused.value.code == "has_dependents"
+        assert retention.expire(session, utcnow() + timedelta(days=8)) == 0
+        transition(session, WebhookRow, WebhookState.FAILED, WebhookRow.id == "w")
+        assert retention.of_job(session, job_id).webhooks == 0
+        assert retention.expire(session, utcnow() + timedelta(days=8)) == 1
+    assert counts(db).keys() == {"scenes", "scene_names"}
+
+
+def test_a_job_is_not_said_to_go_with_itself(db: Database) -> None:
+    with db.write() as session:
+        job_id = an_ended_job(session, with_region=True)
+        with pytest.raises(CirisError, match=rf"with job {job_id} go 1 region and 0\.0 MB"):
+            retention.delete_job(session, job_id, dependents=False)
 
 
 def test_a_cover_expires_after_its_jobs(db: Database) -> None:
