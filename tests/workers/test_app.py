@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -55,4 +56,7 @@ def test_a_process_that_starts_slowly_is_not_killed(sqlite_url: str, own_queue: 
         finally:
             worker.send_signal(signal.SIGQUIT)
             worker.wait()
-    assert "Timed out waiting for UP message" not in log.read_text()
+    lines = [json.loads(line) for line in log.read_text().splitlines()]
+    assert not any("Timed out waiting for UP message" in line["message"] for line in lines)
+    assert [line["logger"] for line in lines if "SIGKILL" in line["message"]], "the pool says in the same form what befell a process"
+    assert not any("superuser" in line["message"] for line in lines)
