@@ -160,7 +160,12 @@ def lock(session: Session, job_id: str) -> JobRow:
     Raises:
         CirisError: job_not_found.
     """
-    return _found(session.get(JobRow, job_id, with_for_update=True, populate_existing=True), job_id)
+    return _found(locked(session, job_id), job_id)
+
+
+def locked(session: Session, job_id: str) -> JobRow | None:
+    """Does as :func:`lock`, but returns None where the job was deleted."""
+    return session.get(JobRow, job_id, with_for_update=True, populate_existing=True)
 
 
 def _found(job: JobRow | None, job_id: str) -> JobRow:

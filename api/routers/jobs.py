@@ -170,7 +170,9 @@ def list_jobs(
     kind: Annotated[JobKind | None, Query(description="List only the jobs of this kind.")] = None,
     scene: OfScene = None,
     ended: Annotated[bool | None, Query(description="`true` lists the jobs that have ended, `false` the others.")] = None,
-    parent: Annotated[str | None, Query(max_length=64, description="List the jobs that grow the regions of this cover.")] = None,
+    parent: Annotated[
+        str | None, Query(min_length=1, max_length=64, description="List the jobs that grow the regions of this cover.")
+    ] = None,
     label: Label = None,
     search: Search = None,
     after: Cursor = None,

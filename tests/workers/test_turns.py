@@ -18,7 +18,7 @@ from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.pair.forecast import forecast
-from db import jobs, pairs, regions, steps
+from db import jobs, pairs, regions, retention, steps
 from db.models import IterationRow, JobRow, PairRow, ProofRow, StepRow, SubtreesRow
 from db.session import database
 from db.settings import settings
@@ -28,7 +28,7 @@ from tests.services import Queue
 from tests.workers.options import box_around, grow_box
 from tests.workers.record import check_record
 from tests.workers.service import environment, events_of, job_of, pairs_of, submit
-from workers import admission, sweeper, transaction
+from workers import admission, sweeper, transaction, turns
 from workers.app import CONTROL, SOLVE, send_coordinate, waiting
 from workers.scenes import load_scene
 from workers.solver import Piece, work
@@ -344,6 +344,30 @@ def test_a_solver_that_leaves_work_sends_for_another(job_id: str, own_queue: Que
             own_queue.flush()
             assert work()
             assert waiting(SOLVE) == left
+
+
+def delete(job_id: str) -> None:
+    with database().write() as session:
+        jobs.cancel(session, job_id)
+        retention.delete_job(session, job_id, dependents=False)
+
+
+@pytest.mark.parametrize("options", [box_around([0.0], 0.1), box_around([9.0], 0.1)], ids=["to be saved", "to be given up"])
+def test_a_job_that_is_deleted_is_coordinated_no_more(options: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its message may come after it, and it may go while a decision about it is made."""
+    gone, going = (submit(slider(), options) for _ in range(2))
+    delete(gone)
+    coordinate(gone)
+    decide = turns._decide
+
+    def meanwhile(turn: turns.Turn) -> Any:
+        delete(going)
+        return decide(turn)
+
+    monkeypatch.setattr(turns, "_decide", meanwhile)
+    coordinate(going)
+    with database().read() as session:
+        assert session.scalars(select(JobRow)).all() == []
 
 
 def test_the_sweeper_sends_lost_messages_again(job_id: str, own_queue: Queue) -> None:
