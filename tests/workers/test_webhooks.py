@@ -228,6 +228,22 @@ def test_receivers_that_do_not_answer_delay_nobody_else(service: None, receiver:
     assert sum(row.attempts for row in every_row()) == webhooks.OF_RECEIVER + 2
 
 
+def test_two_control_workers_send_nothing_twice(service: None, receiver: Receiver) -> None:
+    told = [a_webhook(receiver.url) for _ in range(30)]
+    stop = threading.Event()
+    workers = [threading.Thread(target=delivering.run, args=(stop, Troubles())) for _ in range(2)]
+    for worker in workers:
+        worker.start()
+    try:
+        eventually(lambda: all(row.state == "delivered" for row in every_row()), "all are told", 60)
+    finally:
+        stop.set()
+        for worker in workers:
+            worker.join()
+    assert {row.attempts for row in every_row()} == {1}
+    assert len(receiver.bodies) == len({headers["webhook-id"] for headers in receiver.headers}) == len(told)
+
+
 def every_row() -> list[WebhookRow]:
     with database().read() as session:
         return list(session.scalars(select(WebhookRow)))
