@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
@@ -12,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from api import checks
 from api.access import Caller
-from api.schemas.jobs import CertifyPathRequest, CertifyRequest, CoverRequest, GrowRequest, JobRequest, RecertifyRequest
+from api.schemas.jobs import CertifyPathRequest, CertifyRequest, CoverRequest, GrowRequest, RecertifyRequest
 from certifier.errors import CirisError
 from certifier.model import Scene
 from db import clock, jobs, regions, scenes, webhooks
@@ -60,6 +61,21 @@ def submit(session: Session, asked: Checked, caller: Caller, idempotency_key: st
     Raises:
         CirisError: as :func:`db.jobs.create` and :func:`db.webhooks.add` say.
     """
+    return _submit(session, asked, caller, idempotency_key and f"{_name(caller)}:{idempotency_key}", _digest(asked))
+
+
+def submit_all(session: Session, asked: Sequence[Checked], caller: Caller, idempotency_key: str | None) -> list[tuple[JobRow, bool]]:
+    """Does as :func:`submit` for the jobs of a batch. Its key is none of a single job, and stands for the whole batch.
+
+    Raises:
+        CirisError: as :func:`submit`.
+    """
+    whole = hashlib.sha256(json.dumps([_digest(one) for one in asked]).encode()).hexdigest()
+    keys = [idempotency_key and f"batch:{_name(caller)}:{i}:{idempotency_key}" for i in range(len(asked))]
+    return [_submit(session, one, caller, key, whole) for one, key in zip(asked, keys, strict=True)]
+
+
+def _submit(session: Session, asked: Checked, caller: Caller, stored_key: str | None, digest: str) -> tuple[JobRow, bool]:
     body = asked.body
     job, made = jobs.create(
         session,
@@ -67,8 +83,8 @@ def submit(session: Session, asked: Checked, caller: Caller, idempotency_key: st
         scene_id=asked.scene_id,
         options=asked.options,
         deadline_at=clock.now(session) + timedelta(seconds=body.deadline_seconds) if body.deadline_seconds else None,
-        idempotency_key=idempotency_key and f"{caller.key_id or 'open'}:{idempotency_key}",
-        request_digest=_digest(asked.scene_id, asked.options, body),
+        idempotency_key=stored_key,
+        request_digest=digest,
         key_id=caller.key_id,
         priority=body.priority,
         given_labels=body.labels,
@@ -76,6 +92,11 @@ def submit(session: Session, asked: Checked, caller: Caller, idempotency_key: st
     if made and body.webhook is not None:
         webhooks.add(session, job.id, body.webhook.url, body.webhook.secret)
     return job, made
+
+
+def _name(caller: Caller) -> str:
+    """Returns whose idempotency keys are meant."""
+    return caller.key_id or "open"
 
 
 def _options(body: GrowRequest | CertifyRequest | CertifyPathRequest | CoverRequest, scene: Scene) -> dict[str, Any]:
@@ -100,7 +121,8 @@ def _recertify(body: RecertifyRequest, scene: Scene, db: Database) -> dict[str, 
     return {"kind": "recertify", "seed": {**polytope, "region": region, "proof": digest}, "random_seed": body.random_seed}
 
 
-def _digest(scene_id: str, options: dict[str, Any], body: JobRequest) -> str:
-    document: list[Any] = [scene_id, options, body.priority, body.deadline_seconds, body.webhook and body.webhook.model_dump()]
+def _digest(asked: Checked) -> str:
+    body = asked.body
+    document: list[Any] = [asked.scene_id, asked.options, body.priority, body.deadline_seconds, body.webhook and body.webhook.model_dump()]
     document += [body.labels] if body.labels else []
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()

@@ -56,6 +56,7 @@ def _shown(worker: Document, args: Namespace) -> int:
         [
             ("kind", worker["kind"]),
             ("state", _state(worker)),
+            *([("trouble", worker["trouble"])] if worker["trouble"] else []),
             ("process", worker["process"]),
             ("version", worker["version"]),
             ("busy", f"{worker['busy']} of {worker['processes']}"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
 from typing import Any
@@ -19,6 +20,9 @@ from db.session import insert_new
 from db.settings import settings
 from db.states import JOB, STEP, JobKind, JobState, StepKind, transition, unfinished
 from db.types import utcnow
+
+ROW_BYTES = 1000
+"""A job counts as so many bytes besides its options and labels."""
 
 
 def create(
@@ -62,6 +66,7 @@ def create(
         "attempt": attempt,
         "parent_id": parent_id,
         "number": number,
+        "bytes": ROW_BYTES + len(json.dumps([options, dict(given_labels or {})])),
         "traceparent": traces.here(),
     }
     if insert_new(session, JobRow, [new]):
@@ -155,7 +160,12 @@ def lock(session: Session, job_id: str) -> JobRow:
     Raises:
         CirisError: job_not_found.
     """
-    return _found(session.get(JobRow, job_id, with_for_update=True, populate_existing=True), job_id)
+    return _found(locked(session, job_id), job_id)
+
+
+def locked(session: Session, job_id: str) -> JobRow | None:
+    """Does as :func:`lock`, but returns None where the job was deleted."""
+    return session.get(JobRow, job_id, with_for_update=True, populate_existing=True)
 
 
 def _found(job: JobRow | None, job_id: str) -> JobRow:

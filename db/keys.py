@@ -170,7 +170,7 @@ def _digest(key: str) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs ``ciris key`` on the database that the settings name. It migrates the database first if that is needed."""
-    parser = argparse.ArgumentParser(prog="ciris key", description="The API keys of the service whose database the settings name.")
+    parser = command_line.Parser(prog="ciris key", description="The API keys of the service whose database the settings name.")
     parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
     verbs = parser.add_subparsers(dest="verb", required=True)
     adding = verbs.add_parser("add", help="make a key and print it, once")

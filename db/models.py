@@ -143,7 +143,12 @@ class JobRow(Owned, Base):
     """A job is one request to grow a region, to certify a polytope or a motion, or to cover a scene; or a region of a cover."""
 
     __tablename__ = "jobs"
-    __table_args__ = (Index(None, "state"), Index(None, "project", "created_at", "id"), UniqueConstraint("parent_id", "number"))
+    __table_args__ = (
+        Index(None, "state"),
+        Index(None, "project", "created_at", "id"),
+        Index(None, "project", "bytes"),
+        UniqueConstraint("parent_id", "number"),
+    )
     transitions: ClassVar[states.Table] = states.JOB
 
     id: Mapped[str] = mapped_column(String(36), primary_key=True)
@@ -207,6 +212,8 @@ class JobRow(Owned, Base):
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
     deadline_at: Mapped[datetime | None]
+    bytes: Mapped[int] = mapped_column(BigInteger, default=0)
+    """What counts of the row for its project: the options and labels, and something for the rest (db.jobs). They never change."""
     traceparent: Mapped[str | None] = mapped_column(String(55))
     """Of the request that created the job (db.traces); None where nobody traces."""
 
@@ -429,9 +436,10 @@ class EventRow(Base):
     """An event says what happened to a job."""
 
     __tablename__ = "events"
-    __table_args__ = (UniqueConstraint("job_id", "seq"),)
+    __table_args__ = (UniqueConstraint("job_id", "seq"), {"sqlite_autoincrement": True})
 
     id: Mapped[int] = mapped_column(primary_key=True)
+    """No id comes again after a deletion, because clients ask for what is after the last one that they have seen."""
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"))
     seq: Mapped[int]
     """The event's number within the job: 1, 2, 3 ..."""
@@ -499,6 +507,8 @@ class WorkerRow(Base):
     """What people want of it, a value of WorkerState."""
     state: Mapped[str] = mapped_column(String(16))
     """What it does, as it said last, a value of WorkerState."""
+    trouble: Mapped[str | None]
+    """What fails of what it does again and again, as it said last; None where all goes well."""
     created_at: Mapped[datetime]
     """When it began, by the database's clock."""
     seen_at: Mapped[datetime]

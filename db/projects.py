@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
@@ -23,6 +23,9 @@ from db.session import insert_new
 
 NAME = re.compile(r"\w[\w.@-]{0,63}")
 """Projects and keys have such names."""
+MOST_BYTES = 2**62
+MOST_DAYS = 36_500
+"""A project keeps things for at most so many days. An earlier version took more: then nothing expires."""
 
 
 def add(session: Session, name: str) -> ProjectRow:
@@ -59,33 +62,49 @@ def all_of(session: Session) -> Sequence[ProjectRow]:
 
 def some_expires(session: Session) -> bool:
     """Says whether a project deletes what is old."""
-    return session.scalar(select(ProjectRow.name).where(ProjectRow.keep_days.is_not(None)).limit(1)) is not None
+    return session.scalar(select(ProjectRow.name).where(expires()).limit(1)) is not None
+
+
+def expires() -> ColumnElement[bool]:
+    """Returns the condition that a project deletes what is old."""
+    return ProjectRow.keep_days <= MOST_DAYS
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs ``ciris project`` on the database that the settings name. It migrates the database first if that is needed."""
-    parser = argparse.ArgumentParser(prog="ciris project", description="The projects of the service whose database the settings name.")
+    parser = command_line.Parser(prog="ciris project", description="The projects of the service whose database the settings name.")
     parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")
     verbs = parser.add_subparsers(dest="verb", required=True)
     verbs.add_parser("add", help="make a project").add_argument("name")
     verbs.add_parser("ls", help="list the projects with their limits").add_argument("--json", action="store_true")
     setting = verbs.add_parser("set", help="set a project's limits; 0 for none")
     setting.add_argument("name")
-    setting.add_argument("--max-bytes", type=_at_least_none, help="what the project stores may take so many bytes")
-    setting.add_argument("--keep-days", type=_at_least_none, help="jobs without a region are deleted so many days after their end")
+    setting.add_argument("--max-bytes", type=_bytes, help="what the project stores may take so many bytes")
+    setting.add_argument(
+        "--keep-days", type=partial(_limit, most=MOST_DAYS), help="jobs without a region are deleted so many days after their end"
+    )
     given = parser.parse_args(arguments)
     for line in command_line.on_database(given.data, partial(_run, given=given)):
         print(line)
 
 
-def _at_least_none(text: str) -> float:
+def _limit(text: str, most: int) -> float:
     try:
         number = float(text)
     except ValueError:
         number = -1.0
-    if not 0 <= number <= 2**62:
+    if not number >= 0:
         raise argparse.ArgumentTypeError(f"{text} is not a number from 0 on; 0 takes the limit away")
+    if number > most:
+        raise argparse.ArgumentTypeError(f"{text} is more than {most}; 0 takes the limit away")
     return number
+
+
+def _bytes(text: str) -> int:
+    number = _limit(text, MOST_BYTES)
+    if number != int(number):
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number; 0 takes the limit away")
+    return int(number)
 
 
 def _run(session: Session, given: argparse.Namespace) -> list[str]:
@@ -98,7 +117,7 @@ def _run(session: Session, given: argparse.Namespace) -> list[str]:
         case "set":
             row = get(session, given.name)
             if given.max_bytes is not None:
-                row.max_bytes = int(given.max_bytes) or None
+                row.max_bytes = given.max_bytes or None
             if given.keep_days is not None:
                 row.keep_days = given.keep_days or None
             audit.note(session, row.name, COMMAND_LINE, Action.LIMITS_SET, f"max_bytes {row.max_bytes}, keep_days {row.keep_days}")

@@ -7,14 +7,14 @@ never expire. The proofs of pairs, cells, steps and events of a job that has end
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
 from sqlalchemy import ColumnElement, Select, Text, cast, delete, exists, func, or_, select, union, update
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db import jobs, proofs, regions, scenes
+from db import jobs, projects, proofs, regions, scenes
 from db.models import (
     EventRow,
     JobRow,
@@ -26,8 +26,9 @@ from db.models import (
     SceneRow,
     StepRow,
     SubtreesRow,
+    WebhookRow,
 )
-from db.states import JOB, unfinished
+from db.states import JOB, WebhookState, unfinished
 
 TOGETHER = 20
 """So many jobs expire in one transaction."""
@@ -35,18 +36,21 @@ TOGETHER = 20
 
 @dataclass(frozen=True)
 class Dependents:
-    """Counts what goes with a scene or a job: its jobs, those of them that have not ended, regions, and bytes of proofs and cells.
+    """Counts what goes with a scene or a job: its jobs, those of them that have not ended, regions, webhooks that still wait, and bytes.
 
-    A job is not counted as its own dependent; the regions that a cover has grown are its jobs.
+    The bytes are those of proofs and cells. A job is not counted as its own dependent; the regions that a cover has grown are its jobs.
     """
 
     jobs: int
     unfinished: int
     regions: int
+    webhooks: int
     bytes: int
 
     def __str__(self) -> str:
-        return f"{_number(self.jobs, 'job')}, {_number(self.regions, 'region')} and {self.bytes / 1e6:.1f} MB of proofs and cells"
+        counts = {"job": self.jobs, "region": self.regions, "waiting webhook": self.webhooks}
+        counted = ", ".join(_number(count, name) for name, count in counts.items() if count)
+        return f"{counted} and {self.bytes / 1e6:.1f} MB of proofs and cells"
 
 
 def of_scene(session: Session, scene_id: str) -> Dependents:
@@ -66,7 +70,7 @@ def of_job(session: Session, job_id: str) -> Dependents:
     """
     job = jobs.get(session, job_id)
     found = _counted(session, _of_job(job.id))
-    return Dependents(found.jobs - 1, found.unfinished, found.regions, found.bytes)
+    return replace(found, jobs=found.jobs - 1)
 
 
 def delete_scene(session: Session, scene_id: str, *, dependents: bool) -> None:
@@ -96,19 +100,18 @@ def delete_job(session: Session, job_id: str, *, dependents: bool) -> None:
     job = jobs.get(session, job_id)
     if job.id != job_id:
         raise CirisError("job_not_found", f"no job has the id {job_id!r}", field="job", hint="give all of its id to delete it")
-    which = _of_job(job.id)
-    found = _counted(session, which)
-    _check(found, found.jobs - 1 + found.regions, f"job {job_id}", dependents)
-    _delete_jobs(session, which)
+    found = of_job(session, job.id)
+    _check(found, found.jobs + found.regions + found.webhooks, f"job {job_id}", dependents)
+    _delete_jobs(session, _of_job(job.id))
 
 
 def expire(session: Session, now: datetime) -> int:
     """Deletes some of what has expired in the projects that keep things for so many days. Returns how many jobs it was about.
 
-    A job without regions goes. Of one with regions, only these and its own row stay.
+    A job without regions goes, once nobody is to be told of its end any more. Of one with regions, only these and its own row stay.
     """
     done = 0
-    for project in session.scalars(select(ProjectRow).where(ProjectRow.keep_days.is_not(None))):
+    for project in session.scalars(select(ProjectRow).where(projects.expires())):
         before = now - timedelta(days=project.keep_days or 0.0)
         # A cover goes when all of its jobs may go.
         other = JobRow.__table__.alias()
@@ -116,7 +119,8 @@ def expire(session: Session, now: datetime) -> int:
         old = (JobRow.project == project.name, JobRow.finished_at < before, ~child)
         has_region = exists().where(RegionRow.job_id == JobRow.id)
         has_child = exists().where(other.c.parent_id == JobRow.id)
-        gone = list(session.scalars(select(JobRow.id).where(*old, ~has_region, ~has_child).limit(TOGETHER)))
+        told = ~exists().where(WebhookRow.job_id == JobRow.id, WebhookRow.state == WebhookState.WAITING)
+        gone = list(session.scalars(select(JobRow.id).where(*old, ~has_region, ~has_child, told).limit(TOGETHER)))
         _delete_jobs(session, JobRow.id.in_(gone))
         bulky = or_(*(exists().where(model.job_id == JobRow.id) for model in _BULK))
         kept = list(session.scalars(select(JobRow.id).where(*old, has_region, bulky).limit(TOGETHER)))
@@ -144,10 +148,12 @@ def _of_job(job_id: str) -> ColumnElement[bool]:
 def _counted(session: Session, which: ColumnElement[bool]) -> Dependents:
     mine = select(JobRow.id).where(which)
     count = select(func.count()).select_from(JobRow).where(which)
+    to_tell = (WebhookRow.job_id.in_(mine), WebhookRow.state == WebhookState.WAITING)
     return Dependents(
         jobs=session.scalar(count) or 0,
         unfinished=session.scalar(count.where(JobRow.state.in_(unfinished(JOB)))) or 0,
         regions=session.scalar(select(func.count()).select_from(RegionRow).where(RegionRow.job_id.in_(mine))) or 0,
+        webhooks=session.scalar(select(func.count()).select_from(WebhookRow).where(*to_tell)) or 0,
         bytes=_bytes(session, mine),
     )
 
@@ -161,9 +167,14 @@ def _bytes(session: Session, mine: Select[str]) -> int:
 
 
 def stored(session: Session, project: str) -> int:
-    """Returns how many bytes of scenes, proofs and cells a project stores."""
+    """Returns how many bytes of scenes, jobs, proofs and cells a project stores."""
     documents = select(func.sum(func.length(cast(SceneRow.document, Text)))).where(SceneRow.project == project)
-    return int(session.scalar(documents) or 0) + _bytes(session, select(JobRow.id).where(JobRow.project == project))
+    asked = select(func.sum(JobRow.bytes)).where(JobRow.project == project)
+    return (
+        int(session.scalar(documents) or 0)
+        + int(session.scalar(asked) or 0)
+        + _bytes(session, select(JobRow.id).where(JobRow.project == project))
+    )
 
 
 def _check(found: Dependents, number: int, what: str, dependents: bool) -> None:

@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from uuid import uuid4
 
-from sqlalchemy import delete, select
+from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
 from db import pages
 from db.models import DeliveryRow, JobRow, WebhookRow
 from db.states import JOB, WebhookState, transition, unfinished
+from db.types import utcnow
 from db.vault import is_sealed, vault
 
 BACKOFF_SECONDS = (10, 60, 300, 1800, 7200, 21600)
 """The service pauses this many seconds after each failed attempt but the last."""
+HELD_SECONDS = 60
+"""A claim holds this long. An attempt takes less, so nobody else begins one meanwhile."""
+AT_ONCE, OF_PROJECT, OF_RECEIVER = 32, 8, 4
+"""A control worker has so many deliveries under way at most: in all, of one project, and to one receiver of a project."""
 KEPT = 20
 """So many attempts are remembered of each webhook, the last ones."""
 ANSWER = 500
 """So many characters of a receiver's answer are kept."""
+
+
+Place = tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -30,6 +39,11 @@ class Delivery:
 
     webhook: WebhookRow
     job: JobRow
+
+    @property
+    def place(self) -> Place:
+        """Returns the project that the attempt is made for, and the receiver: scheme, host and port of its address."""
+        return self.job.project, "/".join(self.webhook.url.partition("?")[0].split("/")[:3])
 
 
 @dataclass(frozen=True)
@@ -87,27 +101,52 @@ def page(session: Session, state: str | None, after: str | None, limit: int) -> 
     return [of[job.id] for job in told.rows], told.next
 
 
-def claim(session: Session, now: datetime, limit: int = 50) -> Sequence[Delivery]:
-    """Claims the deliveries that are due, and counts each as an attempt. Nobody else gets it until its pause is over.
+def claim(session: Session, now: datetime, under_way: Sequence[Place] = ()) -> Sequence[Delivery]:
+    """Claims deliveries that are due, and counts each as an attempt. Nobody else gets one until it is settled or its claim is over.
+
+    Projects take turns: the next delivery is of the project that has the fewest under way, and then of the one that waits longest. So
+    receivers that do not answer delay others of their project at most.
 
     A worker that claims a delivery and dies has used up an attempt. A webhook whose last attempt got no answer is given up.
+
+    Args:
+        under_way: the places of those that the caller has claimed before and not settled.
     """
-    due = (WebhookRow.state == WebhookState.WAITING, WebhookRow.next_at <= now)
-    query = select(WebhookRow, JobRow).join(JobRow, JobRow.id == WebhookRow.job_id).where(*due, JobRow.state.not_in(unfinished(JOB)))
-    query = query.order_by(WebhookRow.next_at).limit(limit).with_for_update(of=WebhookRow, skip_locked=True)
-    claimed = []
-    for webhook, job in session.execute(query):
+    due = (WebhookRow.state == WebhookState.WAITING, WebhookRow.next_at <= now, JobRow.state.not_in(unfinished(JOB)))
+    waiting = select(JobRow.project, func.min(WebhookRow.next_at)).join(WebhookRow, WebhookRow.job_id == JobRow.id).where(*due)
+    since = dict(session.execute(waiting.group_by(JobRow.project)).all())
+    places, of_project = Counter(under_way), Counter(project for project, _ in under_way)
+    claimed: list[Delivery] = []
+    while places.total() < AT_ONCE and (free := [project for project in since if of_project[project] < OF_PROJECT]):
+        project = min(free, key=lambda one: (of_project[one], since[one]))
+        full = [receiver for (of, receiver), count in places.items() if of == project and count >= OF_RECEIVER]
+        others = (~WebhookRow.url.startswith(receiver, autoescape=True) for receiver in full)
+        query = select(WebhookRow, JobRow).join(JobRow, JobRow.id == WebhookRow.job_id).where(*due, JobRow.project == project, *others)
+        query = query.order_by(WebhookRow.next_at).limit(1).with_for_update(of=WebhookRow, skip_locked=True)
+        found = session.execute(query).one_or_none()
+        if found is None:
+            del since[project]
+            continue
+        delivery = Delivery(*found)
+        webhook = delivery.webhook
         if webhook.attempts > len(BACKOFF_SECONDS):
             transition(session, WebhookRow, WebhookState.FAILED, WebhookRow.id == webhook.id)
             continue
         webhook.attempts += 1
-        webhook.next_at = now + timedelta(seconds=BACKOFF_SECONDS[min(webhook.attempts, len(BACKOFF_SECONDS)) - 1])
-        claimed.append(Delivery(webhook, job))
+        webhook.next_at = now + timedelta(seconds=max(HELD_SECONDS, _pause(webhook)))
+        claimed.append(delivery)
+        places[delivery.place] += 1
+        of_project[project] += 1
     return claimed
 
 
+def _pause(webhook: WebhookRow) -> int:
+    """Returns how many seconds pass after the attempt before the next one."""
+    return BACKOFF_SECONDS[min(webhook.attempts, len(BACKOFF_SECONDS)) - 1]
+
+
 def settle(session: Session, webhook_id: str, answered: Answered) -> None:
-    """Notes how an attempt went. After the last attempt a webhook is given up."""
+    """Notes how an attempt went, and when the next one is due. After the last attempt a webhook is given up."""
     row = session.get_one(WebhookRow, webhook_id)
     session.add(
         DeliveryRow(
@@ -127,6 +166,8 @@ def settle(session: Session, webhook_id: str, answered: Answered) -> None:
         transition(session, WebhookRow, WebhookState.DELIVERED, WebhookRow.id == webhook_id)
     elif row.attempts > len(BACKOFF_SECONDS):
         transition(session, WebhookRow, WebhookState.FAILED, WebhookRow.id == webhook_id)
+    elif row.attempts:  # none where somebody has had the receiver called again meanwhile
+        row.next_at = utcnow() + timedelta(seconds=_pause(row))
 
 
 def deliveries(session: Session, webhook_id: str) -> Sequence[DeliveryRow]:

@@ -53,16 +53,17 @@ class Made:
     memory_bytes: int
 
 
-def tell(session: Session, made: Made, state: WorkerState) -> WorkerState:
-    """Says that a worker lives and what it does, and returns what is wanted of it.
+def tell(session: Session, made: Made, state: WorkerState, trouble: str | None = None) -> WorkerState:
+    """Says that a worker lives, what it does and what fails, and returns what is wanted of it.
 
     A worker without a row, because it is new or was believed gone, gets one, and is wanted to go on with what it does.
     """
     now = clock.now(session)
-    known = update(WorkerRow).where(WorkerRow.process == made.process).values(state=state, seen_at=now)
+    known = update(WorkerRow).where(WorkerRow.process == made.process).values(state=state, trouble=trouble, seen_at=now)
     wanted = session.scalar(known.returning(WorkerRow.wanted))
     if wanted is None:
-        session.add(WorkerRow(id=str(uuid4()), **asdict(made), wanted=state, state=state, created_at=now, seen_at=now))
+        new = WorkerRow(id=str(uuid4()), **asdict(made), wanted=state, state=state, trouble=trouble, created_at=now, seen_at=now)
+        session.add(new)
         return state
     return WorkerState(wanted)
 
@@ -132,6 +133,11 @@ def counts(session: Session) -> dict[tuple[str, str], int]:
         select(WorkerRow.kind, WorkerRow.state, func.count()).where(_lives(session)).group_by(WorkerRow.kind, WorkerRow.state)
     )
     return {(kind.value, state.value): 0 for kind in WorkerKind for state in WorkerState} | {(kind, state): n for kind, state, n in found}
+
+
+def in_trouble(session: Session) -> int:
+    """Returns how many of the workers that live say that something fails."""
+    return session.scalar(select(func.count()).select_from(WorkerRow).where(_lives(session), WorkerRow.trouble.is_not(None))) or 0
 
 
 def _lives(session: Session) -> ColumnElement[bool]:

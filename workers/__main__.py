@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import os
 import threading
+import warnings
 from typing import Any
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
@@ -20,7 +21,9 @@ def main() -> None:
     queue = parser.parse_args().queue
     os.environ.update(ONE_THREAD)  # must come before numpy is imported
 
+    from celery.exceptions import SecurityWarning
     from celery.signals import setup_logging, worker_process_init, worker_process_shutdown, worker_ready
+    from celery.utils.log import get_multiprocessing_logger
 
     from certifier.isolation.child import prepare
     from db import logs, traces
@@ -32,6 +35,7 @@ def main() -> None:
     from workers.presence import Presence
     from workers.processes import die_with_parent
     from workers.tasks import register
+    from workers.troubles import Troubles
 
     app = celery_app()
     register(app, queue)
@@ -39,9 +43,14 @@ def main() -> None:
     pool = ["--pool=threads", "--concurrency=2"] if queue == CONTROL else ["--pool=prefork", f"--concurrency={settings().solve_processes}"]
     stop, worker = threading.Event(), os.getpid()
 
+    logs.configure(queue)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # Celery says there in plain lines that it was asked to end
+    # It warns of a superuser's worker that would take pickled messages. Ours take JSON only.
+    warnings.filterwarnings("ignore", category=SecurityWarning)
+
     @setup_logging.connect(weak=False)
-    def configure_logs(**_: Any) -> None:
-        logs.configure(queue)
+    def keep_logs(**_: Any) -> None:
+        get_multiprocessing_logger().propagate = True  # what the pool says would be in plain lines
 
     @worker_process_init.connect(weak=False)
     def after_fork(**_: Any) -> None:
@@ -57,7 +66,8 @@ def main() -> None:
     def before_end(**_: Any) -> None:
         traces.end()
 
-    presence = Presence(WorkerKind(queue), stop)
+    troubles = Troubles()
+    presence = Presence(WorkerKind(queue), stop, troubles)
 
     @worker_ready.connect(weak=False)
     def begin(sender: Any, **_: Any) -> None:
@@ -67,7 +77,7 @@ def main() -> None:
             from workers import checkpoints, sweeper, webhooks
 
             for loop in (sweeper.run, webhooks.run, checkpoints.run):
-                threading.Thread(target=loop, args=(stop,), name=loop.__module__, daemon=True).start()
+                threading.Thread(target=loop, args=(stop, troubles), name=loop.__module__, daemon=True).start()
 
     app.worker_main(
         [

@@ -29,6 +29,12 @@ SILENCE_SECONDS = 10
 """A Redis that says nothing for this many seconds is believed gone, and a new connection is opened."""
 GRACE_SECONDS = 30
 """A step ends itself with an error at its own limit. The worker kills its process this many seconds after that limit."""
+START_SECONDS = 120
+"""A worker kills a process that it has forked anew and that has not said within so many seconds that it is up.
+
+Celery's four seconds are too few on a machine at work, and the next process needs as long. The time also counts what the worker itself is
+late to listen. A process that really hangs leaves the others alone meanwhile.
+"""
 
 SENDING = {"max_retries": 1, "interval_start": 0, "interval_step": 0}
 """A sender does not wait until Redis comes back: the sweeper sends again."""
@@ -49,6 +55,7 @@ def celery_app() -> Celery:
         task_acks_late=True,
         task_reject_on_worker_lost=True,
         worker_prefetch_multiplier=1,
+        worker_proc_alive_timeout=START_SECONDS,
         task_time_limit=settings().time_limit_seconds + GRACE_SECONDS,
         worker_enable_remote_control=False,
         worker_hijack_root_logger=False,

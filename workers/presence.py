@@ -21,6 +21,7 @@ from db.session import UNAVAILABLE, Database
 from db.settings import settings
 from db.states import WorkerState
 from db.workers import Made, WorkerKind
+from workers.troubles import Troubles
 
 log = logging.getLogger(__name__)
 
@@ -40,14 +41,16 @@ class Presence:
 
     Args:
         ended: set when the worker ends.
+        troubles: what fails of what the worker does again and again.
     """
 
-    def __init__(self, kind: WorkerKind, ended: threading.Event) -> None:
+    def __init__(self, kind: WorkerKind, ended: threading.Event, troubles: Troubles) -> None:
         processes = settings().solve_processes if kind is WorkerKind.SOLVE else 1
         self._made = Made(this_worker(), kind, version("ciris"), processes, machine.cores(), machine.memory_bytes())
-        self._ended = ended
+        self._ended, self._troubles = ended, troubles
         self._state = self._wanted = WorkerState.RUNNING
         self._told: float | None = None
+        self._told_of: str | None = None
         self._database = Database(settings().database)
         self._visit = threading.Lock()
         os.register_at_fork(before=self._before_fork, after_in_parent=self._visit.release, after_in_child=self._visit.release)
@@ -83,15 +86,16 @@ class Presence:
             log.warning("the database cannot be reached; this worker is forgotten later: %s", type(error).__name__)
 
     def _look(self) -> WorkerState:
-        """Returns what is wanted, and says what the worker does where that is due."""
-        if self._told is not None and time.monotonic() - self._told < TELL_SECONDS:
+        """Returns what is wanted, and says what the worker does and what fails where that is due, or news."""
+        trouble = self._troubles.said()
+        if self._told is not None and trouble == self._told_of and time.monotonic() - self._told < TELL_SECONDS:
             with self._database.read() as session:
                 wanted = workers.wanted(session, self._made.process)
             if wanted is not None:
                 return wanted
         with self._database.write() as session:
-            wanted = workers.tell(session, self._made, self._state)
-        self._told = time.monotonic()
+            wanted = workers.tell(session, self._made, self._state, trouble)
+        self._told, self._told_of = time.monotonic(), trouble
         return wanted
 
     def _change(self, consumer: Any) -> None:

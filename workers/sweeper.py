@@ -1,4 +1,4 @@
-"""The sweeper finds work that was lost with a worker, a message or Redis itself, and sends it again.
+"""The sweeper finds work that was lost with a worker, a message or Redis itself, and sends it again. Then it tidies up.
 
 It runs beside the control worker. Several sweepers, or one that is late, do no harm.
 """
@@ -12,6 +12,7 @@ from datetime import datetime, timedelta
 from typing import Any
 
 from kombu.exceptions import OperationalError
+from sqlalchemy.exc import DBAPIError, TimeoutError
 from sqlalchemy.orm import Session
 
 from db import clock, events, jobs, leases, pairs, projects, retention, work, workers
@@ -19,25 +20,39 @@ from db.models import JobRow, PairRow, StepRow
 from db.session import database
 from db.settings import settings
 from db.types import utcnow
-from workers.app import SOLVE, send_coordinate, send_work, waiting
+from workers.app import CONTROL, SOLVE, send_coordinate, send_work, waiting
 from workers.transaction import writing
+from workers.troubles import Troubles
 
 log = logging.getLogger(__name__)
 
+ASKED = 100
+"""While so many messages wait for the control worker, it is asked for nothing more: it may be paused, and what is due stays due."""
 
-def run(stop: threading.Event) -> None:
-    """Sweeps until ``stop`` is set. A round that fails (the database or Redis is away) is logged, and the next one tries again."""
+
+def run(stop: threading.Event, troubles: Troubles) -> None:
+    """Sweeps and tidies up until ``stop`` is set. What fails (the database or Redis is away) is tried again in the next round."""
     holders = Holders()
     while not stop.wait(settings().sweep_seconds):
-        if database().disk.trouble():
-            holders.could_not_write()
+        do_round(holders, troubles)
+
+
+def do_round(holders: Holders, troubles: Troubles) -> None:
+    """Does one round. What fails in it keeps nothing else from being done."""
+    if database().disk.trouble():
+        holders.could_not_write()
+    with troubles.noting("the sweep"):
         try:
             sweep(by_time=holders.could_renew(utcnow()))
         except OperationalError as error:
             log.warning("Redis cannot be reached; nothing was sent again: %s", error)
-        except Exception:
-            log.exception("a round of the sweeper failed")
+        except (DBAPIError, TimeoutError):
             holders.could_not_write()
+            raise
+    # What tidying up fails at says nothing about the holders of leases.
+    for what, chore in (("forgetting workers", forget_gone), ("expiry", expire), ("giving room back", shrink)):
+        with troubles.noting(what):
+            chore()
 
 
 class Holders:
@@ -67,12 +82,10 @@ def sweep(*, by_time: bool = True) -> None:
     with database().read() as session:
         due = jobs.awaiting_coordination(session, clock.now(session))
         is_open = work.next_job(session) is not None
-    for job_id in due:
+    for job_id in due[: max(ASKED - waiting(CONTROL), 0)]:
         send_coordinate(job_id)
     if is_open and waiting(SOLVE) == 0:
         send_work()
-    forget_gone()
-    expire()
 
 
 def forget_gone() -> None:
@@ -85,12 +98,16 @@ def forget_gone() -> None:
 
 
 def expire() -> None:
-    """Deletes some of what has expired, and gives room that is not used back to the disk."""
+    """Deletes some of what has expired."""
     with database().read() as session:
         keeps = projects.some_expires(session)
     if keeps:
         with database().write() as session:
             retention.expire(session, utcnow())
+
+
+def shrink() -> None:
+    """Gives room that the database does not use back to the disk."""
     database().shrink()
 
 

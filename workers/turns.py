@@ -102,8 +102,8 @@ def _forecast(scene_id: str) -> list[PairCost]:
 def _begin(job_id: str) -> Turn | None:
     """Ends the job if it is to end, or else claims its next turn. Returns None when there is nothing to decide."""
     with writing() as (session, afterwards):
-        job = jobs.lock(session, job_id)
-        if job.state not in unfinished(JOB):
+        job = jobs.locked(session, job_id)
+        if job is None or job.state not in unfinished(JOB):
             return None
         now = clock.now(session)
         if job.state == JobState.CANCELLING:
@@ -165,8 +165,8 @@ def _save(turn: Turn, transition: Transition | cover.Transition | motions.Action
     It returns True when something may have to be decided before any work is done.
     """
     with writing() as (session, afterwards):
-        job = jobs.lock(session, turn.job_id)
-        if job.turn != turn.number or job.state not in (JobState.QUEUED, JobState.RUNNING):
+        job = jobs.locked(session, turn.job_id)
+        if job is None or job.turn != turn.number or job.state not in (JobState.QUEUED, JobState.RUNNING):
             return True
         if job.state == JobState.QUEUED:
             jobs.start(session, job, work.served_by_now(session))
@@ -250,8 +250,8 @@ def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: A
 def _give_up(turn: Turn, error: CirisError) -> bool:
     """Ends the job's growth with this error. It returns True, because the end of the job is to be decided next."""
     with writing() as (session, afterwards):
-        job = jobs.lock(session, turn.job_id)
-        if job.turn == turn.number and job.state in (JobState.QUEUED, JobState.RUNNING):
+        job = jobs.locked(session, turn.job_id)
+        if job is not None and job.turn == turn.number and job.state in (JobState.QUEUED, JobState.RUNNING):
             job.error = error.to_document()
             _finish_growth(session, job, Finish(Outcome.ERROR, error.message), afterwards)
     return True

@@ -15,9 +15,10 @@ import socket
 import ssl
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from http.client import HTTPConnection, HTTPException
+from typing import Self
 from urllib.parse import SplitResult, urlsplit
 
 from structlog.contextvars import bound_contextvars
@@ -30,35 +31,59 @@ from db.settings import settings
 from db.types import utcnow
 from db.vault import vault
 from workers.addresses import resolve
+from workers.troubles import Troubles
 
 log = logging.getLogger(__name__)
 
-AT_ONCE = 8
 SECONDS = 15.0
 """A receiver that has not answered within this many seconds has failed, even if it is still sending."""
 
 
-def run(stop: threading.Event) -> None:
-    """Delivers until ``stop`` is set. A round that fails (the database is away) is logged, and the next one tries again."""
+def run(stop: threading.Event, troubles: Troubles) -> None:
+    """Delivers until ``stop`` is set. What fails (the database is away) is tried again."""
     sealed = False
-    while not stop.wait(settings().sweep_seconds):
-        try:
-            if not sealed and vault().usable:
-                with database().write() as session:
-                    webhooks.seal_all(session)
-                sealed = True
-            deliver_due()
-        except Exception:
-            log.exception("a round of webhooks failed")
+    with Couriers() as couriers:
+        while not stop.is_set():
+            with troubles.noting("telling the receivers of webhooks"):
+                if not sealed and vault().usable:
+                    with database().write() as session:
+                        webhooks.seal_all(session)
+                    sealed = True
+                couriers.send_due()
+            couriers.rest(stop, settings().sweep_seconds)
 
 
-def deliver_due() -> None:
-    """Does one round: it attempts every delivery that is due, a few at once."""
-    with database().write() as session:
-        due = webhooks.claim(session, utcnow())
-    if due:
-        with ThreadPoolExecutor(AT_ONCE, thread_name_prefix="webhook") as pool:
-            list(pool.map(_deliver, due))
+class Couriers:
+    """Couriers make deliveries, each in a thread of its own. A receiver that does not answer keeps one of them, and nobody else."""
+
+    def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(webhooks.AT_ONCE, thread_name_prefix="webhook")
+        self._under_way: dict[Future[None], webhooks.Place] = {}
+
+    def send_due(self) -> None:
+        """Begins what is due as far as there is room for it, and waits for no receiver. One that has failed raises its error."""
+        for future in [future for future in self._under_way if future.done()]:
+            del self._under_way[future]
+            future.result()
+        with database().write() as session:
+            due = webhooks.claim(session, utcnow(), list(self._under_way.values()))
+        for delivery in due:
+            self._under_way[self._pool.submit(_deliver, delivery)] = delivery.place
+
+    def rest(self, stop: threading.Event, seconds: float) -> None:
+        """Waits until one that is under way has ended and left room, but not longer than these seconds."""
+        if self._under_way:
+            wait(self._under_way, seconds, FIRST_COMPLETED)
+        else:
+            stop.wait(seconds)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._pool.shutdown()
+        for future in self._under_way:
+            future.result()
 
 
 def _deliver(delivery: webhooks.Delivery) -> None:
@@ -127,16 +152,19 @@ class _Pinned(HTTPConnection):
     """Connects to the address that was checked, under the name that was given."""
 
     def __init__(self, url: SplitResult) -> None:
-        self._tls = url.scheme == "https"
+        self._tls, self._abandoned = url.scheme == "https", False
         super().__init__(url.hostname or "", url.port or (443 if self._tls else 80), timeout=SECONDS)
 
     def connect(self) -> None:
         address = resolve(self.host, self.port, private=settings().webhook_private)
         self.sock = socket.create_connection((address, self.port), self.timeout)
+        if self._abandoned:
+            raise TimeoutError("timed out")
         if self._tls:
             self.sock = ssl.create_default_context().wrap_socket(self.sock, server_hostname=self.host)
 
     def abandon(self) -> None:
+        self._abandoned = True
         if self.sock is not None:
             with suppress(OSError):
                 self.sock.shutdown(socket.SHUT_RDWR)

@@ -15,6 +15,7 @@ from api.reading import ReadingRoute
 from api.schemas.common import MAX_INT, JobGiven, Listed
 from api.schemas.jobs import Event, EventList, ProjectEvent, ProjectEventList
 from db import events, jobs
+from db.models import JobRow
 from db.session import Database
 
 After = Annotated[int, Query(ge=0, le=MAX_INT, description="Return only events with a larger number than this.")]
@@ -44,15 +45,15 @@ def list_job_events(
         return EventList(events=[Event.of(row) for row in rows])
 
 
-def _existing(job_id: JobGiven, db: Db) -> str:
-    """Returns the id if the job exists. This comes before the stream begins, because a stream cannot answer 404 any more."""
+def _existing(job_id: JobGiven, db: Db) -> JobRow:
+    """Returns the job if it exists. This comes before the stream begins, because a stream cannot answer 404 any more."""
     with db.read() as session:
-        return jobs.get(session, job_id).id
+        return jobs.get(session, job_id)
 
 
 @router.get("/{job_id}/events/stream", response_class=EventSourceResponse)
 async def stream_job_events(
-    job_id: Annotated[str, Depends(_existing)],
+    job: Annotated[JobRow, Depends(_existing)],
     db: Db,
     request: Request,
     after: After = 0,
@@ -62,18 +63,19 @@ async def stream_job_events(
 ) -> AsyncIterator[ServerSentEvent]:
     """Streams the job's events as they happen.
 
-    The last event is called `end`. After it the stream closes. It closes without that event when the caller's key is revoked.
+    A number beyond the last event counts as the last one. The last event is called `end`. After it the stream closes. It closes without
+    that event when the caller's key is revoked.
     """
-    seq = after if last_event_id is None else last_event_id
+    seq = min(after if last_event_id is None else last_event_id, job.event_seq)
     keyring, given = request.app.state.keyring, presented_key(request.headers)
     while await keyring.caller(given) is not None:
-        page, ended = await run_in_threadpool(_next_page, db, job_id, seq)
+        page, ended = await run_in_threadpool(_next_page, db, job.id, seq)
         for event in page:
             yield ServerSentEvent(data=event.model_dump(mode="json"), event=event.kind, id=str(event.seq))
         if page:
             seq = page[-1].seq
         if ended and len(page) < PAGE:
-            yield ServerSentEvent(data={"job": job_id}, event="end")
+            yield ServerSentEvent(data={"job": job.id}, event="end")
             return
         await asyncio.sleep(0 if page else POLL_SECONDS)
 
@@ -112,10 +114,11 @@ async def stream_project_events(
     """Streams what happens to all jobs of the project.
 
     It does not end by itself. It goes back a little where it goes on, so an event may come twice, with the same `job` and `seq`. It closes
-    when the caller's key is revoked.
+    when the caller's key is revoked. A number beyond the last event counts as the last one.
     """
     begin = after if last_event_id is None else last_event_id
-    newest = await run_in_threadpool(_last_id, db) if begin is None else begin
+    last = await run_in_threadpool(_last_id, db)
+    newest = last if begin is None else min(begin, last)
     seen: set[int] = set() if begin is not None else set(range(max(newest - LATE, 0), newest + 1))
     keyring, given = request.app.state.keyring, presented_key(request.headers)
     while await keyring.caller(given) is not None:

@@ -124,12 +124,13 @@ def create_jobs(
 ) -> JobList:
     """Starts several jobs at once: all of them, or none where something is wrong with one, which the error's field names.
 
-    With an Idempotency-Key a repetition returns the same jobs.
+    A repetition of the request with the same Idempotency-Key returns the same jobs. Another batch with that key is refused (409). Keys of
+    single jobs are others.
     """
     asked = [submission.checked(db, one, f"jobs[{i}]") for i, one in enumerate(body.jobs)]
     room.check(db, caller.project)
     with db.write() as session:
-        made = [submission.submit(session, one, caller, idempotency_key and f"{idempotency_key}:{i}") for i, one in enumerate(asked)]
+        made = submission.submit_all(session, asked, caller, idempotency_key)
     for job, new in made:
         if new:
             background.add_task(announcements.announce, job.id)
@@ -169,7 +170,9 @@ def list_jobs(
     kind: Annotated[JobKind | None, Query(description="List only the jobs of this kind.")] = None,
     scene: OfScene = None,
     ended: Annotated[bool | None, Query(description="`true` lists the jobs that have ended, `false` the others.")] = None,
-    parent: Annotated[str | None, Query(max_length=64, description="List the jobs that grow the regions of this cover.")] = None,
+    parent: Annotated[
+        str | None, Query(min_length=1, max_length=64, description="List the jobs that grow the regions of this cover.")
+    ] = None,
     label: Label = None,
     search: Search = None,
     after: Cursor = None,
@@ -204,7 +207,7 @@ def get_job(job_id: JobGiven, db: Db) -> Job:
 
 @router.get("/{job_id}/dependents")
 def get_job_dependents(job_id: JobGiven, db: Db) -> Dependents:
-    """Returns what is deleted with a job: its regions and proofs, and the jobs that a cover has made."""
+    """Returns what is deleted with a job: its regions and proofs, its webhook where it waits, and the jobs that a cover has made."""
     with db.read() as session:
         return Dependents(**asdict(retention.of_job(session, job_id)))
 
@@ -212,7 +215,7 @@ def get_job_dependents(job_id: JobGiven, db: Db) -> Dependents:
 @router.delete("/{job_id}", status_code=status.HTTP_204_NO_CONTENT)
 @writing
 def delete_job(job_id: JobGiven, caller: Admin, db: Db, dependents: WithDependents = "keep") -> None:
-    """Deletes a job that has ended. Where it has regions or other jobs, the request has to say that they are deleted, too."""
+    """Deletes a job that has ended. Where it has regions, other jobs or a waiting webhook, the request has to say that they go, too."""
     with db.write() as session:
         retention.delete_job(session, job_id, dependents=dependents == "delete")
         audit.note(session, caller.project, str(caller), Action.JOB_DELETED, job_id)

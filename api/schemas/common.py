@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 from fastapi import Path, Query
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic_core import PydanticKnownError
 
 from api.schemas import patterns
 from certifier.growth.options import WHOLE_NUMBERS
@@ -13,7 +14,7 @@ from certifier.growth.options import WHOLE_NUMBERS
 MAX_INT = 2**31 - 1
 """The largest integer that the databases can store in a column."""
 
-Real = Annotated[float, Field(allow_inf_nan=False)]
+Real = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Vector = Annotated[list[Real], Field(min_length=1, max_length=64)]
 RandomSeed = Annotated[
     int, Field(ge=WHOLE_NUMBERS["random_seed"][0], le=WHOLE_NUMBERS["random_seed"][1], description="Seed of every random choice.")
@@ -31,19 +32,35 @@ JobGiven = Annotated[str, Path(description="The id of a job, or its first charac
 RegionGiven = Annotated[str, Path(description="The id of a region, or its first characters, four at least.", examples=["5d0c1e42"])]
 WorkerGiven = Annotated[str, Path(description="The id of a worker, or its first characters, four at least.", examples=["7c3e91d0"])]
 PairGiven = Annotated[int, Path(description="Index of a pair among the scene's, from 0.", examples=[0])]
-OfScene = Annotated[str | None, Query(max_length=255, description="List only what belongs to this scene: its id or a name of it.")]
+OfScene = Annotated[
+    str | None, Query(min_length=1, max_length=255, description="List only what belongs to this scene: its id or a name of it.")
+]
 OfIteration = Annotated[int | None, Query(ge=0, le=MAX_INT, description="The number of an iteration, from 0.")]
 WithDependents = Annotated[
     Literal["keep", "delete"],
     Query(description="`delete` deletes what depends on it, too; otherwise the request is refused where something does."),
 ]
 Offsets = Annotated[list[Real], Field(max_length=2000)]
+INTEGERS = (
+    *WHOLE_NUMBERS,
+    *("at_once", "max_iterations", "max_iterations_separating_planes", "priority", "size"),
+)
+"""The fields of requests that are whole numbers wherever there is one of this name."""
+
+
+def integer(value: object) -> object:
+    """Refuses texts and truth for a whole number. Pydantic's own strictness would refuse 7.0 too, which is one in JSON."""
+    if isinstance(value, bool | str):
+        raise PydanticKnownError("int_type")
+    return value
 
 
 class Request(BaseModel):
-    """All requests derive from this model: it refuses unknown fields and numbers that are not finite."""
+    """All requests derive from this model: it refuses unknown fields, numbers that are not finite, and texts and truth in their place."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    _integers = field_validator(*INTEGERS, mode="before", check_fields=False)(integer)
 
 
 class Page(BaseModel):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, field_validator
 
-from api.schemas.common import Real, Request, Vector
+from api.schemas.common import Real, Request, Vector, integer
 from certifier.outcome import Outcome
 from db.states import JobState
 from planner.cover.options import ENOUGH, MOST_GIVEN, MOST_JOINTS, STAGES, WHOLE_NUMBERS, CoverOptions
@@ -59,6 +59,8 @@ class CoverRequestOptions(Request):
         ),
     ] = None
     random_seed: Annotated[int, _whole("random_seed", "Seed of every random choice.")] = DEFAULTS.random_seed
+
+    _integer = field_validator("regions", mode="before")(integer)
 
 
 class Coverage(BaseModel):

@@ -87,6 +87,7 @@ class Dependents(BaseModel):
     jobs: int = Field(description="Jobs of the scene, or those that a cover has made.")
     unfinished: int = Field(description="Jobs that have not ended, the job itself included. Nothing is deleted before they have.")
     regions: int = Field(description="Certified regions.")
+    webhooks: int = Field(description="Webhooks that wait: receivers that were not told yet that a job has ended, and would never be.")
     bytes: int = Field(description="Bytes of proofs and cells.")
 
 
@@ -95,6 +96,6 @@ class Project(BaseModel):
 
     name: str = Field(description="The project's name.")
     scope: Scope = Field(description="What the caller's key allows.")
-    bytes: int = Field(description="Bytes of scenes, proofs and cells that the project stores, as of some seconds ago.")
+    bytes: int = Field(description="Bytes of scenes, jobs, proofs and cells that the project stores, as of some seconds ago.")
     max_bytes: int | None = Field(description="From so many bytes on, the service takes no more scenes and jobs; null for no limit.")
     keep_days: float | None = Field(description="So many days after their end jobs lose what they have besides regions; null for never.")

@@ -29,6 +29,7 @@ class Worker(BaseModel):
     memory_bytes: int = Field(description="Memory that all processes on its machine, or in its container, may use together.")
     state: WorkerState = Field(description="What it does, as it said last.")
     wanted: WorkerState = Field(description="What it was asked to do. It learns of it within seconds.")
+    trouble: str | None = Field(description="What fails of what it does again and again, such as its sweep; null where all goes well.")
     started_at: datetime = Field(description="When it began.")
     seen_at: datetime = Field(description="When it said last that it lives. It says so every ten seconds, and is gone after sixty.")
     work: list[HeldWork] = Field(description="What its processes hold of the jobs of the caller's project.")
@@ -47,6 +48,7 @@ class Worker(BaseModel):
             memory_bytes=row.memory_bytes,
             state=WorkerState(row.state),
             wanted=WorkerState(row.wanted),
+            trouble=row.trouble,
             started_at=row.created_at,
             seen_at=row.seen_at,
             work=list(work),

@@ -177,7 +177,7 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
         ask("GET", route)
     with database.write() as session:  # the solver of the tests is no worker of its own, so its parent stands for one
         made = Made(leases._name(os.getppid()), WorkerKind.SOLVE, "0.1.0", 2, machine.cores(), machine.memory_bytes())
-        workers.tell(session, made, WorkerState.RUNNING)
+        workers.tell(session, made, WorkerState.RUNNING, "expiry failed: OverflowError")
     path = EXAMPLES / "planar_2dof" / "scene.yaml"
     scene = ask("POST", "/v1/scenes", {"bundle": ("scene.zip", pack_bundle(path), "application/zip")})
     name, home, away = scene["name"], [0.4, 0.3], [0.6, 0.5]

@@ -1,6 +1,7 @@
 """Events as a list and as a stream; the stream against a real server, because a test client would wait for its end."""
 
 import json
+import time
 from collections.abc import Iterator
 
 import httpx2
@@ -78,6 +79,19 @@ def test_an_interrupted_stream_goes_on_where_it_was(url: str, database: Database
     assert ids == ["3", "4"]
     nothing_new = httpx2.get(f"{url}/v1/jobs/{job_id}/events/stream", params={"after": 4}, timeout=60)
     assert [line for line in nothing_new.text.splitlines() if line.startswith("event: ")] == ["event: end"]
+
+
+@pytest.mark.parametrize("path", ["/v1/jobs/{job_id}/events/stream", "/v1/events/stream"])
+def test_a_stream_that_is_to_go_on_beyond_the_last_event_tells_the_next_one(url: str, database: Database, job_id: str, path: str) -> None:
+    """Such a number is of a database that was put back to a backup, or nobody's."""
+    beyond = {"Last-Event-ID": str(2**31 - 1)}
+    with httpx2.stream("GET", url + path.format(job_id=job_id), headers=beyond, timeout=20) as response:
+        add(database, job_id, 7)
+        began = time.monotonic()
+        for line in response.iter_lines():
+            assert time.monotonic() - began < 10, "only signs of life come"
+            if line.startswith("data: ") and json.loads(line.removeprefix("data: "))["seq"] == 2:
+                break
 
 
 def test_an_open_stream_does_not_keep_the_server_from_stopping(database: Database, job_id: str, url: str) -> None:

@@ -86,6 +86,21 @@ def test_several_jobs_are_made_together_or_not_at_all(client: TestClient, scene:
     assert client.post("/v1/jobs/batch", json={"jobs": [GROW] * 101}).status_code == 422
 
 
+def test_a_key_of_a_batch_stands_for_all_of_it_and_for_no_single_job(client: TestClient, scene: Scene) -> None:
+    def post(*jobs: dict[str, Any], key: str = "k") -> tuple[int, str | None]:
+        answer = client.post("/v1/jobs/batch", json={"jobs": list(jobs)}, headers={"Idempotency-Key": key})
+        return answer.status_code, answer.json().get("code")
+
+    one, two, three = (GROW | {"labels": {"n": str(i)}} for i in range(3))
+    assert [post(one, two), post(one, two)] == [(201, None)] * 2
+    others = [post(one), post(one, two, three), post(two, one), post(three, three), post(one, three)]
+    assert others == [(409, "idempotency_conflict")] * 5
+    assert len(listed(client)) == 2, "none of another batch was made"
+    for key in ("k", "k:0", "batch:open:0:k"):
+        assert client.post("/v1/jobs", json=three, headers={"Idempotency-Key": key}).status_code == 201
+    assert post(three, key="open:k") == (201, None)
+
+
 def test_several_jobs_are_cancelled_together(client: TestClient, scene: Scene) -> None:
     a, b, c = labelled(client, batch="1"), labelled(client, batch="1"), labelled(client, batch="2")
     by_label = client.post("/v1/jobs/cancel", json={"labels": {"batch": "1"}})
@@ -114,6 +129,18 @@ def test_events_of_all_jobs_of_the_project_are_listed(client: TestClient, databa
         key = keys.add(session, "stranger", Scope.ADMIN, "others")
     answer = client.get("/v1/events", headers={"Authorization": f"Bearer {key}"})
     assert answer.json() == {"events": []}
+
+
+def test_no_event_is_lost_after_a_job_was_deleted(client: TestClient, database: Database, scene: Scene) -> None:
+    def made() -> str:
+        return str(client.post("/v1/jobs", json=GROW).json()["id"])
+
+    gone = made()
+    client.post(f"/v1/jobs/{gone}/cancel")
+    last = client.get("/v1/events").json()["events"][-1]["id"]
+    assert client.delete(f"/v1/jobs/{gone}").status_code == 204
+    job = made()
+    assert [event["job"] for event in client.get("/v1/events", params={"after": last}).json()["events"]] == [job]
 
 
 def test_one_stream_tells_of_all_jobs_also_of_late_ones(url: str, client: TestClient, database: Database, scene: Scene) -> None:

@@ -48,6 +48,7 @@ def test_the_figures_are_those_of_the_database(client: TestClient, region: str) 
     assert found['ciris_pair_seconds{state="certified"}'] == 0.2
     assert found["ciris_regions"] == 1
     assert found['ciris_queue_messages{queue="control"}'] == 1
+    assert found["ciris_decisions_due"] == 1
     assert found['ciris_http_requests_total{method="POST",status="201"}'] == 1
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Callable, Iterator
+from typing import Any, get_args
 
 import pytest
 from fastapi.testclient import TestClient
@@ -15,6 +17,8 @@ from sqlalchemy.exc import OperationalError
 from api import guard
 from api.access import KEYS_SECONDS
 from api.app import create_app
+from api.schemas.common import INTEGERS, Request
+from api.schemas.covers import CoverRequestOptions
 from certifier.model import Scene
 from db import jobs
 from db.session import Database
@@ -54,6 +58,46 @@ def test_odd_json_is_the_clients_fault(client: TestClient, scene: Scene, body: s
     assert client.get("/v1/jobs").json()["jobs"] == []
 
 
+@pytest.mark.parametrize("wrong", ["7", True, "", False], ids=repr)
+@pytest.mark.parametrize(
+    ("field", "body"),
+    [
+        ("options.random_seed", lambda value: GROW | {"options": {"random_seed": value}}),
+        ("options.cells", lambda value: GROW | {"options": {"cells": value}}),
+        ("options.tolerance", lambda value: GROW | {"options": {"tolerance": value}}),
+        ("priority", lambda value: GROW | {"priority": value}),
+        ("seed.max_iterations", lambda value: GROW | {"seed": {**GROW["seed"], "max_iterations": value}}),
+        ("seed.q[0]", lambda value: GROW | {"seed": {"q": [value]}}),
+        ("random_seed", lambda value: CERTIFY | {"random_seed": value}),
+    ],
+)
+def test_texts_and_truth_are_no_numbers(
+    client: TestClient, scene: Scene, field: str, body: Callable[[object], dict[str, Any]], wrong: object
+) -> None:
+    answer = client.post("/v1/jobs", json=body(wrong))
+    assert (answer.status_code, answer.json()["field"]) == (422, field)
+    assert "valid" in answer.json()["detail"]
+
+
+def requests(model: type[Request]) -> Iterator[type[Request]]:
+    for one in model.__subclasses__():
+        yield one
+        yield from requests(one)
+
+
+def test_every_whole_number_of_a_request_is_one() -> None:
+    fields = [(name, field.annotation) for model in requests(Request) for name, field in model.model_fields.items()]
+    whole = {name for name, kind in fields if int in {getattr(one, "__origin__", one) for one in get_args(kind) or [kind]}}
+    assert whole == {*INTEGERS, "regions"}
+    with pytest.raises(ValueError, match="valid integer"):
+        CoverRequestOptions(regions="7")
+
+
+def test_a_whole_number_may_be_written_with_a_point(client: TestClient, scene: Scene) -> None:
+    answer = client.post("/v1/jobs", json=GROW | {"options": {"random_seed": 7.0}})
+    assert (answer.status_code, answer.json()["options"]["random_seed"]) == (201, 7)
+
+
 def test_bytes_that_are_no_text_are_the_clients_fault(client: TestClient, scene: Scene) -> None:
     assert client.post("/v1/jobs", content=b'{"kind": "\xff"}', headers=JSON).status_code in (400, 422)
 
@@ -84,6 +128,9 @@ def test_any_document_is_a_job_or_a_problem(client: TestClient, scene: Scene, ch
         "/v1/scenes?after=%C3%A9",
         "/v1/scenes/" + "x" * 5000,
         "/v1/regions?scene=%00",
+        "/v1/regions?scene=",
+        "/v1/jobs?scene=",
+        "/v1/jobs?parent=",
     ],
 )
 def test_odd_addresses_are_the_clients_fault(client: TestClient, path: str) -> None:

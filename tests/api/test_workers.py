@@ -112,6 +112,15 @@ def test_another_project_sees_the_workers_but_neither_its_jobs_nor_pauses_them(
     assert client.get(f"/v1/workers/{crew['solve']}", headers=mine).json()["wanted"] == "running"
 
 
+def test_what_fails_in_a_worker_can_be_seen(client: TestClient, database: Database, crew: dict[str, str]) -> None:
+    assert samples(client.get("/metrics").text)["ciris_workers_in_trouble"] == 0
+    with database.write() as session:
+        workers.tell(session, Made(CONTROL, WorkerKind.CONTROL, "1.2", 4, 8, 2**34), WorkerState.RUNNING, "expiry failed: OverflowError")
+    assert client.get(f"/v1/workers/{crew['control']}").json()["trouble"] == "expiry failed: OverflowError"
+    assert client.get(f"/v1/workers/{crew['solve']}").json()["trouble"] is None
+    assert samples(client.get("/metrics").text)["ciris_workers_in_trouble"] == 1
+
+
 def test_the_metrics_say_how_many_would_be_busy(client: TestClient, database: Database, crew: dict[str, str], busy: str) -> None:
     found = samples(client.get("/metrics").text)
     assert found['ciris_workers{kind="solve",state="running"}'] == 1

@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from api.access import KEYS_SECONDS
-from db import keys, projects
+from db import keys, migrate, projects
 from db.keys import Scope
 from db.session import Database
+from db.settings import Settings
 from tests.client.conftest import Ciris, command, surroundings
 
 
@@ -49,6 +50,7 @@ def test_an_admin_manages_the_keys_of_the_project_over_http(ciris: Ciris, url: s
 
 def test_projects_on_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("CIRIS_DATA_DIR", str(tmp_path))
+    migrate.upgrade(Settings().database)
     projects.main(["add", "welding"])
     projects.main(["set", "welding", "--max-bytes", "1e9", "--keep-days", "30"])
     keys.main(["add", "planner", "--scope", "read", "--project", "welding"])
@@ -66,14 +68,36 @@ def test_projects_on_the_command_line(tmp_path: Path, monkeypatch: pytest.Monkey
             projects.main(wrong)
         assert ended.value.code == 2
     capsys.readouterr()
-    with pytest.raises(SystemExit):
-        projects.main(["set", "welding", "--max-bytes", "none"])
-    assert "none is not a number from 0 on; 0 takes the limit away" in capsys.readouterr().err
+    for option, number, wrong_with_it in (
+        ("--max-bytes", "none", "is not a number from 0 on"),
+        ("--max-bytes", "nan", "is not a number from 0 on"),
+        ("--max-bytes", "0.4", "is not a whole number"),
+        ("--max-bytes", "1e19", f"is more than {2**62}"),
+        ("--max-bytes", "inf", f"is more than {2**62}"),
+        ("--keep-days", "1000000", "is more than 36500"),
+    ):
+        with pytest.raises(SystemExit):
+            projects.main(["set", "welding", option, number])
+        said = f"error: argument {option}: {number} {wrong_with_it}; 0 takes the limit away (see ciris project set --help)\n"
+        assert capsys.readouterr().err == said
+    projects.main(["ls"])
+    assert "keep_days 30.0" in capsys.readouterr().out, "nothing was changed"
     with pytest.raises(SystemExit):
         keys.main(["revoke", "planner"])  # that of the default project
 
 
+@pytest.mark.parametrize("words", [("key", "ls"), ("key", "add", "planner", "--scope", "read"), ("project", "ls"), ("project", "add", "a")])
+def test_no_command_but_up_makes_a_database(tmp_path: Path, words: tuple[str, ...]) -> None:
+    data = tmp_path / "misspelt"
+    done = subprocess.run(command(*words, "--data", data), env=surroundings(), capture_output=True, text=True, check=False)
+    where = data / "ciris.sqlite3"
+    hint = "is it spelt so? `ciris up` and `python -m db.migrate` make one"
+    assert (done.returncode, done.stderr) == (2, f"error: database: there is none at {where} ({hint})\n")
+    assert not data.exists()
+
+
 def test_the_command_passes_limits_on(tmp_path: Path) -> None:
+    migrate.upgrade(Settings(data_dir=tmp_path).database)
     for words in (("add", "welding"), ("set", "welding", "--keep-days", "7")):
         subprocess.run(command("project", *words, "--data", tmp_path), env=surroundings(), check=True)
     listed = subprocess.run(command("project", "ls", "--json", "--data", tmp_path), env=surroundings(), check=True, capture_output=True)

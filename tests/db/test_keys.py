@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from sqlalchemy import text
 
 from certifier.errors import CirisError
-from db import keys
+from db import keys, migrate
 from db.keys import Scope
 from db.session import Database
+from db.settings import Settings
 
 
 def test_a_key_is_valid_until_it_is_revoked(db: Database) -> None:
@@ -85,6 +86,7 @@ def test_scopes_are_ordered() -> None:
 
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("CIRIS_DATA_DIR", str(tmp_path))
+    migrate.upgrade(Settings().database)
     keys.main(["add", "planner", "--scope", "submit"])
     key = capsys.readouterr().out.strip()
     keys.main(["ls", "--json"])

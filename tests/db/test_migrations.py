@@ -6,11 +6,11 @@ from datetime import timedelta
 
 from sqlalchemy import inspect
 
-from db import jobs, migrate, overlaps, pairs, regions, scenes, subtrees, work
+from db import events, jobs, migrate, overlaps, pairs, regions, retention, scenes, subtrees, work
 from db.models import SceneRow
 from db.session import Database
 from db.types import utcnow
-from tests.db.builders import a_running_job, add_region, all_pairs, certified
+from tests.db.builders import a_job, a_running_job, add_region, all_pairs, certified
 from tests.scenes import slider
 
 
@@ -151,6 +151,49 @@ def test_regions_stored_before_there_were_boxes_have_their_limits_and_numbers(em
         assert {(*box.lower, *box.upper) for box in regions.polytopes(session, made)} == {(-2.0, 2.0)}
         regions.delete(session, made[0])
         assert regions.roll(session, scene_id) == (4, made[1:])
+    database.close()
+
+
+def ids_of_new_events(database: Database) -> list[int]:
+    """The ids of the events of a job that is deleted again."""
+    with database.write() as session:
+        job_id = a_job(session).id
+        ids = [event.id for event in events.since(session, job_id)]
+        jobs.cancel(session, job_id)
+    with database.write() as session:
+        retention.delete_job(session, job_id, dependents=False)
+    return ids
+
+
+def test_ids_of_events_go_on_from_the_largest_one_and_never_come_again(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.write() as session:
+        kept = events.since(session, a_job(session).id)[-1].id
+    database.close()
+    migrate.downgrade(empty_database_url, "0021")
+    migrate.upgrade(empty_database_url)
+    assert migrate.drift(empty_database_url) == []
+    database = Database(empty_database_url)
+    with database.read() as session:
+        assert events.last_id(session) == kept
+    first, second = ids_of_new_events(database), ids_of_new_events(database)
+    assert kept < min(first) <= max(first) < min(second)
+    database.close()
+
+
+def test_jobs_of_before_their_bytes_were_counted_count(empty_database_url: str) -> None:
+    migrate.upgrade(empty_database_url)
+    database = Database(empty_database_url)
+    with database.write() as session:
+        job_id = a_job(session, given_labels={"team": "welding"}).id
+    database.close()
+    migrate.downgrade(empty_database_url, "0022")
+    migrate.upgrade(empty_database_url)
+    assert migrate.drift(empty_database_url) == []
+    database = Database(empty_database_url)
+    with database.read() as session:
+        assert jobs.get(session, job_id).bytes == jobs.ROW_BYTES + len('{"random_seed": 0}') + len("teamwelding")
     database.close()
 
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from datetime import timedelta
 from pathlib import Path
 
 import pytest
-from sqlalchemy import func, select
+from sqlalchemy import func, select, text
 
 from certifier.errors import CirisError
 from db import jobs, pairs, projects, proofs, regions, retention, scenes, subtrees
-from db.models import Base, JobRow, LibraryRow, ProofRow, RegionRow, SceneRow
+from db.models import Base, JobRow, LibraryRow, ProofRow, RegionRow, SceneRow, WebhookRow
 from db.session import Database, Session
-from db.states import JobState
+from db.states import JobState, WebhookState, transition
 from db.types import utcnow
 from tests.db.builders import a_running_job, a_scene, add_region, all_pairs, certified
 
@@ -138,6 +139,42 @@ def test_what_is_old_expires_where_the_project_says_so(db: Database) -> None:
         assert set(session.scalars(select(ProofRow.digest))) == {proofs.digest(b"of a region")}
 
 
+@pytest.mark.parametrize("days", [projects.MOST_DAYS + 1, 1e6, 2.0**62])
+def test_a_project_that_keeps_things_for_ever_stops_nobody(db: Database, days: float) -> None:
+    """An earlier version took such numbers, and no date is so long ago."""
+    with db.write() as session:
+        an_ended_job(session, with_region=False)
+        projects.add(session, "others").keep_days = days
+        session.flush()
+        assert not projects.some_expires(session)
+        projects.get(session, "default").keep_days = 7.0
+        assert retention.expire(session, utcnow() + timedelta(days=8)) == 1
+
+
+def test_a_webhook_that_waits_is_not_dropped_without_a_word(db: Database) -> None:
+    with db.write() as session:
+        projects.get(session, "default").keep_days = 7.0
+        job_id = an_ended_job(session, with_region=False)
+        session.add(WebhookRow(id="w", job_id=job_id, url="https://example.org/", secret="sealed"))
+        session.flush()
+        assert (retention.of_job(session, job_id).webhooks, retention.of_scene(session, "slider").webhooks) == (1, 1)
+        with pytest.raises(CirisError, match=rf"with job {job_id} go 1 waiting webhook and 0\.0 MB") as refused:
+            retention.delete_job(session, job_id, dependents=False)
+        assert refused.value.code == "has_dependents"
+        assert retention.expire(session, utcnow() + timedelta(days=8)) == 0
+        transition(session, WebhookRow, WebhookState.FAILED, WebhookRow.id == "w")
+        assert retention.of_job(session, job_id).webhooks == 0
+        assert retention.expire(session, utcnow() + timedelta(days=8)) == 1
+    assert counts(db).keys() == {"scenes", "scene_names"}
+
+
+def test_a_job_is_not_said_to_go_with_itself(db: Database) -> None:
+    with db.write() as session:
+        job_id = an_ended_job(session, with_region=True)
+        with pytest.raises(CirisError, match=rf"with job {job_id} go 1 region and 0\.0 MB"):
+            retention.delete_job(session, job_id, dependents=False)
+
+
 def test_a_cover_expires_after_its_jobs(db: Database) -> None:
     with db.write() as session:
         projects.get(session, "default").keep_days = 7.0
@@ -165,6 +202,33 @@ def test_bytes_are_counted_by_project(db: Database) -> None:
     with db.read() as session:
         assert retention.stored(session, "default") == 0
         assert retention.stored(session, "others") > len(b"of a pair" + b"of a region" + b"cells") + 500, "the scene counts, too"
+
+
+def test_what_jobs_were_asked_for_counts(db: Database) -> None:
+    options = {"seed": {"contain": [[0.125] * 7] * 2000}}
+    labels = {f"name{number}": "v" * 200 for number in range(20)}
+    with db.write() as session:
+        scene = a_scene(session)
+        before = retention.stored(session, "default")
+        job, _ = jobs.create(session, kind="grow", scene_id=scene.id, options=options, given_labels=labels)
+        counted = retention.stored(session, "default") - before
+        assert 0 < counted - len(json.dumps(options)) - len(json.dumps(labels)) <= jobs.ROW_BYTES + 10
+        jobs.cancel(session, job.id)
+        retention.delete_job(session, job.id, dependents=False)
+        assert retention.stored(session, "default") == before
+
+
+def test_counting_jobs_reads_no_row_of_them(db: Database) -> None:
+    """Their options may be long."""
+    counting = "SELECT sum(bytes) FROM jobs WHERE project = 'default'"
+    with db.read() as session:
+        if db.sqlite:
+            (step,) = session.execute(text(f"EXPLAIN QUERY PLAN {counting}")).all()
+            assert "COVERING INDEX ix_jobs_project_bytes" in step[-1]
+        else:
+            session.execute(text("SET enable_seqscan = off"))
+            plan = session.scalars(text(f"EXPLAIN {counting}")).all()
+            assert any("Index Only Scan using ix_jobs_project_bytes" in line for line in plan)
 
 
 def test_the_file_of_an_sqlite_database_shrinks(tmp_path: Path, migrated_sqlite: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import update
 
-from db import jobs, keys, projects, retention
+from db import command_line, jobs, keys, projects, retention
 from db.disk import Disk
 from db.keys import Scope
 from db.models import JobRow
@@ -94,6 +94,16 @@ TEAMS = [
             "there is no project {name}",
             "`ciris project add NAME` makes one",
             lambda t: write(t, lambda session: keys.add(session, "planner", Scope.READ, "nobody")),
+        ),
+    ),
+    *rows(
+        "db/command_line.py",
+        (
+            "no_database",
+            "database",
+            "there is none at {database}",
+            "is it spelt so? `ciris up` and `python -m db.migrate` make one",
+            lambda t: command_line.check_there(f"sqlite:///{t.directory}/misspelt.sqlite3"),
         ),
     ),
     *rows(

@@ -4,6 +4,7 @@ import re
 from importlib.util import find_spec
 from pathlib import Path
 
+import pytest
 import yaml
 
 from db import traces
@@ -38,6 +39,21 @@ def test_the_commands_exist() -> None:
 def test_the_settings_exist() -> None:
     names = {f"CIRIS_{name.upper()}" for name in Settings.model_fields} | set(traces.ENDPOINTS)
     assert {name for service in OURS for name in SERVICES[service]["environment"]} <= names
+
+
+def test_settings_of_an_operator_come_from_the_file_and_have_the_programs_defaults(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = SERVICES["api"]["environment"]
+    for name in ("CIRIS_TRUSTED_PROXIES", "CIRIS_WEBHOOK_PRIVATE", "CIRIS_REQUESTS_PER_SECOND"):
+        assert given[name] == SERVICES["control"]["environment"][name]
+        default = re.fullmatch(rf"\$\{{{name}:?-(.*)\}}", given[name])
+        assert default
+        field = name.removeprefix("CIRIS_").lower()
+        monkeypatch.delenv(name, raising=False)
+        expected = getattr(Settings(), field)
+        monkeypatch.setenv(name, default[1])
+        found = getattr(Settings(), field)
+        assert set(expected) <= set(found) if name == "CIRIS_TRUSTED_PROXIES" else expected == found
+    assert given["CIRIS_TRUSTED_PROXIES"].startswith("${CIRIS_TRUSTED_PROXIES-"), "an empty one means nobody"
 
 
 def test_no_secret_has_a_default() -> None:

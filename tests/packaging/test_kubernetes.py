@@ -99,6 +99,16 @@ def test_the_user_is_that_of_the_image() -> None:
     assert {PODS[name]["spec"]["securityContext"]["runAsUser"] for name in OURS} == {10001}
 
 
+def test_the_api_survives_a_node() -> None:
+    """Its pods are on several nodes where there are some, and one that is drained takes one pod at a time."""
+    labels = PODS["api"]["metadata"]["labels"]
+    (apart,) = PODS["api"]["spec"]["affinity"]["podAntiAffinity"]["preferredDuringSchedulingIgnoredDuringExecution"]
+    assert apart["podAffinityTerm"] == {"topologyKey": "kubernetes.io/hostname", "labelSelector": {"matchLabels": labels}}
+    budget = next(d for d in DOCUMENTS if d["kind"] == "PodDisruptionBudget")["spec"]
+    assert budget == {"maxUnavailable": 1, "selector": {"matchLabels": labels}}
+    assert next(d for d in DOCUMENTS if d["kind"] == "Deployment" and d["metadata"]["name"] == "api")["spec"]["replicas"] == 2
+
+
 def test_workers_end_by_sigquit_and_are_looked_after() -> None:
     for name in ("control", "solve"):
         container = CONTAINERS[name]
@@ -121,6 +131,7 @@ def test_settings_exist_and_secrets_are_referred_to() -> None:
     config = next(d for d in DOCUMENTS if d["kind"] == "ConfigMap")["data"]
     named = set(config) | {entry["name"] for name in OURS for entry in CONTAINERS[name]["env"]}
     assert {name for name in named if name.startswith("CIRIS_")} <= {f"CIRIS_{name.upper()}" for name in Settings.model_fields}
+    assert "CIRIS_TRUSTED_PROXIES" in config, "without the Ingress in it, all callers without a key have one budget"
     assert not any(document["kind"] == "Secret" for document in DOCUMENTS)
     for container in CONTAINERS.values():
         for entry in container.get("env", []):

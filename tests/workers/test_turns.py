@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import timedelta
+from functools import partial
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,7 @@ from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.pair.forecast import forecast
-from db import jobs, pairs, regions, steps
+from db import jobs, pairs, regions, retention, steps
 from db.models import IterationRow, JobRow, PairRow, ProofRow, StepRow, SubtreesRow
 from db.session import database
 from db.settings import settings
@@ -26,10 +28,11 @@ from tests.services import Queue
 from tests.workers.options import box_around, grow_box
 from tests.workers.record import check_record
 from tests.workers.service import environment, events_of, job_of, pairs_of, submit
-from workers import admission, sweeper, transaction
+from workers import admission, sweeper, transaction, turns
 from workers.app import CONTROL, SOLVE, send_coordinate, waiting
 from workers.scenes import load_scene
 from workers.solver import Piece, work
+from workers.troubles import Troubles
 from workers.turns import coordinate
 
 ELSEWHERE = "elsewhere:1:1"
@@ -343,6 +346,30 @@ def test_a_solver_that_leaves_work_sends_for_another(job_id: str, own_queue: Que
             assert waiting(SOLVE) == left
 
 
+def delete(job_id: str) -> None:
+    with database().write() as session:
+        jobs.cancel(session, job_id)
+        retention.delete_job(session, job_id, dependents=False)
+
+
+@pytest.mark.parametrize("options", [box_around([0.0], 0.1), box_around([9.0], 0.1)], ids=["to be saved", "to be given up"])
+def test_a_job_that_is_deleted_is_coordinated_no_more(options: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its message may come after it, and it may go while a decision about it is made."""
+    gone, going = (submit(slider(), options) for _ in range(2))
+    delete(gone)
+    coordinate(gone)
+    decide = turns._decide
+
+    def meanwhile(turn: turns.Turn) -> Any:
+        delete(going)
+        return decide(turn)
+
+    monkeypatch.setattr(turns, "_decide", meanwhile)
+    coordinate(going)
+    with database().read() as session:
+        assert session.scalars(select(JobRow)).all() == []
+
+
 def test_the_sweeper_sends_lost_messages_again(job_id: str, own_queue: Queue) -> None:
     own_queue.flush()
     sweeper.sweep()
@@ -353,6 +380,16 @@ def test_the_sweeper_sends_lost_messages_again(job_id: str, own_queue: Queue) ->
     own_queue.flush()
     sweeper.sweep()
     assert (waiting(SOLVE), waiting(CONTROL)) == (0, 1)
+
+
+def test_a_paused_control_worker_is_asked_so_often_and_no_more(own_queue: Queue, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweeper, "ASKED", 3)
+    for _ in range(5):
+        submit(slider(), box_around([0.0], 0.1))
+    own_queue.flush()
+    for _ in range(4):
+        sweeper.sweep()
+        assert waiting(CONTROL) == 3
 
 
 def test_the_sweeper_frees_what_a_lost_worker_held_and_says_why(job_id: str) -> None:
@@ -379,6 +416,54 @@ def test_leases_are_not_ended_by_time_right_after_nobody_could_renew_them() -> N
     assert could_renew(200, 220, 240, 261) == [False, False, False, True]
     holders.could_not_write()
     assert could_renew(262) == [False]
+
+
+def lose_a_lease(job_id: str) -> None:
+    """A worker of another machine holds all pairs, and its leases have run out."""
+    with database().write() as session:
+        pairs.claim(session, jobs.lock(session, job_id), lease_seconds=60, batch_seconds=60)
+        session.execute(update(PairRow).values(worker=ELSEWHERE, lease_until=utcnow() - timedelta(seconds=1)))
+
+
+@pytest.mark.parametrize("chore", ["forget_gone", "expire", "shrink"])
+def test_tidying_up_that_fails_keeps_nothing_from_being_taken_back(job_id: str, monkeypatch: pytest.MonkeyPatch, chore: str) -> None:
+    done = []
+
+    def fails() -> None:
+        done.append(chore)
+        raise OverflowError
+
+    for name in ("forget_gone", "expire", "shrink"):
+        monkeypatch.setattr(sweeper, name, fails if name == chore else partial(done.append, name))
+    holders, troubles, now = sweeper.Holders(), Troubles(), utcnow()
+    lose_a_lease(job_id)
+    for seconds in range(0, 61, 20):
+        assert {row.state for row in pairs_of(job_id)} == {"running"}, "their holders may renew them"
+        monkeypatch.setattr(sweeper, "utcnow", partial(add, now, timedelta(seconds=seconds)))
+        sweeper.do_round(holders, troubles)
+    assert {row.state for row in pairs_of(job_id)} == {"open"}
+    assert sorted(done) == sorted(["forget_gone", "expire", "shrink"] * 4)
+    assert (troubles.said() or "").endswith("failed: OverflowError")
+    monkeypatch.setattr(sweeper, chore, list)
+    sweeper.do_round(holders, troubles)
+    assert troubles.said() is None
+
+
+def test_a_database_that_is_away_for_the_sweep_takes_no_lease_back(job_id: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    holders, troubles, now = sweeper.Holders(), Troubles(), utcnow()
+    lose_a_lease(job_id)
+    for seconds in range(0, 61, 20):
+        with monkeypatch.context() as away:
+            away.setattr(sweeper, "utcnow", partial(add, now, timedelta(seconds=seconds)))
+            if seconds == 40:
+                away.setattr(sweeper, "release_lost", partial(raise_, OperationalError("SELECT 1", {}, Away())))
+            sweeper.do_round(holders, troubles)
+        assert (troubles.said() is not None) == (seconds == 40)
+    assert {row.state for row in pairs_of(job_id)} == {"running"}
+
+
+def raise_(error: Exception, **_: object) -> None:
+    raise error
 
 
 @pytest.mark.parametrize(

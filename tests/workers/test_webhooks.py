@@ -9,6 +9,7 @@ import json
 import socket
 import threading
 import time
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import timedelta
@@ -16,21 +17,22 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
-from sqlalchemy import text
+from sqlalchemy import select, text
 
 from certifier.errors import CirisError
-from db import jobs, webhooks
-from db.models import Base, WebhookRow
+from db import jobs, projects, webhooks
+from db.models import DEFAULT_PROJECT, Base, WebhookRow
 from db.session import database
 from db.settings import settings
 from db.states import JobState
 from db.types import utcnow
 from db.vault import vault
 from tests.db.builders import a_job
-from tests.workers.service import environment
+from tests.workers.service import environment, eventually
 from workers import addresses
 from workers import webhooks as delivering
 from workers.addresses import is_public, resolve
+from workers.troubles import Troubles
 
 SECRET = "whsec_" + base64.b64encode(bytes(range(32))).decode()
 
@@ -79,14 +81,20 @@ def service(database_url: str) -> Iterator[None]:
         yield
 
 
-def a_webhook(url: str, *, ended: bool = True) -> str:
+def a_webhook(url: str, *, ended: bool = True, project: str = DEFAULT_PROJECT) -> str:
     """The id of a job with a webhook."""
-    with database().write() as session:
+    with database().of(project).write() as session:
         job = a_job(session)
         webhooks.add(session, job.id, url, SECRET)
         if ended:
             jobs.finish(session, job, JobState.CANCELLED, reason="no longer wanted")
         return job.id
+
+
+def deliver_due() -> None:
+    """Attempts every delivery that is due."""
+    with delivering.Couriers() as couriers:
+        couriers.send_due()
 
 
 def row_of(job_id: str) -> WebhookRow:
@@ -104,7 +112,7 @@ def pass_time(seconds: float) -> None:
 def test_the_end_of_a_job_is_told_once_and_signed(service: None, receiver: Receiver) -> None:
     job_id = a_webhook(receiver.url)
     for _ in range(2):
-        delivering.deliver_due()
+        deliver_due()
     (body,), (headers,) = receiver.bodies, receiver.headers
     message = json.loads(body)
     assert (message["type"], message["data"]["id"], message["data"]["state"]) == ("job.ended", job_id, "cancelled")
@@ -118,24 +126,24 @@ def test_the_end_of_a_job_is_told_once_and_signed(service: None, receiver: Recei
 
 def test_a_job_that_goes_on_is_not_told(service: None, receiver: Receiver) -> None:
     job_id = a_webhook(receiver.url, ended=False)
-    delivering.deliver_due()
+    deliver_due()
     assert receiver.bodies == []
     with database().write() as session:
         jobs.cancel(session, job_id)
-    delivering.deliver_due()
+    deliver_due()
     assert len(receiver.bodies) == 1
 
 
 def test_a_receiver_that_fails_is_called_again_later_and_later(service: None, receiver: Receiver) -> None:
     receiver.answers = [500, 302, 204]
     job_id = a_webhook(receiver.url)
-    delivering.deliver_due()
+    deliver_due()
     for calls, pause in enumerate(webhooks.BACKOFF_SECONDS[:2], start=1):
         pass_time(pause - 5)
-        delivering.deliver_due()
+        deliver_due()
         assert len(receiver.bodies) == calls
         pass_time(5)
-        delivering.deliver_due()
+        deliver_due()
     assert len(receiver.bodies) == 3
     row = row_of(job_id)
     assert (row.state, row.attempts, row.error) == ("delivered", 3, None)
@@ -147,7 +155,7 @@ def test_a_receiver_that_never_answers_well_is_given_up(service: None, receiver:
     job_id = a_webhook(receiver.url)
     for pause in (0, *webhooks.BACKOFF_SECONDS, 86400):
         pass_time(pause)
-        delivering.deliver_due()
+        deliver_due()
     row = row_of(job_id)
     assert (row.state, row.attempts, row.error) == ("failed", 1 + len(webhooks.BACKOFF_SECONDS), "the receiver answered 503")
     assert len(receiver.bodies) == row.attempts
@@ -158,10 +166,11 @@ def test_a_worker_that_dies_with_a_delivery_loses_nothing(service: None, receive
     with database().write() as session:
         assert len(webhooks.claim(session, utcnow())) == 1
         assert webhooks.claim(session, utcnow()) == [], "nobody else takes it meanwhile"
-    delivering.deliver_due()
-    assert receiver.bodies == []
-    pass_time(webhooks.BACKOFF_SECONDS[0])
-    delivering.deliver_due()
+    pass_time(delivering.SECONDS + webhooks.BACKOFF_SECONDS[0])
+    deliver_due()
+    assert receiver.bodies == [], "an attempt may take longer than the pause after it"
+    pass_time(webhooks.HELD_SECONDS - delivering.SECONDS - webhooks.BACKOFF_SECONDS[0])
+    deliver_due()
     assert row_of(job_id).state == "delivered"
 
 
@@ -172,6 +181,72 @@ def test_a_worker_that_dies_each_time_is_given_up(service: None) -> None:
             webhooks.claim(session, utcnow())
         pass_time(86400)
     assert row_of(job_id).state == "failed"
+
+
+def claimed(*under_way: webhooks.Place) -> list[webhooks.Place]:
+    with database().write() as session:
+        return [delivery.place for delivery in webhooks.claim(session, utcnow(), under_way)]
+
+
+def test_projects_take_turns_and_have_a_bound_as_each_of_their_receivers_has(service: None) -> None:
+    with database().write() as session:
+        projects.add(session, "others")
+    for number in range(20):
+        a_webhook(f"http://slow.example/{number}")
+        a_webhook(f"http://{number}.example:8080?a")
+    a_webhook("http://late.example", project="others")
+    first = claimed()
+    assert first[:2] in ([first[0], ("others", "http://late.example")], [("others", "http://late.example"), first[1]])
+    assert Counter(project for project, _ in first) == {"default": webhooks.OF_PROJECT, "others": 1}
+    slow = ("default", "http://slow.example")
+    assert Counter(first)[slow] == webhooks.OF_RECEIVER
+    assert claimed(*first) == [], "the project has as many under way as it may"
+    assert set(claimed(*[slow] * webhooks.OF_RECEIVER)) == {("default", f"http://{number}.example:8080") for number in range(4, 8)}
+    assert claimed(*[("elsewhere", "http://any.example")] * webhooks.AT_ONCE) == []
+
+
+def test_receivers_that_do_not_answer_delay_nobody_else(service: None, receiver: Receiver) -> None:
+    """Neither another project nor another receiver of the same project."""
+    with database().write() as session:
+        projects.add(session, "others")
+    stop = threading.Event()
+    telling = threading.Thread(target=delivering.run, args=(stop, Troubles()))
+    with socket.create_server(("127.0.0.1", 0), backlog=100) as silent:
+        for _ in range(60):
+            a_webhook(f"http://127.0.0.1:{silent.getsockname()[1]}/")
+        telling.start()
+        try:
+            eventually(lambda: sum(row.attempts for row in every_row()) == webhooks.OF_RECEIVER, "the silent one is called")
+            began = time.monotonic()
+            told = [a_webhook(receiver.url), a_webhook(receiver.url, project="others")]
+            eventually(lambda: all(row_of(job_id).state == "delivered" for job_id in told), "the others are told", delivering.SECONDS)
+            assert time.monotonic() - began < delivering.SECONDS
+        finally:
+            stop.set()
+            silent.close()
+            telling.join()
+    assert sum(row.attempts for row in every_row()) == webhooks.OF_RECEIVER + 2
+
+
+def test_two_control_workers_send_nothing_twice(service: None, receiver: Receiver) -> None:
+    told = [a_webhook(receiver.url) for _ in range(30)]
+    stop = threading.Event()
+    workers = [threading.Thread(target=delivering.run, args=(stop, Troubles())) for _ in range(2)]
+    for worker in workers:
+        worker.start()
+    try:
+        eventually(lambda: all(row.state == "delivered" for row in every_row()), "all are told", 60)
+    finally:
+        stop.set()
+        for worker in workers:
+            worker.join()
+    assert {row.attempts for row in every_row()} == {1}
+    assert len(receiver.bodies) == len({headers["webhook-id"] for headers in receiver.headers}) == len(told)
+
+
+def every_row() -> list[WebhookRow]:
+    with database().read() as session:
+        return list(session.scalars(select(WebhookRow)))
 
 
 def test_a_receiver_that_trickles_is_cut_off(service: None, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,7 +267,7 @@ def test_a_receiver_that_trickles_is_cut_off(service: None, monkeypatch: pytest.
         thread.start()
         job_id = a_webhook(f"http://127.0.0.1:{server.getsockname()[1]}/")
         start = time.monotonic()
-        delivering.deliver_due()
+        deliver_due()
         assert time.monotonic() - start < 30
         done.set()
         thread.join()
@@ -224,7 +299,7 @@ def test_a_secret_that_an_earlier_version_stored_is_encrypted_when_the_worker_st
         webhooks.of_job(session, job_id).secret = SECRET
         assert webhooks.seal_all(session) == 1
         assert webhooks.seal_all(session) == 0
-    delivering.deliver_due()
+    deliver_due()
     row = row_of(job_id)
     assert row.state == "delivered"
     assert SECRET not in row.secret
@@ -233,7 +308,7 @@ def test_a_secret_that_an_earlier_version_stored_is_encrypted_when_the_worker_st
 def test_without_the_key_a_receiver_is_not_told_and_the_attempt_says_why(service: None, receiver: Receiver) -> None:
     job_id = a_webhook(receiver.url)
     with environment(CIRIS_DATABASE_URL=settings().database_url, CIRIS_WEBHOOK_PRIVATE="1", CIRIS_SECRET_KEY=""):
-        delivering.deliver_due()
+        deliver_due()
         assert receiver.bodies == []
         assert "no key fits" in (row_of(job_id).error or "")
 
@@ -241,22 +316,22 @@ def test_without_the_key_a_receiver_is_not_told_and_the_attempt_says_why(service
 def test_attempts_are_remembered_and_a_receiver_is_told_again_when_somebody_asks(service: None, receiver: Receiver) -> None:
     receiver.answers = [500, 204]
     job_id = a_webhook(receiver.url)
-    delivering.deliver_due()
+    deliver_due()
     pass_time(webhooks.BACKOFF_SECONDS[0])
-    delivering.deliver_due()
+    deliver_due()
     with database().write() as session:
         row = webhooks.of_job(session, job_id)
         told = [(one.status, one.error) for one in webhooks.deliveries(session, row.id)]
         assert told == [(204, None), (500, "the receiver answered 500")]
         again = webhooks.send_again(session, jobs.lock(session, job_id), utcnow())
         assert (again.state, again.attempts) == ("waiting", 0)
-    delivering.deliver_due()
+    deliver_due()
     assert row_of(job_id).state == "delivered"
     assert [headers["webhook-id"] for headers in receiver.headers] == [row.id] * 3
     for _ in range(webhooks.KEPT):
         with database().write() as session:
             webhooks.send_again(session, jobs.lock(session, job_id), utcnow())
-        delivering.deliver_due()
+        deliver_due()
     with database().read() as session:
         assert len(webhooks.deliveries(session, row.id)) == webhooks.KEPT
 
@@ -264,7 +339,7 @@ def test_attempts_are_remembered_and_a_receiver_is_told_again_when_somebody_asks
 def test_private_addresses_are_not_called(database_url: str, receiver: Receiver) -> None:
     with environment(CIRIS_DATABASE_URL=database_url):
         job_id = a_webhook(receiver.url.replace("127.0.0.1", "localhost"))
-        delivering.deliver_due()
+        deliver_due()
         assert receiver.bodies == []
         assert "localhost is not a public address" in (row_of(job_id).error or "")
 
@@ -301,7 +376,7 @@ def test_names_that_do_not_resolve_are_an_error_of_the_receiver() -> None:
 
 
 def test_the_running_service_delivers(receiver: Receiver, sqlite_url: str, queue: object, tmp_path: Path) -> None:
-    from tests.workers.service import eventually, running_service
+    from tests.workers.service import running_service
 
     with running_service(sqlite_url, queue.url, tmp_path, CIRIS_WEBHOOK_PRIVATE="1"):  # type: ignore[attr-defined]
         job_id = a_webhook(receiver.url)
