@@ -11,12 +11,10 @@ from typing import NoReturn
 from certifier.errors import CirisError
 
 CHECKOUT = Path(__file__).parents[1]
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-"""These variables must be in the environment before numpy is loaded, so that everything runs on one thread."""
 
 
 def bench(args: Namespace) -> NoReturn:
-    """Replaces this process by ``python -m benchmarks`` on one thread.
+    """Replaces this process by ``python -m benchmarks``.
 
     Raises:
         CirisError: ``no_benchmarks`` outside a checkout.
@@ -25,4 +23,4 @@ def bench(args: Namespace) -> NoReturn:
         raise CirisError("no_benchmarks", "the benchmarks are not installed", hint="run ciris from a checkout of the repository")
     path = os.pathsep.join([str(CHECKOUT), *filter(None, [os.environ.get("PYTHONPATH")])])
     command = [sys.executable, "-P", "-m", "benchmarks", args.benchmark, *args.arguments]
-    os.execve(sys.executable, command, os.environ | ONE_THREAD | {"PYTHONPATH": path})
+    os.execve(sys.executable, command, os.environ | {"PYTHONPATH": path})

@@ -7,8 +7,6 @@ they are now, so nothing depends on what the old proof was worth.
 
 from __future__ import annotations
 
-import numpy as np
-
 from certifier.model import Array, Volume
 from certifier.partition.area import Area
 from certifier.partition.cell import Cell
@@ -27,7 +25,7 @@ def try_again(area: Area, search: Search, volumes: tuple[Volume, Volume], old: P
         search: that of the two volumes.
         old: a proof about two bodies that were much like these, in the same order or the other.
     """
-    seeds = _Seeds(search, volumes, old, area.scene.padding)
+    seeds = _Seeds(search, volumes, old)
     root = Node()
     waiting = [(seeds.root, root, area.lower, area.upper, area.samples)]
     while waiting:
@@ -49,29 +47,21 @@ def try_again(area: Area, search: Search, volumes: tuple[Volume, Volume], old: P
 class _Seeds:
     """Holds the old tree, and says which plane to try in a cell of it."""
 
-    def __init__(self, search: Search, volumes: tuple[Volume, Volume], old: PartitionProof, padding: float) -> None:
+    def __init__(self, search: Search, volumes: tuple[Volume, Volume], old: PartitionProof) -> None:
         vertices = [len(a.vertices) + len(b.vertices) for a, b in old.chosen]
         self.root = of_streams({name: getattr(old, name) for name in STREAMS}, vertices, 1)[0]
         turned = not set(volumes[0].geometries) & set(old.volumes[0].geometries)
-        self._sign = np.array([-1.0, -1.0, -1.0, -1.0, 1.0])[:, None] if turned else np.ones((5, 1))
-        self._same_frame = old.frame == search.frame and old.planes.shape[2] == 1 + len(search.joints)
+        self._sign = -1.0 if turned else 1.0
+        self._usable = old.frame == search.frame and old.planes.shape[2] == 1 + len(search.joints)
         levels = {tuple(map(_key, chosen, volumes)): level for level, chosen in enumerate(search.volumes_of_levels)}
         keys = (tuple(map(_key, chosen, old.volumes)) for chosen in old.chosen)
         self._levels = [levels.get(key[::-1] if turned else key, 0) for key in keys]
-        # A plane of bodies without a radius has no bound of its normal's length, which bodies with one need.
-        rounded = [_is_round(pair, padding) for pair in search.volumes_of_levels]
-        was_round = [_is_round(pair, old.scene.padding) for pair in old.chosen]
-        self._usable = [self._same_frame and (was or not rounded[level]) for was, level in zip(was_round, self._levels, strict=True)]
 
     def of(self, was: Node) -> tuple[Array | None, int]:
         """Returns the plane to try in the cell of an old node, and the level of the bodies that it is about."""
-        if was.plane is None or not self._usable[was.choice]:
+        if was.plane is None or not self._usable:
             return None, 0
-        return self._sign * was.plane, self._levels[was.choice]
-
-
-def _is_round(pair: tuple[Volume, Volume], padding: float) -> bool:
-    return max(volume.radius for volume in pair) + padding > 0
+        return self._sign * was.plane[:4], self._levels[was.choice]
 
 
 def _key(chosen: Volume, own: Volume) -> _Key:

@@ -29,10 +29,10 @@ SAFE, ROUNDING = 1e-9, 1e-12
 """The bound of a normal's length is larger than it by the first part, and by the second part of the terms that it is made of."""
 LOOKS, ROUNDS = 20, 8
 """So many planes are tried against configurations, and so many of those that hold there are tried to be proved, before a cell is cut."""
-PIECES, MANY_PIECES = 25, 60
+PIECES, MANY_PIECES = 25, 250
 """A vertex may take this many pieces: PIECES with up to 5 joints between the bodies, MANY_PIECES with more."""
 FEW_JOINTS = 5
-DESCENT = 4
+DESCENT = 8
 """In so many steps a vertex is moved to where it is farther on the wrong side."""
 CLOSE = 0.05
 """From bodies that come as close as this, relative to their extent, a contact is looked for."""
@@ -127,13 +127,13 @@ class Bodies:
         """Returns the proof that a given plane separates the bodies on the polytope and a cell; None where it cannot be proved.
 
         Args:
-            plane: (5, 1 + k), as a proof holds it that has the joints ``play`` in play, ascending. Its last row bounds the normal's length
-                on the cell, where a radius is positive.
+            plane: (4, 1 + k), as a proof holds it that has the joints ``play`` in play, ascending; a bound of its normal's length on the
+                cell is made anew.
         """
         own = [0, *(1 + play.index(joint) for joint in self.joints)]
         if np.delete(plane, own, axis=1).any():
             return None  # It moves with joints that move neither body.
-        plane = np.ascontiguousarray(plane[:, own])
+        plane = self._bounded(cell, plane[:, own])
         result = self._prove(cell, plane)
         return Separated(plane, result) if isinstance(result, tuple) else None
 
@@ -208,22 +208,26 @@ class Bodies:
         return first, second
 
     def _in_s(self, cell: Cell, z: Array) -> Array:
-        """Returns a plane as a proof holds it, (5, 1 + k), from one in the coordinates of the search.
-
-        Its last row is a bound of the normal's length on the cell, larger than that by more than rounding errors.
-        """
-        k = len(self.joints)
-        plane = np.zeros((5, 1 + k))
-        plane[:4] = z.reshape(4, 1 + k)
-        if max(self._radii) > 0:
-            planes.length_bound(z, k, CALM, plane[4])
-            plane[4, 0] += SAFE * np.abs(plane[4]).sum()
-        plane[[0, 1, 2, 4]] /= self.extent
+        """Returns a plane as a proof holds it, (5, 1 + k), from one in the coordinates of the search."""
+        plane = z.reshape(4, 1 + len(self.joints)).copy()
+        plane[:3] /= self.extent
         plane[3] -= self._middle @ plane[:3]
         plane[:, 1:] *= CALM / cell.half[self.joints]
         plane[:, 0] -= plane[:, 1:] @ cell.mid[self.joints]
-        normed: Array = plane / np.abs(plane[:3]).max()
+        return self._bounded(cell, plane / np.abs(plane[:3]).max())
+
+    def _bounded(self, cell: Cell, plane: Array) -> Array:
+        """Returns a plane (4, 1 + k) with a bound of its normal's length on the cell, larger than that by more than rounding errors."""
+        k, mid, half = len(self.joints), cell.mid[self.joints], cell.half[self.joints]
+        bound = np.zeros(1 + k)
+        if max(self._radii) > 0:
+            at_mid = np.column_stack([plane[:, 0] + plane[:, 1:] @ mid, plane[:, 1:] * half / CALM])
+            planes.length_bound(at_mid.ravel(), k, CALM, bound)
+            bound[0] += SAFE * np.abs(bound).sum()
+            bound[1:] *= CALM / half
+            bound[0] -= bound[1:] @ mid
+        normal = np.abs(np.vstack([plane[:3], bound]))
         # In a narrow cell, terms that nearly cancel leave a short normal, and the verifier adds up their rounding errors.
         farthest = np.maximum(np.abs(cell.lower), np.abs(cell.upper))[self.joints]
-        normed[4, 0] += ROUNDING * (np.abs(normed[[0, 1, 2, 4], 0]).sum() + (np.abs(normed[[0, 1, 2, 4], 1:]) @ farthest).sum())
-        return normed
+        bound[0] += ROUNDING * (normal[:, 0].sum() + (normal[:, 1:] @ farthest).sum())
+        return np.vstack([plane, bound])

@@ -14,7 +14,7 @@ from certifier.kinematics import Kinematics
 from certifier.model import Array, Volume
 from certifier.partition.chords import INSIDE
 from certifier.partition.wolfe import unused, weigh
-from certifier.polytopes.simplex import corner
+from certifier.polytopes.simplex import WORK, corner
 
 APART = 1e-4
 """A gap is known when it may be larger by this part of itself at most."""
@@ -147,26 +147,6 @@ def gaps(a: Hull, b: Hull, X: Array) -> Array:
 
 
 @njit(cache=True)
-def along(C: Array, d: Array, s: Array, direction: Array, basis: Array) -> Array:
-    """Returns configurations on the way from s to the vertex of {C x <= d} that is farthest in a direction, (SHORTEST, n), farthest first.
-
-    Args:
-        C, d: rows of length 1.
-        basis: see :func:`certifier.polytopes.simplex.corner`.
-
-    Returns:
-        (0, n) where no vertex was found.
-    """
-    way = np.zeros(len(s))
-    found = np.empty((SHORTEST if corner(C, d, s, direction, basis, way) else 0, len(s)))
-    length = INSIDE
-    for i in range(len(found)):
-        found[i] = s + length * way
-        length *= 0.5
-    return found
-
-
-@njit(cache=True)
 def approach(a: Hull, b: Hull, joints: Array, half: Array, C: Array, d: Array, s: Array, steps: int, near: float) -> float:
     """Moves s to where the bodies are nearer on {C s <= d}, until they are as near as ``near``, and returns their gap there.
 
@@ -179,7 +159,8 @@ def approach(a: Hull, b: Hull, joints: Array, half: Array, C: Array, d: Array, s
     """
     A, B, P, Q = np.empty(a.vertices.shape), np.empty(b.vertices.shape), np.empty((4, 4)), np.empty((4, 4))
     normal, wa, wb, falling = np.empty(3), np.empty(len(A)), np.empty(len(B)), np.zeros(len(s))
-    now, basis = np.inf, np.full(len(s), -1)
+    now, basis, edges, columns = np.inf, np.full(len(s), -1), np.empty((len(s), len(s))), np.ascontiguousarray(C.T)
+    way, trials, work = np.empty(len(s)), np.empty((SHORTEST, len(s))), np.empty((WORK, len(d)))
     for _ in range(steps):
         place(a, s, P, Q, A)
         place(b, s, P, Q, B)
@@ -195,10 +176,15 @@ def approach(a: Hull, b: Hull, joints: Array, half: Array, C: Array, d: Array, s
                 place(b, s, P, Q, B)
                 falling[j] -= sign * ((wa @ A - wb @ B) @ normal) / (2 * step)
             s[j] = old
-        trials = along(C, d, s, falling, basis)
+        if not corner(columns, d, s, falling, basis, edges, work, way):
+            break
+        length = INSIDE
+        for i in range(SHORTEST):
+            trials[i] = s + length * way
+            length *= 0.5
         found = gaps(a, b, trials)
-        best = found.argmin() if len(found) else 0
-        if not len(found) or found[best] >= now - SLOWEST * abs(now):
+        best = found.argmin()
+        if found[best] >= now - SLOWEST * abs(now):
             break
         s[:] = trials[best]
         now = found[best]

@@ -12,15 +12,18 @@ import numpy as np
 from numba import njit
 
 from certifier.model import Array
-from certifier.partition.hulls import SLOWEST, Hull, along, place
-from certifier.partition.wolfe import unused, weigh
+from certifier.partition.chords import INSIDE
+from certifier.partition.hulls import SHORTEST, SLOWEST, Hull, place
+from certifier.partition.separate import Support, separate
+from certifier.polytopes.simplex import WORK, corner
 
-FEW = 24
-"""So many configurations are looked at in each step for a plane, as long as one of them is on its wrong side."""
 WRONG = -1e-9
 """A vertex with a smaller value than this is on the wrong side."""
 STEEPEST = 5.0
 """The bound of a normal's length counts as so many times the length at most."""
+
+LENGTHS = INSIDE * 0.5 ** np.arange(SHORTEST)
+"""A step of a descent goes one of these parts of the way."""
 
 NO_PLANE, FOUND, TIRED = 0, 1, 2
 
@@ -64,123 +67,6 @@ def _length(bound: Array, u: Array) -> float:
     for e in range(len(u)):
         t += bound[1 + e] * u[e]
     return float(t)
-
-
-@njit(cache=True)
-def _worst(
-    A: Array, B: Array, u: Array, radius_a: float, radius_b: float, ratio: Array, rows: Array, z: Array, values: Array
-) -> tuple[int, int, int, float]:
-    """Returns the configuration, the vertex and the side (1 for A, -1 for B) that are farthest on the wrong side of a plane, and how far.
-
-    Args:
-        values: gets the least value at each of the rows, which is positive on the right side.
-    """
-    plane = np.zeros(4)
-    lowest, row, vertex, side = np.inf, 0, 0, 1
-    for i in range(len(rows)):
-        r = rows[i]
-        _plane(z, u[r], plane)
-        norm = ratio[r] * np.sqrt(plane[0] ** 2 + plane[1] ** 2 + plane[2] ** 2)
-        least = np.inf
-        for v in range(A.shape[1]):
-            t = plane[0] * A[r, v, 0] + plane[1] * A[r, v, 1] + plane[2] * A[r, v, 2] + plane[3] - radius_a * norm
-            if t < least:
-                least = t
-                if t < lowest:
-                    lowest, row, vertex, side = t, r, v, 1
-        for v in range(B.shape[1]):
-            t = -(plane[0] * B[r, v, 0] + plane[1] * B[r, v, 1] + plane[2] * B[r, v, 2] + plane[3]) - radius_b * norm
-            if t < least:
-                least = t
-                if t < lowest:
-                    lowest, row, vertex, side = t, r, v, -1
-        values[i] = least
-    return row, vertex, side, lowest
-
-
-@njit(cache=True)
-def separate(
-    A: Array, B: Array, u: Array, radius_a: float, radius_b: float, ratio: Array, rows: Array, least: float, enough: float
-) -> tuple[int, Array, Array, Array]:
-    """Looks for the plane z, affine in u, that keeps the points A on its positive and B on its negative side with the widest margin.
-
-    This is Wolfe's algorithm for the point nearest to 0 of the hull of all +-[p; 1] x [1; u].
-
-    Args:
-        A, B: (N, v, 3), (N, w, 3) points at N configurations.
-        u: (N, k) the configurations.
-        ratio: (N,) the bodies keep so many times their radius away from the plane there.
-        rows: configurations to look at.
-        least: a plane with a smaller margin than this counts as none.
-        enough: any plane with this share of the widest margin will do.
-
-    Returns:
-        (found, z (4 (k + 1),), configurations (m,), weights (m,)): these weights of points at these configurations come to the point that
-        is nearest to 0, which is z.
-    """
-    k = u.shape[1]
-    D = 4 * (k + 1)
-    points, G, w = np.zeros((D + 2, D)), np.zeros((D + 2, D + 2)), np.zeros(D + 2)
-    places = np.zeros(D + 2, np.int64)
-    origin = np.zeros(D + 2, np.int64)
-    z, direction, point = np.zeros(D), np.zeros(3), np.zeros(D)
-    m = 0
-    values = np.empty(len(rows))
-    few = rows[:0]
-    for _ in range(8 * D):
-        row, vertex, side, lowest = _worst(A, B, u, radius_a, radius_b, ratio, few, z, values)
-        if m == 0 or lowest >= enough * (z @ z):
-            # No point of those that mattered last is on its wrong side, so all are looked at.
-            row, vertex, side, lowest = _worst(A, B, u, radius_a, radius_b, ratio, rows, z, values)
-            few = rows[np.argsort(values)[:FEW]]
-        if m > 0:
-            square = 0.0
-            for i in range(D):
-                square += z[i] * z[i]
-            if square < least * least:
-                return 0, z, places[:m].copy(), w[:m].copy()
-            if lowest >= enough * square:
-                return 1, z, places[:m].copy(), w[:m].copy()
-            if m > D:
-                return (1 if lowest > 0 else 0), z, places[:m].copy(), w[:m].copy()
-        for c in range(3):
-            direction[c] = z[c * (k + 1)]
-            for e in range(k):
-                direction[c] += z[c * (k + 1) + 1 + e] * u[row, e]
-        length = np.sqrt(direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2)
-        direction *= ratio[row] / length if length > 0 else 0.0
-        for c in range(4):
-            t = 1.0
-            if c < 3:
-                t = A[row, vertex, c] - radius_a * direction[c] if side > 0 else B[row, vertex, c] + radius_b * direction[c]
-            point[c * (k + 1)] = side * t
-            for e in range(k):
-                point[c * (k + 1) + 1 + e] = side * t * u[row, e]
-        for i in range(m):
-            t = 0.0
-            for c in range(D):
-                t += points[origin[i], c] * point[c]
-            G[i, m] = G[m, i] = t
-        t = 0.0
-        for c in range(D):
-            t += point[c] * point[c]
-        G[m, m] = t
-        free = unused(origin, m)
-        points[free] = point
-        origin[m] = free
-        keys = np.empty(m + 1, np.int64)
-        for i in range(m):
-            keys[i] = origin[i] * 1000000 + places[i]
-        keys[m] = free * 1000000 + row
-        w[m] = 1.0 if m == 0 else 0.0
-        m = weigh(G, w, keys, m + 1)
-        for i in range(m):
-            origin[i], places[i] = keys[i] // 1000000, keys[i] % 1000000
-        z[:] = 0.0
-        for i in range(m):
-            for c in range(D):
-                z[c] += w[i] * points[origin[i], c]
-    return 0, z, places[:m].copy(), w[:m].copy()
 
 
 @njit(cache=True)
@@ -265,30 +151,90 @@ def _slopes(hull: Hull, sign: float, z: Array, bound: Array, chart: Chart, s: Ar
 
 
 @njit(cache=True)
+def _values_on_the_way(
+    hull: Hull, vertex: Array, sign: float, z: Array, bound: Array, chart: Chart, s: Array, way: Array, lanes: Array, values: Array
+) -> None:
+    """Fills in the values of :func:`_value` at s + LENGTHS[i] way, (SHORTEST,), side by side in vector registers.
+
+    Args:
+        lanes: (12, SHORTEST) is overwritten.
+    """
+    p, q, plane, x = lanes[:4], lanes[4:8], lanes[8:], lanes[8]
+    for c in range(4):
+        p[c] = vertex[c]
+    for f in range(len(hull.joints) - 1, -1, -1):
+        j, terms = hull.joints[f], hull.terms[f]
+        if j >= 0:
+            for i in range(SHORTEST):
+                x[i] = s[j] + LENGTHS[i] * way[j]
+        for a in range(4):
+            t = q[a]
+            for i in range(SHORTEST):
+                t[i] = terms[0, a, 0] * p[0, i] + terms[0, a, 1] * p[1, i] + terms[0, a, 2] * p[2, i] + terms[0, a, 3] * p[3, i]
+            if j >= 0:
+                for b in range(4):
+                    linear, square = terms[1, a, b], terms[2, a, b]
+                    if linear != 0 or square != 0:
+                        for i in range(SHORTEST):
+                            t[i] += x[i] * (linear + x[i] * square) * p[b, i]
+        p, q = q, p
+    k = len(chart.joints)
+    for c in range(4):
+        plane[c] = z[c * (k + 1)]
+    values[:] = -hull.radius * bound[0]
+    x = q[0]
+    for e in range(k):
+        j = chart.joints[e]
+        for i in range(SHORTEST):
+            x[i] = (s[j] + LENGTHS[i] * way[j] - chart.shift[e]) * chart.scale[e]
+            values[i] -= hull.radius * bound[1 + e] * x[i]
+        for c in range(4):
+            slope = z[c * (k + 1) + 1 + e]
+            for i in range(SHORTEST):
+                plane[c, i] += slope * x[i]
+    for i in range(SHORTEST):
+        values[i] += sign * ((plane[0, i] * p[0, i] + plane[1, i] * p[1, i] + plane[2, i] * p[2, i]) / p[3, i] + plane[3, i])
+
+
+@njit(cache=True)
 def descend(
-    hull: Hull, vertex: Array, sign: float, z: Array, bound: Array, chart: Chart, C: Array, d: Array, s: Array, steps: int, basis: Array
+    hull: Hull,
+    vertex: Array,
+    sign: float,
+    z: Array,
+    bound: Array,
+    chart: Chart,
+    columns: Array,
+    d: Array,
+    s: Array,
+    steps: int,
+    basis: Array,
+    edges: Array,
+    work: Array,
 ) -> float:
     """Moves s to where the vertex is farther on the wrong side, by linear programs over {C s <= d}, and returns its value there.
 
     Args:
-        C, d: rows of length 1.
-        basis: see :func:`certifier.polytopes.simplex.corner`.
+        columns: (n, m) the transpose of C, which has rows of length 1.
+        basis, edges, work: see :func:`certifier.polytopes.simplex.corner`.
     """
-    images, slopes = np.ones((len(hull.joints) + 1, 4)), np.empty(len(s))
-    u, plane = np.empty(len(chart.joints)), np.empty(4)
+    n = len(s)
+    images, slopes, way = np.ones((len(hull.joints) + 1, 4)), np.empty(n), np.empty(n)
+    u, plane, lanes, values = np.empty(len(chart.joints)), np.empty(4), np.empty((12, SHORTEST)), np.empty(SHORTEST)
     images[-1, :3] = vertex
     now = _value(hull, sign, z, bound, chart, s, images, u, plane)
     for _ in range(steps):
         _slopes(hull, sign, z, bound, chart, s, images, plane, slopes)
-        least, best = np.inf, -1
-        trials = along(C, d, s, -slopes, basis)
-        for i in range(len(trials)):
-            t = _value(hull, sign, z, bound, chart, trials[i], images, u, plane)
-            if t < least:
-                least, best = t, i
-        if best < 0 or least >= now - SLOWEST * abs(now) + WRONG:
+        for i in range(n):
+            slopes[i] = -slopes[i]
+        if not corner(columns, d, s, slopes, basis, edges, work, way):
             break
-        s[:] = trials[best]
+        _values_on_the_way(hull, images[-1], sign, z, bound, chart, s, way, lanes, values)
+        best = values.argmin()
+        if values[best] >= now - SLOWEST * abs(now) + WRONG:
+            break
+        for i in range(n):
+            s[i] += LENGTHS[best] * way[i]
         now = _value(hull, sign, z, bound, chart, s, images, u, plane)
     return now
 
@@ -300,7 +246,7 @@ def look(
     """Looks for a plane that keeps a on its positive and b on its negative side on {C s <= d}.
 
     Args:
-        C, d: as for :func:`descend`.
+        C, d: with rows of length 1.
         X: (capacity, n) its first N rows are points of the polytope; those at which planes failed are added.
         rounds: give up after so many planes.
         least, enough: as for :func:`separate`.
@@ -310,43 +256,55 @@ def look(
     """
     n, k, capacity, made = X.shape[1], len(chart.joints), len(X), 0
     V, W = len(a.vertices), len(b.vertices)
-    A, B, u, ratio = np.empty((capacity, V, 3)), np.empty((capacity, W, 3)), np.empty((capacity, k)), np.ones(capacity)
-    P, Q, s, bound, plane = np.empty((4, 4)), np.empty((4, 4)), np.empty(n), np.zeros(1 + k), np.empty(4)
-    low, where, basis = np.empty(V + W), np.empty(V + W, np.int64), np.full(n, -1)
+    A, B, u, ratio = np.empty((V, 3, capacity)), np.empty((W, 3, capacity)), np.empty((k, capacity)), np.ones(capacity)
+    P, Q, s, bound, plane, at = np.empty((4, 4)), np.empty((4, 4)), np.empty(n), np.zeros(1 + k), np.empty(4), np.empty(k)
+    points_a, points_b, z = np.empty((V, 3)), np.empty((W, 3)), np.zeros(4 * (k + 1))
+    low, where = np.empty(V + W), np.empty(V + W, np.int64)
+    columns, work = np.ascontiguousarray(C.T), np.empty((WORK, len(d)))
+    # The programs of a vertex begin where its last one ended, and the first one where that of the vertex before did.
+    basis, edges = np.full((V + W, n), -1), np.empty((V + W, n, n))
+    support = Support(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
     for _ in range(rounds):
         for i in range(made, N):
-            place(a, X[i], P, Q, A[i])
-            place(b, X[i], P, Q, B[i])
-            _coordinates(chart, X[i], u[i])
+            place(a, X[i], P, Q, points_a)
+            place(b, X[i], P, Q, points_b)
+            A[:, :, i], B[:, :, i] = points_a, points_b
+            _coordinates(chart, X[i], at)
+            u[:, i] = at
         made = N
-        found, z, places, weights = separate(A[:N], B[:N], u[:N], a.radius, b.radius, ratio, np.arange(N), least, enough)
+        found, support = separate(A, B, u, a.radius, b.radius, ratio, N, least, enough, z, support)
         if not found:
-            return NO_PLANE, z, places, weights, N
+            return NO_PLANE, z, support.rows, support.weights, N
         if a.radius + b.radius > 0:
             length_bound(z, k, chart.calm, bound)
         low[:] = np.inf
         for i in range(N):
-            kappa = _length(bound, u[i])
-            _plane(z, u[i], plane)
+            at[:] = u[:, i]
+            kappa = _length(bound, at)
+            _plane(z, at, plane)
             if kappa > 0:
                 # The bodies will have to keep their radius times this bound away from the next plane, if it is like this one.
                 ratio[i] = min(kappa / np.sqrt(plane[0] ** 2 + plane[1] ** 2 + plane[2] ** 2), STEEPEST)
-            for v in range(V + W):
-                p = A[i, v] if v < V else B[i, v - V]
-                t = plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2] + plane[3]
-                t = t - a.radius * kappa if v < V else -t - b.radius * kappa
+            for v in range(V):
+                t = plane[0] * A[v, 0, i] + plane[1] * A[v, 1, i] + plane[2] * A[v, 2, i] + plane[3] - a.radius * kappa
                 if t < low[v]:
                     low[v], where[v] = t, i
+            for v in range(W):
+                t = -(plane[0] * B[v, 0, i] + plane[1] * B[v, 1, i] + plane[2] * B[v, 2, i] + plane[3]) - b.radius * kappa
+                if t < low[V + v]:
+                    low[V + v], where[V + v] = t, i
         held = low.min() >= 0
         for v in range(V + W):
             s[:] = X[where[v]]
+            if basis[v, 0] < 0 and v > 0:
+                basis[v], edges[v] = basis[v - 1], edges[v - 1]
             if v < V:
-                t = descend(a, a.vertices[v], 1.0, z, bound, chart, C, d, s, steps, basis)
+                t = descend(a, a.vertices[v], 1.0, z, bound, chart, columns, d, s, steps, basis[v], edges[v], work)
             else:
-                t = descend(b, b.vertices[v - V], -1.0, z, bound, chart, C, d, s, steps, basis)
+                t = descend(b, b.vertices[v - V], -1.0, z, bound, chart, columns, d, s, steps, basis[v], edges[v], work)
             if t < WRONG and capacity > N:
                 X[N] = s
                 N += 1
         if made == N and held:
-            return FOUND, z, places, weights, N
-    return TIRED, z, places, weights, N
+            return FOUND, z, support.rows, support.weights, N
+    return TIRED, z, support.rows, support.weights, N

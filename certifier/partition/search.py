@@ -133,7 +133,7 @@ class Search:
         """Settles a cell with a plane that is given, if it holds for the bodies of this level, or if the cell misses the polytope.
 
         Args:
-            plane: (5, 1 + k), as a proof holds it; None where none is given.
+            plane: (4, 1 + k), as a proof holds it, without the bound of its normal's length; None where none is given.
         """
         found = None if plane is None else self._levels[level].held_by(cell, plane, self.joints)
         if found is not None:

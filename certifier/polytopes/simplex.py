@@ -22,6 +22,8 @@ _LEVEL = 1e-13
 """A step no longer than this counts as none; the unknowns are of order one."""
 _BEYOND = 1e-9
 """A vertex may be beyond a face by this."""
+WORK = 5
+"""A program needs so many numbers for each row to work with."""
 _PIVOTS = 50
 """At most this many edges are followed for every row and unknown."""
 
@@ -42,7 +44,7 @@ def maximise(A: Array, b: Array, directions: Array, start: Array) -> tuple[Array
     rows = np.ascontiguousarray(A / norms[:, None])
     slack = np.maximum(b / norms - rows @ start, 0.0)
     points, multipliers = np.zeros(directions.shape), np.zeros((len(directions), len(b)))
-    if not _walk(rows, slack, np.ascontiguousarray(directions, dtype=float), points, multipliers):
+    if not _walk(np.ascontiguousarray(rows.T), slack, np.ascontiguousarray(directions, dtype=float), points, multipliers):
         raise np.linalg.LinAlgError("no vertex is the best")
     return start + points, multipliers / norms
 
@@ -67,43 +69,67 @@ def deepest(C: Array, d: Array, start: Array) -> tuple[Array, float, Array]:
 
 
 @njit(cache=True)
-def corner(A: Array, b: Array, start: Array, direction: Array, basis: Array, way: Array) -> bool:
+def corner(columns: Array, b: Array, start: Array, direction: Array, basis: Array, edges: Array, work: Array, way: Array) -> bool:
     """Fills in the way (n,) from a point of {x : A x <= b}, with rows of length 1, to where the direction has its largest value.
 
     Args:
+        columns: (n, m) the transpose of A.
         basis: (n,) the rows of a vertex to begin at, which this replaces with those of the one found; basis[0] = -1 for none.
+        edges: (n, n) belongs to the basis; what is in it does not matter where there is none.
+        work: (WORK, m) is overwritten.
 
     Returns:
         False where there is none, or rounding stands in the way.
     """
-    m = len(A)
-    slack, multipliers = np.empty(m), np.zeros(m)
-    for j in range(m):
-        slack[j] = max(b[j] - _dot(A[j], start), 0.0)
-    found = basis[0] >= 0 or _vertex(A, slack, direction, basis)
-    found = found and _along_edges(A, slack, direction, basis, way, multipliers)
-    for j in range(m):
-        found = found and _dot(A[j], way) - slack[j] <= _BEYOND
+    slack, multipliers, values = work[WORK - 2], work[WORK - 1], work[0]
+    _times(columns, start, slack)
+    for j in range(len(b)):
+        slack[j] = max(b[j] - slack[j], 0.0)
+    found = basis[0] >= 0 or (_vertex(columns, slack, direction, basis, work) and _edges(columns, basis, edges))
+    found = found and _along_edges(columns, slack, direction, basis, edges, work, way, multipliers)
+    if found:
+        _times(columns, way, values)
+        for j in range(len(b)):
+            found = found and values[j] - slack[j] <= _BEYOND
     if not found:
         basis[0] = -1
     return found
 
 
 @njit(cache=True)
-def _walk(A: Array, b: Array, directions: Array, points: Array, multipliers: Array) -> bool:
-    n = A.shape[1]
-    basis = np.zeros(n, dtype=np.int64)
-    solved = _vertex(A, b, directions[0], basis)
+def _walk(columns: Array, b: Array, directions: Array, points: Array, multipliers: Array) -> bool:
+    n = len(columns)
+    basis, edges, work = np.zeros(n, dtype=np.int64), np.zeros((n, n)), np.empty((WORK, len(b)))
+    solved = _vertex(columns, b, directions[0], basis, work)
     for k in range(len(directions)):
-        solved = solved and _along_edges(A, b, directions[k], basis, points[k], multipliers[k])
+        solved = solved and _edges(columns, basis, edges)
+        solved = solved and _along_edges(columns, b, directions[k], basis, edges, work, points[k], multipliers[k])
     return solved
 
 
 @njit(cache=True)
-def _vertex(A: Array, b: Array, c: Array, basis: Array) -> bool:
+def _times(columns: Array, x: Array, values: Array) -> None:
+    """Fills in A x, (m,); the rows are side by side in vector registers, and each is summed up in the same order."""
+    n, m = columns.shape
+    values[:] = 0.0
+    for i in range(0, n - n % 4, 4):
+        a, b, c, d = columns[i], columns[i + 1], columns[i + 2], columns[i + 3]
+        x0, x1, x2, x3 = x[i], x[i + 1], x[i + 2], x[i + 3]
+        for j in range(m):
+            values[j] = values[j] + x0 * a[j] + x1 * b[j] + x2 * c[j] + x3 * d[j]
+    for i in range(n - n % 4, n):
+        t, column = x[i], columns[i]
+        for j in range(m):
+            values[j] += t * column[j]
+
+
+@njit(cache=True)
+def _vertex(columns: Array, b: Array, c: Array, basis: Array, work: Array) -> bool:
     """Fills in the rows of a vertex that is reached from 0 without going down in c; returns False when no face ends the way."""
-    n = A.shape[1]
-    x, frame, v, unit = np.zeros(n), np.zeros((n, n)), np.zeros(n), np.zeros(n)
+    n = len(columns)
+    left, rates, times = work[0], work[1], work[2]
+    left[:] = b
+    frame, v, unit = np.zeros((n, n)), np.zeros(n), np.zeros(n)
     for k in range(n):
         rising = _rest(frame, k, c, v) > _PARALLEL * np.sqrt(_dot(c, c))
         if not rising:
@@ -118,16 +144,17 @@ def _vertex(A: Array, b: Array, c: Array, basis: Array) -> bool:
             unit[axis] = 1.0
             _rest(frame, k, unit, v)
         _scale(v, 1 / np.sqrt(_dot(v, v)))
-        entering, step = _first(A, b, x, v, basis, k, False)
+        entering, step = _first(columns, left, v, basis, k, False, rates, times)
         if entering < 0 and not rising:
             _scale(v, -1.0)
-            entering, step = _first(A, b, x, v, basis, k, False)
+            entering, step = _first(columns, left, v, basis, k, False, rates, times)
         if entering < 0:
             return False
-        for i in range(n):
-            x[i] += step * v[i]
+        _walked(left, rates, step)
         basis[k] = entering
-        length = _rest(frame, k, A[entering], v)
+        for i in range(n):
+            unit[i] = columns[i, entering]
+        length = _rest(frame, k, unit, v)
         for i in range(n):
             frame[k, i] = v[i] / length
     return True
@@ -161,19 +188,32 @@ def _rest(frame: Array, k: int, v: Array, rest: Array) -> float:
 
 
 @njit(cache=True)
-def _first(A: Array, b: Array, x: Array, v: Array, basis: Array, size: int, lowest: bool) -> tuple[int, float]:
-    """Returns the row that ends the way from x along v, and the length of the way; the row is -1 if there is none.
+def _walked(left: Array, rates: Array, step: float) -> None:
+    """Takes so long a way off what is left to each row, (m,)."""
+    for j in range(len(left)):
+        left[j] = max(left[j] - step * rates[j], 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _first(columns: Array, left: Array, v: Array, basis: Array, size: int, lowest: bool, rates: Array, times: Array) -> tuple[int, float]:
+    """Returns the row that ends the way along v, and the length of the way; the row is -1 if there is none.
 
     The first ``size`` rows of the basis are left out. Of several rows it is the one that is met most squarely or, if ``lowest``, the one
     with the lowest number.
+
+    Args:
+        left: (m,) what is left to each row.
+        rates, times: (m,) get A v, and how long the way to each row is.
     """
     entering, step, speed = -1, np.inf, 0.0
-    for j in range(len(b)):
-        approach = _dot(A[j], v)
-        if approach <= _PARALLEL:
+    _times(columns, v, rates)
+    for j in range(len(left)):
+        times[j] = left[j] / rates[j] if rates[j] > _PARALLEL else np.inf
+    for j in range(len(left)):
+        if times[j] > step + _LEVEL:
             continue
-        time = max(b[j] - _dot(A[j], x), 0.0) / approach
-        if time > step + _LEVEL or (time > step - _LEVEL and (lowest or approach <= speed)):
+        time, approach = times[j], rates[j]
+        if approach <= _PARALLEL or (time > step - _LEVEL and (lowest or approach <= speed)):
             continue
         used = False
         for i in range(size):
@@ -184,7 +224,7 @@ def _first(A: Array, b: Array, x: Array, v: Array, basis: Array, size: int, lowe
 
 
 @njit(cache=True)
-def _edges(A: Array, basis: Array, edges: Array) -> bool:
+def _edges(columns: Array, basis: Array, edges: Array) -> bool:
     """Fills in the columns of the inverse of the basis' rows, row by row, by Gauss-Jordan elimination with pivots.
 
     Returns:
@@ -194,7 +234,7 @@ def _edges(A: Array, basis: Array, edges: Array) -> bool:
     work = np.zeros((n, n))
     for i in range(n):
         for j in range(n):
-            work[i, j] = A[basis[j], i]
+            work[i, j] = columns[i, basis[j]]
             edges[i, j] = 1.0 if i == j else 0.0
     for k in range(n):
         pivot = k
@@ -219,44 +259,57 @@ def _edges(A: Array, basis: Array, edges: Array) -> bool:
 
 
 @njit(cache=True)
-def _along_edges(A: Array, b: Array, c: Array, basis: Array, x: Array, multipliers: Array) -> bool:
-    """Goes from the basis' vertex to the best one, which the basis then is; fills in x and the multipliers.
+def _along_edges(columns: Array, b: Array, c: Array, basis: Array, edges: Array, work: Array, x: Array, multipliers: Array) -> bool:
+    """Goes from the basis' vertex to the best one, which the basis then is, with its edges; fills in x and the multipliers.
 
     Returns:
         False when there is no best vertex.
     """
-    m, n = A.shape
+    n, m = columns.shape
     size = np.sqrt(_dot(c, c))
-    edges, v = np.zeros((n, n)), np.zeros(n)
-    if not _edges(A, basis, edges):
-        return False
+    v, row, left, rates, times = np.zeros(n), np.zeros(n), work[0], work[1], work[2]
+    multipliers[:] = 0.0
+    _at(b, basis, edges, x)
+    _times(columns, x, left)
+    for j in range(m):
+        left[j] = max(b[j] - left[j], 0.0)
     lowest = False
     for _ in range(_PIVOTS * (m + n)):
         leaving, least, largest = -1, 0.0, 0.0
-        x[:] = 0.0
         for k in range(n):
-            for i in range(n):
-                x[i] += edges[k, i] * b[basis[k]]
             y = _dot(c, edges[k])
             multipliers[basis[k]] = max(y, 0.0)
             largest = max(largest, abs(y))
             if y < -_OPTIMAL * size and (basis[k] < basis[leaving] if lowest and leaving >= 0 else y < least):
                 leaving, least = k, y
         if leaving < 0 or least > -1e-15 * largest:
+            _at(b, basis, edges, x)
             return True
         for k in range(n):
             multipliers[basis[k]] = 0.0
             v[k] = -edges[leaving, k]
         _scale(v, 1 / np.sqrt(_dot(v, v)))
-        entering, step = _first(A, b, x, v, basis, n, lowest)
+        entering, step = _first(columns, left, v, basis, n, lowest, rates, times)
         if entering < 0:
             return False
+        _walked(left, rates, step)
         lowest = step <= _LEVEL
-        _scale(edges[leaving], 1 / _dot(A[entering], edges[leaving]))
+        for i in range(n):
+            row[i] = columns[i, entering]
+        _scale(edges[leaving], 1 / _dot(row, edges[leaving]))
         for k in range(n):
             if k != leaving:
-                rate = _dot(A[entering], edges[k])
+                rate = _dot(row, edges[k])
                 for i in range(n):
                     edges[k, i] -= rate * edges[leaving, i]
         basis[leaving] = entering
     return False
+
+
+@njit(cache=True)
+def _at(b: Array, basis: Array, edges: Array, x: Array) -> None:
+    """Fills in the vertex of a basis, (n,)."""
+    x[:] = 0.0
+    for k in range(len(x)):
+        for i in range(len(x)):
+            x[i] += edges[k, i] * b[basis[k]]

@@ -8,7 +8,7 @@ import pytest
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Volume
 from certifier.partition.hulls import hull, place
-from certifier.partition.planes import FOUND, NO_PLANE, Chart, _slopes, _value, length_bound, look
+from certifier.partition.planes import FOUND, LENGTHS, NO_PLANE, Chart, _slopes, _value, _values_on_the_way, length_bound, look
 from tests.certifier.scenes import box, planar_arm
 
 CALM = 0.3
@@ -54,7 +54,7 @@ def test_there_is_no_plane_where_the_bodies_touch_somewhere():
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_the_slopes_of_a_vertex_are_those_of_its_value(seed):
+def test_the_slopes_of_a_vertex_and_its_values_on_a_way_are_those_of_its_value(seed):
     rng = np.random.default_rng(seed)
     scene = planar_arm(4, box("world/box", WORLD, (0.2, 0.2, 0.2), (1.2, 1.2, 0.0)))
     tip = Volume(("tip",), "arm/link4", np.array([[1.0, 0.3, 0.1]]), 0.05)
@@ -76,3 +76,6 @@ def test_the_slopes_of_a_vertex_are_those_of_its_value(seed):
     assert value(s) == pytest.approx(-(points[0] @ at_s[:3] + at_s[3]) - body.radius * (bound @ u))
     _slopes(body, -1.0, z, bound, chart, s, images, plane, slopes)
     assert slopes == pytest.approx(differences, abs=1e-6)
+    way, lanes, values = rng.normal(size=4), np.empty((12, len(LENGTHS))), np.empty(len(LENGTHS))
+    _values_on_the_way(body, images[-1], -1.0, z, bound, chart, s, way, lanes, values)
+    assert values == pytest.approx([value(s + length * way) for length in LENGTHS])

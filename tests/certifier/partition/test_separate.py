@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
-from certifier.partition.planes import separate
+from certifier.partition.separate import Support, separate
 from certifier.partition.wolfe import weigh
 
 LEAST, ENOUGH = 3e-4, 0.8
@@ -31,6 +31,18 @@ def widest(A, B, u, radius_a, radius_b):
     program.AddQuadraticCost(np.eye(D), np.zeros(D), z, is_convex=True)
     result = ClarabelSolver().Solve(program)
     return 1 / np.linalg.norm(result.GetSolution(z)) if result.is_success() else 0.0
+
+
+NONE = Support(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
+
+
+def found_for(A, B, u, radius_a, radius_b, N=None, z=None, begun=NONE):
+    """What is found for clouds (N, v, 3) at configurations (N, k), of which the first ones count, and the plane."""
+    z = np.zeros(4 * (u.shape[1] + 1)) if z is None else z.copy()
+    lanes = [np.ascontiguousarray(points.transpose(1, 2, 0)) for points in (A, B)]
+    many = len(u) if N is None else N
+    found, support = separate(*lanes, np.ascontiguousarray(u.T), radius_a, radius_b, np.ones(len(u)), many, LEAST, ENOUGH, z, begun)
+    return found, z, support
 
 
 def values(A, B, u, radius_a, radius_b, z):
@@ -57,10 +69,26 @@ def moving_points(seed, k, apart, radius):
 def test_a_plane_is_found_where_there_is_one_and_its_margin_is_nearly_the_widest(seed, k, apart, radius):
     A, B, u, radius_a, radius_b = moving_points(seed, k, apart, radius)
     best = widest(A, B, u, radius_a, radius_b)
-    found, z, places, weights = separate(A, B, u, radius_a, radius_b, np.ones(len(u)), np.arange(len(u)), LEAST, ENOUGH)
-    assert len(places) == len(weights)
-    assert (weights > 0).all()
-    assert weights.sum() == pytest.approx(1)
+    found, z, support = found_for(A, B, u, radius_a, radius_b)
+    check_plane(A, B, u, radius_a, radius_b, best, found, z, support)
+    # What the first configurations came to is where all of them begin.
+    _, z, begun = found_for(A, B, u, radius_a, radius_b, N=7)
+    found, z, support = found_for(A, B, u, radius_a, radius_b, z=z, begun=begun)
+    check_plane(A, B, u, radius_a, radius_b, best, found, z, support)
+
+
+def check_plane(A, B, u, radius_a, radius_b, best, found, z, support):
+    assert len(support.rows) == len(support.vertices) == len(support.weights)
+    assert (support.weights > 0).all()
+    assert support.weights.sum() == pytest.approx(1)
+    assert ((-B.shape[1] <= support.vertices) & (support.vertices < A.shape[1])).all()
+    if radius_a == radius_b == 0:
+        signed = [A[i, v] if v >= 0 else -B[i, -1 - v] for i, v in zip(support.rows, support.vertices, strict=True)]
+        points = [
+            np.outer(np.append(p, 1.0 if v >= 0 else -1.0), np.append(1.0, u[i])).ravel()
+            for p, i, v in zip(signed, support.rows, support.vertices, strict=True)
+        ]
+        assert support.weights @ points == pytest.approx(z, abs=1e-9)
     if found:
         margin = values(A, B, u, radius_a, radius_b, z) / np.linalg.norm(z)
         assert margin >= (ENOUGH - 1e-6) * best
@@ -74,18 +102,18 @@ def test_both_answers_occur_on_the_clouds_of_this_file():
     answers = []
     for seed in range(60):
         A, B, u, radius_a, radius_b = moving_points(seed, 2, [0.0, 1.5][seed % 2], 0.2)
-        answers.append(separate(A, B, u, radius_a, radius_b, np.ones(len(u)), np.arange(len(u)), LEAST, ENOUGH)[0])
+        answers.append(found_for(A, B, u, radius_a, radius_b)[0])
     assert 20 <= sum(answers) <= 40
 
 
-def test_only_the_configurations_asked_for_count():
+def test_only_the_first_configurations_count():
     """Apart from each other at the first ten configurations and in each other's places at the others."""
     A, B, u, *_ = moving_points(0, 1, 1.5, 0.0)
     A[10:], B[10:, :4] = B[10:, :4], A[10:]
-    assert separate(A, B, u, 0.0, 0.0, np.ones(len(u)), np.arange(10), LEAST, ENOUGH)[0]
-    found, _, places, _ = separate(A, B, u, 0.0, 0.0, np.ones(len(u)), np.arange(5, 15), LEAST, ENOUGH)
+    assert found_for(A, B, u, 0.0, 0.0, N=10)[0]
+    found, _, support = found_for(A, B, u, 0.0, 0.0, N=15)
     assert not found
-    assert set(places.tolist()) <= set(range(5, 15))
+    assert set(support.rows.tolist()) <= set(range(15))
 
 
 @settings(max_examples=60)

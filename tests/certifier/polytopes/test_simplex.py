@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from certifier.model import Polytope
-from certifier.polytopes.simplex import corner, deepest, maximise
+from certifier.polytopes.simplex import WORK, corner, deepest, maximise
 
 
 @st.composite
@@ -100,9 +100,10 @@ def test_a_corner_is_the_same_from_every_vertex_that_the_search_begins_at(progra
     A, b, directions, start, size = program
     kept = np.linalg.norm(A, axis=1) > 0
     polytope = unit(A[kept], b[kept])
-    basis, way = np.full(len(start), -1), np.zeros(len(start))
+    n, columns, work = len(start), np.ascontiguousarray(polytope.C.T), np.empty((WORK, len(polytope.d)))
+    basis, edges, way = np.full(n, -1), np.empty((n, n)), np.zeros(n)
     for direction in directions:
-        assert corner(polytope.C, polytope.d, start, direction, basis, way)
+        assert corner(columns, polytope.d, start, direction, basis, edges, work, way)
         warm = direction @ way
-        assert corner(polytope.C, polytope.d, start, direction, np.full(len(start), -1), way)
+        assert corner(columns, polytope.d, start, direction, np.full(n, -1), np.empty((n, n)), work, way)
         assert warm == pytest.approx(direction @ way, abs=1e-7 * size * max(np.linalg.norm(direction), 1e-9))
