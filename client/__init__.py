@@ -1,7 +1,7 @@
 """This package holds the `ciris` command line.
 
 Commands that compute do so in as many processes as there are cores, each in one thread. A BLAS with more threads makes them wait for each
-other: two processes on two cores took four times as long to verify a pair, and longer.
+other: two processes on two cores took six times as long to verify a pair.
 """
 
 import os

@@ -29,10 +29,14 @@ def busy(database: Database) -> str:
 
 
 def test_the_page_shows_what_workers_do_and_pauses_them(page: Any, url: str, busy: str, database: Database, barriers: Any) -> None:
+    with database.write() as session:
+        made = Made(leases._name(os.getppid()), WorkerKind.SOLVE, "1.2", 4, 8, 2**34)
+        workers.tell(session, made, WorkerState.RUNNING, "expiry failed: OverflowError")
     page.goto(url)
     page.get_by_role("link", name="Workers").click()
     row = page.get_by_role("row").nth(1)
     assert "1 of 4" in row.text_content()
+    assert "expiry failed: OverflowError" in row.text_content()
     assert row.get_by_role("link", name=busy[:8]).get_attribute("href") == f"/jobs/{busy}"
     assert barriers(page) == []
     row.get_by_role("button", name="Pause").click()
