@@ -50,6 +50,7 @@ def test_an_admin_manages_the_keys_of_the_project_over_http(ciris: Ciris, url: s
 
 def test_projects_on_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("CIRIS_DATA_DIR", str(tmp_path))
+    monkeypatch.delenv("CIRIS_DATABASE_URL", raising=False)  # other tests of this process may use another database
     migrate.upgrade(Settings().database)
     projects.main(["add", "welding"])
     projects.main(["set", "welding", "--max-bytes", "1e9", "--keep-days", "30"])
@@ -97,7 +98,7 @@ def test_no_command_but_up_makes_a_database(tmp_path: Path, words: tuple[str, ..
 
 
 def test_the_command_passes_limits_on(tmp_path: Path) -> None:
-    migrate.upgrade(Settings(data_dir=tmp_path).database)
+    migrate.upgrade(Settings(data_dir=tmp_path, database_url="").database)
     for words in (("add", "welding"), ("set", "welding", "--keep-days", "7")):
         subprocess.run(command("project", *words, "--data", tmp_path), env=surroundings(), check=True)
     listed = subprocess.run(command("project", "ls", "--json", "--data", tmp_path), env=surroundings(), check=True, capture_output=True)

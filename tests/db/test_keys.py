@@ -86,6 +86,7 @@ def test_scopes_are_ordered() -> None:
 
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("CIRIS_DATA_DIR", str(tmp_path))
+    monkeypatch.delenv("CIRIS_DATABASE_URL", raising=False)  # other tests of this process may use another database
     migrate.upgrade(Settings().database)
     keys.main(["add", "planner", "--scope", "submit"])
     key = capsys.readouterr().out.strip()
