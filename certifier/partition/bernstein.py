@@ -16,6 +16,7 @@ from numba import njit
 
 from certifier.model import Array
 from certifier.partition.wolfe import unused, weigh
+from certifier.proof.limits import PIECE_DEPTH
 
 PROVED, REFUTED, UNDECIDED = 1, 0, -1
 FACES, MORE, ATTEMPTS = 10, 4, 4
@@ -806,7 +807,7 @@ def prove(
             continue
         if count >= EARLY and count > HOPELESS * done * most:
             return UNDECIDED
-        if count >= most or top + 2 > DEPTH or lengths[0] >= len(codes):
+        if count >= most or top + 2 > DEPTH or level[top] == PIECE_DEPTH or lengths[0] >= len(codes):
             return UNDECIDED
         axis = wide if wide >= 0 else steepest(cc, k)
         halvings[axis] += 1
