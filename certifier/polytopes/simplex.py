@@ -131,7 +131,7 @@ def _vertex(columns: Array, b: Array, c: Array, basis: Array, work: Array) -> bo
     left[:] = b
     frame, v, unit = np.zeros((n, n)), np.zeros(n), np.zeros(n)
     for k in range(n):
-        rising = _rest(frame, k, c, v) > _PARALLEL * np.sqrt(_dot(c, c))
+        rising = _rest(frame, k, c, v) > _PARALLEL * np.sqrt(dot(c, c))
         if not rising:
             longest, axis = -1.0, 0
             for i in range(n):
@@ -143,7 +143,7 @@ def _vertex(columns: Array, b: Array, c: Array, basis: Array, work: Array) -> bo
             unit[:] = 0.0
             unit[axis] = 1.0
             _rest(frame, k, unit, v)
-        _scale(v, 1 / np.sqrt(_dot(v, v)))
+        _scale(v, 1 / np.sqrt(dot(v, v)))
         entering, step = _first(columns, left, v, basis, k, False, rates, times)
         if entering < 0 and not rising:
             _scale(v, -1.0)
@@ -161,7 +161,8 @@ def _vertex(columns: Array, b: Array, c: Array, basis: Array, work: Array) -> bo
 
 
 @njit(cache=True)
-def _dot(v: Array, w: Array) -> float:
+def dot(v: Array, w: Array) -> float:
+    """Returns a scalar product; for few elements this is faster than BLAS, which needs Python's lock."""
     total = 0.0
     for i in range(len(v)):
         total += v[i] * w[i]
@@ -181,10 +182,10 @@ def _rest(frame: Array, k: int, v: Array, rest: Array) -> float:
         rest[i] = v[i]
     for _ in range(2):
         for j in range(k):
-            along = _dot(frame[j], rest)
+            along = dot(frame[j], rest)
             for i in range(len(v)):
                 rest[i] -= along * frame[j, i]
-    return np.sqrt(_dot(rest, rest))
+    return np.sqrt(dot(rest, rest))
 
 
 @njit(cache=True)
@@ -266,7 +267,7 @@ def _along_edges(columns: Array, b: Array, c: Array, basis: Array, edges: Array,
         False when there is no best vertex.
     """
     n, m = columns.shape
-    size = np.sqrt(_dot(c, c))
+    size = np.sqrt(dot(c, c))
     v, row, left, rates, times = np.zeros(n), np.zeros(n), work[0], work[1], work[2]
     multipliers[:] = 0.0
     _at(b, basis, edges, x)
@@ -277,7 +278,7 @@ def _along_edges(columns: Array, b: Array, c: Array, basis: Array, edges: Array,
     for _ in range(_PIVOTS * (m + n)):
         leaving, least, largest = -1, 0.0, 0.0
         for k in range(n):
-            y = _dot(c, edges[k])
+            y = dot(c, edges[k])
             multipliers[basis[k]] = max(y, 0.0)
             largest = max(largest, abs(y))
             if y < -_OPTIMAL * size and (basis[k] < basis[leaving] if lowest and leaving >= 0 else y < least):
@@ -288,7 +289,7 @@ def _along_edges(columns: Array, b: Array, c: Array, basis: Array, edges: Array,
         for k in range(n):
             multipliers[basis[k]] = 0.0
             v[k] = -edges[leaving, k]
-        _scale(v, 1 / np.sqrt(_dot(v, v)))
+        _scale(v, 1 / np.sqrt(dot(v, v)))
         entering, step = _first(columns, left, v, basis, n, lowest, rates, times)
         if entering < 0:
             return False
@@ -296,10 +297,10 @@ def _along_edges(columns: Array, b: Array, c: Array, basis: Array, edges: Array,
         lowest = step <= _LEVEL
         for i in range(n):
             row[i] = columns[i, entering]
-        _scale(edges[leaving], 1 / _dot(row, edges[leaving]))
+        _scale(edges[leaving], 1 / dot(row, edges[leaving]))
         for k in range(n):
             if k != leaving:
-                rate = _dot(row, edges[k])
+                rate = dot(row, edges[k])
                 for i in range(n):
                     edges[k, i] -= rate * edges[leaving, i]
         basis[leaving] = entering

@@ -22,6 +22,15 @@ def tables(url: str) -> set[str]:
         database.close()
 
 
+def there_and_back(database: Database, url: str, revision: str) -> Database:
+    """The same database after the way down to a revision and up again."""
+    database.close()
+    migrate.downgrade(url, revision)
+    migrate.upgrade(url)
+    assert migrate.drift(url) == []
+    return Database(url)
+
+
 def test_an_empty_database_drifts(empty_database_url: str) -> None:
     assert migrate.drift(empty_database_url)
 
@@ -121,11 +130,7 @@ def test_jobs_of_before_there_were_outlines_have_none_and_lose_those_that_are_le
     with database.write() as session:
         job_id = a_running_job(session, 2).id
         subtrees.keep(session, job_id, 0, {(0, 0): (b"subtrees", b"outline"), (1, 0): (b"", b"outline of a job that has ended")})
-    database.close()
-    migrate.downgrade(empty_database_url, "0013")
-    migrate.upgrade(empty_database_url)
-    assert migrate.drift(empty_database_url) == []
-    database = Database(empty_database_url)
+    database = there_and_back(database, empty_database_url, "0013")
     with database.read() as session:
         assert jobs.get(session, job_id).pieces is None
         assert [subtrees.left_of(session, job_id, pair, 0) for pair in range(2)] == [[b"subtrees"], []]
@@ -140,11 +145,7 @@ def test_regions_stored_before_there_were_boxes_have_their_limits_and_numbers(em
         job = a_running_job(session)
         made = [add_region(session, job).id for _ in range(3)]
         scene_id = job.scene_id
-    database.close()
-    migrate.downgrade(empty_database_url, "0011")
-    migrate.upgrade(empty_database_url)
-    assert migrate.drift(empty_database_url) == []
-    database = Database(empty_database_url)
+    database = there_and_back(database, empty_database_url, "0011")
     with database.write() as session:
         assert regions.roll(session, scene_id) == (3, made)
         assert list(overlaps.numbers(session, scene_id).values()) == [(1, 0), (2, 0), (3, 0)]
@@ -170,11 +171,7 @@ def test_ids_of_events_go_on_from_the_largest_one_and_never_come_again(empty_dat
     database = Database(empty_database_url)
     with database.write() as session:
         kept = events.since(session, a_job(session).id)[-1].id
-    database.close()
-    migrate.downgrade(empty_database_url, "0021")
-    migrate.upgrade(empty_database_url)
-    assert migrate.drift(empty_database_url) == []
-    database = Database(empty_database_url)
+    database = there_and_back(database, empty_database_url, "0021")
     with database.read() as session:
         assert events.last_id(session) == kept
     first, second = ids_of_new_events(database), ids_of_new_events(database)
@@ -187,11 +184,7 @@ def test_jobs_of_before_their_bytes_were_counted_count(empty_database_url: str) 
     database = Database(empty_database_url)
     with database.write() as session:
         job_id = a_job(session, given_labels={"team": "welding"}).id
-    database.close()
-    migrate.downgrade(empty_database_url, "0022")
-    migrate.upgrade(empty_database_url)
-    assert migrate.drift(empty_database_url) == []
-    database = Database(empty_database_url)
+    database = there_and_back(database, empty_database_url, "0022")
     with database.read() as session:
         assert jobs.get(session, job_id).bytes == jobs.ROW_BYTES + len('{"random_seed": 0}') + len("teamwelding")
     database.close()
