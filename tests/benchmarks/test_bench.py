@@ -102,10 +102,12 @@ def test_what_is_measured_anew_replaces_its_own_rows_only() -> None:
 
 def test_rows_of_several_machines_say_which_is_whose() -> None:
     document = json.loads((report.FIGURES / "growth.json").read_text(encoding="utf-8"))
-    document["against"] = []
     row = document["ways"][-1]
-    assert f"{row['scene']}: Measured on" not in report.text(document)
-    row |= {"scene": "another", "machine": row["machine"] | {"processor": "an abacus"}}
+    other = row | {"scene": "another"}
+    document |= {"ways": [row, other], "against": []}
+    assert ": Measured on" not in report.text(document)
+    other["machine"] = row["machine"] | {"processor": "an abacus"}
+    assert f"{row['scene']}: Measured on" in report.text(document)
     assert "another: Measured on: an abacus, " in report.text(document)
 
 
