@@ -118,10 +118,11 @@ def of_job_pair(database: Database, kept: OutlinesKept, scene: Scene, job_id: st
             where = "an iteration" if iteration is None else f"iteration {iteration}"
             raise _without_cells(index, f"the job has not begun {where} with it")
         row, parts = found
+        own = parts[0].pair_index
         state = pairs.state_of_parts([PairState(part.state) for part in parts])
         begun = row.index if row.begun is None else row.begun
-        left = subtrees.outlines(session, job_id, index, begun, row.index)
-        counts = pairs.parts_of(session, job_id, index, left)
+        left = subtrees.outlines(session, job_id, own, begun, row.index)
+        counts = pairs.parts_of(session, job_id, own, left)
     if state is PairState.CERTIFIED:
         proof = kept.of(database, parts[0].proof_digest or "", scene)[0]
         return partition(scene, index, proof.cells, state, _kind(proof), row.index)

@@ -273,6 +273,8 @@ class IterationRow(Base):
     """Pair index (as a string) -> how many parts its open cells are dealt to, where there are several."""
     ending: Mapped[list[int]] = mapped_column(default=list)
     """Indices of the pairs whose open cells are going to be cut off."""
+    together: Mapped[Document] = mapped_column(default=dict)
+    """Pair index (as a string) -> the indices of the other pairs that are certified with it as one, and have no rows of their own."""
     reuse: Mapped[Document]
     """Pair index (as a string) -> the iteration whose proof serves here too."""
     ellipsoid_volume: Mapped[float | None]

@@ -97,6 +97,7 @@ def add_iteration(
     begun: int | None = None,
     parts: Mapping[int, int] | None = None,
     ending: Sequence[int] = (),
+    together: Mapping[int, Sequence[int]] | None = None,
 ) -> None:
     """Adds an iteration and its pairs. An iteration without pairs is certified at once. The caller holds the job's lock.
 
@@ -119,6 +120,7 @@ def add_iteration(
             begun=begun,
             parts={str(pair): count for pair, count in (parts or {}).items()},
             ending=list(ending),
+            together={str(pair): list(others) for pair, others in (together or {}).items()},
             **certified,
         )
     )
@@ -319,6 +321,11 @@ def lately_failed(session: Session, job_id: str) -> dict[int, list[PairRow]]:
     return {index: parts for index, parts in found.items() if str(index) not in reuse}
 
 
+def leader(iteration: IterationRow, pair: int) -> int:
+    """Returns the pair that has the rows of a pair that is certified with it as one; the pair itself where it has rows of its own."""
+    return next((int(first) for first, others in iteration.together.items() if pair in others), pair)
+
+
 def with_pair(session: Session, job_id: str, pair: int, iteration: int | None) -> tuple[IterationRow, Sequence[PairRow]] | None:
     """Returns the iteration that a pair's result is from, and the parts of the pair in it, in order.
 
@@ -330,10 +337,11 @@ def with_pair(session: Session, job_id: str, pair: int, iteration: int | None) -
     """
     last = select(func.max(IterationRow.index)).where(IterationRow.job_id == job_id)
     found = session.get(IterationRow, (job_id, session.scalar(last) if iteration is None else iteration))
-    if found is not None and (source := found.reuse.get(str(pair))) is not None:
-        found = session.get_one(IterationRow, (job_id, source))
     if found is None:
         return None
+    pair = leader(found, pair)
+    if (source := found.reuse.get(str(pair))) is not None:
+        found = session.get_one(IterationRow, (job_id, source))
     rows = session.scalars(_pairs(job_id, found.index).where(PairRow.pair_index == pair).order_by(PairRow.part)).all()
     return (found, rows) if rows else None
 

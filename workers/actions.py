@@ -28,4 +28,5 @@ def certify_action(iteration: IterationRow, pairs: list[int]) -> Certify:
         begun=iteration.begun,
         parts={int(pair): count for pair, count in iteration.parts.items()},
         ending=iteration.ending,
+        together={int(pair): tuple(others) for pair, others in iteration.together.items()},
     )

@@ -162,6 +162,7 @@ def _accept(scene: Scene, claim: steps.Claim) -> Done:
                 seed=None if accepted["seed"] is None else np.array(accepted["seed"]),
                 ellipsoid_volume=accepted["ellipsoid_volume"],
                 proofs={int(index): iteration for index, iteration in accepted["proofs"].items()},
+                together={int(index): tuple(others) for index, others in accepted.get("together", {}).items()},
                 obstacles={int(index): Obstacle.from_document(one) for index, one in accepted.get("obstacles", {}).items()},
             )
             held = _proofs(session, claim.job_id, accepted["proofs"])

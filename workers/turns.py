@@ -212,6 +212,7 @@ def _add_acceptance(session: Session, job: JobRow, candidate: Candidate) -> None
         "seed": None if candidate.seed is None else candidate.seed.tolist(),
         "ellipsoid_volume": candidate.ellipsoid_volume,
         "proofs": candidate.proofs,
+        "together": candidate.together,
         "obstacles": {index: obstacle.to_document() for index, obstacle in candidate.obstacles.items()},
     }
     steps.add(session, job, StepKind.ACCEPT, work_on)
@@ -239,6 +240,7 @@ def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: A
         begun=action.begun,
         parts=action.parts,
         ending=action.ending,
+        together=action.together,
     )
     # A certified pair is not asked for again, and partitions that begin anew have nothing to go on with.
     subtrees.drop(session, job.id, [] if action.begun is None else action.pairs)

@@ -329,13 +329,14 @@ def get_job_pairs(
     begin = _place(after)
     with db.read() as session:
         job = jobs.get(session, job_id)
-        rows, last = pairs.page(session, job.id, iteration=iteration, only=pair, after=begin, limit=limit)
-        iterations = [row for row in pairs.iterations(session, job.id) if iteration in (None, row.index)] if begin is None else []
+        iterations = [row for row in pairs.iterations(session, job.id) if iteration in (None, row.index)]
+        only = None if pair is None else {pairs.leader(row, index) for row in iterations for index in pair}
+        rows, last = pairs.page(session, job.id, iteration=iteration, only=only, after=begin, limit=limit)
     scene = scenes.load(db, job.scene_id)
     known = enumerate(scene.pairs) if begin is None else ()
     return PairMatrix(
         pairs=[PairInfo(index=index, a=one.a, b=one.b) for index, one in known if pair is None or index in pair],
-        iterations=[_iteration(row) for row in iterations],
+        iterations=[_iteration(row) for row in iterations] if begin is None else [],
         cells=[_cell(scene, list(parts)) for _, parts in itertools.groupby(rows, lambda row: (row.iteration, row.pair_index))],
         next=None if last is None else f"{last[0]}.{last[1]}",
     )
@@ -386,6 +387,9 @@ def _letters(row: IterationRow, known: Mapping[int, PairState], count: int) -> I
         states[int(pair)] = "u"
     for index, state in known.items():
         states[index] = _LETTERS[state]
+    for first, others in row.together.items():
+        for other in others:
+            states[other] = states[int(first)]
     return IterationStates(index=row.index, label=row.label, state=IterationState(row.state), faces=row.faces, states="".join(states))
 
 
@@ -402,7 +406,8 @@ def download_pair_proof(
     """
     with db.read() as session:
         job = jobs.get(session, job_id)
-        rows = pairs.of_iteration(session, job.id, iteration, [pair])
+        own = next((pairs.leader(row, pair) for row in pairs.iterations(session, job.id) if row.index == iteration), pair)
+        rows = pairs.of_iteration(session, job.id, iteration, [own])
         digest = _cell(scenes.load(db, job.scene_id), rows).proof if rows else None
         if digest is None:
             message = f"there is no proof of pair {pair} in iteration {iteration}"
@@ -420,6 +425,7 @@ def _iteration(row: IterationRow) -> Iteration:
         faces=row.faces,
         ellipsoid_volume=row.ellipsoid_volume,
         reused={int(pair): iteration for pair, iteration in row.reuse.items()},
+        together={int(pair): others for pair, others in row.together.items()},
         started_at=row.started_at,
         finished_at=row.finished_at,
     )

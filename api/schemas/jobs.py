@@ -379,6 +379,9 @@ class Iteration(BaseModel):
     faces: int = Field(description="Number of rows of C, joint limits included.")
     ellipsoid_volume: float | None = Field(description="Volume of the inscribed ellipsoid of its region, in s; null without a region.")
     reused: dict[int, int] = Field(description="Maps a pair's index to the earlier iteration whose proof serves here too.")
+    together: dict[int, list[int]] = Field(
+        description="Maps a pair's index to the other pairs that are certified with it as one. These have no results of their own."
+    )
     started_at: datetime = Field(description="When it began.")
     finished_at: datetime | None = Field(description="When its last pair was settled; null before.")
 
@@ -410,7 +413,8 @@ class PairCell(BaseModel):
 class PairMatrix(Page):
     """Holds one page of the results of pairs in iterations, by iteration and pair.
 
-    A pair without a cell in an iteration was reused there from an earlier iteration, or was not reached.
+    A pair without a cell in an iteration was reused there from an earlier iteration, was certified with another one as one, or was not
+    reached.
     """
 
     pairs: list[PairInfo] = Field(description="The pairs that were asked for; on the first page only.")

@@ -49,6 +49,7 @@ class Certify:
         parts: pair index -> how many parts its open cells are dealt to; 1 for a pair that is left out.
         ending: pairs whose open cells are going to be cut off where the volumes touch that these are tried with next; all of them where the
             pair is hard as well.
+        together: pair index -> the other pairs that are certified with it as one, and are not among ``pairs`` or in ``reuse``.
     """
 
     kind: ClassVar[str] = "certify"
@@ -65,6 +66,7 @@ class Certify:
     begun: int | None = None
     parts: dict[int, int] = field(default_factory=dict)
     ending: list[int] = field(default_factory=list)
+    together: dict[int, tuple[int, ...]] = field(default_factory=dict)
 
     @property
     def work(self) -> list[tuple[int, int]]:
@@ -166,6 +168,7 @@ class Candidate:
         seed: (n,) the point in s that the region was grown around; None for a given polytope.
         ellipsoid_volume: volume of the largest ellipsoid inside; None for a given polytope, which is not compared with any other.
         proofs: pair index -> iteration that holds its proof.
+        together: pair index -> the other pairs that its proof is about, which are not in ``proofs``.
         obstacles: pair index -> what was cut off for it on the way.
     """
 
@@ -175,6 +178,7 @@ class Candidate:
     seed: Array | None
     ellipsoid_volume: float | None
     proofs: dict[int, int]
+    together: dict[int, tuple[int, ...]] = field(default_factory=dict)
     obstacles: dict[int, Obstacle] = field(default_factory=dict)
 
 

@@ -114,7 +114,7 @@ def _better(scene: Scene, start: Start | None, action: Certify, volume: float, b
 def _candidate(state: GrowthState, report: Outcomes, volume: float | None) -> Candidate:
     action, seed = report.action, None if state.start is None else state.start.seed
     proofs = {**dict.fromkeys(action.pairs, action.iteration), **action.reuse}
-    return Candidate(action.iteration, action.polytope, action.center, seed, volume, proofs, state.obstacles)
+    return Candidate(action.iteration, action.polytope, action.center, seed, volume, proofs, action.together, state.obstacles)
 
 
 def _after(scene: Scene, state: GrowthState, start: Start, report: Outcomes, accepted: bool) -> Transition:

@@ -12,6 +12,7 @@ cells are cheap show where the next ones have to be, which takes a fraction of t
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -25,6 +26,7 @@ from certifier.growth.trials import by_joints, joints_between
 from certifier.model import Array, Box, Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.pair.result import Weakness
+from certifier.partition.together import Together, together
 from certifier.polytopes.polytope import bounds
 
 FIRST = 0.7
@@ -63,6 +65,10 @@ REVOKED = "revoked: "
 """The reason begins like this where nothing is left of a region that is certified again."""
 EARLY_EFFORT = 24 * SLICE
 """The effort of the first two stages, so that the first regions come soon, and where a region is certified again."""
+
+
+KNOWN, THIN = 4, 8
+"""Of every THIN samples of the proposal one says which pairs are certified as one."""
 
 
 def begin_whole(scene: Scene, state: GrowthState, start: Start) -> Transition:
@@ -207,10 +213,29 @@ def _ended(state: GrowthState, report: Outcomes, reason: str) -> Transition:
     return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
 
 
+_joined: OrderedDict[tuple[str, bytes], Together] = OrderedDict()
+"""What was certified as one last, by scene and proposal; at most KNOWN of these are kept."""
+
+
+def _together(scene: Scene, state: GrowthState) -> Together:
+    """Returns which pairs are certified as one, the same in all stages of a growth; none where a region is certified again."""
+    start = state.start
+    if start is None or state.options.kind == "recertify":
+        return {}
+    key = scene.hash, b"".join(part.tobytes() for part in (start.rows.C, start.rows.d, start.keep))
+    if key not in _joined:
+        _joined[key] = together(scene, samples_of(scene, start.rows)[::THIN], start.keep)
+        if len(_joined) > KNOWN:
+            _joined.popitem(last=False)
+    return _joined[key]
+
+
 def _next(scene: Scene, state: GrowthState) -> Transition:
     whole = state.whole
     assert whole is not None
-    pairs = [i for i in by_joints(scene) if i not in whole.holds]
+    as_one = _together(scene, state)
+    others = {other for members in as_one.values() for other in members}
+    pairs = [i for i in by_joints(scene) if i not in whole.holds and i not in others]
     ending = 0 if _gone(whole) >= LATEST else ENDING
     spent, effort = {i: whole.spent.get(i, 0) for i in pairs}, {i: _effort(state, whole, i) for i in pairs}
     action = Certify(
@@ -227,5 +252,6 @@ def _next(scene: Scene, state: GrowthState) -> Transition:
         begun=whole.begun,
         parts=_parts(pairs, whole),
         ending=[i for i in pairs if spent[i] >= effort[i]],
+        together=as_one,
     )
     return Transition(replace(state, next=state.next + 1), action)

@@ -52,7 +52,7 @@ def certified_region(
     """Assembles a region from its pairs' proofs, verifies the whole, and describes it.
 
     Args:
-        proofs: pair index -> proof file, for every pair of the scene; a proof that covers several pairs stands at each of them.
+        proofs: pair index -> proof file, for every pair of the scene but those that the candidate has together with others.
         provenance: options, versions, growth curve, and the seconds of the whole job, of the seeding and of all pairs.
         proposal: what the region was grown from; None for a given polytope.
         processes: how many processes verify.
@@ -62,6 +62,7 @@ def certified_region(
         ProofError: the proof does not hold; nothing may be served as certified then.
         RegionError: the polytope is empty or unbounded.
     """
+    proofs = proofs | {other: proofs[index] for index, others in candidate.together.items() for other in others}
     kept = drop_redundant(candidate.polytope, fixed=2 * scene.n)
     polytope = Polytope(candidate.polytope.C[kept], candidate.polytope.d[kept])
     C, d = polytope.C, polytope.d

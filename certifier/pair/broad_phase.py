@@ -10,7 +10,7 @@ What is tried for a pair does not depend on which pairs were asked for before.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Generic, TypeVar
@@ -57,10 +57,14 @@ class BroadPhase(Generic[R]):
         self._partners, self._root = _trees(kinematics)
         self._tried: dict[tuple[Node, Node], R | None] = {}
 
-    def find(self, pair: Pair) -> R | None:
-        """Returns the result for the largest volumes that have one and hold the pair; None when the pair has to be settled by itself."""
+    def find(self, pair: Pair, names: Collection[str] | None = None) -> R | None:
+        """Returns the result for the largest volumes that have one and hold the pair; None when the pair has to be settled by itself.
+
+        Args:
+            names: other geometries that the volumes have to hold as well; None for none.
+        """
         ((_, a), first), ((_, b), second) = sorted(((self._root[name], name) for name in (pair.a, pair.b)), key=lambda root: root[0][0])
-        while a.children or b.children:
+        while (a.children or b.children) and {*(names or ())} <= {*a.volume.geometries, *b.volume.geometries}:
             if (a, b) not in self._tried:
                 self._tried[a, b] = self._attempt((a.volume, b.volume)) if self._worth_it(a, b) else None
             if (found := self._tried[a, b]) is not None:

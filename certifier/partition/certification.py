@@ -21,7 +21,7 @@ import numpy as np
 
 from certifier.errors import ProofError
 from certifier.kinematics import Kinematics
-from certifier.model import Array, Box, Polytope, Scene, Volume
+from certifier.model import Array, Box, Polytope, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair.broad_phase import BroadPhase, Volumes
 from certifier.pair.closest import closest
@@ -34,6 +34,7 @@ from certifier.partition.hulls import approach, gaps
 from certifier.partition.search import Report, Search
 from certifier.partition.shared import Shared
 from certifier.partition.subtrees import Subtrees, dealt, open_cells, put_together
+from certifier.partition.together import Together, volumes_of
 from certifier.partition.tree import Node, OpenCell, to_streams
 from certifier.polytopes.simplex import deepest
 from certifier.proof.negative import WitnessProof
@@ -76,13 +77,14 @@ class CellCertification:
         polytope: its last 2n rows are the joint limits.
         seed: seeds the samples.
         box: the root cell, which contains P; None for P's smallest box. What was begun must have had the same one.
+        together: pairs that are certified as one with others; None for none. What was begun must have had the same ones.
 
     Raises:
         RegionError: the polytope is empty or unbounded.
     """
 
-    def __init__(self, scene: Scene, polytope: Polytope, seed: int = 0, box: Box | None = None) -> None:
-        self._scene = scene
+    def __init__(self, scene: Scene, polytope: Polytope, seed: int = 0, box: Box | None = None, together: Together | None = None) -> None:
+        self._scene, self._with = scene, together or {}
         self._area = Area.of(scene, polytope, seed, box)
         check_ground(scene, self._area.ground)
         check_interior(scene, self._area.ground, self._area.center)
@@ -98,8 +100,9 @@ class CellCertification:
             cut_off: which points of open cells the result names, because they will be cut off.
             former: a proof about bodies that were much like these, whose cells and planes are tried first; None where there is none.
         """
-        start, pair = time.perf_counter(), self._scene.pairs[index]
-        result = self._broad_phase.find(pair) or self._begin(self._volumes(index), cells, cut_off, former)
+        start, pair, volumes = time.perf_counter(), self._scene.pairs[index], self._volumes(index)
+        names = [name for volume in volumes for name in volume.geometries]
+        result = self._broad_phase.find(pair, names) or self._begin(volumes, cells, cut_off, former)
         return replace(result, seconds=time.perf_counter() - start)
 
     def go_on(
@@ -135,8 +138,7 @@ class CellCertification:
         return replace(self._proved(search, volumes, root, part, parts), seconds=time.perf_counter() - start)
 
     def _volumes(self, index: int) -> Volumes:
-        pair = self._scene.pairs[index]
-        return Volume.of(self._scene.geometry(pair.a)), Volume.of(self._scene.geometry(pair.b))
+        return volumes_of(self._scene, [self._scene.pairs[i] for i in (index, *self._with.get(index, ()))])
 
     def _together(self, volumes: Volumes) -> PairResult | None:
         search, root = Search(self._area, self._shared, volumes), Node()

@@ -105,22 +105,23 @@ def ball(kinematics: Kinematics, geometries: Sequence[Geometry], body: str) -> V
     return Volume(names, body, _placed(known[0].poses[0], center[None]), _enlarged(radius))
 
 
-def capsule(kinematics: Kinematics, geometry: Geometry) -> Volume | None:
-    """Returns a capsule along the axis of the joint that moves the geometry's rigid part, which holds it at all angles of this joint.
+def capsule(kinematics: Kinematics, geometries: Sequence[Geometry]) -> Volume | None:
+    """Returns a capsule along the axis of the joint that moves geometries of one body, which holds them at all angles of this joint.
 
     It is fixed to the root of the rigid part before the joint. Among those with the least radius, it is the shortest.
 
     Returns:
-        None if no joint moves the geometry, or one that slides.
+        None if no joint moves the geometries, or one that slides.
     """
-    root = kinematics.rigid_root(geometry.body)
+    root = kinematics.rigid_root(geometries[0].body)
     if root == WORLD:
         return None
     body = kinematics.rigid_root(kinematics.scene.joint_above[root].parent)
-    linkage = _Linkage.between(kinematics, body, geometry)
-    if linkage is None:
+    linkages = [linkage for geometry in geometries if (linkage := _Linkage.between(kinematics, body, geometry)) is not None]
+    if not linkages:
         return None
-    axis, vertices = linkage.axes[0], linkage.vertices
+    linkage, vertices = linkages[0], np.concatenate([linkage.vertices for linkage in linkages])
+    axis = linkage.axes[0]
     along = vertices @ axis
     across = np.linalg.norm(vertices - along[:, None] * axis, axis=1)
     # A vertex that is nearer to the axis may reach beyond the segment into the cap.
@@ -130,7 +131,8 @@ def capsule(kinematics: Kinematics, geometry: Geometry) -> Volume | None:
         lower = upper = 0.5 * (lower + upper)
     distance = float(np.linalg.norm(vertices - np.clip(along, lower, upper)[:, None] * axis, axis=1).max())
     ends = _placed(linkage.poses[0], np.outer([lower, upper], axis))
-    return Volume((geometry.name,), body, ends, _enlarged(distance + geometry.radius))
+    names = tuple(geometry.name for geometry in geometries)
+    return Volume(names, body, ends, _enlarged(distance + max(geometry.radius for geometry in geometries)))
 
 
 FAT = 2.1
@@ -140,17 +142,15 @@ STOUT = 1.25
 
 
 def slim_volume(kinematics: Kinematics, volume: Volume, other: Volume) -> Volume | None:
-    """Returns a coarse volume for a single geometry that moves with as few joints against another volume as is worth it, or None."""
-    if len(volume.geometries) != 1:
-        return None
-    geometry = kinematics.scene.geometry(volume.geometries[0])
-    own = _farthest(geometry.vertices, geometry.vertices.mean(axis=0)) + geometry.radius
+    """Returns a coarse volume that moves with as few joints against another volume as is worth it, or None."""
+    geometries = [kinematics.scene.geometry(name) for name in volume.geometries]
+    own = _farthest(volume.vertices, volume.vertices.mean(axis=0)) + volume.radius
     roots = _roots(kinematics, volume, other)
     for body in reversed(roots):
-        found = ball(kinematics, [geometry], body) if len(kinematics.chain(body, geometry.body)) > 1 else None
+        found = ball(kinematics, geometries, body) if len(kinematics.chain(body, volume.body)) > 1 else None
         if found is not None and found.radius <= FAT * own:
             return found
-    found = capsule(kinematics, geometry)
+    found = capsule(kinematics, geometries)
     return found if found is not None and found.body in roots and found.radius <= STOUT * own else None
 
 

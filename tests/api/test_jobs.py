@@ -254,6 +254,30 @@ def test_the_parts_of_a_pair_are_shown_as_one(client: TestClient, database: Data
     assert proof() == 200
 
 
+def test_a_pair_that_is_certified_with_another_one_is_found_there(client: TestClient, database: Database, scene: Scene) -> None:
+    job_id = client.post("/v1/jobs", json=CERTIFY | {"cells": 50}).json()["id"]
+    polytope = scene.polytope([[1.0], [-1.0]], [0.9, 0.9])
+    certified = CellCertification(scene, polytope).certify(0, 50)
+    with database.write() as session:
+        job = jobs.lock(session, job_id)
+        jobs.start(session, job)
+        new, given = [pairs.NewPair(0, "a0", "b0", 1.0)], {"C": polytope.C, "d": polytope.d, "center": None}
+        more = {"hard": [], "failures": None, "cells": 50, "together": {0: (1,)}}
+        pairs.add_iteration(session, job, index=0, label="cells", **given, pairs=new, reuse={}, **more)
+        claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
+        assert claim is not None
+        pairs.save(session, claim, {(0, 0): certified})
+    matrix = client.get(f"/v1/jobs/{job_id}/pairs?pair=1").json()
+    assert ([pair["index"] for pair in matrix["pairs"]], [cell["pair"] for cell in matrix["cells"]]) == ([1], [0])
+    assert matrix["iterations"][0]["together"] == {"0": [1]}
+    assert [it["states"] for it in client.get(f"/v1/jobs/{job_id}/pairs/states").json()["iterations"]] == ["cc"]
+    first, second = (client.get(f"/v1/jobs/{job_id}/pairs/{pair}/proof", params={"iteration": 0}) for pair in (0, 1))
+    assert first.status_code == 200
+    assert first.content == second.content
+    cells = [client.get(f"/v1/jobs/{job_id}/pairs/{pair}/cells").json() for pair in (0, 1)]
+    assert [cell["cuts"] for cell in cells] == 2 * [cells[0]["cuts"]]
+
+
 def test_a_job_that_asks_for_cells_says_so(client: TestClient, scene: Scene) -> None:
     def options(body: dict[str, Any]) -> GrowthOptions:
         return GrowthOptions.from_document(client.post("/v1/jobs", json=body).json()["options"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,6 +41,24 @@ def planar_arm(links=2, obstacle=None, q_star=None, limit=2.0, kind=JointKind.RE
     pairs = tuple(Pair(*sorted((g.name, obstacle.name))) for g in geometries)
     center = np.zeros(links) if q_star is None else np.array(q_star, dtype=float)
     return Scene("planar", tuple(joints), tuple(bodies), (*geometries, obstacle), pairs, (), center, padding)
+
+
+def beads(count=4, spacing=0.25, radius=0.08, obstacle=None, lean=(0.0, 0.0)):
+    """A planar arm of two links, each of them a row of balls, and an obstacle; pairs ball - obstacle.
+
+    Args:
+        lean: how much larger the last ball of either link is than the others, in metres.
+    """
+    obstacle = obstacle or box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.5, 0.0))
+    arm = planar_arm(2, obstacle)
+    radii = {link: [radius] * (count - 1) + [radius + lean[link - 1]] for link in (1, 2)}
+    balls = [
+        ball(f"arm/link{link}/ball{i}", f"arm/link{link}", radii[link][i], (spacing * (0.5 + i), 0.0, 0.0))
+        for link in (1, 2)
+        for i in range(count)
+    ]
+    pairs = tuple(Pair(one.name, obstacle.name) for one in balls)
+    return replace(arm, geometries=(*balls, obstacle), pairs=pairs)
 
 
 def two_arms(links=3, apart=7.0, limit=2.0):

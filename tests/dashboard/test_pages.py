@@ -113,6 +113,7 @@ def iteration(index: int, reused: dict[int, int]) -> Iteration:
         faces=4,
         ellipsoid_volume=None,
         reused=reused,
+        together={},
         started_at=NOW,
         finished_at=None,
     )

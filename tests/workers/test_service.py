@@ -18,6 +18,7 @@ from db import jobs, pairs, proofs, regions
 from db.models import PairRow, SubtreesRow
 from db.session import database
 from db.settings import settings
+from tests.certifier.scenes import beads
 from tests.workers.options import box_around, grow_box
 from tests.workers.record import check_record
 from tests.workers.service import Service, ended, events_of, eventually, holder, kill_holder, pairs_of, submit
@@ -57,6 +58,20 @@ def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(plana
     assert [event.seq for event in events] == list(range(1, len(events) + 1))
     assert (events[0].data["state"], events[-1].data["state"]) == ("queued", "succeeded")
     assert {"iteration", "pairs", "step", "region"} < {event.kind for event in events}
+
+
+@pytest.mark.lengthy
+def test_pairs_that_are_certified_as_one_come_to_the_same_region_as_without_the_service() -> None:
+    scene, options = beads(), grow_box(SEED, 0.3, contraction="whole", cells=600)
+    job = ended(submit(scene, options))
+    with database().read() as session:
+        region = regions.get(session, job.region_id or "")
+        iterations = pairs.iterations(session, job.id)
+    assert iterations[0].together == {"0": [1, 2, 3], "4": [5, 6, 7]}
+    assert {row.pair_index for row in pairs_of(job.id)} == {0, 4}
+    alone = grow(scene, GrowthOptions.from_document(options)).manifest
+    assert all(region.manifest[name] == alone[name] for name in SAME)
+    assert certified_pairs(region.manifest) == certified_pairs(alone)
 
 
 def certified_pairs(manifest: dict[str, Any]) -> list[tuple[Any, ...]]:

@@ -78,7 +78,7 @@ def made(scene: Scene) -> list[Volume]:
     """All balls, about every body, and all capsules."""
     kinematics = Kinematics.of(scene)
     found = [ball(kinematics, [geometry], body) for geometry in scene.geometries for body in scene.bodies]
-    found += [capsule(kinematics, geometry) for geometry in scene.geometries]
+    found += [capsule(kinematics, [geometry]) for geometry in scene.geometries]
     return [volume for volume in found if volume is not None]
 
 
@@ -223,8 +223,8 @@ def test_what_slides_or_is_fixed_or_is_on_another_branch_has_no_coarse_volume():
         assert ball(Kinematics.of(scene), [hand], body) is None
     assert ball(Kinematics.of(scene), [hand], "arm/b") is not None
     slides = planar_arm(1, kind=JointKind.PRISMATIC)
-    assert capsule(Kinematics.of(slides), slides.geometry("arm/link1/bar")) is None
-    assert capsule(Kinematics.of(arm()), arm().geometry("world/obstacle")) is None
+    assert capsule(Kinematics.of(slides), [slides.geometry("arm/link1/bar")]) is None
+    assert capsule(Kinematics.of(arm()), [arm().geometry("world/obstacle")]) is None
     joints = [replace(joint, parent=WORLD) for joint in arm().joints]
     branches = replace(arm(), joints=tuple(joints))
     refused(branches, bar([[0.0, 0.0, 0.0]], "arm/link1", 100.0), "revolute")

@@ -1,0 +1,158 @@
+"""Pairs that are certified as one: which they are, that their hulls hold them, and that their proofs say so of each of them."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from certifier.growth.options import GrowthOptions
+from certifier.jobs.local import grow, recertify
+from certifier.kinematics import Kinematics
+from certifier.model import WORLD, Pair, Polytope
+from certifier.outcome import Outcome
+from certifier.partition.certification import CellCertification
+from certifier.partition.hulls import gaps, hull
+from certifier.partition.together import LOST, together, volumes_of
+from certifier.proof import limits
+from certifier.proof.region import read_part
+from certifier.verify.kinematics import ExactKinematics
+from certifier.verify.region import verify_region
+from certifier.verify.volume import check_volume
+from tests.certifier.scenes import beads, box
+
+
+def samples(scene, half=0.3, count=500):
+    return np.random.default_rng(0).uniform(-half, half, size=(count, scene.n))
+
+
+KEEP = np.zeros((1, 2))
+
+
+def units(scene, joined):
+    """Returns the pairs that are certified as one, those by themselves included."""
+    others = {other for members in joined.values() for other in members}
+    return [(index, *joined.get(index, ())) for index in range(len(scene.pairs)) if index not in others]
+
+
+def test_the_balls_of_a_link_are_certified_as_one_beside_an_obstacle():
+    scene = beads()
+    joined = together(scene, samples(scene), KEEP)
+    assert sorted(units(scene, joined)) == [(0, 1, 2, 3), (4, 5, 6, 7)]
+
+
+@pytest.mark.parametrize("count", [1, 3, 8, 9, 20])
+def test_every_pair_is_in_one_unit_of_two_bodies_and_few_vertices(count):
+    scene = beads(count, 1.0 / count)
+    found = units(scene, together(scene, samples(scene), KEEP))
+    assert sorted(index for unit in found for index in unit) == list(range(len(scene.pairs)))
+    for unit in found:
+        pairs = [scene.pairs[index] for index in unit]
+        one, other = volumes_of(scene, pairs)
+        assert {Pair(*sorted(names)) for names in itertools.product(one.geometries, other.geometries)} == set(pairs)
+        assert max(len(one.vertices), len(other.vertices)) <= limits.CORNERS
+        kinematics = ExactKinematics.at(scene, [])
+        for volume in (one, other):
+            check_volume(scene, kinematics, volume)
+
+
+def test_balls_of_different_radius_are_not_joined():
+    scene = beads(lean=(0.05, 0.0))
+    assert sorted(units(scene, together(scene, samples(scene), KEEP))) == [(0, 1, 2), (3,), (4, 5, 6, 7)]
+
+
+def test_pairs_that_are_left_out_of_the_scene_divide_a_hull():
+    scene = beads()
+    links = [[ball.name for ball in scene.geometries if ball.body == f"arm/link{link}"] for link in (1, 2)]
+    scene = replace(scene, pairs=tuple(Pair(a, b) for a, b in itertools.product(*links)))
+    assert units(scene, together(scene, samples(scene), KEEP)) == [tuple(range(16))]
+    divided = replace(scene, pairs=scene.pairs[:-1])
+    found = units(divided, together(divided, samples(scene), KEEP))
+    assert sorted(map(len, found)) == [1, 2, 4, 8]
+    assert sorted(index for unit in found for index in unit) == list(range(15))
+
+
+def test_hulls_that_touch_what_none_of_their_balls_does_are_divided():
+    # The obstacle is between the second and the third ball of the first link, where the hull is and the balls are not.
+    scene = beads(4, 0.6, 0.05, box("world/obstacle", WORLD, (0.1, 0.1, 0.1), (1.2, 0.0, 0.0)))
+    narrow = samples(scene, 0.01)
+    assert sorted(units(scene, together(scene, narrow, KEEP)))[:2] == [(0, 1), (2, 3)]
+
+
+def test_a_configuration_to_keep_divides_a_hull_that_no_sample_does():
+    scene = beads(4, 0.6, 0.05, box("world/obstacle", WORLD, (0.1, 0.1, 0.1), (1.2, 0.0, 0.0)))
+    away = samples(scene) + np.array([1.2, 0.0])
+    assert (0, 1, 2, 3) in units(scene, together(scene, away, np.array([[1.2, 0.0]])))
+    assert (0, 1, 2, 3) not in units(scene, together(scene, away, KEEP))
+
+
+def test_only_a_small_share_of_the_samples_may_be_lost():
+    scene = beads(4, 0.6, 0.05, box("world/obstacle", WORLD, (0.1, 0.1, 0.1), (1.2, 0.0, 0.0)))
+    away = samples(scene, count=1000) + np.array([1.2, 0.0])
+    for lost, joined in ((int(LOST * 1000), True), (int(LOST * 1000) + 1, False)):
+        few = away.copy()
+        few[:lost] = KEEP
+        assert ((0, 1, 2, 3) in units(scene, together(scene, few, np.array([[1.2, 0.0]])))) is joined
+
+
+def test_what_the_balls_touch_themselves_is_not_held_against_their_hull():
+    scene = beads(obstacle=box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.875, 0.0, 0.0)))
+    touching = np.zeros((100, 2))
+    assert (0, 1, 2, 3) in units(scene, together(scene, touching, np.array([[1.5, 0.0]])))
+
+
+def certified(scene, index, half):
+    rows = np.vstack([np.eye(2), -np.eye(2)])
+    limited = scene.polytope(rows, np.full(4, half))
+    joined = together(scene, samples(scene, half), KEEP)
+    return CellCertification(scene, Polytope(limited.C, limited.d), together=joined).certify(index, 500)
+
+
+def test_a_proof_of_pairs_that_are_certified_as_one_is_about_each_of_them():
+    scene = beads()
+    result = certified(scene, 4, 0.3)
+    assert result.outcome is Outcome.CERTIFIED
+    proof = read_part(result.proof, scene)
+    assert {f"arm/link2/ball{i}" for i in range(4)} <= {name for volume in proof.volumes for name in volume.geometries}
+
+
+def test_pairs_of_which_one_touches_are_not_certified_as_one():
+    scene = beads(obstacle=box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (2.05, 0.0, 0.0)))
+    joined = {4: (5, 6, 7)}
+    limited = scene.polytope(np.vstack([np.eye(2), -np.eye(2)]), np.full(4, 0.3))
+    search = CellCertification(scene, Polytope(limited.C, limited.d), together=joined)
+    outcomes = [search.certify(index, 500).outcome for index in (4,)]
+    alone = CellCertification(scene, Polytope(limited.C, limited.d))
+    assert [alone.certify(index, 500).outcome for index in (4, 5, 6, 7)] == [Outcome.CERTIFIED] * 3 + [Outcome.REFUTED]
+    assert outcomes == [Outcome.INCONCLUSIVE]
+
+
+def test_a_region_has_a_proof_of_every_pair_and_is_free():
+    scene = beads()
+    options = {"kind": "grow", "seed": {"method": "box", "q": [0.0, 0.0], "half_width": 1.0}, "contraction": "whole", "cells": 600}
+    region = grow(scene, GrowthOptions.from_document(options))
+    statement = verify_region(region.proof)
+    assert set(statement.gaps) == set(scene.pairs)
+    assert min(statement.gaps.values()) > 0
+    digests = [pair["proof_digest"] for pair in region.manifest["pairs"]]
+    assert len(set(digests)) < len(digests)
+    C, d = (np.array(region.manifest[name]) for name in ("halfspace_normals", "halfspace_offsets"))
+    s = np.random.default_rng(1).uniform(-1, 1, size=(20000, 2))
+    inside = s[(s @ C.T <= d).all(axis=1)]
+    assert len(inside) > 1000
+    kinematics = Kinematics.of(scene)
+    for pair in scene.pairs:
+        one, other = volumes_of(scene, [pair])
+        hulls = [hull(kinematics, one.body, v, v.radius, np.zeros(3), 1.0) for v in (one, other)]
+        assert gaps(*hulls, inside).min() > 0
+
+
+def test_a_region_of_such_pairs_is_certified_again_for_a_changed_scene():
+    options = {"kind": "grow", "seed": {"method": "box", "q": [0.0, 0.0], "half_width": 0.5}, "contraction": "whole", "cells": 600}
+    region = grow(beads(), GrowthOptions.from_document(options))
+    changed = beads(obstacle=box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.7, 1.4, 0.0)))
+    statement = verify_region(recertify(changed, region.proof).proof)
+    assert set(statement.gaps) == set(changed.pairs)
+    assert min(statement.gaps.values()) > 0
