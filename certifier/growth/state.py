@@ -118,6 +118,7 @@ class Whole:
         cuts: pair index -> in how many rounds something was cut off for it; pairs for which nothing was are left out.
         since, passed: the shares of the time until the deadline that had passed when this stage began, and now; 0 without a deadline.
         stage: the number of the stage, from 1 on.
+        together: pair index -> the other pairs that are certified with it as one.
     """
 
     reach: float
@@ -133,6 +134,7 @@ class Whole:
     since: float = 0.0
     passed: float = 0.0
     stage: int = 1
+    together: dict[int, tuple[int, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,8 +212,9 @@ class GrowthState:
 def _whole(document: dict[str, Any] | None) -> Whole | None:
     if document is None:
         return None
-    counts = {name: _by_pair(document[name]) for name in ("holds", "open_cells", "spent", "cuts")}
-    return replace(_part(Whole, {**document, **dict.fromkeys(counts, None)}), **counts)
+    known = {name: _by_pair(document[name]) for name in ("holds", "open_cells", "spent", "cuts")}
+    known["together"] = {pair: tuple(others) for pair, others in _by_pair(document.get("together", {})).items()}
+    return replace(_part(Whole, {**document, **dict.fromkeys(known, None)}), **known)
 
 
 def _document(part: Best | Start | Whole | Cuts | Bisection | Round) -> dict[str, Any]:

@@ -12,7 +12,6 @@ cells are cheap show where the next ones have to be, which takes a fraction of t
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -67,7 +66,7 @@ EARLY_EFFORT = 24 * SLICE
 """The effort of the first two stages, so that the first regions come soon, and where a region is certified again."""
 
 
-KNOWN, THIN = 4, 8
+THIN = 8
 """Of every THIN samples of the proposal one says which pairs are certified as one."""
 
 
@@ -97,7 +96,9 @@ def begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polyto
     """Asks to certify all pairs on a polytope; what was proved on the one of the stage before says nothing about it."""
     box = Box.around(*bounds(polytope))
     stage = 1 if state.whole is None else state.whole.stage + 1
-    return _next(scene, replace(state, whole=Whole(reach, kept, polytope, box.mid, box.half, since=passed, passed=passed, stage=stage)))
+    joined = _together(scene, state)
+    begun = Whole(reach, kept, polytope, box.mid, box.half, since=passed, passed=passed, stage=stage, together=joined)
+    return _next(scene, replace(state, whole=begun))
 
 
 def in_words(scene: Scene, s: Array) -> str:
@@ -213,28 +214,19 @@ def _ended(state: GrowthState, report: Outcomes, reason: str) -> Transition:
     return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
 
 
-_joined: OrderedDict[tuple[str, bytes], Together] = OrderedDict()
-"""What was certified as one last, by scene and proposal; at most KNOWN of these are kept."""
-
-
 def _together(scene: Scene, state: GrowthState) -> Together:
     """Returns which pairs are certified as one, the same in all stages of a growth; none where a region is certified again."""
-    start = state.start
-    if start is None or state.options.kind == "recertify":
+    if state.whole is not None:
+        return state.whole.together
+    if state.start is None or state.options.kind == "recertify":
         return {}
-    key = scene.hash, b"".join(part.tobytes() for part in (start.rows.C, start.rows.d, start.keep))
-    if key not in _joined:
-        _joined[key] = together(scene, samples_of(scene, start.rows)[::THIN], start.keep)
-        if len(_joined) > KNOWN:
-            _joined.popitem(last=False)
-    return _joined[key]
+    return together(scene, samples_of(scene, state.start.rows)[::THIN], state.start.keep)
 
 
 def _next(scene: Scene, state: GrowthState) -> Transition:
     whole = state.whole
     assert whole is not None
-    as_one = _together(scene, state)
-    others = {other for members in as_one.values() for other in members}
+    others = {other for members in whole.together.values() for other in members}
     pairs = [i for i in by_joints(scene) if i not in whole.holds and i not in others]
     ending = 0 if _gone(whole) >= LATEST else ENDING
     spent, effort = {i: whole.spent.get(i, 0) for i in pairs}, {i: _effort(state, whole, i) for i in pairs}
@@ -252,6 +244,6 @@ def _next(scene: Scene, state: GrowthState) -> Transition:
         begun=whole.begun,
         parts=_parts(pairs, whole),
         ending=[i for i in pairs if spent[i] >= effort[i]],
-        together=as_one,
+        together=whole.together,
     )
     return Transition(replace(state, next=state.next + 1), action)

@@ -84,13 +84,13 @@ class CellCertification:
     """
 
     def __init__(self, scene: Scene, polytope: Polytope, seed: int = 0, box: Box | None = None, together: Together | None = None) -> None:
-        self._scene, self._with = scene, together or {}
+        self._scene, self._together = scene, together or {}
         self._area = Area.of(scene, polytope, seed, box)
         check_ground(scene, self._area.ground)
         check_interior(scene, self._area.ground, self._area.center)
         self._covariance = np.cov(self._area.samples.T).reshape(scene.n, scene.n)
         self._shared = Shared(self._area)
-        self._broad_phase = BroadPhase(Kinematics.of(scene), self._together)
+        self._broad_phase = BroadPhase(Kinematics.of(scene), self._attempt)
 
     def certify(self, index: int, cells: int, cut_off: CutOff = CutOff.CONTACTS, former: PartitionProof | None = None) -> PairResult:
         """Certifies pair ``scene.pairs[index]``, alone or with others that the same proof covers.
@@ -138,9 +138,9 @@ class CellCertification:
         return replace(self._proved(search, volumes, root, part, parts), seconds=time.perf_counter() - start)
 
     def _volumes(self, index: int) -> Volumes:
-        return volumes_of(self._scene, [self._scene.pairs[i] for i in (index, *self._with.get(index, ()))])
+        return volumes_of(self._scene, [self._scene.pairs[i] for i in (index, *self._together.get(index, ()))])
 
-    def _together(self, volumes: Volumes) -> PairResult | None:
+    def _attempt(self, volumes: Volumes) -> PairResult | None:
         search, root = Search(self._area, self._shared, volumes), Node()
         search.run([OpenCell(root, self._area.lower, self._area.upper)], GROUP_CELLS)
         if any(node.kind == OPEN for node in root.preorder()):
