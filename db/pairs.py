@@ -292,10 +292,15 @@ def order(session: Session, iteration: IterationRow) -> list[int]:
     return list(session.scalars(select(PairRow.pair_index).where(*mine).order_by(PairRow.id)))
 
 
-def of_iteration(session: Session, job_id: str, iteration: int, only: Collection[int] | None = None) -> Sequence[PairRow]:
-    """Returns the pairs of one iteration with their parts, in the order of the scene's pairs; of all pairs, or of those asked for."""
-    query = _pairs(job_id, iteration).order_by(PairRow.pair_index, PairRow.part)
-    return session.scalars(query if only is None else query.where(PairRow.pair_index.in_(only))).all()
+def of_iteration(session: Session, job_id: str, iteration: int, pair: int) -> Sequence[PairRow]:
+    """Returns the parts of a pair in one iteration, in order, or of the pair that it is certified with as one; none where it has none."""
+    found = session.get(IterationRow, (job_id, iteration))
+    return [] if found is None else _parts(session, found, leader(found, pair))
+
+
+def _parts(session: Session, iteration: IterationRow, pair: int) -> Sequence[PairRow]:
+    query = _pairs(iteration.job_id, iteration.index).where(PairRow.pair_index == pair).order_by(PairRow.part)
+    return session.scalars(query).all()
 
 
 def lately_failed(session: Session, job_id: str) -> dict[int, list[PairRow]]:
@@ -342,7 +347,7 @@ def with_pair(session: Session, job_id: str, pair: int, iteration: int | None) -
     pair = leader(found, pair)
     if (source := found.reuse.get(str(pair))) is not None:
         found = session.get_one(IterationRow, (job_id, source))
-    rows = session.scalars(_pairs(job_id, found.index).where(PairRow.pair_index == pair).order_by(PairRow.part)).all()
+    rows = _parts(session, found, pair)
     return (found, rows) if rows else None
 
 

@@ -329,7 +329,8 @@ def get_job_pairs(
     begin = _place(after)
     with db.read() as session:
         job = jobs.get(session, job_id)
-        iterations = [row for row in pairs.iterations(session, job.id) if iteration in (None, row.index)]
+        asked = pairs.iterations(session, job.id) if begin is None or pair is not None else ()
+        iterations = [row for row in asked if iteration in (None, row.index)]
         only = None if pair is None else {pairs.leader(row, index) for row in iterations for index in pair}
         rows, last = pairs.page(session, job.id, iteration=iteration, only=only, after=begin, limit=limit)
     scene = scenes.load(db, job.scene_id)
@@ -406,8 +407,7 @@ def download_pair_proof(
     """
     with db.read() as session:
         job = jobs.get(session, job_id)
-        own = next((pairs.leader(row, pair) for row in pairs.iterations(session, job.id) if row.index == iteration), pair)
-        rows = pairs.of_iteration(session, job.id, iteration, [own])
+        rows = pairs.of_iteration(session, job.id, iteration, pair)
         digest = _cell(scenes.load(db, job.scene_id), rows).proof if rows else None
         if digest is None:
             message = f"there is no proof of pair {pair} in iteration {iteration}"

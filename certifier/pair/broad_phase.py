@@ -57,14 +57,14 @@ class BroadPhase(Generic[R]):
         self._partners, self._root = _trees(kinematics)
         self._tried: dict[tuple[Node, Node], R | None] = {}
 
-    def find(self, pair: Pair, names: Collection[str] | None = None) -> R | None:
+    def find(self, pair: Pair, names: Collection[str] = ()) -> R | None:
         """Returns the result for the largest volumes that have one and hold the pair; None when the pair has to be settled by itself.
 
         Args:
-            names: other geometries that the volumes have to hold as well; None for none.
+            names: other geometries that the volumes have to hold as well.
         """
         ((_, a), first), ((_, b), second) = sorted(((self._root[name], name) for name in (pair.a, pair.b)), key=lambda root: root[0][0])
-        while (a.children or b.children) and {*(names or ())} <= {*a.volume.geometries, *b.volume.geometries}:
+        while (a.children or b.children) and {*names} <= {*a.volume.geometries, *b.volume.geometries}:
             if (a, b) not in self._tried:
                 self._tried[a, b] = self._attempt((a.volume, b.volume)) if self._worth_it(a, b) else None
             if (found := self._tried[a, b]) is not None:

@@ -64,7 +64,7 @@ def test_the_proof_of_a_pair_carries_its_scene(client: TestClient, region: str, 
     assert client.get(f"/v1/jobs/{job}/pairs/9/proof?iteration=0").json()["code"] == "proof_not_found"
     found = Certification(scene, scene.polytope([[1.0], [-1.0]], [0.2, 0.3]), np.zeros(1)).certify(0)
     with database.write() as session:
-        digest = pairs.of_iteration(session, job, 0)[0].proof_digest
+        digest = pairs.of_iteration(session, job, 0, 0)[0].proof_digest
         session.get_one(ProofRow, digest).data = found.proof
     data = client.get(f"/v1/jobs/{job}/pairs/0/proof?iteration=0").content
     statement = verify_file(data)
