@@ -244,8 +244,8 @@ def next_turn(job: JobRow, action: dict[str, Any]) -> None:
     """Says what the job waits for from now on, which ends the turn of its coordinator. The caller holds the job's lock."""
     job.turn += 1
     job.action = action
-    job.coordinator = job.coordinator_until = None
-    job.coordinator_attempts = 0
+    job.coordinator = job.coordinator_parent = job.coordinator_until = None
+    job.coordinator_attempts = job.coordinator_deaths = 0
 
 
 def start(session: Session, job: JobRow, served: float = 0.0) -> None:
@@ -281,6 +281,25 @@ def is_coordinated(job: JobRow, now: datetime) -> bool:
     if job.coordinator is None or job.coordinator_until is None or job.coordinator_until < now:
         return False
     return leases.is_alive(job.coordinator) is not False
+
+
+def coordinate(job: JobRow, until: datetime) -> None:
+    """Says that this process computes the job's next transition. The caller holds the job's lock."""
+    job.coordinator_deaths = _deaths(job)
+    job.coordinator, job.coordinator_parent = leases.this_worker(), leases.parent_worker()
+    job.coordinator_until = until
+    job.coordinator_attempts += 1
+
+
+def kills_coordinators(job: JobRow, now: datetime, limit: int) -> bool:
+    """Says whether nobody must compute the job's next transition any more (:func:`db.leases.is_poison`)."""
+    return not is_coordinated(job, now) and leases.is_poison(_deaths(job), job.coordinator_attempts + 1, limit)
+
+
+def _deaths(job: JobRow) -> int:
+    """Returns how many coordinators died over the next transition while those that had forked them lived, the last one included."""
+    died_alone = leases.is_alive(job.coordinator) is False and leases.is_alive(job.coordinator_parent) is True
+    return job.coordinator_deaths + int(died_alone)
 
 
 def coordinated_by(session: Session, processes: Collection[str]) -> Sequence[JobRow]:

@@ -45,6 +45,11 @@ def this_worker() -> str:
     return _name(os.getpid())
 
 
+def parent_worker() -> str:
+    """Returns the name of the process that has forked this one."""
+    return _name(os.getppid())
+
+
 def is_alive(worker: str | None) -> bool | None:
     """Says whether that worker lives; None when it is on another host, where this process cannot look."""
     host, pid, started = (worker or "::").rsplit(":", 2)
@@ -94,7 +99,7 @@ def take(session: Session, model: type[PairRow] | type[StepRow], ids: Sequence[i
         model.id.in_(ids),
         attempts=model.attempts + 1,
         worker=this_worker(),
-        parent=_name(os.getppid()),
+        parent=parent_worker(),
         lease_token=token,
         lease_until=clock.now(session) + timedelta(seconds=seconds),
     )

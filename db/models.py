@@ -208,6 +208,10 @@ class JobRow(Owned, Base):
     """Until this time that process is believed to be at work."""
     coordinator_attempts: Mapped[int] = mapped_column(default=0)
     """How often the next transition was begun."""
+    coordinator_parent: Mapped[str | None]
+    """The process that had forked ``coordinator``."""
+    coordinator_deaths: Mapped[int] = mapped_column(default=0)
+    """How many processes died over the next transition while those that had forked them lived."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]

@@ -111,7 +111,7 @@ def _begin(job_id: str) -> Turn | None:
         elif _is_late(session, job, now):
             outcome = Outcome.CERTIFIED if steps.accepted(session, job_id) else Outcome.INCONCLUSIVE
             _finish_growth(session, job, Finish(outcome, DEADLINE), afterwards)
-        if job.coordinator_attempts >= settings().max_attempts:
+        elif jobs.kills_coordinators(job, now, settings().max_attempts):
             problem = "the coordinator died or hung each time it decided about this job"
             job.error = CirisError("coordination_failed", problem, hint=IN_LOG).to_document()
             _finish_growth(session, job, Finish(Outcome.ERROR, "the coordinator failed"), afterwards)
@@ -122,8 +122,7 @@ def _begin(job_id: str) -> Turn | None:
         report = None if job.action is None else _report(session, job, growth)
         if jobs.is_coordinated(job, now) or (job.action is not None and report is None):
             return None
-        job.coordinator, job.coordinator_until = leases.this_worker(), now + timedelta(seconds=COORDINATION_SECONDS)
-        job.coordinator_attempts += 1
+        jobs.coordinate(job, now + timedelta(seconds=COORDINATION_SECONDS))
         return Turn(job_id, job.traceparent, job.kind, job.turn, job.scene_id, job.options, job.deadline_at, growth, report)
 
 

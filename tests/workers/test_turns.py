@@ -18,7 +18,7 @@ from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.pair.forecast import forecast
-from db import jobs, pairs, regions, retention, steps
+from db import jobs, leases, pairs, regions, retention, steps
 from db.models import IterationRow, JobRow, PairRow, ProofRow, StepRow, SubtreesRow
 from db.session import database
 from db.settings import settings
@@ -251,10 +251,37 @@ def test_a_poison_pair_ends_as_an_error_with_its_cause(job_id: str) -> None:
     assert job.error["code"] == "worker_lost"
 
 
-def test_a_coordination_that_always_dies_ends_the_job(job_id: str) -> None:
+def died(job_id: str, parent: str, *, deaths: int, attempts: int) -> None:
+    """Leaves a coordinator behind that died after others, and the process that had forked it."""
+    gone = leases.this_worker() + "0"
+    with database().write() as session:
+        job = jobs.lock(session, job_id)
+        job.coordinator, job.coordinator_parent, job.coordinator_until = gone, parent, utcnow() + timedelta(seconds=60)
+        job.coordinator_deaths, job.coordinator_attempts = deaths, attempts
+
+
+def test_workers_that_end_while_they_coordinate_do_not_end_the_job(job_id: str) -> None:
+    work_all()
+    died(job_id, leases.this_worker() + "0", deaths=2, attempts=20)
+    coordinate(job_id)
+    job = job_of(job_id)
+    assert (job.error, job.turn) == (None, 2)
+
+
+def test_a_last_attempt_to_coordinate_that_is_under_way_is_waited_for(job_id: str) -> None:
     work_all()
     with database().write() as session:
-        jobs.lock(session, job_id).coordinator_attempts = 3
+        job = jobs.lock(session, job_id)
+        job.coordinator, job.coordinator_until = ELSEWHERE, utcnow() + timedelta(seconds=60)
+        job.coordinator_deaths, job.coordinator_attempts = 2, 3
+    coordinate(job_id)
+    assert job_of(job_id).state == "running"
+
+
+@pytest.mark.parametrize(("deaths", "attempts"), [(2, 3), (0, 30)])
+def test_a_coordination_that_always_dies_ends_the_job(job_id: str, deaths: int, attempts: int) -> None:
+    work_all()
+    died(job_id, leases.this_worker(), deaths=deaths, attempts=attempts)
     coordinate(job_id)
     error = job_of(job_id).error
     assert error is not None
