@@ -22,7 +22,7 @@ from certifier.growth.refusal import DEADLINE
 from certifier.outcome import Outcome
 from certifier.pair.forecast import PairCost, forecast
 from certifier.pair.result import Weakness
-from db import clock, jobs, leases, pairs, steps, subtrees, traces, work
+from db import clock, jobs, pairs, steps, subtrees, traces, work
 from db.models import IterationRow, JobRow
 from db.settings import settings
 from db.states import JOB, STEP, IterationState, JobKind, JobState, StepKind, StepState, unfinished

@@ -44,11 +44,14 @@ as so many slices of its effort even where it has fewer parts. When a stage is l
 VERIFIED = 5 * SLICE
 """When no cell is open, what so many cells came to is a part to verify."""
 HARD = 6 * SLICE
-"""When so many cells of a pair were looked at, its open cells are cut off where the bodies are near, not only contacts."""
+"""When so many cells of a pair were looked at, its open cells are cut off where the bodies are near, not only contacts. Where faces part
+volumes that fewer joints move (certifier.partition.search), cells are cut off from the first round on."""
 LOSS, PATIENCE = 0.002, 36 * SLICE
-"""While a hard pair is worked on, its faces lose this share of the polytope in a round at most, and twice as much after PATIENCE cells."""
+"""While open cells of a pair are cut off, its faces lose this share of the polytope in a round at most, and twice as much after PATIENCE
+cells of a hard pair."""
 FAST_LOSS = 0.05
-"""They lose this share at most before a pair is hard, and when its effort is spent. Then it is twice as much after PIECES slices more."""
+"""They lose this share at most before that, in the first stage, and when the pair's effort is spent. Then it is twice as much after PIECES
+slices more."""
 CONTACT_LOSS = 0.01
 """For contacts, which have to go sooner or later, they lose this share at least where that is needed."""
 ENDING = 60 * SLICE
@@ -138,7 +141,7 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     failing = [i for i in report.failures if report.open_cells.get(i) != 0]
     if not failing:
         return _next(scene, replace(state, whole=whole))
-    most = {i: _most_loss(state, whole, i) for i in failing}
+    most = {i: _most_loss(state, whole, i, 0 if report.weaknesses[i].joints else HARD) for i in failing}
     corners = [corner for i in failing for corner in _corners(scene, i, report.weaknesses[i], most[i])]
     around = start.rows if whole.reach >= 1 else _copy(scene, start, whole.reach)
     made = cut(scene, whole.polytope, start.keep, corners, around)
@@ -174,13 +177,17 @@ def _obstacles(stage: int, failing: Sequence[int], cut: Cut) -> dict[int, Obstac
     return found
 
 
-def _most_loss(state: GrowthState, whole: Whole, pair: int) -> float:
-    """Returns which share of the polytope the faces for a pair may lose in this round, for points that are no contacts."""
+def _most_loss(state: GrowthState, whole: Whole, pair: int, hard: int) -> float:
+    """Returns which share of the polytope the faces for a pair may lose in this round, for points that are no contacts.
+
+    Args:
+        hard: after so many cells open cells of the pair are cut off.
+    """
     if _gone(whole) >= LATE:
         return float(min(LATE_LOSS * 2.0 ** ((_gone(whole) - LATE) / LATER), 1.0))
     effort, spent = _effort(state, whole, pair), whole.spent[pair]
-    if whole.reach >= 1 and HARD < spent < effort:
-        return float(LOSS * 2.0 ** ((spent - HARD) // PATIENCE))
+    if whole.reach >= 1 and hard < spent < effort:
+        return float(LOSS * 2.0 ** (max(spent - HARD, 0) // PATIENCE))
     return float(min(FAST_LOSS * 2.0 ** max((spent - effort) // (PIECES * SLICE), 0), 1.0))
 
 

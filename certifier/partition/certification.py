@@ -58,7 +58,10 @@ MOST_POINTS = 2000
 
 
 class CutOff(Enum):
-    """Says of which open cells a result names points, because they will be cut off. Contacts are named in any case."""
+    """Says of which open cells a result names points, because they will be cut off. Contacts are named in any case.
+
+    Where faces part volumes that fewer joints move, it is always those where these touch, so that they become enough, or all of them.
+    """
 
     CONTACTS = "contacts"
     """None of them."""
@@ -78,13 +81,22 @@ class CellCertification:
         seed: seeds the samples.
         box: the root cell, which contains P; None for P's smallest box. What was begun must have had the same one.
         together: pairs that are certified as one with others; None for none. What was begun must have had the same ones.
+        faces: faces will be added to the polytope where pairs are hard, and so their cells are cut in other ways.
 
     Raises:
         RegionError: the polytope is empty or unbounded.
     """
 
-    def __init__(self, scene: Scene, polytope: Polytope, seed: int = 0, box: Box | None = None, together: Together | None = None) -> None:
-        self._scene, self._together = scene, together or {}
+    def __init__(
+        self,
+        scene: Scene,
+        polytope: Polytope,
+        seed: int = 0,
+        box: Box | None = None,
+        together: Together | None = None,
+        faces: bool = False,
+    ) -> None:
+        self._scene, self._together, self._faces = scene, together or {}, faces
         self._area = Area.of(scene, polytope, seed, box)
         check_ground(scene, self._area.ground)
         check_interior(scene, self._area.ground, self._area.center)
@@ -117,7 +129,7 @@ class CellCertification:
             parts: how many parts the round has.
         """
         start, volumes = time.perf_counter(), self._volumes(index)
-        search = Search(self._area, self._shared, volumes)
+        search = Search(self._area, self._shared, volumes, self._faces)
         given, contacts = dealt(open_cells(left), part, parts), search.scout(1 + part)
         report = search.run(given, cells)
         result = self._left(search, volumes, given, replace(report, contacts=contacts + report.contacts), cut_off)
@@ -132,7 +144,7 @@ class CellCertification:
             parts: the cells to verify are dealt to so many parts.
         """
         start, volumes = time.perf_counter(), self._volumes(index)
-        search = Search(self._area, self._shared, volumes)
+        search = Search(self._area, self._shared, volumes, self._faces)
         vertices = [len(a.vertices) + len(b.vertices) for a, b in choices_of(volumes, search.coarse)]
         root = put_together(rounds, len(self._area.ground.d), 2 * self._scene.n, vertices)
         return replace(self._proved(search, volumes, root, part, parts), seconds=time.perf_counter() - start)
@@ -141,7 +153,7 @@ class CellCertification:
         return volumes_of(self._scene, [self._scene.pairs[i] for i in (index, *self._together.get(index, ()))])
 
     def _attempt(self, volumes: Volumes) -> PairResult | None:
-        search, root = Search(self._area, self._shared, volumes), Node()
+        search, root = Search(self._area, self._shared, volumes, self._faces), Node()
         search.run([OpenCell(root, self._area.lower, self._area.upper)], GROUP_CELLS)
         if any(node.kind == OPEN for node in root.preorder()):
             return None
@@ -149,7 +161,7 @@ class CellCertification:
         return result if result.outcome is Outcome.CERTIFIED else None
 
     def _begin(self, volumes: Volumes, cells: int, cut_off: CutOff, former: PartitionProof | None) -> PairResult:
-        area, search = self._area, Search(self._area, self._shared, volumes)
+        area, search = self._area, Search(self._area, self._shared, volumes, self._faces)
         contacts = search.scout(0)
         root = Node() if former is None else try_again(area, search, volumes, former)
         given = [OpenCell(root, area.lower, area.upper)]
@@ -178,7 +190,7 @@ class CellCertification:
         points = self._contacts(search, report.contacts)
         contacts = min(len(points), MOST_POINTS)
         bodies = search.bodies
-        if cut_off is not CutOff.CONTACTS:
+        if cut_off is not CutOff.CONTACTS or search.parted is not None:
             bodies, of_cells = self._of_cells(search, left.open_cells, cut_off)
             points += of_cells
         if bodies is search.bodies:
@@ -242,16 +254,18 @@ class CellCertification:
         return found
 
     def _of_cells(self, search: Search, cells: Sequence[OpenCell], cut_off: CutOff) -> tuple[Bodies, list[Array]]:
-        """Returns bodies, and points of the polytope in the cells where these are near.
+        """Returns the bodies that faces will keep apart, and points of the polytope in the cells where these are near.
 
         Coarsely, the bodies are the fat balls that most of the cells are tried with next, if they are.
         """
         found: list[Array] = []
         bodies = search.bodies
-        if cut_off is CutOff.COARSELY and cells:
+        if search.parted is not None and cut_off is not CutOff.ALL:
+            bodies = search.parted
+        elif cut_off is CutOff.COARSELY and cells:
             bodies = Counter(search.at_hand(node) for node, _, _ in cells).most_common(1)[0][0]
             cells = [cell for cell in cells if search.at_hand(cell.node) is bodies]
-        within = AROUND if cut_off is CutOff.NEAR else np.inf if bodies is search.bodies else NEAR
+        within = NEAR if bodies is not search.bodies else AROUND if cut_off is CutOff.NEAR else np.inf
         for _, lower, upper in cells:
             _, C, d = self._area.inside(lower, upper)
             middle, depth, _ = deepest(C, d, (lower + upper) / 2)

@@ -45,6 +45,10 @@ NARROW_COARSE = np.radians(15.0)
 them any more."""
 FEW_JOINTS, NARROWER = 6, np.radians(30.0)
 """Where more than FEW_JOINTS move one body against the other, a cell without a sample is cut for them until it turns less than NARROWER."""
+PARTED_JOINTS, SAVED, NARROW_PARTED = 7, 2, np.radians(3.5)
+"""Where faces are added, and PARTED_JOINTS move one body against the other, they part the slimmest level that saves SAVED joints and has a
+coarse volume in the place of one body only. Cells are cut for it until they turn less than NARROW_PARTED: in all joints of the bodies they
+would be far too many."""
 CUTS, LEAST_ROOM, MOST_ROOM = 3, 1e-5, 10.0
 """For coarse volumes so many joints are compared to cut a cell in; less room for a plane than LEAST_ROOM counts as that, and so on."""
 BEYOND = 1e-9
@@ -74,15 +78,19 @@ class Report:
 class Search:
     """Searches the partition of two volumes on one polytope.
 
+    Args:
+        faces: faces will be added to the polytope where the pair is hard.
+
     Attributes:
         frame: body in whose frame the planes are.
         joints: position indices of the joints in play, ascending.
         coarse: the coarse volumes that a leaf may choose, as in a proof.
         bodies: the volumes themselves.
+        parted: the volumes that faces keep apart in the place of the bodies; None where it is the bodies.
         volumes_of_levels: the two volumes of every level; those of level 0 are the volumes themselves.
     """
 
-    def __init__(self, area: Area, shared: Shared, volumes: tuple[Volume, Volume]) -> None:
+    def __init__(self, area: Area, shared: Shared, volumes: tuple[Volume, Volume], faces: bool = False) -> None:
         self._area, self._shared = area, shared
         self.frame, self.joints = choose_frame(area.kinematics, volumes, area.lower, area.upper)
         self.coarse: Coarse = ((), ())
@@ -95,6 +103,10 @@ class Search:
         self.bodies = Bodies(area, self.frame, volumes)
         self.volumes_of_levels = [chosen[choice] for choice in self._choices]
         self._levels = [self.bodies, *(shared.bodies(self.frame, chosen[choice]) for choice in self._choices[1:])]
+        self.parted: Bodies | None = None
+        if faces and len(self.joints) == PARTED_JOINTS:
+            one_sided = (bodies for bodies, level in zip(self._levels, levels, strict=True) if (level[0] > 0) != (level[1] > 0))
+            self.parted = next((bodies for bodies in one_sided if len(bodies.joints) <= PARTED_JOINTS - SAVED), None)
 
     def run(self, cells: Sequence[OpenCell], most: int) -> Report:
         """Works on open cells, whose nodes it changes.
@@ -215,6 +227,8 @@ class Search:
     def _worth_a_cut(self, cell: Cell, bodies: Bodies, found: Undecided) -> bool:
         """Returns whether a cell is cut for coarse volumes, or goes on to the next level."""
         turn = self._turn(cell, bodies)[bodies.joints].max(initial=0.0)
+        if bodies is self.parted:
+            return bool(turn > NARROW_PARTED)
         hopeless = not len(cell.samples) and found.joint is None and (len(self.bodies.joints) <= FEW_JOINTS or turn < NARROWER)
         return not hopeless and turn > NARROW_COARSE
 

@@ -21,14 +21,14 @@ from certifier.partition.frames import choose_frame
 from certifier.partition.levels import APART, LOOKED, levels_of
 from certifier.partition.search import Search
 from certifier.partition.shared import Shared
-from certifier.partition.tree import Node
+from certifier.partition.tree import Node, OpenCell
 from certifier.proof.partition import PartitionProof, choices_of
 from certifier.scene import load_scene
 from certifier.verify.coarse import check_coarse
 from certifier.verify.kinematics import ExactKinematics
 from certifier.verify.partition import _norms
 from certifier.verify.separations import verify_separation
-from tests.certifier.scenes import box, cube, two_arms
+from tests.certifier.scenes import box, cube, planar_arm, two_arms
 from tests.certifier.truth import distances_at
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "ur3e_bin"
@@ -183,3 +183,57 @@ def test_points_are_named_where_the_volumes_at_hand_touch_so_that_these_become_e
     assert (reach < a.radius + b.radius + 0.05).all()
     # How many points there are depends on the last digits, and so on the processor. What they are about does not.
     assert certification.certify(HANDS, CELLS, cut_off=CutOff.ALL).weakness.joints == ()
+
+
+@cache
+def reaching():
+    """An arm of seven links beside an obstacle, and the pair of its last link, which seven joints move; a ball about it needs four."""
+    scene = planar_arm(7, box("world/obstacle", "world", (0.3, 0.3, 0.3), (4.0, 5.8, 0.0)))
+    return scene, cube(scene, 0.0, 0.25), len(scene.pairs) - 1
+
+
+def test_points_are_named_where_a_ball_touches_that_saves_joints_so_that_faces_part_it():
+    """The ball touches the obstacle in some open cells, the link itself does not."""
+    scene, polytope, index = reaching()
+    assert len(CellCertification(scene, polytope).certify(index, CELLS // 2).weakness.points) == 0
+    certification = CellCertification(scene, polytope, faces=True)
+    found = certification.certify(index, CELLS // 2)
+    area, _, alternatives = levels(scene, polytope, index)
+    weakness, (a, b) = found.weakness, alternatives[1]
+    assert (found.outcome, weakness.contacts) == (Outcome.INCONCLUSIVE, 0)
+    assert weakness.joints == tuple(sorted(area.kinematics.chain(a.body, b.body))) == (0, 1, 2, 3)
+    assert len(weakness.points) > 0
+    assert polytope.contains(weakness.points).all()
+    ends = [area.kinematics.points("world", volume.body, volume.vertices, weakness.points) for volume in (a, b)]
+    assert {len(of_volume[0]) for of_volume in ends} == {1, 8}, "a ball and the obstacle"
+    outside = np.abs(ends[0] - np.array([4.0, 5.8, 0.0])).max(axis=(1, 2)) if len(ends[0][0]) == 1 else None
+    outside = np.abs(ends[1] - np.array([4.0, 5.8, 0.0])).max(axis=(1, 2)) if outside is None else outside
+    assert (outside < a.radius + b.radius + 0.15 + 0.05).all()
+    # How many points there are depends on the last digits, and so on the processor. What they are about does not.
+    assert certification.certify(index, CELLS // 2, cut_off=CutOff.ALL).weakness.joints == ()
+
+
+def parted(scene, polytope, index, faces=True):
+    certification = CellCertification(scene, polytope)
+    return Search(certification._area, certification._shared, certification._volumes(index), faces).parted
+
+
+def test_faces_part_coarse_volumes_only_where_they_are_added_and_save_two_joints_of_seven():
+    scene, polytope, index = reaching()
+    assert parted(scene, polytope, index).joints == [0, 1, 2, 3]
+    assert parted(scene, polytope, index, faces=False) is None
+    assert parted(scene, polytope, index - 1) is None, "six joints move link 6"
+    two, cube_of_two = facing(6.0)
+    assert parted(two, cube_of_two, HANDS) is None, "both bodies would be coarse"
+
+
+def test_wide_cells_are_cut_for_the_volumes_that_faces_part_and_not_for_the_bodies():
+    scene, polytope, index = reaching()
+    certification = CellCertification(scene, polytope)
+    cuts = {}
+    for faces in (False, True):
+        search, root = Search(certification._area, certification._shared, certification._volumes(index), faces), Node()
+        search.run([OpenCell(root, certification._area.lower, certification._area.upper)], CELLS)
+        cuts[faces] = {node.kind for node in root.preorder() if node.children}
+    assert cuts[True] <= {0, 1, 2, 3}
+    assert not cuts[False] <= {0, 1, 2, 3}, "without faces the link itself is tried in cells that hold no sample"
