@@ -298,8 +298,7 @@ def kills_coordinators(job: JobRow, now: datetime, limit: int) -> bool:
 
 def _deaths(job: JobRow) -> int:
     """Returns how many coordinators died over the next transition while those that had forked them lived, the last one included."""
-    died_alone = leases.is_alive(job.coordinator) is False and leases.is_alive(job.coordinator_parent) is True
-    return job.coordinator_deaths + int(died_alone)
+    return job.coordinator_deaths + int(leases.died_alone(job.coordinator, job.coordinator_parent))
 
 
 def coordinated_by(session: Session, processes: Collection[str]) -> Sequence[JobRow]:

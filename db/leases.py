@@ -56,6 +56,11 @@ def is_alive(worker: str | None) -> bool | None:
     return _started(int(pid)) == started if host == _host() else None
 
 
+def died_alone(worker: str | None, parent: str | None) -> bool:
+    """Says whether that worker has died while the process that had forked it lives, as far as this host can tell."""
+    return is_alive(worker) is False and is_alive(parent) is True
+
+
 def _name(pid: int) -> str:
     return f"{_host()}:{pid}:{_started(pid)}"
 
@@ -184,7 +189,7 @@ def lost(session: Session, model: type[Row], *, by_time: bool) -> list[Lost]:
     for row in session.scalars(select(model).where(model.state == RUNNING)):
         alone = False
         if is_alive(row.worker) is False:
-            alone = is_alive(row.parent) is True
+            alone = died_alone(row.worker, row.parent)
             reason = "its process died" if alone else "its worker ended"
         elif by_time and row.lease_until is not None and row.lease_until < now:
             reason = "its lease ran out"
