@@ -35,7 +35,7 @@ class GrowOptions(TypedDict, total=False):
     max_rounds: int
     """Most rounds of the polytope step."""
     random_seed: int
-    """Seed of every random choice."""
+    """Seed of every random choice, those of Drake's IRIS too, so that another one comes to another region."""
     priority: int
     """From -3 to 3; each step up doubles the job's share of the work."""
     labels: Mapping[str, str]

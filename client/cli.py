@@ -268,7 +268,9 @@ def _parser() -> argparse.ArgumentParser:
     grow.add_argument("--label", metavar="NAME=VALUE", action="append", default=[], help="what the job is to be found by; may be repeated")
     grow.add_argument("--pushes", type=int, help="how often the faces are pushed out again; default: more often for smaller arms")
     grow.add_argument("--rounds", type=int, help="rounds of the polytope step; default: a few for small arms, none for large ones")
-    grow.add_argument("--random-seed", type=int, help="seed of every random choice; default 0")
+    grow.add_argument(
+        "--random-seed", type=int, help="seed of every random choice, IRIS' too, so that another one comes to another region; default 0"
+    )
     grow.add_argument("--out", metavar="FILE", help="new file for the proof; default: one in this directory, named after scene and proof")
     grow.add_argument("--watch", action="store_true", help="print a line for every pair as it is settled")
     grow.add_argument("--local", action="store_true", help="grow in this process, without a service")

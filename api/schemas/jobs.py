@@ -103,7 +103,9 @@ class Seed(Request):
     )
     tolerance: Real | None = Field(None, description="IRIS ends when the ellipsoid's volume grows by less than this fraction.")
     margin: Real | None = Field(None, description="Distance in s that IRIS' faces keep from the collisions found.")
-    random_seed: int | None = Field(None, description="Seed of IRIS' random choices.")
+    random_seed: int | None = Field(
+        None, description="Seed of IRIS' random choices. Default: `random_seed` of the options. Other seeds come to other proposals."
+    )
 
 
 class WebhookRequest(Request):

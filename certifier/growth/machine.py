@@ -27,7 +27,7 @@ from certifier.model import Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.polytopes.polytope import chebyshev_center
-from certifier.seeding.options import IRIS, Method
+from certifier.seeding.options import IRIS, IRIS_SEEDS, Method
 from certifier.seeding.proposal import Proposal
 from certifier.step.stepped import Stepped
 
@@ -40,7 +40,8 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
     """
     state = GrowthState(options)
     if options.kind == "grow":
-        return Transition(state, Propose(options.seed))
+        seed = options.seed.get("random_seed")
+        return Transition(state, Propose({**options.seed, "random_seed": options.random_seed % IRIS_SEEDS if seed is None else seed}))
     if options.kind == "recertify":
         return begin_again(scene, state)
     if "C" not in options.seed or "d" not in options.seed:

@@ -62,7 +62,7 @@ class GrowthOptions:
         max_rounds: rounds of the polytope step (12) after the pushes.
         tolerance: relative growth of the ellipsoid's volume that is still worth a push or a round.
         backoff: how many times a stepped polytope that fails to certify is halved towards the last certified one.
-        random_seed: seeds every random choice of the certification.
+        random_seed: seeds every random choice; IRIS' too, unless the seed's document says another.
     """
 
     kind: Literal["grow", "certify", "recertify"] = "grow"

@@ -134,7 +134,7 @@ class _Iris:
         sampled.max_iterations_separating_planes = options.max_iterations_separating_planes
         sampled.relative_termination_threshold, sampled.termination_threshold = options.tolerance, -math.inf
         sampled.configuration_space_margin, sampled.relax_margin = options.margin, True
-        sampled.random_seed = options.random_seed
+        sampled.random_seed = options.random_seed or 0
         sampled.parallelism = Parallelism.Max()
         sampled.sample_particles_in_parallel = False  # otherwise the samples would depend on the number of threads
         sampled.verbose = True

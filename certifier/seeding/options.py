@@ -26,6 +26,8 @@ class Method(StrEnum):
 
 
 IRIS = (Method.IRIS_NP2, Method.IRIS_ZO)
+IRIS_SEEDS = 2**31
+"""IRIS has so many seeds of its random choices, from 0 on."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class SeedOptions:
         max_iterations_separating_planes: IRIS' rounds of adding faces within each alternation.
         tolerance: IRIS ends when the ellipsoid's volume grows by less than this fraction.
         margin: distance in s at which IRIS' faces stay clear of the collisions found.
-        random_seed: seeds IRIS.
+        random_seed: seeds IRIS; None for the growth's own, and 0 where nothing grows. Other seeds come to other proposals.
     """
 
     method: Method | None = None
@@ -61,7 +63,7 @@ class SeedOptions:
     max_iterations_separating_planes: int = 20
     tolerance: float = 0.02
     margin: float = 0.01
-    random_seed: int = 0
+    random_seed: int | None = None
 
     def to_document(self) -> dict[str, Any]:
         """Returns the options as JSON-able data; those that are not given are left out."""
@@ -105,7 +107,7 @@ class SeedOptions:
         for name, least, most in (
             ("max_iterations", 1, 1000),
             ("max_iterations_separating_planes", 1, 1000),
-            ("random_seed", 0, 2**31 - 1),
+            ("random_seed", 0, IRIS_SEEDS - 1),
         ):
             if name in given and not (isinstance(given[name], int) and not isinstance(given[name], bool) and least <= given[name] <= most):
                 raise _refuse(name, f"{name} must be an integer from {least} to {most}")

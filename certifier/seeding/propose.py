@@ -42,7 +42,7 @@ def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> None:
 
 
 def propose(scene: Scene, options: SeedOptions) -> Proposal:
-    """Returns a polytope around the seed, by the options' method; it is deterministic for ``random_seed``.
+    """Returns a polytope around the seed, by the options' method; it is deterministic for ``random_seed``, 0 if not given.
 
     What is on a joint limit is moved inside by a hair (:func:`certifier.seeding.limits.off_limits`).
 

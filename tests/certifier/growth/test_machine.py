@@ -17,6 +17,7 @@ from certifier.model import WORLD, Polytope
 from certifier.outcome import Outcome
 from certifier.pair.result import Weakness
 from certifier.polytopes.polytope import bounds
+from certifier.seeding.options import SeedOptions
 from certifier.seeding.proposal import Proposal
 from certifier.step.stepped import Stepped
 from tests.certifier.scenes import box, planar_arm
@@ -254,3 +255,14 @@ def test_points_that_cannot_be_contained_together_are_refused():
     with pytest.raises(RegionError) as refusal:
         GrowthOptions.from_document({"seed": {"q": [0.0, 0.0], "contain": [[0.1, 0.1]]}, "contraction": "uniform"})
     assert refusal.value.field == "options.contraction"
+
+
+@pytest.mark.parametrize(
+    ("growth", "iris", "expected"), [(0, None, 0), (7, None, 7), (7, 3, 3), (7, 0, 0), (2**31 + 5, None, 5), (2**63 - 1, None, 2**31 - 1)]
+)
+def test_the_random_seed_is_that_of_iris_too_unless_the_seed_has_its_own(growth, iris, expected):
+    """A growth takes larger ones than IRIS does."""
+    seed = {"q": [0.1, 0.2], **({} if iris is None else {"random_seed": iris})}
+    action = begin(planar_arm(), GrowthOptions.from_document({"kind": "grow", "seed": seed, "random_seed": growth})).action
+    assert isinstance(action, Propose)
+    assert SeedOptions.from_document(action.seed).random_seed == expected
