@@ -206,8 +206,8 @@ def test_points_are_named_where_a_ball_touches_that_saves_joints_so_that_faces_p
     assert polytope.contains(weakness.points).all()
     ends = [area.kinematics.points("world", volume.body, volume.vertices, weakness.points) for volume in (a, b)]
     assert {len(of_volume[0]) for of_volume in ends} == {1, 8}, "a ball and the obstacle"
-    outside = np.abs(ends[0] - np.array([4.0, 5.8, 0.0])).max(axis=(1, 2)) if len(ends[0][0]) == 1 else None
-    outside = np.abs(ends[1] - np.array([4.0, 5.8, 0.0])).max(axis=(1, 2)) if outside is None else outside
+    centers = next(of_volume for of_volume in ends if len(of_volume[0]) == 1)
+    outside = np.abs(centers - np.array([4.0, 5.8, 0.0])).max(axis=(1, 2))
     assert (outside < a.radius + b.radius + 0.15 + 0.05).all()
     # How many points there are depends on the last digits, and so on the processor. What they are about does not.
     assert certification.certify(index, CELLS // 2, cut_off=CutOff.ALL).weakness.joints == ()
