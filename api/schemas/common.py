@@ -43,7 +43,7 @@ WithDependents = Annotated[
 Offsets = Annotated[list[Real], Field(max_length=2000)]
 INTEGERS = (
     *WHOLE_NUMBERS,
-    *("at_once", "max_iterations", "max_iterations_separating_planes", "priority", "size"),
+    *("at_once", "max_iterations", "max_iterations_separating_planes", "priority", "size", "tries"),
 )
 """The fields of requests that are whole numbers wherever there is one of this name."""
 

@@ -45,10 +45,13 @@ NARROW_COARSE = np.radians(15.0)
 them any more."""
 FEW_JOINTS, NARROWER = 6, np.radians(30.0)
 """Where more than FEW_JOINTS move one body against the other, a cell without a sample is cut for them until it turns less than NARROWER."""
-PARTED_JOINTS, SAVED, NARROW_PARTED = 7, 2, np.radians(3.5)
+PARTED_JOINTS, SAVED, MOST_PARTED, NARROW_PARTED = 7, 2, 6, np.radians(3.5)
 """Where faces are added, and PARTED_JOINTS move one body against the other, they part the slimmest level that saves SAVED joints and has a
-coarse volume in the place of one body only. Cells are cut for it until they turn less than NARROW_PARTED: in all joints of the bodies they
-would be far too many."""
+coarse volume in the place of one body only. Where more do, they part the slimmest level that MOST_PARTED joints move or fewer. Cells are
+cut for it until they turn less than NARROW_PARTED: in all joints of the bodies they would be far too many.
+
+Where more than PARTED_JOINTS do, a cell in which the volumes of a level touch is tried with the next level at once, and its halves with all
+levels again. Cuts for volumes that touch would only multiply the cells of the next level, which has to be cut in other joints."""
 CUTS, LEAST_ROOM, MOST_ROOM = 3, 1e-5, 10.0
 """For coarse volumes so many joints are compared to cut a cell in; less room for a plane than LEAST_ROOM counts as that, and so on."""
 BEYOND = 1e-9
@@ -103,10 +106,7 @@ class Search:
         self.bodies = Bodies(area, self.frame, volumes)
         self.volumes_of_levels = [chosen[choice] for choice in self._choices]
         self._levels = [self.bodies, *(shared.bodies(self.frame, chosen[choice]) for choice in self._choices[1:])]
-        self.parted: Bodies | None = None
-        if faces and len(self.joints) == PARTED_JOINTS:
-            one_sided = (bodies for bodies, level in zip(self._levels, levels, strict=True) if (level[0] > 0) != (level[1] > 0))
-            self.parted = next((bodies for bodies in one_sided if len(bodies.joints) <= PARTED_JOINTS - SAVED), None)
+        self.parted = self._parted(levels) if faces and len(self.joints) >= PARTED_JOINTS else None
 
     def run(self, cells: Sequence[OpenCell], most: int) -> Report:
         """Works on open cells, whose nodes it changes.
@@ -167,6 +167,12 @@ class Search:
                 contacts.append(s)
         return contacts
 
+    def _parted(self, levels: list[Level]) -> Bodies | None:
+        if len(self.joints) > PARTED_JOINTS:
+            return next((bodies for bodies in self._levels[1:] if len(bodies.joints) <= MOST_PARTED), None)
+        one_sided = (bodies for bodies, level in zip(self._levels, levels, strict=True) if (level[0] > 0) != (level[1] > 0))
+        return next((bodies for bodies in one_sided if len(bodies.joints) <= PARTED_JOINTS - SAVED), None)
+
     def _halves(self, cell: Cell, joint: int, value: float, points: Array) -> list[Cell]:
         """Returns the lower and the upper part of a cell, with nodes of their own."""
         halves = []
@@ -200,6 +206,8 @@ class Search:
             if isinstance(tried.found, Separated):
                 self._separated(cell, level, tried.found)
                 return None
+            if len(self.joints) > PARTED_JOINTS and bodies is not self.parted and _touch(bodies, tried.found):
+                continue
             if self._worth_a_cut(cell, bodies, tried.found):
                 if tried.joint is None:
                     tried.joint = self._cut(cell, bodies, tried.found)
@@ -289,3 +297,8 @@ class Search:
             cell.node.kind, cell.node.streams = EMPTY, streams
             return None
         return point
+
+
+def _touch(bodies: Bodies, found: Undecided) -> bool:
+    """Returns whether volumes touch at a configuration that was looked at, so that no plane separates them in this cell."""
+    return found.support is not None and bool((gaps(*bodies.hulls, found.points) <= 0).any())

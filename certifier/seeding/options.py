@@ -48,6 +48,8 @@ class SeedOptions:
         tolerance: IRIS ends when the ellipsoid's volume grows by less than this fraction.
         margin: distance in s at which IRIS' faces stay clear of the collisions found.
         random_seed: seeds IRIS; None for the growth's own, and 0 where nothing grows. Other seeds come to other proposals.
+        tries: IRIS makes so many proposals at most, each with a random seed of its own, and the best is taken
+            (:mod:`certifier.seeding.tries`).
     """
 
     method: Method | None = None
@@ -64,6 +66,7 @@ class SeedOptions:
     tolerance: float = 0.02
     margin: float = 0.01
     random_seed: int | None = None
+    tries: int = 4
 
     def to_document(self) -> dict[str, Any]:
         """Returns the options as JSON-able data; those that are not given are left out."""
@@ -108,6 +111,7 @@ class SeedOptions:
             ("max_iterations", 1, 1000),
             ("max_iterations_separating_planes", 1, 1000),
             ("random_seed", 0, IRIS_SEEDS - 1),
+            ("tries", 1, 1000),
         ):
             if name in given and not (isinstance(given[name], int) and not isinstance(given[name], bool) and least <= given[name] <= most):
                 raise _refuse(name, f"{name} must be an integer from {least} to {most}")

@@ -19,7 +19,7 @@ class Proposal:
         center: (n,) the seed in s (for ``polytope``, the centre), inside all faces and limits.
         contain: (k, n) what else the region has to contain, in s, inside all faces and limits as well.
         info: JSON-able: method, guarantee (``sampled`` when IRIS passed its statistical test, else ``none``), faces, seconds, and for
-            IRIS termination, iterations, epsilon, delta and Drake's warnings.
+            IRIS termination, iterations, epsilon, delta, Drake's warnings, the random seed, and how many random seeds were tried.
     """
 
     C: Array

@@ -14,10 +14,10 @@ from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.polytope import chebyshev_center, drop_redundant
 from certifier.seeding.free import check_free
-from certifier.seeding.iris import iris
 from certifier.seeding.limits import check_limits, off_limits
 from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.proposal import Proposal
+from certifier.seeding.tries import best_of_tries
 
 
 def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> None:
@@ -71,7 +71,7 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
             C, d = _box(scene, np.concatenate([center[None], contain]), options.half_width)
             said = {}
         else:
-            C, d, said = iris(scene, np.concatenate([center[None], contain]), replace(options, method=method))
+            C, d, said = best_of_tries(scene, np.concatenate([center[None], contain]), replace(options, method=method))
     if not (d[:, None] > C @ np.concatenate([center[None], contain]).T).all():
         problem = f"the polytope of {method} does not contain the seed" + (" and all of contain" if options.contain else "")
         raise RegionError("seed_cut_off", problem, field="seed", hint="allow fewer iterations, or give points that see one another")

@@ -257,7 +257,15 @@ def offered(scene: str, home: list[float], away: list[float], region: str) -> di
         "webhook": {"url": "https://example.org/", "secret": "whsec_" + "A" * 32},
     }
     knots, curve = [0, 0, 0, 0, 1, 1, 1, 1], [home, [0.45, 0.3], [0.5, 0.4], away]
-    iris = {"epsilon": 0.001, "delta": 0.05, "max_iterations": 3, "max_iterations_separating_planes": 20, "tolerance": 0.02, "margin": 0.01}
+    iris = {
+        "epsilon": 0.001,
+        "delta": 0.05,
+        "max_iterations": 3,
+        "max_iterations_separating_planes": 20,
+        "tolerance": 0.02,
+        "margin": 0.01,
+        "tries": 2,
+    }
     faces = {"C": [[1, 0], [-1, 0], [0, 1], [0, -1]], "d": [0.3, 0.3, 0.3, 0.3], "center": [0.0, 0.0]}
     growing = {"contraction": "targeted", "cells": 1000, "contractions": 1, "max_rounds": 2, "pushes": 2, "tolerance": 0.02}
     covering = {

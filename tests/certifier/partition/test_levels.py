@@ -13,6 +13,7 @@ import yaml
 from certifier.kinematics import Kinematics
 from certifier.model import Volume
 from certifier.outcome import Outcome
+from certifier.partition import search
 from certifier.partition.area import Area
 from certifier.partition.bodies import Bodies, Undecided
 from certifier.partition.cell import Cell
@@ -232,8 +233,44 @@ def test_wide_cells_are_cut_for_the_volumes_that_faces_part_and_not_for_the_bodi
     certification = CellCertification(scene, polytope)
     cuts = {}
     for faces in (False, True):
-        search, root = Search(certification._area, certification._shared, certification._volumes(index), faces), Node()
-        search.run([OpenCell(root, certification._area.lower, certification._area.upper)], CELLS)
+        looking, root = Search(certification._area, certification._shared, certification._volumes(index), faces), Node()
+        looking.run([OpenCell(root, certification._area.lower, certification._area.upper)], CELLS)
         cuts[faces] = {node.kind for node in root.preorder() if node.children}
     assert cuts[True] <= {0, 1, 2, 3}
     assert not cuts[False] <= {0, 1, 2, 3}, "without faces the link itself is tried in cells that hold no sample"
+
+
+@cache
+def two_wrists():
+    """A cube about the seed of dual_ur3e, and the pair of the two first links of the wrists, which eight joints move."""
+    example = EXAMPLE.parent / "dual_ur3e"
+    scene, q = load_scene(example / "scene.yaml"), np.array(yaml.safe_load((example / "seed.yaml").read_text())["q"])
+    index = next(i for i, pair in enumerate(scene.pairs) if (pair.a, pair.b) == ("left/wrist_1/box", "right/wrist_1/box"))
+    return scene, cube(scene, scene.to_s(q), 0.5), index
+
+
+def test_of_more_than_seven_joints_faces_part_what_six_move_whichever_bodies_are_coarse():
+    scene, polytope, index = two_wrists()
+    assert parted(scene, polytope, index).joints == [0, 1, 2, 6, 7, 8]
+    assert parted(scene, polytope, index, faces=False) is None
+
+
+@pytest.mark.parametrize("faces", [False, True])
+def test_cells_are_not_cut_for_volumes_that_touch_where_more_than_seven_joints_move(monkeypatch, faces):
+    """The fat balls touch somewhere, and slimmer ones never: with cuts for the fat ones, half of the cells are still open."""
+    scene, polytope, index = two_wrists()
+    results = []
+    for together in (search._touch, lambda bodies, found: False):
+        monkeypatch.setattr(search, "_touch", together)
+        results.append(CellCertification(scene, polytope, faces=faces).certify(index, 10 * CELLS))
+    assert [result.outcome for result in results] == [Outcome.CERTIFIED, Outcome.INCONCLUSIVE]
+    proof = PartitionProof.from_bytes(results[0].proof, scene)
+    samples = Area.of(scene, polytope, 3).samples
+    gap = verify_separation(proof).gap
+    assert 0 < gap <= min(distances_at(replace(scene, pairs=(scene.pairs[index],)), samples).values())
+
+
+def test_a_pair_of_more_than_seven_joints_that_touches_is_refuted():
+    scene, _, index = two_wrists()
+    result = CellCertification(scene, scene.polytope([], [])).certify(index, CELLS)
+    assert result.outcome is Outcome.REFUTED, result

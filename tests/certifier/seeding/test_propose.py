@@ -262,6 +262,7 @@ def test_polytopes_that_are_refused(document, code, field):
         ({"q": [0], "half_width": "wide"}, "seed.half_width"),
         ({"q": [0], "max_iterations": 0}, "seed.max_iterations"),
         ({"q": [0], "max_iterations": 2.5}, "seed.max_iterations"),
+        ({"q": [0], "tries": 0}, "seed.tries"),
         ({"q": [0], "random_seed": True}, "seed.random_seed"),
     ],
 )
@@ -283,6 +284,7 @@ def test_options_that_are_refused_name_the_field(document, field):
         tolerance=st.floats(1e-6, 1),
         margin=st.floats(1e-6, 1),
         random_seed=st.integers(0, 2**31 - 1),
+        tries=st.integers(1, 1000),
     )
 )
 def test_options_survive_a_round_trip(options):
