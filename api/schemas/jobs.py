@@ -107,7 +107,7 @@ class Seed(Request):
         None, description="Seed of IRIS' random choices. Default: `random_seed` of the options. Other seeds come to other proposals."
     )
     tries: int | None = Field(
-        None, description="IRIS makes so many proposals at most, each with a random seed of its own, and the best is taken. Default: 4."
+        None, description="IRIS makes so many proposals at most, each with a random seed of its own, and the best is taken. Default: 2."
     )
 
 

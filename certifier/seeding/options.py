@@ -66,7 +66,7 @@ class SeedOptions:
     tolerance: float = 0.02
     margin: float = 0.01
     random_seed: int | None = None
-    tries: int = 4
+    tries: int = 2
 
     def to_document(self) -> dict[str, Any]:
         """Returns the options as JSON-able data; those that are not given are left out."""
