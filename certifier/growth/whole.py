@@ -25,7 +25,7 @@ from certifier.growth.trials import by_joints, joints_between
 from certifier.model import Array, Box, Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.pair.result import Weakness
-from certifier.partition.together import Together, together
+from certifier.partition.together import THIN, Together, together
 from certifier.polytopes.polytope import bounds
 
 FIRST = 0.7
@@ -67,10 +67,6 @@ REVOKED = "revoked: "
 """The reason begins like this where nothing is left of a region that is certified again."""
 EARLY_EFFORT = 24 * SLICE
 """The effort of the first two stages, so that the first regions come soon, and where a region is certified again."""
-
-
-THIN = 8
-"""Of every THIN samples of the proposal one says which pairs are certified as one."""
 
 
 def begin_whole(scene: Scene, state: GrowthState, start: Start) -> Transition:

@@ -10,10 +10,7 @@ from certifier.partition.area import Area
 from certifier.partition.hulls import gaps
 from certifier.partition.search import LONG, Search
 from certifier.partition.shared import Shared
-from certifier.partition.together import together, volumes_of
-
-THIN = 8
-"""One of so many samples says which pairs are certified as one."""
+from certifier.partition.together import THIN, together, volumes_of
 
 
 def touched(scene: Scene, polytope: Polytope, samples: Array, keep: Array) -> float:

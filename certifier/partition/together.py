@@ -16,6 +16,8 @@ from certifier.model import WORLD, Array, Geometry, Pair, Scene, Volume
 from certifier.partition.hulls import gaps, hull
 from certifier.proof import limits
 
+THIN = 8
+"""One of so many samples of a proposal is enough to say which pairs are certified as one."""
 LOST = 0.002
 """Two hulls touch at this share of the samples at most, those left out at which two of the geometries themselves touch."""
 

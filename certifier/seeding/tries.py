@@ -59,6 +59,9 @@ def best_of_tries(scene: Scene, points: Array, options: SeedOptions) -> tuple[Ar
         RegionError: as :func:`certifier.seeding.iris.iris`.
     """
     first = options.random_seed or 0
+    if options.tries == 1:
+        C, d, account = iris(scene, points, replace(options, random_seed=first))
+        return C, d, {**account, "random_seed": first, "tries": 1}
     others = np.random.SeedSequence(first).generate_state(options.tries - 1) % IRIS_SEEDS
     tries: list[_Try] = []
     for random_seed in (first, *map(int, others)):

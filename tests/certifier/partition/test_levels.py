@@ -260,8 +260,8 @@ def test_cells_are_not_cut_for_volumes_that_touch_where_more_than_seven_joints_m
     """The fat balls touch somewhere, and slimmer ones never: with cuts for the fat ones, half of the cells are still open."""
     scene, polytope, index = two_wrists()
     results = []
-    for together in (search._touch, lambda bodies, found: False):
-        monkeypatch.setattr(search, "_touch", together)
+    for touch in (search._touch, lambda bodies, found: False):
+        monkeypatch.setattr(search, "_touch", touch)
         results.append(CellCertification(scene, polytope, faces=faces).certify(index, 10 * CELLS))
     assert [result.outcome for result in results] == [Outcome.CERTIFIED, Outcome.INCONCLUSIVE]
     proof = PartitionProof.from_bytes(results[0].proof, scene)

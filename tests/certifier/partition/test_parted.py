@@ -14,7 +14,7 @@ from certifier.polytopes.gibbs import uniform_in_q
 
 
 def looked_at(name, half):
-    """Returns a scene with the pairs that many joints move, a cube in s about its seed, samples of that, and which of them collide."""
+    """Returns a scene, a cube in s about its seed, samples of the cube, the pairs that many joints move, and the seed."""
     scene, kinematics = catalogue.scene(name), Kinematics.of(catalogue.scene(name))
 
     def moving(pair):
