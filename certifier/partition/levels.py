@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,14 +23,35 @@ from certifier.proof.partition import Coarse
 APART, LOOKED = (0.99, 1.0), 500
 """The fattest balls are apart at the first share of the configurations, the next ones at the second; so many are looked at."""
 
+MANY_JOINTS = 7
+"""Where so many joints or more move one body against the other, cells that are narrow in all of them are far too many."""
+
 Level = tuple[int, int]
 """The numbers of the volumes of a level: 0 for a volume itself, i for the coarse one with the number i - 1."""
 
 
-def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> tuple[Coarse, list[Level], int]:
-    """Returns the coarse volumes of two volumes, which the polytope does not matter to, the levels, and the first one of fat balls.
+class Levels(NamedTuple):
+    """Says which volumes the cells of two volumes are tried with.
 
-    A cell tries the last level first; level 0 is that of the volumes themselves.
+    Attributes:
+        coarse: the coarse volumes of either, which the polytope does not matter to.
+        levels: a cell tries the last one first; the first one is that of the volumes themselves.
+        fat: the place of the first level of fat balls.
+        two_chains: whether both have coarse volumes, and MANY_JOINTS move them, as those of two hands. Then every level leaves out joints
+            of one chain or the other, and cuts that are made for it may not help the next one.
+    """
+
+    coarse: Coarse
+    levels: list[Level]
+    fat: int
+    two_chains: bool
+
+
+def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> Levels:
+    """Returns the levels of two volumes.
+
+    Of two chains, there is one for every number of joints that balls leave. So the slimmest ones stay the same while faces are added: what
+    is fat enough to touch at corners only takes many faces, which lose far more (docs/measurements.md).
 
     Args:
         frame: any body; distances are computed in its frame.
@@ -44,6 +66,7 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> tuple[C
         return len(kinematics.chain(known[0][level[0]].body, known[1][level[1]].body))
 
     levels: list[Level] = [(0, 0)]
+    two_chains = bool(first and second) and moving((0, 0)) >= MANY_JOINTS
     slender = int(slim[0] is not None), int(slim[1] is not None)
     if slender != (0, 0):
         levels.append(slender)
@@ -56,10 +79,11 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> tuple[C
         best = max(room, key=lambda level: float(room[level][shares[0]]))
         if room[best][shares[0]] > 0:
             fats.append(best)
-        shares = [share for share in shares if room[best][share] <= 0]
+        if not two_chains:
+            shares = [share for share in shares if room[best][share] <= 0]
         if not shares:
             break
-    return (first, second), levels + fats[::-1], len(levels)
+    return Levels((first, second), levels + fats[::-1], len(levels), two_chains)
 
 
 def _room(area: Area, frame: str, volumes: Sequence[Volume]) -> Array:

@@ -30,11 +30,11 @@ from certifier.partition.cell import KEPT, Cell
 from certifier.partition.chords import chords
 from certifier.partition.frames import choose_frame
 from certifier.partition.hulls import gaps
-from certifier.partition.levels import Level, levels_of
+from certifier.partition.levels import MANY_JOINTS, Level, Levels, levels_of
 from certifier.partition.shared import Shared
 from certifier.partition.tree import Node, OpenCell, Streams
 from certifier.polytopes.simplex import deepest
-from certifier.proof.partition import EMPTY, PLANE, Coarse, choices_of
+from certifier.proof.partition import EMPTY, PLANE, choices_of
 
 NARROW = np.radians(3.0)
 """A cell that turns less than this in every joint is not cut any more."""
@@ -45,13 +45,14 @@ NARROW_COARSE = np.radians(15.0)
 them any more."""
 FEW_JOINTS, NARROWER = 6, np.radians(30.0)
 """Where more than FEW_JOINTS move one body against the other, a cell without a sample is cut for them until it turns less than NARROWER."""
-PARTED_JOINTS, SAVED, MOST_PARTED, NARROW_PARTED = 7, 2, 6, np.radians(3.5)
-"""Where faces are added, and PARTED_JOINTS move one body against the other, they part the slimmest level that saves SAVED joints and has a
-coarse volume in the place of one body only. Where more do, they part the slimmest level that MOST_PARTED joints move or fewer. Cells are
-cut for it until they turn less than NARROW_PARTED: in all joints of the bodies they would be far too many.
-
-Where more than PARTED_JOINTS do, a cell in which the volumes of a level touch is tried with the next level at once, and its halves with all
-levels again. Cuts for volumes that touch would only multiply the cells of the next level, which has to be cut in other joints."""
+SAVED, MOST_PARTED, NARROW_PARTED = 2, 6, np.radians(3.5)
+"""Where faces are added, and MANY_JOINTS move one body against the other, they part the slimmest level that saves SAVED joints and has a
+coarse volume in the place of one body only. Of two chains they part the slimmest level that MOST_PARTED joints move or fewer. Cells are
+cut for it until they turn less than NARROW_PARTED."""
+LOOKED_AT = 64
+"""Of two chains, a cell in which the volumes of a level touch is tried with the next level at once. Cuts for volumes that touch would only
+multiply the cells of the next level, which has to be cut in other joints. So many of the configurations of a cell, and fewer than twice as
+many, are looked at: cells are cut where volumes touch in a small corner only."""
 CUTS, LEAST_ROOM, MOST_ROOM = 3, 1e-5, 10.0
 """For coarse volumes so many joints are compared to cut a cell in; less room for a plane than LEAST_ROOM counts as that, and so on."""
 BEYOND = 1e-9
@@ -96,17 +97,14 @@ class Search:
     def __init__(self, area: Area, shared: Shared, volumes: tuple[Volume, Volume], faces: bool = False) -> None:
         self._area, self._shared = area, shared
         self.frame, self.joints = choose_frame(area.kinematics, volumes, area.lower, area.upper)
-        self.coarse: Coarse = ((), ())
-        levels: list[Level] = [(0, 0)]
-        self._fat = 1
-        if len(self.joints) >= LONG:
-            self.coarse, levels, self._fat = levels_of(area, self.frame, volumes)
+        known = levels_of(area, self.frame, volumes) if len(self.joints) >= LONG else Levels(((), ()), [(0, 0)], 1, False)
+        self.coarse, levels, self._fat, self._two_chains = known
         chosen = choices_of(volumes, self.coarse)
         self._choices = [i + (1 + len(self.coarse[0])) * j for i, j in levels]
         self.bodies = Bodies(area, self.frame, volumes)
         self.volumes_of_levels = [chosen[choice] for choice in self._choices]
         self._levels = [self.bodies, *(shared.bodies(self.frame, chosen[choice]) for choice in self._choices[1:])]
-        self.parted = self._parted(levels) if faces and len(self.joints) >= PARTED_JOINTS else None
+        self.parted = self._parted(levels) if faces and len(self.joints) >= MANY_JOINTS else None
 
     def run(self, cells: Sequence[OpenCell], most: int) -> Report:
         """Works on open cells, whose nodes it changes.
@@ -168,10 +166,10 @@ class Search:
         return contacts
 
     def _parted(self, levels: list[Level]) -> Bodies | None:
-        if len(self.joints) > PARTED_JOINTS:
+        if self._two_chains:
             return next((bodies for bodies in self._levels[1:] if len(bodies.joints) <= MOST_PARTED), None)
         one_sided = (bodies for bodies, level in zip(self._levels, levels, strict=True) if (level[0] > 0) != (level[1] > 0))
-        return next((bodies for bodies in one_sided if len(bodies.joints) <= PARTED_JOINTS - SAVED), None)
+        return next((bodies for bodies in one_sided if len(bodies.joints) <= MANY_JOINTS - SAVED), None)
 
     def _halves(self, cell: Cell, joint: int, value: float, points: Array) -> list[Cell]:
         """Returns the lower and the upper part of a cell, with nodes of their own."""
@@ -206,9 +204,8 @@ class Search:
             if isinstance(tried.found, Separated):
                 self._separated(cell, level, tried.found)
                 return None
-            if len(self.joints) > PARTED_JOINTS and bodies is not self.parted and _touch(bodies, tried.found):
-                continue
-            if self._worth_a_cut(cell, bodies, tried.found):
+            touch = self._two_chains and bodies is not self.parted and _touch(bodies, tried.found)
+            if not touch and self._worth_a_cut(cell, bodies, tried.found):
                 if tried.joint is None:
                     tried.joint = self._cut(cell, bodies, tried.found)
                 return tried.joint, tried.found.points
@@ -301,4 +298,5 @@ class Search:
 
 def _touch(bodies: Bodies, found: Undecided) -> bool:
     """Returns whether volumes touch at a configuration that was looked at, so that no plane separates them in this cell."""
-    return found.support is not None and bool((gaps(*bodies.hulls, found.points) <= 0).any())
+    looked_at = found.points[:: max(1, len(found.points) // LOOKED_AT)]
+    return found.support is not None and bool((gaps(*bodies.hulls, looked_at) <= 0).any())
