@@ -161,8 +161,9 @@ def separate(
         _mean(points, origin, w, m, z)
     else:
         z[:] = 0.0
-    found = -1
-    for _ in range(8 * D):
+    found, anew, steps = -1, m == 0, 8 * D
+    while steps > 0:
+        steps -= 1
         row, vertex, lowest = 0, 0, np.inf
         square = z @ z
         if F:
@@ -188,8 +189,12 @@ def separate(
                 found = 0
             elif lowest >= enough * square:
                 found = 1
-            elif m > D:
+            elif m > D and anew:
                 found = 1 if lowest > 0 else 0
+            elif m > D:
+                # Points of balls that were found for other planes may be too near to each other to go on with.
+                m, F, anew, steps, z[:] = 0, 0, True, 8 * D, 0.0
+                continue
             if found >= 0:
                 break
         _point(A, B, u, radius_a, radius_b, ratio, z, row, vertex, point)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
@@ -66,6 +66,8 @@ def moving_points(seed, k, apart, radius):
 
 @settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 3), st.floats(0.0, 1.5), st.sampled_from([0.0, 0.2]))
+@example(778866, 1, 0.75, 0.2)
+@example(778866, 2, 0.75, 0.2)
 def test_a_plane_is_found_where_there_is_one_and_its_margin_is_nearly_the_widest(seed, k, apart, radius):
     A, B, u, radius_a, radius_b = moving_points(seed, k, apart, radius)
     best = widest(A, B, u, radius_a, radius_b)
