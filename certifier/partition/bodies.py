@@ -92,7 +92,7 @@ class Bodies:
         seen = [area.kinematics.points(frame, volume.body, volume.vertices, area.samples[:64]).reshape(-1, 3) for volume in volumes]
         points = np.concatenate(seen)
         self._middle = (points.min(axis=0) + points.max(axis=0)) / 2
-        self.extent = float(np.abs(points - self._middle).max())
+        self.extent = float(np.abs(points - self._middle).max()) or 1.0  # all vertices may be one point
         self.hulls = tuple(
             hull(area.kinematics, frame, volume, radius, self._middle, self.extent)
             for volume, radius in zip(volumes, self._radii, strict=True)

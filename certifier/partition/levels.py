@@ -21,7 +21,8 @@ from certifier.proof import limits
 from certifier.proof.partition import Coarse
 
 APART, LOOKED = (0.99, 1.0), 500
-"""The fattest balls are apart at the first share of the configurations, the next ones at the second; so many are looked at."""
+"""The fattest balls are apart at the first share of the configurations, the next ones at the second; so many are looked at. Of two chains
+all are apart at the first share."""
 
 MANY_JOINTS = 7
 """Where so many joints or more move one body against the other, cells that are narrow in all of them are far too many."""
@@ -37,8 +38,8 @@ class Levels(NamedTuple):
         coarse: the coarse volumes of either, which the polytope does not matter to.
         levels: a cell tries the last one first; the first one is that of the volumes themselves.
         fat: the place of the first level of fat balls.
-        two_chains: whether both have coarse volumes, and MANY_JOINTS move them, as those of two hands. Then every level leaves out joints
-            of one chain or the other, and cuts that are made for it may not help the next one.
+        two_chains: whether both have coarse volumes, and MANY_JOINTS or more move them, as those of two hands. Then every level but the
+            first leaves out joints of one chain or the other, and cuts that are made for it may not help the next one.
     """
 
     coarse: Coarse
@@ -50,8 +51,9 @@ class Levels(NamedTuple):
 def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> Levels:
     """Returns the levels of two volumes.
 
-    Of two chains, there is one for every number of joints that balls leave. So the slimmest ones stay the same while faces are added: what
-    is fat enough to touch at corners only takes many faces, which lose far more (docs/measurements.md).
+    Of two chains, there is one for every number of joints with which balls are apart at most configurations. So slim levels do not go when
+    faces make fatter ones come apart at all that are looked at. These still touch in corners, where faces that part them lose far more
+    (docs/measurements.md).
 
     Args:
         frame: any body; distances are computed in its frame.

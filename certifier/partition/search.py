@@ -8,8 +8,9 @@ A cell goes through these steps (certifier.partition.bodies), each of which send
         -> a point of the polytope where one does not: the plane is looked for again, with this point
         -> too many pieces: the cell is cut
 
-Coarse volumes (certifier.partition.coarse) come first. Where they are not enough, the cell is cut in the joints that move them, until it
-is narrow; then the bodies themselves are tried.
+Coarse volumes (certifier.partition.coarse) come first, on levels (certifier.partition.levels). Where those of a level are not enough, the
+cell is cut in the joints that move them, until it is narrow; then the next level is tried, the bodies themselves at last. Of two chains,
+the next level is tried at once where the volumes touch.
 
 The largest cells, by q-volume, come first.
 """
@@ -46,13 +47,13 @@ them any more."""
 FEW_JOINTS, NARROWER = 6, np.radians(30.0)
 """Where more than FEW_JOINTS move one body against the other, a cell without a sample is cut for them until it turns less than NARROWER."""
 SAVED, MOST_PARTED, NARROW_PARTED = 2, 6, np.radians(3.5)
-"""Where faces are added, and MANY_JOINTS move one body against the other, they part the slimmest level that saves SAVED joints and has a
-coarse volume in the place of one body only. Of two chains they part the slimmest level that MOST_PARTED joints move or fewer. Cells are
-cut for it until they turn less than NARROW_PARTED."""
+"""Where faces are added, and MANY_JOINTS or more move one body against the other, they part the slimmest level that MOST_PARTED joints move
+or fewer. Of bodies that are no two chains, it has to save SAVED joints, and to have a coarse volume in the place of one of them only. Cells
+are cut for it until they turn less than NARROW_PARTED."""
 LOOKED_AT = 64
-"""Of two chains, a cell in which the volumes of a level touch is tried with the next level at once. Cuts for volumes that touch would only
-multiply the cells of the next level, which has to be cut in other joints. So many of the configurations of a cell, and fewer than twice as
-many, are looked at: cells are cut where volumes touch in a small corner only."""
+"""Of two chains, a cell in which the volumes of a level touch is tried with the next level at once, but for volumes that faces part. Cuts
+for volumes that touch would only multiply the cells of the next level, which has to be cut in other joints. So many of the configurations
+of a cell, and fewer than twice as many, are looked at: cells are cut where volumes touch in a small corner only."""
 CUTS, LEAST_ROOM, MOST_ROOM = 3, 1e-5, 10.0
 """For coarse volumes so many joints are compared to cut a cell in; less room for a plane than LEAST_ROOM counts as that, and so on."""
 BEYOND = 1e-9
@@ -168,8 +169,9 @@ class Search:
     def _parted(self, levels: list[Level]) -> Bodies | None:
         if self._two_chains:
             return next((bodies for bodies in self._levels[1:] if len(bodies.joints) <= MOST_PARTED), None)
+        most = min(MOST_PARTED, len(self.joints) - SAVED)
         one_sided = (bodies for bodies, level in zip(self._levels, levels, strict=True) if (level[0] > 0) != (level[1] > 0))
-        return next((bodies for bodies in one_sided if len(bodies.joints) <= MANY_JOINTS - SAVED), None)
+        return next((bodies for bodies in one_sided if len(bodies.joints) <= most), None)
 
     def _halves(self, cell: Cell, joint: int, value: float, points: Array) -> list[Cell]:
         """Returns the lower and the upper part of a cell, with nodes of their own."""
@@ -297,6 +299,6 @@ class Search:
 
 
 def _touch(bodies: Bodies, found: Undecided) -> bool:
-    """Returns whether volumes touch at a configuration that was looked at, so that no plane separates them in this cell."""
+    """Returns whether no plane was found, and volumes touch at a configuration that was looked at, so that there is none in this cell."""
     looked_at = found.points[:: max(1, len(found.points) // LOOKED_AT)]
     return found.support is not None and bool((gaps(*bodies.hulls, looked_at) <= 0).any())

@@ -135,10 +135,11 @@ def separate(
         least: a plane with a smaller margin than this counts as none.
         enough: any plane with this share of the widest margin will do.
         z: (4 (k + 1),) the plane to begin with, of these points; it is replaced by the one found.
-        begun: the support of that plane; empty for none.
+        begun: the support of that plane; empty for none. Where nothing comes of it, the search begins anew.
 
     Returns:
-        (found, support): the support's points come to the point that is nearest to 0, which is z.
+        (found, support): whether there is such a plane, 0 also where the steps did not suffice to find it. The support's points come to
+        the point that is nearest to 0, which is z.
     """
     k = len(u)
     D = 4 * (k + 1)
@@ -189,12 +190,12 @@ def separate(
                 found = 0
             elif lowest >= enough * square:
                 found = 1
-            elif m > D and anew:
-                found = 1 if lowest > 0 else 0
-            elif m > D:
-                # Points of balls that were found for other planes may be too near to each other to go on with.
+            elif not anew and (m > D or steps == 0):
+                # Points that were found for another plane may be too near to each other to go on with, those of balls above all.
                 m, F, anew, steps, z[:] = 0, 0, True, 8 * D, 0.0
                 continue
+            elif m > D:
+                found = 1 if _worst(A, B, u, radius_a, radius_b, ratio, N, z, lanes)[2] > 0 else 0
             if found >= 0:
                 break
         _point(A, B, u, radius_a, radius_b, ratio, z, row, vertex, point)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from certifier.errors import RegionError
 from certifier.model import Array, Scene
 from certifier.seeding.iris import Termination, iris
 from certifier.seeding.options import IRIS_SEEDS, SeedOptions
@@ -42,8 +43,8 @@ class _Try:
         return self.holds and whole and self.rating.touched <= LITTLE
 
     @property
-    def worth(self) -> tuple[bool, float]:
-        return self.holds, self.rating.kept
+    def worth(self) -> tuple[bool, float, float]:
+        return self.holds, self.rating.kept, -self.rating.touched
 
 
 def best_of_tries(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Array, dict[str, Any]]:
@@ -56,7 +57,7 @@ def best_of_tries(scene: Scene, points: Array, options: SeedOptions) -> tuple[Ar
         points: (k, n) points in s, the seed first. Whether they are inside remains to be checked.
 
     Raises:
-        RegionError: as :func:`certifier.seeding.iris.iris`.
+        RegionError: no try came to a region; what became of the first one, as :func:`certifier.seeding.iris.iris` says it.
     """
     first = options.random_seed or 0
     if options.tries == 1:
@@ -64,12 +65,20 @@ def best_of_tries(scene: Scene, points: Array, options: SeedOptions) -> tuple[Ar
         return C, d, {**account, "random_seed": first, "tries": 1}
     others = np.random.SeedSequence(first).generate_state(options.tries - 1) % IRIS_SEEDS
     tries: list[_Try] = []
+    failures: list[RegionError] = []
     for random_seed in (first, *map(int, others)):
-        tries.append(_tried(scene, points, replace(options, random_seed=random_seed)))
+        try:
+            tries.append(_tried(scene, points, replace(options, random_seed=random_seed)))
+        except RegionError as error:
+            failures.append(error)
+            continue
         if tries[-1].will_do:
             break
+    if not tries:
+        raise failures[0]
     best = max(tries, key=lambda one: one.worth)
-    return best.C, best.d, {**best.account, "tries": len(tries)}
+    warnings = [*best.account["warnings"], *(f"another try failed: {error}" for error in failures)]
+    return best.C, best.d, {**best.account, "warnings": warnings, "tries": len(tries) + len(failures)}
 
 
 def _tried(scene: Scene, points: Array, options: SeedOptions) -> _Try:

@@ -168,6 +168,16 @@ def test_random_trees_and_shapes_get_no_outcome_that_sampling_contradicts():
     assert min(outcomes.count(outcome) for outcome in (Outcome.CERTIFIED, Outcome.REFUTED)) >= 8
 
 
+@pytest.mark.parametrize("radius", [0.0, 0.1])
+def test_balls_about_one_point_are_refuted(radius):
+    """The space of a search has no extent but that of their radii."""
+    scene = planar_arm(2)
+    balls = ball("arm/link1/ball", "arm/link1", radius, (0.0, 0.0, 0.0)), ball("world/ball", WORLD, radius, (0.0, 0.0, 0.0))
+    scene = replace(scene, geometries=balls, pairs=(Pair("arm/link1/ball", "world/ball"),))
+    polytope = cube(scene, 0.0, 0.3)
+    check_refuted(scene, polytope, 0, certify(scene, polytope))
+
+
 def test_bodies_that_nearly_touch_are_too_close_and_the_distance_is_the_one_there():
     """The ball comes within a millimetre. Thinner by 2 mm it is certified, thicker by 2 mm it touches."""
     scene, polytope = passing(0.6, replace(TIP, radius=0.082))

@@ -133,3 +133,14 @@ def test_weights_come_to_the_point_of_a_hull_that_is_nearest_to_0(seed, count, D
     x = w[:kept] @ points[rows[:kept]]
     assert points[rows[:kept]] @ x == pytest.approx(x @ x, rel=1e-6, abs=1e-9)
     assert np.linalg.norm(x) <= np.linalg.norm(points[0]) * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("seed", [236, 926, 958, 1708, *range(10)])
+def test_a_plane_that_is_found_separates_at_all_configurations_far_out_too(seed):
+    """Where doubles do not tell points apart any more, the search may end while it looks at a few configurations of many."""
+    rng, k = np.random.default_rng(seed), 1 + seed % 5
+    u, drift = rng.uniform(-0.3, 0.3, (120, k)), rng.normal(size=(k, 3)) * 0.3
+    A, B = (1e7 * (rng.normal(size=(1, v, 3)) * 0.2 + (u @ (drift + rng.normal(size=(k, 3)) * 0.05))[:, None]) for v in (4, 6))
+    A, radii = A + np.array([3e6 * (seed % 3), 0, 0]), 2e6 * (seed % 2) * rng.random(2)
+    found, z, _ = found_for(A, B, u, *radii)
+    assert not found or values(A, B, u, *radii, z) > 0

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks import catalogue
+from certifier.errors import RegionError
 from certifier.seeding import tries
 from certifier.seeding.options import IRIS_SEEDS, Method, SeedOptions
 from certifier.seeding.propose import propose
@@ -22,8 +23,10 @@ def of_tries(monkeypatch, found, count, random_seed=None):
 
     def iris(scene, points, options):
         asked.append(options.random_seed)
+        if found[len(asked) - 1] is None:
+            raise RegionError("seeding_failed", f"try {len(asked)} failed")
         offset, _, termination = found[len(asked) - 1]
-        return np.ones((1, 1)), np.array([offset]), {"termination": termination}
+        return np.ones((1, 1)), np.array([offset]), {"termination": termination, "warnings": ["IRIS' own"]}
 
     monkeypatch.setattr(tries, "iris", iris)
     monkeypatch.setattr(tries, "rated", lambda *_: found[len(asked) - 1][1])
@@ -33,6 +36,8 @@ def of_tries(monkeypatch, found, count, random_seed=None):
     _, d, account = tries.best_of_tries(scene, np.zeros((1, 1)), options)
     assert account["tries"] == len(asked)
     assert account["random_seed"] in asked
+    failed = [f"another try failed: try {k + 1} failed" for k, one in enumerate(found[: len(asked)]) if one is None]
+    assert account["warnings"] == ["IRIS' own", *failed]
     return d[0], asked
 
 
@@ -49,6 +54,9 @@ GOOD, BAD = Rating(10.0, 0.0005), Rating(12.0, 0.1)
         ([(-1, Rating(90.0, 0.0), "tolerance"), (2, BAD, "tolerance")], 2, 2, 2),
         ([(-1, Rating(90.0, 0.0), "tolerance"), (-2, BAD, "tolerance")], 2, -1, 2),
         ([(1, BAD, "tolerance")], 1, 1, 1),
+        ([(1, Rating(90.0, 0.9), "tolerance"), (2, Rating(80.0, 0.3), "tolerance")], 2, 2, 2),
+        ([(1, BAD, "tolerance"), None, None], 3, 1, 3),
+        ([None, (2, BAD, "tolerance")], 2, 2, 2),
     ],
     ids=[
         "the first will do",
@@ -58,12 +66,20 @@ GOOD, BAD = Rating(10.0, 0.0005), Rating(12.0, 0.1)
         "holds the seed",
         "none holds it",
         "one",
+        "nothing will be kept of either",
+        "the others fail",
+        "the first one fails",
     ],
 )
 def test_the_best_try_is_taken(monkeypatch, found, count, chosen, tried):
     offset, asked = of_tries(monkeypatch, found, count)
     assert offset == chosen
     assert len(asked) == tried
+
+
+def test_tries_that_all_fail_say_what_became_of_the_first_one(monkeypatch):
+    with pytest.raises(RegionError, match="try 1 failed"):
+        of_tries(monkeypatch, [None, None], 2)
 
 
 @pytest.mark.parametrize("random_seed", [None, 7, IRIS_SEEDS - 1])
