@@ -24,6 +24,8 @@ APART, LOOKED = (0.99, 1.0), 500
 """The fattest balls are apart at the first share of the configurations, the next ones at the second; so many are looked at. Of two chains
 all are apart at the first share."""
 
+LONG = 5
+"""Coarse volumes are tried where so many joints or more move one body against the other."""
 MANY_JOINTS = 7
 """Where so many joints or more move one body against the other, cells that are narrow in all of them are far too many."""
 
@@ -49,7 +51,7 @@ class Levels(NamedTuple):
 
 
 def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> Levels:
-    """Returns the levels of two volumes.
+    """Returns the levels of two volumes: of fewer than LONG joints, that of the volumes themselves alone.
 
     Of two chains, there is one for every number of joints with which balls are apart at most configurations. So slim levels do not go when
     faces make fatter ones come apart at all that are looked at. These still touch in corners, where faces that part them lose far more
@@ -59,6 +61,8 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> Levels:
         frame: any body; distances are computed in its frame.
     """
     kinematics, (a, b) = area.kinematics, volumes
+    if len(kinematics.chain(a.body, b.body)) < LONG:
+        return Levels(((), ()), [(0, 0)], 1, False)
     slim = slim_volume(kinematics, a, b), slim_volume(kinematics, b, a)
     balls = common_balls(kinematics, a, b), common_balls(kinematics, b, a)
     first, second = ((*([one] if one else []), *more)[: limits.COARSE] for one, more in zip(slim, balls, strict=True))

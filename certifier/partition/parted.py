@@ -8,7 +8,8 @@ from __future__ import annotations
 from certifier.model import Array, Polytope, Scene
 from certifier.partition.area import Area
 from certifier.partition.hulls import gaps
-from certifier.partition.search import LONG, Search
+from certifier.partition.levels import LONG
+from certifier.partition.search import Search
 from certifier.partition.shared import Shared
 from certifier.partition.together import THIN, together, volumes_of
 

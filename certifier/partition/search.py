@@ -31,7 +31,7 @@ from certifier.partition.cell import KEPT, Cell
 from certifier.partition.chords import chords
 from certifier.partition.frames import choose_frame
 from certifier.partition.hulls import gaps
-from certifier.partition.levels import MANY_JOINTS, Level, Levels, levels_of
+from certifier.partition.levels import MANY_JOINTS, Level, levels_of
 from certifier.partition.shared import Shared
 from certifier.partition.tree import Node, OpenCell, Streams
 from certifier.polytopes.simplex import deepest
@@ -39,8 +39,6 @@ from certifier.proof.partition import EMPTY, PLANE, choices_of
 
 NARROW = np.radians(3.0)
 """A cell that turns less than this in every joint is not cut any more."""
-LONG = 5
-"""Coarse volumes are tried where so many joints or more move one body against the other."""
 NARROW_COARSE = np.radians(15.0)
 """A cell that turns less than this in every joint that moves the coarse volumes, or has neither a plane nor a sample, is not cut for
 them any more."""
@@ -98,8 +96,7 @@ class Search:
     def __init__(self, area: Area, shared: Shared, volumes: tuple[Volume, Volume], faces: bool = False) -> None:
         self._area, self._shared = area, shared
         self.frame, self.joints = choose_frame(area.kinematics, volumes, area.lower, area.upper)
-        known = levels_of(area, self.frame, volumes) if len(self.joints) >= LONG else Levels(((), ()), [(0, 0)], 1, False)
-        self.coarse, levels, self._fat, self._two_chains = known
+        self.coarse, levels, self._fat, self._two_chains = levels_of(area, self.frame, volumes)
         chosen = choices_of(volumes, self.coarse)
         self._choices = [i + (1 + len(self.coarse[0])) * j for i, j in levels]
         self.bodies = Bodies(area, self.frame, volumes)
@@ -206,8 +203,7 @@ class Search:
             if isinstance(tried.found, Separated):
                 self._separated(cell, level, tried.found)
                 return None
-            touch = self._two_chains and bodies is not self.parted and _touch(bodies, tried.found)
-            if not touch and self._worth_a_cut(cell, bodies, tried.found):
+            if self._worth_a_cut(cell, bodies, tried.found):
                 if tried.joint is None:
                     tried.joint = self._cut(cell, bodies, tried.found)
                 return tried.joint, tried.found.points
@@ -236,6 +232,8 @@ class Search:
         turn = self._turn(cell, bodies)[bodies.joints].max(initial=0.0)
         if bodies is self.parted:
             return bool(turn > NARROW_PARTED)
+        if self._two_chains and _touch(bodies, found):
+            return False
         hopeless = not len(cell.samples) and found.joint is None and (len(self.bodies.joints) <= FEW_JOINTS or turn < NARROWER)
         return not hopeless and turn > NARROW_COARSE
 

@@ -8,8 +8,8 @@ import pytest
 from benchmarks import catalogue
 from certifier.kinematics import Kinematics
 from certifier.pair.collisions import in_collision
+from certifier.partition.levels import LONG
 from certifier.partition.parted import touched
-from certifier.partition.search import LONG
 from certifier.polytopes.gibbs import uniform_in_q
 
 
