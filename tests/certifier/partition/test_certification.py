@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks import catalogue
 from certifier.errors import ProofError, RegionError
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Box, Geometry, Joint, JointKind, Pair, Polytope
@@ -14,9 +15,12 @@ from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import certify_pair
 from certifier.pair.closest import first_within
 from certifier.partition import bodies
+from certifier.partition.area import Area
 from certifier.partition.certification import CellCertification, CutOff
 from certifier.partition.search import Search
+from certifier.partition.shared import Shared
 from certifier.partition.subtrees import open_cells
+from certifier.partition.together import volumes_of
 from certifier.partition.tree import OPEN
 from certifier.polytopes.gibbs import uniform_in_q
 from certifier.polytopes.polytope import bounds
@@ -452,6 +456,20 @@ def test_the_same_seed_gives_the_same_proof_to_the_bit():
     first, second = (certify(scene, polytope, seed=3) for _ in range(2))
     assert first.proof == second.proof
     assert first.proof != certify(scene, polytope, seed=4).proof
+
+
+@pytest.mark.parametrize(("half", "outcome"), [(0.4, Outcome.REFUTED), (0.01, Outcome.CERTIFIED)])
+def test_contacts_in_a_small_corner_are_looked_for_again(half, outcome):
+    """One of 200 000 samples of the cube about the seed touches, and the first look finds nothing; near the seed nothing is to be found."""
+    scene = catalogue.scene("iiwa_sphere_shelf")
+    index = next(i for i, pair in enumerate(scene.pairs) if {pair.a, pair.b} == {"iiwa/link_7/ball3", "shelf/boards/upper"})
+    polytope = scene.polytope(*catalogue.cube(scene.to_s(catalogue.seed("iiwa_sphere_shelf")), half))
+    result = certify(scene, polytope, index, cells=20)
+    assert result.outcome is outcome
+    if outcome is Outcome.REFUTED:
+        check_refuted(scene, polytope, index, result)
+        area = Area.of(scene, polytope, 0)
+        assert not Search(area, Shared(area), volumes_of(scene, [scene.pairs[index]])).scout(0)
 
 
 def test_an_empty_polytope_is_refused():

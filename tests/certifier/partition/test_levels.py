@@ -194,9 +194,10 @@ def reaching():
 
 
 def test_points_are_named_where_a_ball_touches_that_saves_joints_so_that_faces_part_it():
-    """The ball touches the obstacle in some open cells, the link itself does not."""
+    """The ball touches the obstacle in some open cells. Where no faces are added, only contacts of the link itself are named."""
     scene, polytope, index = reaching()
-    assert len(CellCertification(scene, polytope).certify(index, CELLS // 2).weakness.points) == 0
+    without = CellCertification(scene, polytope).certify(index, CELLS // 2).weakness
+    assert (len(without.points), without.joints) == (without.contacts, ())
     certification = CellCertification(scene, polytope, faces=True)
     found = certification.certify(index, CELLS // 2)
     area, _, alternatives = levels(scene, polytope, index)
