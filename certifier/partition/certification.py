@@ -54,7 +54,7 @@ NEAR, POINTS_OF_A_CELL = 0.002, 8
 AROUND = 0.1
 """Open cells of hard pairs are cut off where the bodies are nearer than this, relative to their extent."""
 LOOKS_AGAIN = 8
-"""So many more looks for a contact follow where cells stay open and nothing was found; one look misses those in a small corner."""
+"""So many looks for a contact follow the first one where cells stay open; one alone misses contacts in a small corner."""
 MOST_POINTS = 2000
 """A result names at most this many configurations."""
 
@@ -171,7 +171,7 @@ class CellCertification:
         if any(node.kind == OPEN for node in root.preorder()):
             if not (self._faces or report.contacts):  # where faces are added, every round looks again
                 looks = (search.scout(seed) for seed in range(1, 1 + LOOKS_AGAIN))
-                report.contacts = next((found for found in looks if found), [])
+                report = replace(report, contacts=next(filter(None, looks), []))
             return self._left(search, volumes, given, report, cut_off)
         return self._proved(search, volumes, root)
 
