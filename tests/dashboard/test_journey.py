@@ -39,7 +39,9 @@ def test_a_visit_from_a_job_to_a_plan(page: Any, url: str, planar: Scene, client
     assert page.evaluate("window.loadedOnce"), "the page was not loaded again"
     regions = {region["id"] for region in client.get(f"/v1/regions?job={job_id}").json()["regions"]}
 
-    # A pair, with its outcome in the last iteration, and a cell of it.
+    # A pair, with its outcome in the last iteration, and a cell of it. Columns move until the page shows all iterations.
+    iterations = client.get(f"/v1/jobs/{job_id}/pairs/states").json()["iterations"]
+    page.locator(f"#cell-1-{len(iterations) - 1}").wait_for()
     page.locator("#cell-1-0").click()
     page.get_by_role("heading", name="world/obstacle").wait_for()
     page.get_by_text("A verified proof says").wait_for()
