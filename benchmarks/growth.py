@@ -12,6 +12,11 @@ from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any
 
+from pydrake.common import Parallelism
+from pydrake.geometry.optimization import HPolyhedron, Hyperellipsoid
+from pydrake.multibody.rational import RationalForwardKinematics
+from pydrake.planning import IrisNp2, IrisNp2Options, IrisParameterizationFunction
+
 from benchmarks import catalogue, measure
 from benchmarks.measure import Progress
 from benchmarks.svg import Panel, draw
@@ -21,11 +26,12 @@ from certifier.jobs.local import grow
 from certifier.jobs.reference import Reference
 from certifier.jobs.share import SampledProposal
 from certifier.model import Array, Scene
-from certifier.polytopes.ellipsoid import inscribed_ellipsoid
+from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume, volume_in_q
 from certifier.proof.partition import PartitionProof
 from certifier.proof.region import RegionProof
+from certifier.seeding.iris import checker
 from certifier.seeding.options import SeedOptions
-from certifier.seeding.propose import propose
+from certifier.seeding.propose import check_seed
 from certifier.verify.region import verify_region
 from client.cores import cores
 
@@ -36,7 +42,9 @@ WAYS: dict[str, dict[str, Any]] = {
 }
 """Each way to grow has these options of a grow job, with the default seeding."""
 IRIS = "Drake's IRIS"
-"""This way proposes a region, and proves nothing."""
+"""This way proposes a region, and proves nothing. The share is of this region itself."""
+START_RADIUS = 1e-2
+"""Drake's IRIS starts from a ball about the seed with this radius in s."""
 PICTURED = ("whole", "targeted")
 """The picture shows these ways."""
 LIMIT = 300.0
@@ -167,6 +175,7 @@ def _grown(name: str, seed: dict[str, Any], options: dict[str, Any], limit: floa
         "leaves": _leaves(region.proof),
         "share": manifest["share"]["value"],
         "share_stderr": manifest["share"]["stderr"],
+        "q_volume": manifest["q_volume"]["value"],
         "ellipsoid": manifest["volume"]["ellipsoid"],
         "faces": len(manifest["halfspace_offsets"]),
         "curve": manifest["provenance"]["growth_curve"],
@@ -187,22 +196,36 @@ def _leaves(data: bytes) -> int:
 
 
 def _proposed(name: str) -> dict[str, Any]:
-    """Measures the seeding alone. The proposal is no certified region; ``ended`` says which part of its q-volume is in collision."""
-    scene, spent = catalogue.scene(name), _stopwatch()
+    """Measures Drake's IrisNp2 in s, called once as its users call it, with the limits of our seeding.
+
+    The region is not certified; ``ended`` says which part of its q-volume is in collision.
+    """
+    scene, seed, asked, spent = catalogue.scene(name), catalogue.seed(name), SeedOptions(), _stopwatch()
+    robot = checker(scene)
+    kinematics = RationalForwardKinematics(robot.plant())
+    options = IrisNp2Options()
+    options.parameterization = IrisParameterizationFunction(kinematics, scene.q_star)
+    sampled = options.sampled_iris_options
+    sampled.epsilon, sampled.delta, sampled.configuration_space_margin = asked.epsilon, asked.delta, asked.margin
+    sampled.max_iterations, sampled.max_iterations_separating_planes = asked.max_iterations, asked.max_iterations_separating_planes
+    sampled.parallelism = Parallelism.Max()
     try:
-        proposal = propose(scene, SeedOptions.from_document(_seed(name)))
-    except CirisError as error:
+        check_seed(scene, seed)
+        start = Hyperellipsoid.MakeHypersphere(START_RADIUS, scene.to_s(seed))
+        region = IrisNp2(robot, start, HPolyhedron.MakeBox(scene.s_lower, scene.s_upper), options)
+    except (CirisError, RuntimeError) as error:
         return {**spent(), "ellipsoid": 0.0, "faces": 0, "curve": [], "ended": str(error)}
     took = spent()
-    polytope = scene.polytope(proposal.C, proposal.d)
+    polytope = scene.polytope(region.A(), region.b())
     found = SampledProposal.of(scene, polytope)
     return {
         **took,
         "seeding_seconds": took["seconds"],
         "share": 1.0,
         "share_stderr": 0.0,
+        "q_volume": volume_in_q(polytope, scene.revolute, volume(polytope, 0), 0)[0],
         "ellipsoid": inscribed_ellipsoid(polytope).volume,
-        "faces": len(polytope.d),
+        "faces": len(region.b()) - 2 * scene.n,
         "curve": [],
         "ended": f"not certified; of {found.free.size} samples {int((~found.free).sum())} are in collision",
     }

@@ -132,10 +132,11 @@ def _growth(document: Document) -> list[str]:
     def line(row: Document) -> list[str]:
         return [f"{row['ellipsoid']:.3g}", seconds(row["seconds"]), str(row["faces"])]
 
-    header = ["example", "way", "share", "stderr", "ellipsoid", "seconds", "faces", "processor", "seeding"]
+    header = ["example", "way", "share", "stderr", "q-volume", "ellipsoid", "seconds", "faces", "processor", "seeding"]
     rows = []
     for row in document["ways"]:
-        cells = [row["scene"], row["way"], *_share(row), *line(row), seconds(row["processor_seconds"])]
+        q_volume = f"{row['q_volume']:.3g}" if "q_volume" in row else ""
+        cells = [row["scene"], row["way"], *_share(row), q_volume, *line(row), seconds(row["processor_seconds"])]
         cells += [seconds(row["seeding_seconds"]) if "seeding_seconds" in row else "", str(len(row["curve"])), *_proof(row), row["ended"]]
         rows.append(cells)
     parts = [_machines(document["ways"]), _table([*header, "certified regions", "proof MB", "cells in it", "verified in", "ended"], rows)]

@@ -36,6 +36,8 @@ BETTER = 2.0
 """A new face has to be so many times as good as one that is moved in, because every face makes later cells dearer."""
 CLEAR, CLEARER = 0.005, 0.2
 """A face is moved away from what it cuts off, by CLEAR standard deviations and by CLEARER of the depth of what it cuts off."""
+BARELY = 1e-6
+"""A point that is beyond a face by less than this is on it, as far as rounding can tell."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +69,14 @@ class Made:
     s: Array | None = None
 
 
-def cut(scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[tuple[int, ...], Array, float]], around: Polytope) -> Cut:
+def cut(
+    scene: Scene,
+    polytope: Polytope,
+    keep: Array,
+    corners: Sequence[tuple[tuple[int, ...], Array, float]],
+    around: Polytope,
+    beyond: float = 0.0,
+) -> Cut:
     """Cuts off the points given.
 
     A face of the polytope is moved in, or a new one is added, whichever cuts off more points for what it loses.
@@ -78,6 +87,7 @@ def cut(scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[t
         corners: for each pair that failed, the joints between its bodies, the points (w, n) to cut off, and the share of the polytope that
             its faces may lose together.
         around: a polytope of which this one is a part, the same one for all rounds; its samples are drawn once.
+        beyond: points that are beyond a face by less than this are not cut off yet.
     """
     limits = 2 * scene.n
     samples = samples_of(scene, around)
@@ -92,7 +102,7 @@ def cut(scene: Scene, polytope: Polytope, keep: Array, corners: Sequence[tuple[t
         J, left_to_lose = list(joints), most
         losses: list[tuple[float, Array]] = []
         for _ in range(MOST_FACES):
-            left = points[(points @ C.T < d).all(axis=1)]
+            left = points[(points @ C.T < d + beyond).all(axis=1)]
             if not len(left):
                 break
             distance = np.linalg.norm((left - left[0])[:, J] / scale[J], axis=1)

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
-from certifier.growth.cutting import Cut, cut, samples_of
+from certifier.growth.cutting import BARELY, Cut, cut, samples_of
 from certifier.growth.obstacles import Obstacle, joined
 from certifier.growth.options import MOST_CELLS
 from certifier.growth.state import GrowthState, Start, Whole
@@ -141,10 +141,13 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     corners = [corner for i in failing for corner in _corners(scene, i, report.weaknesses[i], most[i])]
     around = start.rows if whole.reach >= 1 else _copy(scene, start, whole.reach)
     made = cut(scene, whole.polytope, start.keep, corners, around)
+    final = {*action.ending} & {*action.hard}
+    stuck = made.polytope is whole.polytope and all(i in final and most[i] >= 1 for i in failing)
+    if stuck:  # A contact on a face would be found again and again.
+        made = cut(scene, whole.polytope, start.keep, corners, around, BARELY)
     smaller = made.polytope
     state = replace(state, obstacles=joined(state.obstacles, _obstacles(whole.stage, failing, made)))
-    final = {*action.ending} & {*action.hard}
-    if smaller is whole.polytope and all(i in final and most[i] >= 1 for i in failing):
+    if stuck and smaller is whole.polytope:
         pair = scene.pairs[failing[0]]
         return _ended(state, report, f"{pair.a} and {pair.b} could not be certified, and nothing more could be cut off for them")
     if smaller is None:

@@ -75,13 +75,14 @@ class Bodies:
     """Two volumes, in the frame of the plane.
 
     Attributes:
+        volumes: the two volumes.
         joints: position indices of those that move one volume against the other, ascending.
         hulls: the bodies, in the space of the search.
         extent: half the size of the space that their vertices are seen in, in metres.
     """
 
     def __init__(self, area: Area, frame: str, volumes: tuple[Volume, Volume]) -> None:
-        self._area = area
+        self._area, self.volumes = area, volumes
         self._radii = [volume.radius + area.scene.padding for volume in volumes]
         # A joint between the frame and both bodies moves neither against the other, but stays in the plane's frame.
         self.joints = sorted({joint for volume in volumes for joint in area.kinematics.chain(frame, volume.body)})

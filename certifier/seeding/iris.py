@@ -8,6 +8,9 @@ The algorithms are Drake's, and both grow in s through q = q* + 2 atan(s):
 Both draw the more samples the smaller epsilon is. So they run with a coarse epsilon first, and a last round with the small one begins
 with that polytope, where few collisions are left to find.
 
+Where growth will keep coarse volumes apart by faces (certifier.seeding.parts), the same algorithm goes on from the ellipsoid of the first
+polytope, and looks for contacts of these volumes too. Its last round is repeated until it knows those that matter to its polytope.
+
 Werner et al., "Faster Algorithms for Growing Collision-Free Convex Polytopes in Robot Configuration Space", 2024.
 """
 
@@ -36,10 +39,15 @@ from certifier.outcome import Guarantee
 from certifier.polytopes.polytope import drop_redundant
 from certifier.scene.drake_model import build_diagram
 from certifier.seeding.options import Method, SeedOptions
+from certifier.seeding.parts import Parts, parts_of, with_parts
 
 _START_RADIUS = 1e-2
 _COARSE = 0.01
 """The alternation between faces and ellipsoid has an epsilon of at least this."""
+_BEYOND = 0.05
+"""So much farther from the ellipsoid's centre than a point is another one that has to stay inside with it."""
+_LAST_ROUNDS = 3
+"""The last round is repeated so many times at most."""
 
 
 class Termination(StrEnum):
@@ -72,20 +80,49 @@ def iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Arra
     Raises:
         RegionError: ``seeding_failed`` with Drake's words.
     """
-    drake = _Iris(scene, options)
     try:
-        region, account = _coarse(drake, scene, points, options)
-        if options.epsilon < account["epsilon"]:
-            region, account = _refined(drake, region, account, points, options.epsilon)
+        region, account = _region(scene, points, options)
     except (RuntimeError, ValueError) as error:
         raise RegionError(
             "seeding_failed", f"{options.method}: {error}", field="seed", hint="try another method, or move the seed"
         ) from error
-    C, d = region.A()[2 * scene.n :], region.b()[2 * scene.n :]
-    norms = np.linalg.norm(C, axis=1)
-    C, d = C / norms[:, None], d / norms
+    C, d = _faces(scene, region)
     kept = drop_redundant(scene.polytope(C, d), fixed=2 * scene.n)[: -2 * scene.n]
     return C[kept], d[kept], {"delta": options.delta, **account}
+
+
+def _region(scene: Scene, points: Array, options: SeedOptions) -> tuple[HPolyhedron, dict[str, Any]]:
+    """Returns Drake's region, with the joint limits first, and the account of :func:`iris` without delta."""
+
+    def parts_now() -> Parts:
+        return parts_of(scene, scene.polytope(*_faces(scene, region)), points)
+
+    drake = _Iris(scene, options)
+    region, account = _coarse(drake, scene, points, options)
+    parts = parts_now()
+    if parts:
+        drake = _Iris(with_parts(scene, parts), options)
+        region, account = _again(drake, scene, region, account, points, options)
+    if options.epsilon >= account["epsilon"]:
+        return region, account
+    known = parts
+    if parts:
+        parts = parts_now()
+    for _ in range(_LAST_ROUNDS):
+        if parts.keys() != known.keys():
+            drake = _Iris(with_parts(scene, parts), options)
+        region, account = _refined(drake, region, account, points, options.epsilon)
+        known, parts = parts, parts_now()
+        if parts.keys() == known.keys():
+            break
+    return region, account
+
+
+def _faces(scene: Scene, region: HPolyhedron) -> tuple[Array, Array]:
+    """Returns the faces (m, n), (m,) of Drake's region without the joint limits, scaled to |c_j| = 1."""
+    C, d = region.A()[2 * scene.n :], region.b()[2 * scene.n :]
+    norms = np.linalg.norm(C, axis=1)
+    return C / norms[:, None], d / norms
 
 
 def _coarse(drake: _Iris, scene: Scene, points: Array, options: SeedOptions) -> tuple[HPolyhedron, dict[str, Any]]:
@@ -96,6 +133,23 @@ def _coarse(drake: _Iris, scene: Scene, points: Array, options: SeedOptions) -> 
     return drake.grow(limits, start, max(options.epsilon, _COARSE), options.max_iterations, contain)
 
 
+def _again(
+    drake: _Iris, scene: Scene, region: HPolyhedron, account: dict[str, Any], points: Array, options: SeedOptions
+) -> tuple[HPolyhedron, dict[str, Any]]:
+    """Alternates from the ellipsoid of a region, with more to keep clear of.
+
+    Returns:
+        The region as it is where Drake finds none, or one that would lose a point.
+    """
+    limits = HPolyhedron.MakeBox(scene.s_lower, scene.s_upper)
+    start, contain = _start(drake, region, points)
+    try:
+        grown, said = drake.grow(limits, start, account["epsilon"], options.max_iterations, contain)
+    except (RuntimeError, ValueError) as error:
+        return region, {**account, "warnings": [*account["warnings"], f"beside coarse volumes: {error}"]}
+    return _further(region, account, points, grown, {**said, "iterations": account["iterations"] + said["iterations"]})
+
+
 def _refined(
     drake: _Iris, region: HPolyhedron, account: dict[str, Any], points: Array, epsilon: float
 ) -> tuple[HPolyhedron, dict[str, Any]]:
@@ -104,16 +158,33 @@ def _refined(
     The faces are those nearest to the centre of the inscribed ellipsoid, which cost least of its volume, or to the seed if that centre
     is in collision.
     """
+    start, contain = _start(drake, region, points)
+    refined, said = drake.grow(region, start, epsilon, 1, contain)
+    return _further(region, account, points, refined, {**said, **{name: account[name] for name in ("termination", "iterations")}})
+
+
+def _start(drake: _Iris, region: HPolyhedron, points: Array) -> tuple[Hyperellipsoid, Array]:
+    """Returns the inscribed ellipsoid of a region, about the seed if its own centre is in collision, and the points to keep inside.
+
+    Drake lays faces through points that it keeps inside. So every point comes with one that is a little farther from the centre.
+    """
     inscribed = region.MaximumVolumeInscribedEllipsoid()
-    if drake.is_free(inscribed.center()):
-        contain = np.concatenate([points, inscribed.center()[None]])
-    else:
-        inscribed, contain = Hyperellipsoid(inscribed.A(), points[0]), points
-    refined, said = drake.grow(region, inscribed, epsilon, 1, contain)
+    center = inscribed.center()
+    if not drake.is_free(center):
+        return Hyperellipsoid(inscribed.A(), points[0]), points
+    beyond = points + _BEYOND * (points - center)
+    free = [s for s in beyond if region.PointInSet(s) and drake.is_free(s)]
+    return inscribed, np.stack([*points, *free, center])
+
+
+def _further(
+    region: HPolyhedron, account: dict[str, Any], points: Array, found: HPolyhedron, said: dict[str, Any]
+) -> tuple[HPolyhedron, dict[str, Any]]:
+    """Returns what was found with what was said of it, or the region before with its account, where a point would be lost."""
     warnings = account["warnings"] + said["warnings"]
-    if not (refined.A() @ points.T < refined.b()[:, None]).all():
+    if not (found.A() @ points.T < found.b()[:, None]).all():
         return region, {**account, "warnings": warnings}
-    return refined, {**account, "warnings": warnings, "guarantee": said["guarantee"], "epsilon": epsilon}
+    return found, {**said, "warnings": warnings}
 
 
 class _Iris:

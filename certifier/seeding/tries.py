@@ -18,7 +18,7 @@ from certifier.seeding.iris import Termination, iris
 from certifier.seeding.options import IRIS_SEEDS, SeedOptions
 from certifier.seeding.rating import Rating, rated
 
-LITTLE = 0.001
+LITTLE = 0.0002
 """A proposal of which this share is touched, or less, is taken at once, unless IRIS ended because it would have lost the seed."""
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from certifier.growth.cutting import cut
+from certifier.growth.cutting import BARELY, cut
 from certifier.model import JointKind
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.polytopes.gibbs import uniform_in_q
@@ -96,6 +96,27 @@ def test_nothing_to_cut_off_changes_nothing():
         same = cut(scene, polytope, np.zeros((1, 3)), [(ALL, points, 1.0)], polytope).polytope
         assert same.C.tolist() == polytope.C.tolist()
         assert same.d.tolist() == polytope.d.tolist()
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 2**32 - 1), st.floats(-0.9, 0.9))
+def test_a_contact_on_a_face_is_cut_off_where_it_is_asked_for(seed, share):
+    """A search comes to the very face that cut other contacts off. Rounding says which side the contact is on, and it is found again."""
+    scene, rng = planar_arm(3), np.random.default_rng(seed)
+    polytope = polytope_of(scene, rng)
+    samples = uniform_in_q(polytope, scene.revolute, 20, 10, seed % 2**31).reshape(-1, 3)
+    room = polytope.d[0] - samples @ polytope.C[0]
+    contact = samples[np.argmin(room)] + (room.min() + share * BARELY) * polytope.C[0]
+
+    def cut_off(point, beyond):
+        return cut(scene, polytope, np.zeros((1, 3)), [(ALL, point[None], 1.0)], polytope, beyond).polytope
+
+    if (polytope.d[1:] - polytope.C[1:] @ contact > 0).all():
+        smaller = cut_off(contact, BARELY)
+        assert (smaller.d - smaller.C @ contact).min() < -100 * BARELY
+        if abs(share) > 0.01:
+            assert (cut_off(contact, 0.0) is polytope) == (share > 0)
+    assert cut_off(contact + 3 * BARELY * polytope.C[0], BARELY) is polytope
 
 
 @pytest.mark.parametrize("place", [0.0, 0.5, 0.99, 1.01])

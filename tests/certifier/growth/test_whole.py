@@ -123,6 +123,22 @@ def test_where_bodies_touch_is_cut_off_and_what_holds_is_not_asked_for_again():
     assert end.outcome is Outcome.CERTIFIED
 
 
+def test_a_contact_on_a_face_does_not_end_growth():
+    """Searches come to it in every round, and faces have no part of it to cut off, until there is nothing else to do."""
+    contact = np.array([[1.0, 0.3]])
+
+    def verdict(index, action):
+        if index == 1 and action.polytope.contains(contact, 1e-9).any():
+            return Outcome.REFUTED, weak(contact)
+        return Outcome.CERTIFIED, None
+
+    made, accepted, end = drive(verdict, options(), limit=200)
+    assert (stages(made)[1][0].polytope.C @ contact[0] == stages(made)[1][0].polytope.d).any()
+    assert len(accepted) > 1
+    assert not accepted[-1].polytope.contains(contact, 1e-4).any()
+    assert end.reason == "certified"
+
+
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_growth_ends_after_so_many_stages(count):
     corner = np.array([[0.4, 0.8], [0.8, 0.4]])

@@ -41,7 +41,7 @@ def of_tries(monkeypatch, found, count, random_seed=None):
     return d[0], asked
 
 
-GOOD, BAD = Rating(10.0, 0.0005), Rating(12.0, 0.1)
+GOOD, BAD = Rating(10.0, 0.0001), Rating(12.0, 0.1)
 
 
 @pytest.mark.parametrize(

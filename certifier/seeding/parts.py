@@ -1,0 +1,80 @@
+"""IRIS keeps clear of what growth will part by faces: coarse volumes join a scene here as geometries of their own.
+
+Growth certifies a hand with the ball about it, whatever the wrist does, and cuts off where the ball touches. IRIS, which knows the ball,
+has its faces there from the beginning, at the nearest contact. So they lose less than those that growth adds (docs/measurements.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from certifier.model import Array, Geometry, Pair, Polytope, Scene, Volume
+from certifier.partition.hulls import gaps
+from certifier.partition.parted import parted
+from certifier.polytopes.gibbs import uniform_in_q
+
+CHAINS, EACH = 400, 50
+"""A polytope is looked at in this many samples of this many chains."""
+ROOM = 0.25
+"""At every point that stays inside, two volumes are farther apart than this part of the larger radius. Faces that keep nearer ones apart
+would have to pass close by the point, and cost most of the polytope."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part is a volume of any kind, and is equal to others of the same shape on the same body.
+
+    Attributes:
+        corners: the vertices' coordinates, as bytes.
+    """
+
+    body: str
+    corners: bytes
+    radius: float
+
+
+Parts = dict[tuple[Part, Part], tuple[Volume, Volume]]
+"""The volumes that join a scene, by pairs."""
+
+
+def parts_of(scene: Scene, polytope: Polytope, points: Array) -> Parts:
+    """Returns the volumes that faces keep apart on a polytope, where they are not geometries of the scene.
+
+    Left out are those without ROOM, and those that Drake has no shape for, which are hulls of balls. There the geometries themselves have
+    to do.
+
+    Args:
+        polytope: joint limits included.
+        points: (k, n) points in s that stay inside.
+
+    Raises:
+        RegionError: the polytope is empty or unbounded.
+    """
+    samples = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, 0).reshape(-1, scene.n)
+    found: Parts = {}
+    for bodies in parted(scene, polytope, samples, points):
+        if all(volume.is_geometry_of(scene) for volume in bodies.volumes):
+            continue
+        has_shape = all(volume.radius == 0 or len(volume.vertices) <= 2 for volume in bodies.volumes)
+        room = ROOM * max(volume.radius for volume in bodies.volumes)
+        if has_shape and (bodies.extent * gaps(*bodies.hulls, points) > room).all():
+            first, second = (Part(volume.body, volume.vertices.tobytes(), volume.radius) for volume in bodies.volumes)
+            found[first, second] = bodies.volumes
+    return found
+
+
+def with_parts(scene: Scene, parts: Parts) -> Scene:
+    """Returns a scene with volumes as geometries and pairs of its own. Their names begin with two slashes, as no other ones do."""
+    new: dict[Part, Geometry] = {}
+    pairs = []
+    for keys, volumes in parts.items():
+        names = []
+        for key, volume in zip(keys, volumes, strict=True):
+            if volume.is_geometry_of(scene):
+                names.append(volume.geometries[0])
+                continue
+            if key not in new:
+                new[key] = Geometry(f"//{len(new)}", volume.body, volume.vertices, volume.radius, {})
+            names.append(new[key].name)
+        pairs.append(Pair(*sorted(names)))
+    return replace(scene, geometries=(*scene.geometries, *new.values()), pairs=(*scene.pairs, *pairs))
