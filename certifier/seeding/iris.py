@@ -8,8 +8,8 @@ The algorithms are Drake's, and both grow in s through q = q* + 2 atan(s):
 Both draw the more samples the smaller epsilon is. So they run with a coarse epsilon first, and a last round with the small one begins
 with that polytope, where few collisions are left to find.
 
-Where growth will keep coarse volumes apart by faces (certifier.seeding.parts), the same algorithm goes on from the ellipsoid of the first
-polytope, and looks for contacts of these volumes too. Its last round is repeated until it knows those that matter to its polytope.
+Where growth will keep coarse volumes apart by faces (certifier.seeding.coarse_pairs), the same algorithm goes on from the ellipsoid of the
+first polytope, and looks for contacts of these volumes too. Its last round is repeated until it knows those that matter to its polytope.
 
 Werner et al., "Faster Algorithms for Growing Collision-Free Convex Polytopes in Robot Configuration Space", 2024.
 """
@@ -38,8 +38,8 @@ from certifier.model import Array, Joint, JointKind, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.polytope import drop_redundant
 from certifier.scene.drake_model import build_diagram
+from certifier.seeding.coarse_pairs import CoarsePairs, coarse_pairs_of, with_coarse_pairs
 from certifier.seeding.options import Method, SeedOptions
-from certifier.seeding.parts import Parts, parts_of, with_parts
 
 _START_RADIUS = 1e-2
 _COARSE = 0.01
@@ -93,29 +93,30 @@ def iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Arra
 
 def _region(scene: Scene, points: Array, options: SeedOptions) -> tuple[HPolyhedron, dict[str, Any]]:
     """Returns Drake's region, with the joint limits first, and the account of :func:`iris` without delta."""
-
-    def parts_now() -> Parts:
-        return parts_of(scene, scene.polytope(*_faces(scene, region)), points)
-
-    drake = _Iris(scene, options)
+    alone = drake = _Iris(scene, options)
     region, account = _coarse(drake, scene, points, options)
-    parts = parts_now()
-    if parts:
-        drake = _Iris(with_parts(scene, parts), options)
+    known = coarse = _coarse_pairs(scene, region, points)
+    if coarse:
+        drake = _Iris(with_coarse_pairs(scene, coarse), options)
         region, account = _again(drake, scene, region, account, points, options)
+        coarse = _coarse_pairs(scene, region, points)
     if options.epsilon >= account["epsilon"]:
         return region, account
-    known = parts
-    if parts:
-        parts = parts_now()
     for _ in range(_LAST_ROUNDS):
-        if parts.keys() != known.keys():
-            drake = _Iris(with_parts(scene, parts), options)
+        if coarse.keys() != known.keys():
+            drake = _Iris(with_coarse_pairs(scene, coarse), options)
         region, account = _refined(drake, region, account, points, options.epsilon)
-        known, parts = parts, parts_now()
-        if parts.keys() == known.keys():
+        known, coarse = coarse, _coarse_pairs(scene, region, points)
+        if coarse.keys() == known.keys():
             break
+    if known and account["epsilon"] > options.epsilon:  # A point would have been lost in every round, beside these volumes.
+        region, account = _refined(alone, region, account, points, options.epsilon)
     return region, account
+
+
+def _coarse_pairs(scene: Scene, region: HPolyhedron, points: Array) -> CoarsePairs:
+    """Returns the volumes that growth would part on Drake's region."""
+    return coarse_pairs_of(scene, scene.polytope(*_faces(scene, region)), points)
 
 
 def _faces(scene: Scene, region: HPolyhedron) -> tuple[Array, Array]:

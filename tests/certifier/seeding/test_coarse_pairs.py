@@ -10,10 +10,10 @@ from certifier.pair.collisions import in_collision
 from certifier.partition.hulls import gaps
 from certifier.partition.parted import parted
 from certifier.polytopes.gibbs import uniform_in_q
-from certifier.seeding import iris, parts
+from certifier.seeding import coarse_pairs, iris
+from certifier.seeding.coarse_pairs import coarse_pairs_of, with_coarse_pairs
 from certifier.seeding.iris import checker
 from certifier.seeding.options import Method, SeedOptions
-from certifier.seeding.parts import parts_of, with_parts
 from certifier.seeding.rating import rated
 
 
@@ -29,8 +29,8 @@ def hand():
 def test_drake_sees_the_volumes_that_faces_part(hand):
     """The gaps that growth goes by are the oracle. Every ball holds a hand, so what collides without the balls collides with them."""
     scene, polytope, seed, samples = hand
-    found = parts_of(scene, polytope, seed)
-    wider = with_parts(scene, found)
+    found = coarse_pairs_of(scene, polytope, seed)
+    wider = with_coarse_pairs(scene, found)
     assert len(found) == len(wider.pairs) - len(scene.pairs) > 0
     assert wider.pairs[: len(scene.pairs)] == scene.pairs
     assert wider.geometries[: len(scene.geometries)] == scene.geometries
@@ -52,8 +52,8 @@ def test_a_volume_without_room_at_a_point_that_stays_inside_is_left_out(hand, mo
     room = [one.extent * gaps(*one.hulls, seed)[0] / max(v.radius for v in one.volumes) for one in bodies]
     assert 0 < min(room) < max(room)
     for limit in (0.0, *room):
-        monkeypatch.setattr(parts, "ROOM", limit)
-        kept = {volumes[1].geometries for volumes in parts_of(scene, polytope, seed).values()}
+        monkeypatch.setattr(coarse_pairs, "ROOM", limit)
+        kept = {volumes[1].geometries for volumes in coarse_pairs_of(scene, polytope, seed).values()}
         assert kept == {one.volumes[1].geometries for one, has in zip(bodies, room, strict=True) if has > limit}
 
 
@@ -61,7 +61,7 @@ def test_a_volume_without_room_at_a_point_that_stays_inside_is_left_out(hand, mo
 def test_nothing_joins_where_growth_parts_the_geometries_themselves(name):
     scene = catalogue.scene(name)
     seed = scene.to_s(catalogue.seed(name))
-    assert parts_of(scene, scene.polytope(*catalogue.cube(seed, 0.2)), seed[None]) == {}
+    assert coarse_pairs_of(scene, scene.polytope(*catalogue.cube(seed, 0.2)), seed[None]) == {}
 
 
 def test_a_proposal_keeps_clear_of_what_growth_will_part(monkeypatch):
@@ -75,7 +75,7 @@ def test_a_proposal_keeps_clear_of_what_growth_will_part(monkeypatch):
         return rated(scene, scene.polytope(C, d), points)
 
     knowing = rating()
-    monkeypatch.setattr(iris, "parts_of", lambda *_: {})
+    monkeypatch.setattr(iris, "coarse_pairs_of", lambda *_: {})
     unknowing = rating()
     assert knowing.touched < unknowing.touched
     assert knowing.kept > unknowing.kept
@@ -97,8 +97,29 @@ def test_a_polytope_beside_coarse_volumes_that_drake_refuses_is_left_out(monkeyp
     C, d, account = iris.iris(scene, points, options)
     assert len(calls) == 2
     assert account["warnings"][-1] == "beside coarse volumes: no such luck"
-    monkeypatch.setattr(iris, "parts_of", lambda *_: {})
+    monkeypatch.setattr(iris, "coarse_pairs_of", lambda *_: {})
     calls.clear()
+    alone = iris.iris(scene, points, options)
+    assert np.array_equal(C, alone[0])
+    assert np.array_equal(d, alone[1])
+
+
+def test_where_volumes_would_cost_the_seed_the_last_round_does_without_them(monkeypatch):
+    """The answer is the one of a scene without them."""
+    scene, q = catalogue.scene("iiwa_shelf"), tuple(catalogue.seed("iiwa_shelf"))
+    points, options = scene.to_s(q)[None], SeedOptions(Method.IRIS_NP2, q=q, max_iterations=1, epsilon=0.005)
+    refined, rounds = iris._refined, []
+
+    def lost(drake, region, account, *rest):
+        rounds.append(drake._scene is scene)
+        return refined(drake, region, account, *rest) if drake._scene is scene else (region, account)
+
+    monkeypatch.setattr(iris, "_again", lambda drake, scene, region, account, *_: (region, account))
+    monkeypatch.setattr(iris, "_refined", lost)
+    C, d, account = iris.iris(scene, points, options)
+    assert rounds == [False, True]
+    assert account["epsilon"] == 0.005
+    monkeypatch.setattr(iris, "coarse_pairs_of", lambda *_: {})
     alone = iris.iris(scene, points, options)
     assert np.array_equal(C, alone[0])
     assert np.array_equal(d, alone[1])

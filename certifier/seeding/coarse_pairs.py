@@ -21,8 +21,8 @@ would have to pass close by the point, and cost most of the polytope."""
 
 
 @dataclass(frozen=True)
-class Part:
-    """A part is a volume of any kind, and is equal to others of the same shape on the same body.
+class Shape:
+    """The shape of a volume and the body that it is fixed to.
 
     Attributes:
         corners: the vertices' coordinates, as bytes.
@@ -33,11 +33,11 @@ class Part:
     radius: float
 
 
-Parts = dict[tuple[Part, Part], tuple[Volume, Volume]]
-"""The volumes that join a scene, by pairs."""
+CoarsePairs = dict[tuple[Shape, Shape], tuple[Volume, Volume]]
+"""The shapes of two volumes that faces keep apart -> the volumes."""
 
 
-def parts_of(scene: Scene, polytope: Polytope, points: Array) -> Parts:
+def coarse_pairs_of(scene: Scene, polytope: Polytope, points: Array) -> CoarsePairs:
     """Returns the volumes that faces keep apart on a polytope, where they are not geometries of the scene.
 
     Left out are those without ROOM, and those that Drake has no shape for, which are hulls of balls. There the geometries themselves have
@@ -51,23 +51,23 @@ def parts_of(scene: Scene, polytope: Polytope, points: Array) -> Parts:
         RegionError: the polytope is empty or unbounded.
     """
     samples = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, 0).reshape(-1, scene.n)
-    found: Parts = {}
+    found: CoarsePairs = {}
     for bodies in parted(scene, polytope, samples, points):
         if all(volume.is_geometry_of(scene) for volume in bodies.volumes):
             continue
         has_shape = all(volume.radius == 0 or len(volume.vertices) <= 2 for volume in bodies.volumes)
         room = ROOM * max(volume.radius for volume in bodies.volumes)
         if has_shape and (bodies.extent * gaps(*bodies.hulls, points) > room).all():
-            first, second = (Part(volume.body, volume.vertices.tobytes(), volume.radius) for volume in bodies.volumes)
+            first, second = (Shape(volume.body, volume.vertices.tobytes(), volume.radius) for volume in bodies.volumes)
             found[first, second] = bodies.volumes
     return found
 
 
-def with_parts(scene: Scene, parts: Parts) -> Scene:
+def with_coarse_pairs(scene: Scene, coarse: CoarsePairs) -> Scene:
     """Returns a scene with volumes as geometries and pairs of its own. Their names begin with two slashes, as no other ones do."""
-    new: dict[Part, Geometry] = {}
+    new: dict[Shape, Geometry] = {}
     pairs = []
-    for keys, volumes in parts.items():
+    for keys, volumes in coarse.items():
         names = []
         for key, volume in zip(keys, volumes, strict=True):
             if volume.is_geometry_of(scene):
