@@ -1,5 +1,6 @@
 """What growth parts by faces joins a scene for IRIS: balls that hold the hand, where they have room, and the geometries stay."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -51,7 +52,8 @@ def test_a_volume_without_room_at_a_point_that_stays_inside_is_left_out(hand, mo
     bodies = [one for one in parted(scene, polytope, samples, seed) if not all(v.is_geometry_of(scene) for v in one.volumes)]
     room = [one.extent * gaps(*one.hulls, seed)[0] / max(v.radius for v in one.volumes) for one in bodies]
     assert 0 < min(room) < max(room)
-    for limit in (0.0, *room):
+    ways = sorted(room)
+    for limit in (0.0, *((a + b) / 2 for a, b in itertools.pairwise(ways) if b - a > 1e-3), 1 + ways[-1]):
         monkeypatch.setattr(coarse_pairs, "ROOM", limit)
         kept = {volumes[1].geometries for volumes in coarse_pairs_of(scene, polytope, seed).values()}
         assert kept == {one.volumes[1].geometries for one, has in zip(bodies, room, strict=True) if has > limit}
