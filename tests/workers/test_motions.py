@@ -119,7 +119,7 @@ def test_another_worker_begins_again_when_one_is_killed(client: TestClient, plan
 
 
 def test_cancelling_ends_the_search(client: TestClient, planar: Scene) -> None:
-    job_id = asked(client, planar, **long())
+    job_id = submit(planar, long(3 * LAPS))
     running(job_id)
     client.post(f"/v1/jobs/{job_id}/cancel")
     job = ended(job_id, seconds=30)
