@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
+from benchmarks import catalogue
 from certifier.kinematics import Kinematics
 from certifier.model import Volume
 from certifier.outcome import Outcome
@@ -278,3 +279,18 @@ def test_a_pair_of_two_chains_that_touches_is_refuted():
     scene, _, index = two_wrists()
     result = CellCertification(scene, scene.polytope([], [])).certify(index, CELLS)
     assert result.outcome is Outcome.REFUTED, result
+
+
+def test_cells_are_not_cut_for_ever_in_joints_in_which_they_are_narrow(monkeypatch):
+    """A ball about links 6 and 7 touches a board which link 7's own ball, 22 mm away, does not. It hardly moves with joint 6, which is wide
+    in all cells, so cutting the other joints for it does not end."""
+    scene, region = catalogue.scene("iiwa_dense_cupboard"), catalogue.region("iiwa_dense_cupboard", "wide")
+    names = {"iiwa/link_7/ball4", "world/cupboard5"}
+    (index,) = (i for i, pair in enumerate(scene.pairs) if {pair.a, pair.b} == names)
+    polytope = scene.polytope(region.C, region.d)
+    result = CellCertification(scene, polytope).certify(index, 6000)
+    assert result.outcome is Outcome.CERTIFIED
+    monkeypatch.setattr(search, "NARROW_CUT", 0.0)
+    unending = CellCertification(scene, polytope).certify(index, 6000)
+    assert unending.outcome is Outcome.INCONCLUSIVE
+    assert unending.open_cells > 1000
