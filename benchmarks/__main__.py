@@ -154,7 +154,8 @@ def _parser() -> ArgumentParser:
     surveyed = kinds.add_parser("survey", parents=[as_json], help="certify every pair of every scene on every region")
     surveyed.add_argument("scenes", nargs="*", metavar="SCENE", default=list(catalogue.SCENES), help="default: all")
     surveyed.add_argument("--most", type=float, default=5.0, metavar="SECONDS", help="leave pairs with a longer forecast out; default 5")
-    surveyed.add_argument("--cells", type=_count, default=1, metavar="N", help="certify cell by cell, with so many cells of a pair at most")
+    by_cells = "certify cell by cell, with so many cells of a pair, and 20 times as many where it stays open"
+    surveyed.add_argument("--cells", type=_count, default=1, metavar="N", help=by_cells)
     served = kinds.add_parser("service", parents=[as_json], help="measure the service beside --local")
     served.add_argument("example", nargs="?", default="iiwa_shelf", metavar="EXAMPLE", help="default iiwa_shelf")
     served.add_argument("--processes", type=_count, default=1, metavar="N", help="number of the service's solving processes; default 1")

@@ -28,6 +28,9 @@ from certifier.proof.pair import PairProof
 
 DECIDED = (Outcome.CERTIFIED, Outcome.REFUTED, Outcome.NOT_CERTIFIABLE, Outcome.TOO_CLOSE)
 
+AGAIN = 20
+"""A pair that is open after its cells is certified again with so many times as many."""
+
 SizeClass = tuple[int, tuple[int, int], tuple[int, int]]
 """A size class is the number of joints that the plane moves with, the numbers of vertices of A and B, and the dimensions N of their
 polynomial spaces.
@@ -39,7 +42,8 @@ def survey(names: Iterable[str], most: float, progress: Progress, cells: int = 1
 
     Args:
         most: seconds; pairs with a longer forecast of the program (11) are left out, and counted.
-        cells: so many cells of a pair are looked at; 1 for the program (11). Only its times are compared with the forecast.
+        cells: so many cells of a pair are looked at, and AGAIN times as many where it is open after them; 1 for the program (11). Only
+            its times are compared with the forecast.
     """
     counts, undecided = [], []
     spent: dict[SizeClass, list[float]] = defaultdict(list)
@@ -77,7 +81,7 @@ def _certified(scene: Scene, region: Region, cells: int) -> Iterator[tuple[PairR
     if cells == 1:
         certify = Certification(scene, polytope, region.center).certify
     else:
-        certify = partial(CellCertification(scene, polytope).certify, cells=cells)
+        certify = partial(_until_decided, CellCertification(scene, polytope), cells)
     for index in range(len(scene.pairs)):
         start = time.process_time()
         try:
@@ -85,6 +89,11 @@ def _certified(scene: Scene, region: Region, cells: int) -> Iterator[tuple[PairR
         except Exception as error:
             result = PairResult(Outcome.ERROR, Stage.SOS, detail=repr(error))
         yield result, time.process_time() - start
+
+
+def _until_decided(certification: CellCertification, cells: int, index: int) -> PairResult:
+    result = certification.certify(index, cells)
+    return certification.certify(index, AGAIN * cells) if result.outcome is Outcome.INCONCLUSIVE else result
 
 
 def _sizes(scene: Scene) -> list[SizeClass]:

@@ -18,8 +18,9 @@ from certifier.carry.robot import same_bodies
 from certifier.errors import CirisError
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD
-from certifier.outcome import Outcome
+from certifier.outcome import Outcome, Stage
 from certifier.pair.closest import closest
+from certifier.pair.result import PairResult
 from certifier.scene import load_scene
 from certifier.verify.scene import check_scene
 from tests.services import Postgres
@@ -194,6 +195,21 @@ def test_figures_cover_the_boxes_they_stand_for() -> None:
             points = rng.dirichlet(np.ones(8), 200) @ link.vertices
             reach = [np.linalg.norm(points - ball.vertices[0], axis=1) - ball.radius for ball in balls if ball.body == link.body]
             assert np.min(reach, axis=0).max() <= 0
+
+
+@pytest.mark.parametrize(("needed", "asked", "undecided"), [(5, [10], 0), (150, [10, 200], 0), (300, [10, 200], 1)])
+def test_the_survey_tries_again_what_stays_open(monkeypatch: pytest.MonkeyPatch, needed: int, asked: list[int], undecided: int) -> None:
+    given: list[int] = []
+
+    def certify(_: Any, index: int, cells: int) -> PairResult:
+        given.append(cells)
+        return PairResult(Outcome.CERTIFIED if cells >= needed else Outcome.INCONCLUSIVE, Stage.CELLS, detail="open")
+
+    monkeypatch.setattr(survey.CellCertification, "certify", certify)
+    monkeypatch.setattr(catalogue, "REGIONS", {"tiny": catalogue.REGIONS["tiny"]})
+    document = survey.survey(["planar_2dof"], 5.0, lambda _: None, cells=10)
+    assert given == asked * 6
+    assert len(document["undecided"]) == 6 * undecided
 
 
 def test_the_survey_decides_every_pair() -> None:
