@@ -91,7 +91,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "path": lambda args, screen: path.path(args.scenes, args.motions, screen.line),
     "agreement": lambda args, screen: agreement.campaign(agreement.questions(), screen.line),
     "scaling": lambda args, screen: scaling.curves(args.against is not None, screen.line),
-    "service": lambda args, screen: service.beside_local(args.example, args.processes, args.turns, screen.line),
+    "service": lambda args, screen: service.beside_local(args.scenes, args.postgresql, args.processes, args.turns, screen.line),
     "store": lambda args, screen: store.store(args.postgresql, store.COUNTS, screen.line),
     "fleet": lambda args, screen: fleet.fleet(
         args.postgresql, args.workers, args.pieces, args.seconds, args.limit, args.processes, screen.line
@@ -157,7 +157,8 @@ def _parser() -> ArgumentParser:
     by_cells = "certify cell by cell, with so many cells of a pair, and 20 times as many where it stays open"
     surveyed.add_argument("--cells", type=_count, default=1, metavar="N", help=by_cells)
     served = kinds.add_parser("service", parents=[as_json], help="measure the service beside --local")
-    served.add_argument("example", nargs="?", default="iiwa_shelf", metavar="EXAMPLE", help="default iiwa_shelf")
+    served.add_argument("scenes", nargs="*", default=["iiwa_shelf"], metavar="EXAMPLE", help="default iiwa_shelf")
+    served.add_argument("--postgresql", metavar="URL", help="measure the service with this empty PostgreSQL database too, besides SQLite")
     served.add_argument("--processes", type=_count, default=1, metavar="N", help="number of the service's solving processes; default 1")
     served.add_argument("--turns", type=_count, default=5, metavar="N", help="how often each is run; default 5")
     stored = kinds.add_parser("store", parents=[as_json], help="measure what the database takes for a pair in jobs of 1000 and of 100000")

@@ -27,8 +27,6 @@ from certifier.jobs.reference import Reference
 from certifier.jobs.share import SampledProposal
 from certifier.model import Array, Scene
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume, volume_in_q
-from certifier.proof.partition import PartitionProof
-from certifier.proof.region import RegionProof
 from certifier.seeding.iris import checker
 from certifier.seeding.options import SeedOptions
 from certifier.seeding.propose import check_seed
@@ -172,7 +170,7 @@ def _grown(name: str, seed: dict[str, Any], options: dict[str, Any], limit: floa
         "seeding_seconds": manifest["provenance"]["seeding_seconds"],
         "verify_seconds": time.perf_counter() - again,
         "proof_bytes": len(region.proof),
-        "leaves": _leaves(region.proof),
+        "leaves": measure.cells(region.proof),
         "share": manifest["share"]["value"],
         "share_stderr": manifest["share"]["stderr"],
         "q_volume": manifest["q_volume"]["value"],
@@ -189,14 +187,8 @@ def _stopwatch() -> Callable[[], dict[str, float]]:
     return lambda: {"seconds": time.perf_counter() - start, "processor_seconds": time.process_time() - processor}
 
 
-def _leaves(data: bytes) -> int:
-    """Returns how many cells the partitions in a region's proof have."""
-    proofs = RegionProof.from_bytes(data).proofs
-    return sum(int((proof.nodes < 0).sum()) for proof in proofs if isinstance(proof, PartitionProof))
-
-
 def _proposed(name: str) -> dict[str, Any]:
-    """Measures Drake's IrisNp2 in s, called once as its users call it, with the limits of our seeding.
+    """Measures Drake's IrisNp2 in s, called once as its users call it, with the limits of our seeding but its own tolerance.
 
     The region is not certified; ``ended`` says which part of its q-volume is in collision.
     """
@@ -213,7 +205,7 @@ def _proposed(name: str) -> dict[str, Any]:
         check_seed(scene, seed)
         start = Hyperellipsoid.MakeHypersphere(START_RADIUS, scene.to_s(seed))
         region = IrisNp2(robot, start, HPolyhedron.MakeBox(scene.s_lower, scene.s_upper), options)
-    except (CirisError, RuntimeError) as error:
+    except (CirisError, RuntimeError, ValueError) as error:
         return {**spent(), "ellipsoid": 0.0, "faces": 0, "curve": [], "ended": str(error)}
     took = spent()
     polytope = scene.polytope(region.A(), region.b())
@@ -225,7 +217,7 @@ def _proposed(name: str) -> dict[str, Any]:
         "share_stderr": 0.0,
         "q_volume": volume_in_q(polytope, scene.revolute, volume(polytope, 0), 0)[0],
         "ellipsoid": inscribed_ellipsoid(polytope).volume,
-        "faces": len(region.b()) - 2 * scene.n,
+        "faces": len(region.b()),
         "curve": [],
         "ended": f"not certified; of {found.free.size} samples {int((~found.free).sum())} are in collision",
     }

@@ -23,6 +23,8 @@ from certifier.pair.certification import Certification
 from certifier.pair.result import PairResult
 from certifier.proof.negative import DualProof, WitnessProof
 from certifier.proof.pair import PairProof
+from certifier.proof.partition import PartitionProof
+from certifier.proof.region import RegionProof
 from certifier.verify.dual import verify_dual
 from certifier.verify.pair import PairCheck
 from certifier.verify.witness import verify_witness
@@ -42,6 +44,12 @@ def machine() -> dict[str, Any]:
         "python": platform.python_version(),
         "versions": {package: version(package) for package in PACKAGES},
     }
+
+
+def cells(data: bytes) -> int:
+    """Returns how many cells the partitions in a region's proof file have."""
+    proofs = RegionProof.from_bytes(data).proofs
+    return sum(int((proof.nodes < 0).sum()) for proof in proofs if isinstance(proof, PartitionProof))
 
 
 @dataclass(frozen=True)

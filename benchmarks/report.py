@@ -200,28 +200,26 @@ def _scaling(document: Document) -> list[str]:
 
 
 def _service(document: Document) -> list[str]:
-    parts = {"seeding_seconds": "seeding", "pair_seconds": "pairs", "besides_seconds": "besides"}
-    columns = {"seconds": "the command", **parts, "processor_seconds": "processor time", "stolen_seconds": "stolen by the host"}
-    rows = [[str(row["turn"]), row["way"], *(f"{row[key]:.1f}" for key in columns)] for row in document["rows"]]
-    sums = [
+    columns = {"seconds": "the command", "seeding_seconds": "seeding", "processor_seconds": "processor time", "stolen_seconds": "stolen"}
+    rows = [[row["scene"], str(row["turn"]), row["way"], *(f"{row[key]:.1f}" for key in columns)] for row in document["rows"]]
+    more = [
         [
-            columns[key],
-            *(f"{median:.1f}" for median in more["medians"].values()),
-            _percent(more["share"]),
-            ", ".join(map(_percent, more["each"])),
+            row["scene"],
+            row["way"],
+            str(row["cells"]),
+            f"{row['seconds']:+.1f}",
+            f"{row['processor_seconds']:+.1f}",
+            f"{row['cell_ms']:+.2f}",
         ]
-        for key, more in document["more"].items()
+        for row in document["more"]
     ]
     many = "one solving process" if document["processes"] == 1 else f"{document['processes']} solving processes"
     return [
-        f"{document['scene']}, {many}, seconds.",
-        _table(["turn", "way", *columns.values()], rows),
-        _table(["", "service, median", "--local, median", "more, of --local's command", "in each turn"], sums),
+        f"With {many}, in seconds.",
+        _table(["example", "turn", "way", *columns.values()], rows),
+        "What the service takes more than `--local`, by the medians.",
+        _table(["example", "database", "cells", "more, s", "more processor time, s", "of a cell of the proof, ms"], more),
     ]
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:+.1f} %"
 
 
 def _store(document: Document) -> list[str]:

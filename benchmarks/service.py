@@ -1,6 +1,7 @@
-"""This module measures what the service costs beside ``--local``.
+"""This module measures what the service costs beside ``--local``, on each database.
 
-It runs ``ciris grow`` and ``ciris grow --local`` on the same example in turn, and takes their time by the clock and in processor time.
+It runs ``ciris grow`` and ``ciris grow --local`` on the same example in turn, and takes their time by the clock and in processor time. The
+server of PostgreSQL is none of the service's processes, so its processor time is not counted.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -25,7 +26,8 @@ from benchmarks.measure import Progress
 from certifier.errors import CirisError
 
 CIRIS = [sys.executable, "-P", "-m", "client.cli"]
-SERVICE, LOCAL = "service", "--local"
+SQLITE, POSTGRESQL, LOCAL = "SQLite", "PostgreSQL", "--local"
+"""The ways: the service with either database, and no service."""
 
 
 @dataclass(frozen=True)
@@ -36,51 +38,68 @@ class Service:
     url: str
 
 
-def beside_local(name: str, processes: int, turns: int, progress: Progress) -> dict[str, Any]:
-    """Grows the example's region in both ways, ``turns`` times, and returns the document of ``ciris bench service``.
+def beside_local(names: list[str], postgresql: str | None, processes: int, turns: int, progress: Progress) -> dict[str, Any]:
+    """Grows a region of every example in all ways, ``turns`` times, and returns the document of ``ciris bench service``.
 
-    The way that comes first changes with every turn. Both ways do the same computations for seeding and pairs. On a machine that others
+    The way that comes first changes with every turn. All ways do the same computations for seeding and pairs. On a machine that others
     share, the time of these varies by more than all the rest takes.
 
+    Args:
+        postgresql: the URL of an empty database; None to measure SQLite alone.
+
     Raises:
-        CirisError: the service does not start, a command fails, or the two come to different regions.
+        CirisError: the service does not start, a command fails, or two ways come to different regions.
     """
     rows: list[dict[str, Any]] = []
-    with tempfile.TemporaryDirectory() as directory, running(Path(directory) / "data", processes) as service:
-        for turn in range(turns):
-            for way in (SERVICE, LOCAL) if turn % 2 == 0 else (LOCAL, SERVICE):
-                rows.append({"turn": turn, "way": way, **_grown(name, way, service, Path(directory), processes)})
-                if rows[-1]["ellipsoid"] != rows[0]["ellipsoid"]:
-                    raise CirisError("regions_differ", f"the runs came to different regions of {name}")
-                progress(_line(rows[-1]))
-    return {
-        "benchmark": "service",
-        "machine": measure.machine(),
-        "scene": name,
-        "processes": processes,
-        "rows": rows,
-        "more": {what: _more(rows, what) for what in ("seconds", "besides_seconds", "processor_seconds")},
-    }
+    with ExitStack() as stack:
+        directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        services = {SQLITE: stack.enter_context(running(directory / "data", processes))}
+        if postgresql is not None:
+            services[POSTGRESQL] = stack.enter_context(running(directory / "other", processes, postgresql))
+        ways = [*services, LOCAL]
+        for name in names:
+            volumes = set()
+            for turn in range(turns):
+                first = turn % len(ways)
+                for way in ways[first:] + ways[:first]:
+                    row = {"scene": name, "turn": turn, "way": way, **_grown(name, services.get(way), directory, processes)}
+                    progress(_line(row))
+                    rows.append(row)
+                    volumes.add(row["ellipsoid"])
+                    if len(volumes) > 1:
+                        raise CirisError("regions_differ", f"the runs came to different regions of {name}")
+    more = [row for name in names for row in _more(name, [row for row in rows if row["scene"] == name])]
+    return {"benchmark": "service", "machine": measure.machine(), "processes": processes, "rows": rows, "more": more}
 
 
-def _more(rows: list[dict[str, Any]], what: str) -> dict[str, Any]:
-    """Returns the medians, and how much more the service takes in every turn, as a share of that turn's ``--local`` command's seconds."""
-    by_way = {way: [row for row in sorted(rows, key=lambda row: row["turn"]) if row["way"] == way] for way in (SERVICE, LOCAL)}
-    shares = [(mine[what] - other[what]) / other["seconds"] for mine, other in zip(by_way[SERVICE], by_way[LOCAL], strict=True)]
-    medians = {way: statistics.median(row[what] for row in found) for way, found in by_way.items()}
-    return {"medians": medians, "share": statistics.median(shares), "each": shares}
+def _more(name: str, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Returns, for either database, how much more the service takes than ``--local``, by the medians; also for one cell of the proof."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        found.setdefault(row["way"], []).append(row)
+    local, cells = found.pop(LOCAL), rows[0]["cells"]
+    more = []
+    for way, served in found.items():
+        seconds, processor = (_median(served, what) - _median(local, what) for what in ("seconds", "processor_seconds"))
+        per_cell = 1e3 * processor / cells
+        more.append({"scene": name, "way": way, "cells": cells, "seconds": seconds, "processor_seconds": processor, "cell_ms": per_cell})
+    return more
 
 
-def _grown(name: str, way: str, service: Service, directory: Path, processes: int) -> dict[str, Any]:
-    """Runs one command. Returns its seconds, those besides seeding and pairs, and the processor time of the command and the service."""
+def _median(rows: list[dict[str, Any]], what: str) -> float:
+    return statistics.median(row[what] for row in rows)
+
+
+def _grown(name: str, service: Service | None, directory: Path, processes: int) -> dict[str, Any]:
+    """Runs one command, ``--local`` without a service. Returns its seconds, and the processor time of the command and the service."""
     proof = directory / "proof"
     proof.unlink(missing_ok=True)
     command = [*CIRIS, "grow", str(catalogue.ROOT / "examples" / name / "scene.yaml"), "--json", "--out", str(proof)]
-    command += [LOCAL] if way == LOCAL else ["--url", service.url]
-    before, start, busy = _stolen(), time.perf_counter(), _processor_seconds(service.pid)
+    command += [LOCAL] if service is None else ["--url", service.url]
+    before, start, busy = _stolen(), time.perf_counter(), 0.0 if service is None else _processor_seconds(service.pid)
     # ``--local`` uses all cores it may, so it may use as many as the service.
     allowed = set(sorted(os.sched_getaffinity(0))[:processes])
-    fewer = partial(os.sched_setaffinity, 0, allowed) if way == LOCAL else None
+    fewer = partial(os.sched_setaffinity, 0, allowed) if service is None else None
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=fewer) as process:
         assert process.stdout is not None
         assert process.stderr is not None
@@ -90,22 +109,21 @@ def _grown(name: str, way: str, service: Service, directory: Path, processes: in
     if process.returncode != 0:
         raise CirisError("command_failed", f"{' '.join(command)} ended with {process.returncode}: {said.strip()[-300:]}")
     seconds, document = time.perf_counter() - start, json.loads(output)
-    parts = document["provenance"]
+    served = 0.0 if service is None else _processor_seconds(service.pid) - busy
     return {
         "seconds": seconds,
-        "seeding_seconds": parts["seeding_seconds"],
-        "pair_seconds": parts["pair_seconds"],
-        "besides_seconds": seconds - parts["seeding_seconds"] - parts["pair_seconds"],
-        "processor_seconds": usage.ru_utime + usage.ru_stime + _processor_seconds(service.pid) - busy,
+        "seeding_seconds": document["provenance"]["seeding_seconds"],
+        "processor_seconds": usage.ru_utime + usage.ru_stime + served,
         "stolen_seconds": _stolen() - before,
+        "cells": measure.cells(proof.read_bytes()),
         "ellipsoid": document["volume"]["ellipsoid"],
     }
 
 
 @contextmanager
-def running(data: Path, processes: int) -> Iterator[Service]:
-    """Runs a separate service while the block runs, with its data in a directory of its own."""
-    own = {"CIRIS_SOLVE_PROCESSES": str(processes)}
+def running(data: Path, processes: int, postgresql: str | None = None) -> Iterator[Service]:
+    """Runs a separate service while the block runs, with its data in a directory of its own, or in this PostgreSQL database."""
+    own = {"CIRIS_SOLVE_PROCESSES": str(processes)} | ({} if postgresql is None else {"CIRIS_DATABASE_URL": postgresql})
     environment = {name: value for name, value in os.environ.items() if not name.startswith("CIRIS_")} | own
     command = [*CIRIS, "up", "--data", str(data), "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
@@ -141,7 +159,5 @@ def _stolen() -> float:
 
 
 def _line(row: dict[str, Any]) -> str:
-    return (
-        f"{row['turn']} {row['way']}: {row['seconds']:.1f} s, {row['besides_seconds']:.1f} of them besides seeding and pairs, "
-        f"{row['processor_seconds']:.1f} s of processor time, {row['stolen_seconds']:.1f} s stolen"
-    )
+    took = f"{row['seconds']:.1f} s, {row['processor_seconds']:.1f} s of processor time, {row['stolen_seconds']:.1f} s stolen"
+    return f"{row['scene']}, {row['turn']} {row['way']}: {took}; {row['cells']} cells"

@@ -97,7 +97,9 @@ class Seed(Request):
     half_width: Real | None = Field(None, description="Half the edge length of the first polytope, in s; for the method `box`.")
     epsilon: Real | None = Field(None, description="Largest fraction of the volume that IRIS may leave in collision.")
     delta: Real | None = Field(None, description="Probability with which IRIS may be wrong about `epsilon`.")
-    max_iterations: int | None = Field(None, description="Number of IRIS' alternations between faces and ellipsoid.")
+    max_iterations: int | None = Field(
+        None, description="At most so many alternations of IRIS between faces and ellipsoid, and as many beside balls about a hand."
+    )
     max_iterations_separating_planes: int | None = Field(
         None, description="Number of rounds in which IRIS adds faces, within each alternation."
     )

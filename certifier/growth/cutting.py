@@ -98,6 +98,12 @@ def cut(
     C, d = polytope.C, polytope.d.copy()
     blocked = False
     made = []
+
+    def cutting_off(near: Array, J: list[int]) -> list[_Face]:
+        faces = [*_moved_in(C, d, limits, near, J, keep, scale), *_new(near, J, keep, samples, scale)]
+        # Where a point to keep is too near, a face would hardly move, and the same points would have to go again and again.
+        return [face for face in faces if (near @ face.row >= face.offset + beyond).all()]
+
     for joints, points, most in corners:
         J, left_to_lose = list(joints), most
         losses: list[tuple[float, Array]] = []
@@ -108,10 +114,10 @@ def cut(
             distance = np.linalg.norm((left - left[0])[:, J] / scale[J], axis=1)
             near = left[np.argsort(distance, kind="stable")[:MOST_POINTS]]
             near = near[: max(1, int((np.sort(distance)[:MOST_POINTS] < CORNER).sum()))]
-            faces = [*_moved_in(C, d, limits, near, J, keep, scale), *_new(near, J, keep, samples, scale)]
+            faces = cutting_off(near, J)
             if not faces and len(near) > 1:
                 near = near[:1]
-                faces = [*_moved_in(C, d, limits, near, J, keep, scale), *_new(near, J, keep, samples, scale)]
+                faces = cutting_off(near, J)
             rated = [(face, float((samples @ face.row > face.offset).mean())) for face in faces]
             cheap = [(face, loss) for face, loss in rated if loss <= left_to_lose]
             if not cheap:

@@ -55,7 +55,7 @@ def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> Levels:
 
     Of two chains, there is one for every number of joints with which balls are apart at most configurations. So slim levels do not go when
     faces make fatter ones come apart at all that are looked at. These still touch in corners, where faces that part them lose far more
-    (docs/measurements.md).
+    (docs/trials.md).
 
     Args:
         frame: any body; distances are computed in its frame.

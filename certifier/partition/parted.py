@@ -16,20 +16,27 @@ from certifier.partition.shared import Shared
 from certifier.partition.together import THIN, together, volumes_of
 
 
+def long_pairs(scene: Scene) -> list[int]:
+    """Returns the indices of the pairs that LONG joints move or more."""
+    kinematics = Kinematics.of(scene)
+    bodies_of = [(scene.geometry(pair.a).body, scene.geometry(pair.b).body) for pair in scene.pairs]
+    return [index for index, (a, b) in enumerate(bodies_of) if len(kinematics.chain(a, b)) >= LONG]
+
+
 def parted(scene: Scene, polytope: Polytope, samples: Array, keep: Array) -> list[Bodies]:
-    """Returns the volumes that faces keep apart, of every pair that LONG joints move or more; pairs that are certified as one have two.
+    """Returns the volumes that faces keep apart, of every pair that LONG joints move or more.
+
+    Pairs that are certified as one have the same volumes, which are returned once.
 
     Args:
         polytope: joint limits included.
-        samples: (S, n) points of the polytope.
+        samples: (k, n) of the polytope, uniform in q.
         keep: (k, n) configurations that stay inside.
 
     Raises:
         RegionError: the polytope is empty or unbounded.
     """
-    kinematics = Kinematics.of(scene)
-    bodies_of = [(scene.geometry(pair.a).body, scene.geometry(pair.b).body) for pair in scene.pairs]
-    long = [index for index, (a, b) in enumerate(bodies_of) if len(kinematics.chain(a, b)) >= LONG]
+    long = long_pairs(scene)
     if not long:
         return []
     area = Area.of(scene, polytope, 0)

@@ -43,8 +43,9 @@ NARROW_COARSE = np.radians(15.0)
 """A cell that turns less than this in every joint that moves the coarse volumes, or has neither a plane nor a sample, is not cut for
 them any more."""
 NARROW_CUT = np.radians(7.0)
-"""Nor is a cell cut for coarse volumes, but those that faces part, in a joint in which it turns less than this. A joint next to a volume
-may turn as far as it likes: the volume hardly moves for it, and cuts in others would go on for ever."""
+"""A cell is not cut for coarse volumes in a joint in which it turns less than this. A joint next to a volume may turn as far as it likes:
+the volume hardly moves for it, and cuts in others would go on for ever. There are two exceptions: volumes that faces part, and bodies of
+two chains, whose next level has more joints, and far too many cells (docs/trials.md)."""
 FEW_JOINTS, NARROWER = 6, np.radians(30.0)
 """Where more than FEW_JOINTS move one body against the other, a cell without a sample is cut for them until it turns less than NARROWER."""
 SAVED, MOST_PARTED, NARROW_PARTED = 2, 6, np.radians(3.5)
@@ -209,7 +210,7 @@ class Search:
             if self._worth_a_cut(cell, bodies, tried.found):
                 if tried.joint is None:
                     tried.joint = self._cut(cell, bodies, tried.found)
-                if bodies is self.parted or self._turn(cell, bodies)[tried.joint] > NARROW_CUT:
+                if bodies is self.parted or self._two_chains or self._turn(cell, bodies)[tried.joint] > NARROW_CUT:
                     return tried.joint, tried.found.points
             cell.node.level = level
         found = self.bodies.separate(cell, start)

@@ -1,7 +1,7 @@
 """IRIS keeps clear of what growth will part by faces: coarse volumes join a scene here as geometries of their own.
 
 Growth certifies a hand with the ball about it, whatever the wrist does, and cuts off where the ball touches. IRIS, which knows the ball,
-has its faces there from the beginning, at the nearest contact. So they lose less than those that growth adds (docs/measurements.md).
+has its faces there from the beginning, at the nearest contact. So they lose less than those that growth adds (docs/trials.md).
 """
 
 from __future__ import annotations
@@ -10,11 +10,10 @@ from dataclasses import dataclass, replace
 
 from certifier.model import Array, Geometry, Pair, Polytope, Scene, Volume
 from certifier.partition.hulls import gaps
-from certifier.partition.parted import parted
+from certifier.partition.parted import long_pairs, parted
 from certifier.polytopes.gibbs import uniform_in_q
+from certifier.seeding.rating import CHAINS, EACH
 
-CHAINS, EACH = 400, 50
-"""A polytope is looked at in this many samples of this many chains."""
 ROOM = 0.25
 """At every point that stays inside, two volumes are farther apart than this part of the larger radius. Faces that keep nearer ones apart
 would have to pass close by the point, and cost most of the polytope."""
@@ -50,8 +49,10 @@ def coarse_pairs_of(scene: Scene, polytope: Polytope, points: Array) -> CoarsePa
     Raises:
         RegionError: the polytope is empty or unbounded.
     """
-    samples = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, 0).reshape(-1, scene.n)
     found: CoarsePairs = {}
+    if not long_pairs(scene):
+        return found
+    samples = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, 0).reshape(-1, scene.n)
     for bodies in parted(scene, polytope, samples, points):
         if all(volume.is_geometry_of(scene) for volume in bodies.volumes):
             continue
@@ -74,7 +75,10 @@ def with_coarse_pairs(scene: Scene, coarse: CoarsePairs) -> Scene:
                 names.append(volume.geometries[0])
                 continue
             if key not in new:
-                new[key] = Geometry(f"//{len(new)}", volume.body, volume.vertices, volume.radius, {})
+                corners = volume.vertices
+                if (corners == corners[0]).all():  # Drake knows no capsule without length.
+                    corners = corners[:1]
+                new[key] = Geometry(f"//{len(new)}", volume.body, corners, volume.radius, {})
             names.append(new[key].name)
         pairs.append(Pair(*sorted(names)))
     return replace(scene, geometries=(*scene.geometries, *new.values()), pairs=(*scene.pairs, *pairs))

@@ -9,7 +9,8 @@ Both draw the more samples the smaller epsilon is. So they run with a coarse eps
 with that polytope, where few collisions are left to find.
 
 Where growth will keep coarse volumes apart by faces (certifier.seeding.coarse_pairs), the same algorithm goes on from the ellipsoid of the
-first polytope, and looks for contacts of these volumes too. Its last round is repeated until it knows those that matter to its polytope.
+first polytope, and looks for contacts of these volumes too. Its last round is repeated, a few times at most, until it knows those that
+matter to its polytope.
 
 Werner et al., "Faster Algorithms for Growing Collision-Free Convex Polytopes in Robot Configuration Space", 2024.
 """
@@ -47,7 +48,7 @@ _COARSE = 0.01
 _BEYOND = 0.05
 """So much farther from the ellipsoid's centre than a point is another one that has to stay inside with it."""
 _LAST_ROUNDS = 3
-"""The last round is repeated so many times at most."""
+"""There are so many last rounds at most beside coarse volumes."""
 
 
 class Termination(StrEnum):
@@ -75,7 +76,7 @@ def iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Arra
 
     Returns:
         (C, d, account); the account's keys are guarantee, termination, iterations, epsilon, delta, warnings. The epsilon is the coarse one
-        where the last round would have cut a point off.
+        where the last round failed or would have cut a point off.
 
     Raises:
         RegionError: ``seeding_failed`` with Drake's words.
@@ -99,9 +100,10 @@ def _region(scene: Scene, points: Array, options: SeedOptions) -> tuple[HPolyhed
     if coarse:
         drake = _Iris(with_coarse_pairs(scene, coarse), options)
         region, account = _again(drake, scene, region, account, points, options)
-        coarse = _coarse_pairs(scene, region, points)
     if options.epsilon >= account["epsilon"]:
         return region, account
+    if known:
+        coarse = _coarse_pairs(scene, region, points)
     for _ in range(_LAST_ROUNDS):
         if coarse.keys() != known.keys():
             drake = _Iris(with_coarse_pairs(scene, coarse), options)
@@ -109,7 +111,7 @@ def _region(scene: Scene, points: Array, options: SeedOptions) -> tuple[HPolyhed
         known, coarse = coarse, _coarse_pairs(scene, region, points)
         if coarse.keys() == known.keys():
             break
-    if known and account["epsilon"] > options.epsilon:  # A point would have been lost in every round, beside these volumes.
+    if known and account["epsilon"] > options.epsilon:  # The round beside these volumes has failed.
         region, account = _refined(alone, region, account, points, options.epsilon)
     return region, account
 
@@ -137,37 +139,51 @@ def _coarse(drake: _Iris, scene: Scene, points: Array, options: SeedOptions) -> 
 def _again(
     drake: _Iris, scene: Scene, region: HPolyhedron, account: dict[str, Any], points: Array, options: SeedOptions
 ) -> tuple[HPolyhedron, dict[str, Any]]:
-    """Alternates from the ellipsoid of a region, with more to keep clear of.
-
-    Returns:
-        The region as it is where Drake finds none, or one that would lose a point.
-    """
+    """Alternates from the ellipsoid of a region, with more to keep clear of, within the joint limits."""
     limits = HPolyhedron.MakeBox(scene.s_lower, scene.s_upper)
-    start, contain = _start(drake, region, points)
-    try:
-        grown, said = drake.grow(limits, start, account["epsilon"], options.max_iterations, contain)
-    except (RuntimeError, ValueError) as error:
-        return region, {**account, "warnings": [*account["warnings"], f"beside coarse volumes: {error}"]}
-    return _further(region, account, points, grown, {**said, "iterations": account["iterations"] + said["iterations"]})
+    grown, said = _onward(drake, limits, region, account, points, account["epsilon"], options.max_iterations)
+    return grown, said if grown is region else {**said, "iterations": account["iterations"] + said["iterations"]}
 
 
 def _refined(
     drake: _Iris, region: HPolyhedron, account: dict[str, Any], points: Array, epsilon: float
 ) -> tuple[HPolyhedron, dict[str, Any]]:
-    """Adds faces to a region until it passes the test with a smaller epsilon; one that would lose a point is left as it is.
+    """Adds faces to a region until it passes the test with a smaller epsilon.
 
     The faces are those nearest to the centre of the inscribed ellipsoid, which cost least of its volume, or to the seed if that centre
     is in collision.
     """
+    refined, said = _onward(drake, region, region, account, points, epsilon, 1)
+    return refined, {**said, **{name: account[name] for name in ("termination", "iterations")}}
+
+
+def _onward(
+    drake: _Iris, domain: HPolyhedron, region: HPolyhedron, account: dict[str, Any], points: Array, epsilon: float, most: int
+) -> tuple[HPolyhedron, dict[str, Any]]:
+    """Goes on from the inscribed ellipsoid of a region, with so many alternations at most.
+
+    Returns:
+        What was found, and what Drake said of it. Where Drake fails, or a point would be lost, it is the region as it was, and its account
+        with a warning more.
+    """
     start, contain = _start(drake, region, points)
-    refined, said = drake.grow(region, start, epsilon, 1, contain)
-    return _further(region, account, points, refined, {**said, **{name: account[name] for name in ("termination", "iterations")}})
+    try:
+        found, said = drake.grow(domain, start, epsilon, most, contain)
+    except (RuntimeError, ValueError) as error:
+        return region, {**account, "warnings": [*account["warnings"], f"the polytope was left as it was: {error}"]}
+    warnings = account["warnings"] + said["warnings"]
+    # Drake returns the domain where the first faces lose the ellipsoid's centre.
+    nothing = said["termination"] == Termination.SEED_CUT_OFF and said["iterations"] <= 1
+    if nothing or not (found.A() @ points.T < found.b()[:, None]).all():
+        return region, {**account, "warnings": [*warnings, "the polytope was left as it was: a point would have been lost"]}
+    return found, {**said, "warnings": warnings}
 
 
 def _start(drake: _Iris, region: HPolyhedron, points: Array) -> tuple[Hyperellipsoid, Array]:
-    """Returns the inscribed ellipsoid of a region, about the seed if its own centre is in collision, and the points to keep inside.
+    """Returns the inscribed ellipsoid of a region, and the points to keep inside: those given, and its centre.
 
-    Drake lays faces through points that it keeps inside. So every point comes with one that is a little farther from the centre.
+    Drake lays faces through points that it keeps inside. So another one joins each of them that is a little farther from the centre, where
+    that is free and in the region. Where the centre is in collision, the ellipsoid is about the seed, and the points are those given.
     """
     inscribed = region.MaximumVolumeInscribedEllipsoid()
     center = inscribed.center()
@@ -176,16 +192,6 @@ def _start(drake: _Iris, region: HPolyhedron, points: Array) -> tuple[Hyperellip
     beyond = points + _BEYOND * (points - center)
     free = [s for s in beyond if region.PointInSet(s) and drake.is_free(s)]
     return inscribed, np.stack([*points, *free, center])
-
-
-def _further(
-    region: HPolyhedron, account: dict[str, Any], points: Array, found: HPolyhedron, said: dict[str, Any]
-) -> tuple[HPolyhedron, dict[str, Any]]:
-    """Returns what was found with what was said of it, or the region before with its account, where a point would be lost."""
-    warnings = account["warnings"] + said["warnings"]
-    if not (found.A() @ points.T < found.b()[:, None]).all():
-        return region, {**account, "warnings": warnings}
-    return found, {**said, "warnings": warnings}
 
 
 class _Iris:

@@ -42,8 +42,9 @@ class SeedOptions:
         center: (n,) a point inside that polytope, in s; default: the centre of its largest ball.
         half_width: half the side of the ``box``, in s.
         epsilon, delta: IRIS stops adding faces when, except with probability delta, at most the fraction epsilon of the volume in s is in
-            collision. Below 0.01, a last round of faces comes to epsilon; all before it comes to 0.01.
-        max_iterations: IRIS' alternations between faces and ellipsoid.
+            collision. Below 0.01, last rounds of faces come to epsilon; all before them comes to 0.01.
+        max_iterations: IRIS' alternations between faces and ellipsoid; as many again where coarse volumes join the scene
+            (:mod:`certifier.seeding.coarse_pairs`).
         max_iterations_separating_planes: IRIS' rounds of adding faces within each alternation.
         tolerance: IRIS ends when the ellipsoid's volume grows by less than this fraction.
         margin: distance in s at which IRIS' faces stay clear of the collisions found.

@@ -13,7 +13,7 @@ from certifier.polytopes.gibbs import uniform_in_q
 CHAINS, EACH = 400, 50
 """A proposal is looked at in this many samples of this many chains."""
 LOST = 2.0
-"""Growth loses about this many times the root of the share that is touched (docs/measurements.md)."""
+"""Growth loses about this many times the root of the share that is touched (docs/trials.md)."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """IRIS is tried with several random seeds, and the proposal is taken of which a growth is likely to keep most.
 
 Which collisions IRIS happens to find decides where its faces lie. So another random seed may come to a proposal that is twice as large, or
-of which growth loses a fifth of what it loses of the first (docs/measurements.md). The tries end early with a proposal that a growth is
+of which growth loses a fifth of what it loses of the first (docs/trials.md). The tries end early with a proposal that a growth is
 likely to keep nearly whole.
 """
 

@@ -113,15 +113,32 @@ def test_rows_of_several_machines_say_which_is_whose() -> None:
 
 
 @pytest.mark.slow
-def test_the_service_is_measured_beside_local() -> None:
-    document = bench("service", "planar_2dof", "--turns", "1")
-    served, local = document["rows"]
-    assert (served["way"], local["way"]) == ("service", "--local")
-    for row in document["rows"]:
-        assert min(row["seeding_seconds"], row["pair_seconds"], row["besides_seconds"], row["processor_seconds"]) > 0
-    more = (served["besides_seconds"] - local["besides_seconds"]) / local["seconds"]
-    assert document["more"]["besides_seconds"]["each"] == [pytest.approx(more)]
-    assert "planar_2dof, one solving process" in report.text(document)
+def test_the_service_is_measured_beside_local(postgres: Postgres) -> None:
+    document = bench("service", "planar_2dof", "arm_3dof", "--turns", "1", "--postgresql", postgres.new_database())
+    for name in ("planar_2dof", "arm_3dof"):
+        rows = {row["way"]: row for row in document["rows"] if row["scene"] == name}
+        assert list(rows) == ["SQLite", "PostgreSQL", "--local"]
+        for row in rows.values():
+            assert min(row["seconds"], row["seeding_seconds"], row["processor_seconds"], row["cells"]) > 0
+        for more in (row for row in document["more"] if row["scene"] == name):
+            assert more["seconds"] == pytest.approx(rows[more["way"]]["seconds"] - rows["--local"]["seconds"])
+            processor = rows[more["way"]]["processor_seconds"] - rows["--local"]["processor_seconds"]
+            assert more["cell_ms"] == pytest.approx(1e3 * processor / rows["--local"]["cells"])
+    assert "With one solving process" in report.text(document)
+
+
+def test_what_the_service_takes_more_is_of_medians(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken = iter([3.0, 1.0, 2.0, 9.0, 5.0, 1.0])  # SQLite first in the first and in the third turn
+    monkeypatch.setattr(service, "running", lambda *_: nullcontext("a service"))
+    monkeypatch.setattr(service, "_line", str)
+    monkeypatch.setattr(
+        service, "_grown", lambda *_: {"seconds": (t := next(taken)), "processor_seconds": t, "cells": 10, "ellipsoid": 0.5}
+    )
+    document = service.beside_local(["planar_2dof"], None, processes=1, turns=3, progress=lambda _: None)
+    assert [row["way"] for row in document["rows"]] == ["SQLite", "--local", "--local", "SQLite", "SQLite", "--local"]
+    assert document["more"] == [
+        {"scene": "planar_2dof", "way": "SQLite", "cells": 10, "seconds": 4.0, "processor_seconds": 4.0, "cell_ms": 400.0}
+    ]
 
 
 def test_runs_that_come_to_different_regions_are_no_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,7 +147,7 @@ def test_runs_that_come_to_different_regions_are_no_measurement(monkeypatch: pyt
     monkeypatch.setattr(service, "_line", str)
     monkeypatch.setattr(service, "_grown", lambda *_: {"seconds": 1.0, "ellipsoid": next(volumes)})
     with pytest.raises(CirisError, match="different regions"):
-        service.beside_local("planar_2dof", processes=1, turns=1, progress=lambda _: None)
+        service.beside_local(["planar_2dof"], None, processes=1, turns=1, progress=lambda _: None)
 
 
 def test_the_store_is_measured_on_both_databases(postgres: Postgres) -> None:

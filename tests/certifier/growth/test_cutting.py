@@ -119,6 +119,22 @@ def test_a_contact_on_a_face_is_cut_off_where_it_is_asked_for(seed, share):
     assert cut_off(contact + 3 * BARELY * polytope.C[0], BARELY) is polytope
 
 
+@pytest.mark.parametrize("joints", [(0,), (0, 1)])
+@pytest.mark.parametrize("beyond_the_face", [0.0, 1e-9, 0.5 * BARELY])
+@pytest.mark.parametrize("near", [0.0, 1e-16, 1e-9, 0.5 * BARELY, 3 * BARELY])
+def test_a_contact_on_a_face_beside_a_point_to_keep_goes_for_good_or_cannot_be_cut_off(near, beyond_the_face, joints):
+    """Or a face would move by next to nothing, and the contact would be found again in every round."""
+    scene = planar_arm(3)
+    polytope = scene.polytope(np.array([[1.0, 0.0, 0.0]]), [0.4])
+    keep, contact = np.array([[0.4 - near, 0.0, 0.0]]), np.array([[0.4 + beyond_the_face, 0.0, 0.0]])
+    smaller = cut(scene, polytope, keep, [(joints, contact, 1.0)], polytope, BARELY).polytope
+    if near < BARELY:
+        assert smaller is None
+    else:
+        assert (smaller.d - smaller.C @ contact[0]).min() <= -BARELY
+        assert smaller.contains(keep).all()
+
+
 @pytest.mark.parametrize("place", [0.0, 0.5, 0.99, 1.01])
 def test_a_point_between_those_to_keep_cannot_be_cut_off(place):
     scene = planar_arm(2)

@@ -291,6 +291,18 @@ def test_cells_are_not_cut_for_ever_in_joints_in_which_they_are_narrow(monkeypat
     result = CellCertification(scene, polytope).certify(index, 6000)
     assert result.outcome is Outcome.CERTIFIED
     monkeypatch.setattr(search, "NARROW_CUT", 0.0)
-    unending = CellCertification(scene, polytope).certify(index, 6000)
+    unending = CellCertification(scene, polytope).certify(index, 2500)
     assert unending.outcome is Outcome.INCONCLUSIVE
     assert unending.open_cells > 1000
+
+
+def test_cells_of_two_chains_are_cut_for_coarse_volumes_however_narrow_they_are(monkeypatch):
+    """The next level has more joints, so there would be many more cells."""
+    scene, polytope, index = two_wrists(1.0)
+    found = []
+    for narrow in (search.NARROW_CUT, np.pi):
+        monkeypatch.setattr(search, "NARROW_CUT", narrow)
+        result = CellCertification(scene, polytope).certify(index, CELLS)
+        found.append((result.outcome, result.open_cells))
+    assert found[0] == found[1]
+    assert found[0][0] is Outcome.INCONCLUSIVE, "cells were cut"

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from benchmarks import catalogue
+from certifier.model import Volume
 from certifier.pair.collisions import in_collision
 from certifier.partition.hulls import gaps
 from certifier.partition.parted import parted
 from certifier.polytopes.gibbs import uniform_in_q
 from certifier.seeding import coarse_pairs, iris
-from certifier.seeding.coarse_pairs import coarse_pairs_of, with_coarse_pairs
-from certifier.seeding.iris import checker
+from certifier.seeding.coarse_pairs import Shape, coarse_pairs_of, with_coarse_pairs
+from certifier.seeding.iris import Termination, checker
 from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.rating import rated
 
@@ -83,27 +84,65 @@ def test_a_proposal_keeps_clear_of_what_growth_will_part(monkeypatch):
     assert knowing.kept > unknowing.kept
 
 
-def test_a_polytope_beside_coarse_volumes_that_drake_refuses_is_left_out(monkeypatch):
-    """The one without them is the answer, and a warning says why."""
+@pytest.mark.parametrize("fails", ["raises", "returns the domain"])
+def test_a_polytope_beside_coarse_volumes_that_drake_fails_to_find_is_left_out(monkeypatch, fails):
+    """The one without them is the answer, with its last round, and a warning says why. Drake returns the domain where the first faces lose
+    the centre."""
     scene, q = catalogue.scene("iiwa_shelf"), tuple(catalogue.seed("iiwa_shelf"))
-    points, options = scene.to_s(q)[None], SeedOptions(Method.IRIS_NP2, q=q, max_iterations=1, epsilon=0.01)
-    grow, calls = iris._Iris.grow, []
+    points, options = scene.to_s(q)[None], SeedOptions(Method.IRIS_NP2, q=q, max_iterations=1, epsilon=0.005)
+    grow, beside = iris._Iris.grow, []
 
-    def once(self, *given):
-        calls.append(given)
-        if len(calls) > 1:
+    def alone(self, domain, *given):
+        if self._scene is scene:
+            return grow(self, domain, *given)
+        beside.append(given)
+        if fails == "raises":
             raise RuntimeError("no such luck")
-        return grow(self, *given)
+        return domain, {"termination": Termination.SEED_CUT_OFF, "iterations": 1, "epsilon": given[1], "guarantee": "none", "warnings": []}
+
+    monkeypatch.setattr(iris._Iris, "grow", alone)
+    C, d, account = iris.iris(scene, points, options)
+    assert len(beside) == 2, "the alternation, and a last round"
+    assert sum(warning.startswith("the polytope was left as it was: ") for warning in account["warnings"]) == 2
+    assert account["epsilon"] == 0.005
+    assert account["iterations"] == 1
+    monkeypatch.setattr(iris, "coarse_pairs_of", lambda *_: {})
+    without = iris.iris(scene, points, options)
+    assert np.array_equal(C, without[0])
+    assert np.array_equal(d, without[1])
+
+
+def test_where_drake_fails_in_the_last_round_the_polytope_before_it_is_the_answer(monkeypatch):
+    scene, q = catalogue.scene("ur3e_bin"), tuple(catalogue.seed("ur3e_bin"))
+    points = scene.to_s(q)[None]
+    grow = iris._Iris.grow
+
+    def once(self, domain, start, epsilon, *given):
+        if epsilon < 0.01:
+            raise RuntimeError("no such luck")
+        return grow(self, domain, start, epsilon, *given)
 
     monkeypatch.setattr(iris._Iris, "grow", once)
-    C, d, account = iris.iris(scene, points, options)
-    assert len(calls) == 2
-    assert account["warnings"][-1] == "beside coarse volumes: no such luck"
-    monkeypatch.setattr(iris, "coarse_pairs_of", lambda *_: {})
-    calls.clear()
-    alone = iris.iris(scene, points, options)
-    assert np.array_equal(C, alone[0])
-    assert np.array_equal(d, alone[1])
+    coarse = iris.iris(scene, points, SeedOptions(Method.IRIS_NP2, q=q, max_iterations=1, epsilon=0.01))
+    C, d, account = iris.iris(scene, points, SeedOptions(Method.IRIS_NP2, q=q, max_iterations=1, epsilon=0.005))
+    assert np.array_equal(C, coarse[0])
+    assert np.array_equal(d, coarse[1])
+    assert account["epsilon"] == 0.01
+    assert account["warnings"][-1] == "the polytope was left as it was: no such luck"
+
+
+def test_a_capsule_without_length_is_a_ball_to_drake(hand):
+    """The capsule about the axis of the joint before a single ball on this axis has two ends in one point."""
+    scene, _, _, samples = hand
+    point, other = np.array([[0.0, 0.0, 0.1]]), scene.geometries[-1]
+    ball = Volume(tuple(geometry.name for geometry in scene.geometries[:2]), scene.moving[-1].child, np.repeat(point, 2, axis=0), 0.2)
+    wide = Volume((other.name,), other.body, other.vertices, other.radius)
+    keys = tuple(Shape(volume.body, volume.vertices.tobytes(), volume.radius) for volume in (ball, wide))
+    wider = with_coarse_pairs(scene, {keys: (ball, wide)})
+    alone = replace(wider, pairs=wider.pairs[-1:])
+    touching = ~np.array(checker(alone).CheckConfigsCollisionFree(list(scene.to_q(samples))), dtype=bool)
+    assert (touching == in_collision(alone, samples)).all()
+    assert 0 < touching.sum() < len(touching)
 
 
 def test_where_volumes_would_cost_the_seed_the_last_round_does_without_them(monkeypatch):
