@@ -134,7 +134,7 @@ def test_where_drake_fails_in_the_last_round_the_polytope_before_it_is_the_answe
 def test_a_capsule_without_length_is_a_ball_to_drake(hand):
     """The capsule about the axis of the joint before a single ball on this axis has two ends in one point."""
     scene, _, _, samples = hand
-    point, other = np.array([[0.0, 0.0, 0.1]]), scene.geometries[-1]
+    point, other = np.array([[0.0, 0.0, 0.1]]), scene.geometry("shelf/boards/lower")
     ball = Volume(tuple(geometry.name for geometry in scene.geometries[:2]), scene.moving[-1].child, np.repeat(point, 2, axis=0), 0.2)
     wide = Volume((other.name,), other.body, other.vertices, other.radius)
     keys = tuple(Shape(volume.body, volume.vertices.tobytes(), volume.radius) for volume in (ball, wide))
