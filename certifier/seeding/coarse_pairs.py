@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from certifier.model import Array, Geometry, Pair, Polytope, Scene, Volume
 from certifier.partition.hulls import gaps
 from certifier.partition.parted import long_pairs, parted
@@ -17,6 +19,8 @@ from certifier.seeding.rating import CHAINS, EACH
 ROOM = 0.25
 """At every point that stays inside, two volumes are farther apart than this part of the larger radius. Faces that keep nearer ones apart
 would have to pass close by the point, and cost most of the polytope."""
+NO_LENGTH = 1e-9
+"""A capsule that is shorter than this, in metres, is a ball to Drake, which knows no capsule without length."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,7 @@ def with_coarse_pairs(scene: Scene, coarse: CoarsePairs) -> Scene:
                 continue
             if key not in new:
                 corners = volume.vertices
-                if (corners == corners[0]).all():  # Drake knows no capsule without length.
+                if np.ptp(corners, axis=0).max() < NO_LENGTH:
                     corners = corners[:1]
                 new[key] = Geometry(f"//{len(new)}", volume.body, corners, volume.radius, {})
             names.append(new[key].name)
