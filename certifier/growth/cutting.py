@@ -7,6 +7,7 @@ the polytope that are uniform in q as few as possible lie beyond. "As few" is re
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -60,7 +61,7 @@ class Made:
 
     Attributes:
         faces: how many were added or moved in.
-        lost: the shares of the polytope that they cut off, added up; each was a share of what was left before it.
+        lost: the share of the polytope that they cut off.
         s: (n,) the point that the face was made for that lost most; None without a face.
     """
 
@@ -136,7 +137,7 @@ def cut(
             left_to_lose -= loss
             samples = samples[samples @ best.row <= best.offset]
         worst = max(losses, key=lambda lost: lost[0], default=(0.0, None))
-        made.append(Made(len(losses), sum(loss for loss, _ in losses), worst[1]))
+        made.append(Made(len(losses), 1 - math.prod(1 - loss for loss, _ in losses), worst[1]))
     if not any(one.faces for one in made):
         return Cut(None if blocked else polytope, made)
     return Cut(Polytope(C, d), made)

@@ -34,7 +34,7 @@ class Obstacle:
             return other
         shown = other if self.s is None or (other.lost or 0.0) > (self.lost or 0.0) else self
         faces = None if self.faces is None or other.faces is None else self.faces + other.faces
-        lost = None if self.lost is None or other.lost is None else self.lost + other.lost
+        lost = None if self.lost is None or other.lost is None else both(self.lost, other.lost)
         return Obstacle(self.stage, self.times + other.times, faces, lost, shown.s, shown.contact)
 
     @classmethod
@@ -51,6 +51,11 @@ class Obstacle:
         """Does the inverse of :meth:`to_document`."""
         s = document["s"]
         return cls(**{**document, "s": None if s is None else tuple(s)})
+
+
+def both(lost: float, further: float) -> float:
+    """Returns the share that is lost where one share is, and then another one of what is left."""
+    return 1 - (1 - lost) * (1 - further)
 
 
 def joined(known: dict[int, Obstacle], found: dict[int, Obstacle]) -> dict[int, Obstacle]:

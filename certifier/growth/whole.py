@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
 from certifier.growth.cutting import BARELY, Cut, cut, samples_of
-from certifier.growth.obstacles import Obstacle, joined
+from certifier.growth.obstacles import Obstacle, both, joined
 from certifier.growth.options import MOST_CELLS
 from certifier.growth.state import GrowthState, Start, Whole
 from certifier.growth.targeted import pushed
@@ -142,7 +142,9 @@ def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes
     around = start.rows if whole.reach >= 1 else _copy(scene, start, whole.reach)
     made = cut(scene, whole.polytope, start.keep, corners, around)
     final = {*action.ending} & {*action.hard}
-    stuck = made.polytope is whole.polytope and all(i in final and most[i] >= 1 for i in failing)
+    # Cells without a point to cut off miss the polytope, and are settled in the next rounds.
+    named = any(len(points) for _, points, _ in corners)
+    stuck = named and made.polytope is whole.polytope and all(i in final and most[i] >= 1 for i in failing)
     if stuck:  # A contact on a face would be found again and again.
         made = cut(scene, whole.polytope, start.keep, corners, around, BARELY)
     smaller = made.polytope
@@ -171,7 +173,7 @@ def _obstacles(stage: int, failing: Sequence[int], cut: Cut) -> dict[int, Obstac
     for place, index in enumerate(failing):
         contacts, others = cut.made[2 * place : 2 * place + 2]
         if contacts.faces or others.faces:
-            s, lost = contacts.s if contacts.faces else others.s, contacts.lost + others.lost
+            s, lost = contacts.s if contacts.faces else others.s, both(contacts.lost, others.lost)
             found[index] = Obstacle.at(stage, s, contact=contacts.faces > 0, faces=contacts.faces + others.faces, lost=lost)
     return found
 

@@ -105,6 +105,7 @@ class CellCertification:
         self._covariance = np.cov(self._area.samples.T).reshape(scene.n, scene.n)
         self._shared = Shared(self._area)
         self._broad_phase = BroadPhase(Kinematics.of(scene), self._attempt)
+        self._last: tuple[int, Sequence[Sequence[bytes]], PartitionProof] | None = None
 
     def certify(self, index: int, cells: int, cut_off: CutOff = CutOff.CONTACTS, former: PartitionProof | None = None) -> PairResult:
         """Certifies pair ``scene.pairs[index]``, alone or with others that the same proof covers.
@@ -145,11 +146,16 @@ class CellCertification:
             part: the number of this part, from 0; the first one returns the proof.
             parts: the cells to verify are dealt to so many parts.
         """
-        start, volumes = time.perf_counter(), self._volumes(index)
-        search = Search(self._area, self._shared, volumes, self._faces)
-        vertices = [len(a.vertices) + len(b.vertices) for a, b in choices_of(volumes, search.coarse)]
-        root = put_together(rounds, len(self._area.ground.d), 2 * self._scene.n, vertices)
-        return replace(self._proved(search, volumes, root, part, parts), seconds=time.perf_counter() - start)
+        start = time.perf_counter()
+        # One process often verifies several parts of a pair, one after the other.
+        if self._last is None or self._last[:2] != (index, rounds):
+            volumes = self._volumes(index)
+            search = Search(self._area, self._shared, volumes, self._faces)
+            vertices = [len(a.vertices) + len(b.vertices) for a, b in choices_of(volumes, search.coarse)]
+            root = put_together(rounds, len(self._area.ground.d), 2 * self._scene.n, vertices)
+            self._last = index, rounds, self._proof(search, volumes, root)
+        result = self._verified(self._last[2], part, parts)
+        return replace(result, seconds=time.perf_counter() - start)
 
     def _volumes(self, index: int) -> Volumes:
         return volumes_of(self._scene, [self._scene.pairs[i] for i in (index, *self._together.get(index, ()))])
@@ -159,7 +165,7 @@ class CellCertification:
         search.run([OpenCell(root, self._area.lower, self._area.upper)], GROUP_CELLS)
         if any(node.kind == OPEN for node in root.preorder()):
             return None
-        result = self._proved(search, volumes, root)
+        result = self._verified(self._proof(search, volumes, root))
         return result if result.outcome is Outcome.CERTIFIED else None
 
     def _begin(self, volumes: Volumes, cells: int, cut_off: CutOff, former: PartitionProof | None) -> PairResult:
@@ -173,13 +179,16 @@ class CellCertification:
                 looks = (search.scout(seed) for seed in range(1, 1 + LOOKS_AGAIN))
                 report = replace(report, contacts=next(filter(None, looks), []))
             return self._left(search, volumes, given, report, cut_off)
-        return self._proved(search, volumes, root)
+        return self._verified(self._proof(search, volumes, root))
 
-    def _proved(self, search: Search, volumes: Volumes, root: Node, part: int = 0, parts: int = 1) -> PairResult:
-        """Returns the result of a part of a pair that has a tree without open cells."""
+    def _proof(self, search: Search, volumes: Volumes, root: Node) -> PartitionProof:
+        """Returns the proof that a tree without open cells is."""
         streams = to_streams([root], len(search.joints))
         coarse, streams["choices"] = _chosen(search.coarse, streams["choices"])
-        proof = PartitionProof(self._scene, volumes, search.frame, self._area.ground, self._area.center, coarse, **streams)
+        return PartitionProof(self._scene, volumes, search.frame, self._area.ground, self._area.center, coarse, **streams)
+
+    def _verified(self, proof: PartitionProof, part: int = 0, parts: int = 1) -> PairResult:
+        """Returns the result of a part of a pair that has a proof of all its cells."""
         try:
             gap = gap_of_share(self._scene, proof, part, parts)
         except ProofError as error:

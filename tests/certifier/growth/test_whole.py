@@ -291,6 +291,44 @@ def test_a_pair_that_fails_nobody_knows_where_ends_the_growth(after):
     assert SCENE.pairs[1].a in end.reason
 
 
+def test_an_error_of_one_part_ends_the_growth_at_once():
+    """The part has left nothing of its cells, so going on with the others would come to no proof."""
+    made, transition = [], begin(SCENE, options(cells=50 * SLICE))
+    while isinstance(transition.action, Certify | Propose):
+        report = PROPOSAL
+        if isinstance(transition.action, Certify):
+            made.append(transition.action)
+            failed = [(index, Outcome.INCONCLUSIVE, weak([]), 50) for index, _ in made[-1].work]
+            if len(made) == 2:
+                failed[1] = (failed[1][0], Outcome.ERROR, None, None)
+            report = Outcomes.of_parts(made[-1], failed)
+        transition = advance(SCENE, transition.state, report)
+    assert len(made) == 2
+    assert made[1].parts[failed[1][0]] > 1
+    assert transition.action.outcome is Outcome.ERROR
+    assert "nothing is known of where they fail" in transition.action.reason
+
+
+def test_cells_that_miss_the_polytope_are_settled_before_growth_gives_up():
+    """There is nothing to cut off for them, however late it is."""
+    made, transition = [], begin(SCENE, options(cells=SLICE))
+    while isinstance(transition.action, Certify | Propose) and len(made) < 60:
+        report = PROPOSAL
+        if isinstance(transition.action, Certify):
+            made.append(transition.action)
+            results = [(index, Outcome.INCONCLUSIVE, weak([]), 50) for index, _ in made[-1].work]
+            if len(made) >= 50:
+                results = [(index, Outcome.CERTIFIED, None, None) for index, _ in made[-1].work]
+            report = Outcomes.of_parts(made[-1], results)
+            final = {*made[-1].ending} & {*made[-1].hard}
+        transition = advance(SCENE, transition.state, report)
+        if transition.candidate is not None:
+            break
+    assert len(made) == 50
+    assert final == {0, 1}, "everything may be cut off already"
+    assert transition.candidate is not None
+
+
 @cache
 def example(name):
     path = EXAMPLES / name / "scene.yaml"
