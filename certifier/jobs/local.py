@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from certifier.errors import CirisError
@@ -134,7 +134,11 @@ class _Run:
                 break
         outcomes = [result.outcome for parts in found.values() for result in parts]
         self.tell("iteration", {**said, "state": combine(outcomes).value})
-        reached = ((index, r.outcome, r.weakness, r.open_cells) for index, parts in found.items() for r in parts)
+        reached = [(index, r.outcome, r.weakness, r.open_cells) for index, parts in found.items() for r in parts]
+        # Nobody asks for these again, and they would be most of what a long growth holds.
+        self.results[action.iteration] = {
+            index: [replace(result, weakness=None, outline=None) for result in parts] for index, parts in found.items()
+        }
         return Outcomes.of_parts(action, reached, self.passed)
 
     def left(self, iteration: int, index: int) -> list[bytes]:

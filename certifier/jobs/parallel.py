@@ -6,7 +6,9 @@ import multiprocessing
 import signal
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 
+from certifier.errors import CirisError
 from certifier.jobs.pairs import CertifyPart
 from certifier.pair.result import PairResult
 
@@ -21,6 +23,9 @@ def side_by_side(certify: CertifyPart, asked: Sequence[Asked], processes: int, k
         processes: so many children work; 1 for this process alone.
         kind: returns the same for pairs, by their indices, that are alike. One child takes the same part of all of them, because what it
             finds for one helps with the next.
+
+    Raises:
+        CirisError: ``worker_lost``, when a child died, for example because the machine had no memory left.
     """
     if processes == 1 or len(asked) == 1:
         for index, part in asked:
@@ -38,6 +43,9 @@ def side_by_side(certify: CertifyPart, asked: Sequence[Asked], processes: int, k
                 while one not in found:
                     found |= zip(*next(done), strict=True)
                 yield found.pop(one)
+        except BrokenProcessPool as error:
+            problem, hint = "a process that certified pairs died", "look whether the machine ran out of memory; fewer cores need less of it"
+            raise CirisError("worker_lost", problem, hint=hint) from error
         finally:
             executor.shutdown(cancel_futures=True)
 

@@ -1,4 +1,4 @@
-"""Obstacles: what was cut off for a pair, added up over the rounds of a stage, kept in the state and written to the manifest."""
+"""Obstacles: what was cut off for a pair, together over the rounds of a stage, kept in the state and written to the manifest."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,12 +18,12 @@ from tests.scenes import slider
 OPTIONS = GrowthOptions.from_document({"kind": "grow", "seed": {"q": [0.0]}})
 
 
-def test_rounds_of_one_stage_add_up_and_the_one_that_lost_most_is_named():
+def test_what_rounds_of_one_stage_cut_off_is_known_together_and_the_one_that_lost_most_is_named():
     first = Obstacle.at(1, np.array([0.1]), contact=False, faces=2, lost=0.01)
     second = Obstacle.at(1, np.array([0.2]), contact=True, faces=1, lost=0.05)
     third = Obstacle.at(1, np.array([0.3]), contact=False, faces=1, lost=0.02)
     found = joined(joined(joined({}, {4: first}), {4: second, 5: first}), {4: third})
-    assert found[4] == Obstacle(1, 3, 4, 0.01 + 0.05 + 0.02, (0.2,), contact=True)
+    assert found[4] == Obstacle(1, 3, 4, pytest.approx(1 - 0.99 * 0.95 * 0.98), (0.2,), contact=True)
     assert found[5] == first
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -421,3 +422,18 @@ def test_a_seed_in_contact_is_refused():
     scene = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (1.5, 0.0, 0.0)))
     with pytest.raises(CirisError):
         grow(scene, GrowthOptions(seed={"method": "box", "q": [0.0, 0.0], "half_width": 0.2}, contraction="whole", cells=SLICE))
+
+
+def test_a_child_that_dies_leaves_the_region_before(monkeypatch):
+    _, scene, q = example("planar_2dof")
+    certifier = local.part_certifier
+
+    def dying(scene, action, *others):
+        in_the_second_stage = action.iteration > 0 and action.begun is None
+        return (lambda index, part: os._exit(1)) if in_the_second_stage else certifier(scene, action, *others)
+
+    monkeypatch.setattr(local, "part_certifier", dying)
+    region = grow(scene, GrowthOptions(seed={"q": q}), processes=2)
+    assert "a process that certified pairs died" in region.manifest["provenance"]["reason"]
+    assert 0 < region.manifest["share"]["value"] < 1
+    verify_region(region.proof)

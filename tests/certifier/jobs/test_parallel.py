@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import pytest
+
+from certifier.errors import CirisError
 from certifier.growth.trials import alike
 from certifier.jobs.parallel import side_by_side
 from certifier.outcome import Outcome
@@ -39,3 +42,14 @@ def test_pairs_of_the_same_parts_are_alike() -> None:
     assert 1 < len(kinds) < len(scene.pairs) / 4
     # The boards of the rack are at rest in the world, but have little to do with each other.
     assert sum("arm/link_7" in kind and len({*kind} - {"arm/link_7"}) == 1 for kind in kinds) > 6
+
+
+def test_the_death_of_a_child_is_an_error_that_says_what_to_do() -> None:
+    def dies(index: int, part: int) -> PairResult:
+        if index == 3:
+            os._exit(1)
+        return _who(index, part)
+
+    with pytest.raises(CirisError, match="a process that certified pairs died") as caught:
+        list(side_by_side(dies, [(index, 0) for index in range(6)], 2, lambda index: index))
+    assert caught.value.code == "worker_lost"
