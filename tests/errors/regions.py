@@ -63,6 +63,16 @@ def child(function: str, payload: object, timeout_s: float = 60) -> None:
 
 GROWTH = [
     *rows(
+        "certifier/jobs/parallel.py",
+        (
+            "worker_lost",
+            "",
+            "a process that certified pairs died",
+            "look whether the machine ran out of memory; fewer cores need less of it",
+            "a process that the machine killed (tests/certifier/jobs/test_parallel.py)",
+        ),
+    ),
+    *rows(
         "certifier/growth/machine.py",
         (
             "polytope_missing",

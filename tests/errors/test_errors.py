@@ -40,6 +40,7 @@ ABOUT_ALL = {
     "api/questions.py",
     "api/room.py",
     "api/writing.py",
+    "certifier/jobs/parallel.py",
     "client/bench.py",
     "client/demo.py",
     "ciris/asynchronous/client.py",
