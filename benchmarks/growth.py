@@ -170,7 +170,7 @@ def _grown(name: str, seed: dict[str, Any], options: dict[str, Any], limit: floa
         "seeding_seconds": manifest["provenance"]["seeding_seconds"],
         "verify_seconds": time.perf_counter() - again,
         "proof_bytes": len(region.proof),
-        "leaves": measure.cells(region.proof),
+        "cells": measure.cells(region.proof),
         "share": manifest["share"]["value"],
         "share_stderr": manifest["share"]["stderr"],
         "q_volume": manifest["q_volume"]["value"],

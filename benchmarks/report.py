@@ -170,7 +170,7 @@ def _proof(row: Document) -> list[str]:
     """Returns the proof's megabytes, its cells, and for how long it was verified."""
     if "proof_bytes" not in row:
         return ["", "", ""]
-    return [f"{row['proof_bytes'] / 1e6:.2f}", str(row.get("leaves", "")), seconds(row["verify_seconds"])]
+    return [f"{row['proof_bytes'] / 1e6:.2f}", str(row.get("cells", "")), seconds(row["verify_seconds"])]
 
 
 def _agreement(document: Document) -> list[str]:

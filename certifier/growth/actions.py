@@ -131,9 +131,9 @@ class Outcomes:
         outcomes, weaknesses, open_cells = {}, {}, {}
         for index, results in found.items():
             outcomes[index] = combine([outcome for outcome, _, _ in results])
+            known = [weakness for _, weakness, _ in results if weakness is not None]
             # A part in ERROR leaves nothing of its cells, so nobody can go on with the pair.
-            known = [weakness for outcome, weakness, _ in results if weakness is not None]
-            if known and all(outcome is not Outcome.ERROR for outcome, _, _ in results):
+            if known and not any(outcome is Outcome.ERROR for outcome, _, _ in results):
                 weaknesses[index] = Weakness.of_parts(known)
             if left := [cells for _, _, cells in results if cells is not None]:
                 open_cells[index] = sum(left)

@@ -7,7 +7,6 @@ the polytope that are uniform in q as few as possible lie beyond. "As few" is re
 
 from __future__ import annotations
 
-import math
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linprog
 
+from certifier.growth.obstacles import lost_together
 from certifier.model import Array, Polytope, Scene
 from certifier.polytopes.gibbs import uniform_in_q
 
@@ -137,7 +137,7 @@ def cut(
             left_to_lose -= loss
             samples = samples[samples @ best.row <= best.offset]
         worst = max(losses, key=lambda lost: lost[0], default=(0.0, None))
-        made.append(Made(len(losses), 1 - math.prod(1 - loss for loss, _ in losses), worst[1]))
+        made.append(Made(len(losses), lost_together(*(loss for loss, _ in losses)), worst[1]))
     if not any(one.faces for one in made):
         return Cut(None if blocked else polytope, made)
     return Cut(Polytope(C, d), made)

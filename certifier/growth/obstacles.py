@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,7 +35,7 @@ class Obstacle:
             return other
         shown = other if self.s is None or (other.lost or 0.0) > (self.lost or 0.0) else self
         faces = None if self.faces is None or other.faces is None else self.faces + other.faces
-        lost = None if self.lost is None or other.lost is None else both(self.lost, other.lost)
+        lost = None if self.lost is None or other.lost is None else lost_together(self.lost, other.lost)
         return Obstacle(self.stage, self.times + other.times, faces, lost, shown.s, shown.contact)
 
     @classmethod
@@ -53,9 +54,9 @@ class Obstacle:
         return cls(**{**document, "s": None if s is None else tuple(s)})
 
 
-def both(lost: float, further: float) -> float:
-    """Returns the share that is lost where one share is, and then another one of what is left."""
-    return 1 - (1 - lost) * (1 - further)
+def lost_together(*shares: float) -> float:
+    """Returns the share that is lost when each of these is lost of what those before it have left."""
+    return 1 - math.prod(1 - share for share in shares)
 
 
 def joined(known: dict[int, Obstacle], found: dict[int, Obstacle]) -> dict[int, Obstacle]:

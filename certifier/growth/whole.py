@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
 from certifier.growth.cutting import BARELY, Cut, cut, samples_of
-from certifier.growth.obstacles import Obstacle, both, joined
+from certifier.growth.obstacles import Obstacle, joined, lost_together
 from certifier.growth.options import MOST_CELLS
 from certifier.growth.state import GrowthState, Start, Whole
 from certifier.growth.targeted import pushed
@@ -173,7 +173,7 @@ def _obstacles(stage: int, failing: Sequence[int], cut: Cut) -> dict[int, Obstac
     for place, index in enumerate(failing):
         contacts, others = cut.made[2 * place : 2 * place + 2]
         if contacts.faces or others.faces:
-            s, lost = contacts.s if contacts.faces else others.s, both(contacts.lost, others.lost)
+            s, lost = contacts.s if contacts.faces else others.s, lost_together(contacts.lost, others.lost)
             found[index] = Obstacle.at(stage, s, contact=contacts.faces > 0, faces=contacts.faces + others.faces, lost=lost)
     return found
 

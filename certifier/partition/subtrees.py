@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from certifier.partition.tree import Node, OpenCell, of_streams
-from certifier.proof.container import FORMAT, pack, some_of, unpack
+from certifier.proof.container import FORMAT, pack, unpack
 from certifier.proof.outline import OPEN
 from certifier.proof.partition import STREAMS
 
@@ -61,7 +61,7 @@ def open_cells(files: Sequence[bytes]) -> list[OpenCell]:
     """Returns the cells that the parts of a round have left open, in order, each with a node of its own."""
     found = []
     for data in files:
-        arrays = some_of(data, _OF_OPEN_CELLS.__contains__)[1]
+        arrays = unpack(data, KIND, _OF_OPEN_CELLS.__contains__)[1]
         nodes = (Node(level=level) for level in arrays["levels"].tolist())
         found += [OpenCell(*cell) for cell in zip(nodes, arrays["lower"], arrays["upper"], strict=True)]
     return found

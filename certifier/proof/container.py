@@ -80,8 +80,12 @@ def _npy_header(dtype: str, shape: tuple[int, ...]) -> bytes:
     return buffer.getvalue()
 
 
-def unpack(data: bytes, kind: str) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Returns the header and the arrays of a file of this kind; every double is at most LARGEST in magnitude.
+Wanted = Callable[[str], bool]
+"""Says of an array's name whether the array is wanted. The others are not inflated."""
+
+
+def unpack(data: bytes, kind: str, wanted: Wanted = lambda _: True) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Returns the header and the wanted arrays of a file of this kind; every double is at most LARGEST in magnitude.
 
     Raises:
         ProofError: this is no such file of this format, or it is beyond the limits.
@@ -89,8 +93,7 @@ def unpack(data: bytes, kind: str) -> tuple[dict[str, Any], dict[str, np.ndarray
     with _opened(data) as (archive, header):
         if header["kind"] != kind:
             raise _malformed(f"it is a proof of kind {header['kind']}, not {kind}", "header.kind")
-        names = [info for info in archive.infolist() if info.filename != HEADER]
-        return header, {info.filename.removesuffix(".npy"): _array(info.filename, _content(data, info)) for info in names}
+        return header, _arrays(data, archive, wanted)
 
 
 def header_of(data: bytes) -> dict[str, Any]:
@@ -103,15 +106,19 @@ def header_of(data: bytes) -> dict[str, Any]:
         return header
 
 
-def some_of(data: bytes, wanted: Callable[[str], bool]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Returns the header of a file of any kind and the arrays whose names are wanted. The others are not inflated.
+def some_of(data: bytes, wanted: Wanted) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Returns the header of a file of any kind and the wanted arrays.
 
     Raises:
         ProofError: this is no file of this format, or it is beyond the limits.
     """
     with _opened(data) as (archive, header):
-        members = ((info.filename.removesuffix(".npy"), info) for info in archive.infolist() if info.filename != HEADER)
-        return header, {name: _array(info.filename, _content(data, info)) for name, info in members if wanted(name)}
+        return header, _arrays(data, archive, wanted)
+
+
+def _arrays(data: bytes, archive: zipfile.ZipFile, wanted: Wanted) -> dict[str, np.ndarray]:
+    members = ((info.filename.removesuffix(".npy"), info) for info in archive.infolist() if info.filename != HEADER)
+    return {name: _array(info.filename, _content(data, info)) for name, info in members if wanted(name)}
 
 
 def with_scene(data: bytes, scene: Scene) -> bytes:

@@ -13,8 +13,7 @@ import numpy as np
 from certifier.model import Array, Geometry, Pair, Polytope, Scene, Volume
 from certifier.partition.hulls import gaps
 from certifier.partition.parted import long_pairs, parted
-from certifier.polytopes.gibbs import uniform_in_q
-from certifier.seeding.rating import CHAINS, EACH
+from certifier.seeding.rating import samples_of
 
 ROOM = 0.25
 """At every point that stays inside, two volumes are farther apart than this part of the larger radius. Faces that keep nearer ones apart
@@ -56,8 +55,7 @@ def coarse_pairs_of(scene: Scene, polytope: Polytope, points: Array) -> CoarsePa
     found: CoarsePairs = {}
     if not long_pairs(scene):
         return found
-    samples = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, 0).reshape(-1, scene.n)
-    for bodies in parted(scene, polytope, samples, points):
+    for bodies in parted(scene, polytope, samples_of(scene, polytope), points):
         if all(volume.is_geometry_of(scene) for volume in bodies.volumes):
             continue
         has_shape = all(volume.radius == 0 or len(volume.vertices) <= 2 for volume in bodies.volumes)

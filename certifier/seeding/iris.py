@@ -142,7 +142,9 @@ def _again(
     """Alternates from the ellipsoid of a region, with more to keep clear of, within the joint limits."""
     limits = HPolyhedron.MakeBox(scene.s_lower, scene.s_upper)
     grown, said = _onward(drake, limits, region, account, points, account["epsilon"], options.max_iterations)
-    return grown, said if grown is region else {**said, "iterations": account["iterations"] + said["iterations"]}
+    if grown is not region:
+        said["iterations"] += account["iterations"]
+    return grown, said
 
 
 def _refined(
