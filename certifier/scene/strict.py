@@ -9,7 +9,10 @@ from typing import NoReturn
 from certifier.errors import SceneError
 from certifier.model import Array, escaped
 from certifier.scene.file import SceneFile, directive_files
-from certifier.scene.formats import Mjcf, ModelFile, Reference, Sdf, Urdf
+from certifier.scene.formats.mjcf import Mjcf
+from certifier.scene.formats.model_file import ModelFile, Reference
+from certifier.scene.formats.sdf import Sdf
+from certifier.scene.formats.urdf import Urdf
 from certifier.scene.obj import read_points
 from certifier.scene.references import resolve
 

@@ -16,7 +16,7 @@ MAKERS = {
     ("certifier/document.py", "refuse"): 0,
     ("certifier/proof", "refuse"): 0,
     ("certifier/scene/file.py", "_wrong"): 1,
-    ("certifier/scene/formats.py", "_refuse"): 1,
+    ("certifier/scene/formats", "refuse"): 1,
     ("certifier/scene/obj.py", "refuse"): 1,
     ("certifier/scene/strict.py", "_refuse"): 2,
     ("certifier/seeding/options.py", "_refuse"): 1,

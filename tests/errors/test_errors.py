@@ -13,6 +13,7 @@ from tests.errors.bundles import BUNDLES
 from tests.errors.commands import COMMANDS
 from tests.errors.covers import COVERS
 from tests.errors.drawing import DRAWING
+from tests.errors.models import FORMATS
 from tests.errors.motions import MOTIONS
 from tests.errors.proofs import PROOFS
 from tests.errors.python import PYTHON
@@ -24,7 +25,7 @@ from tests.errors.sites import Site, sites
 from tests.errors.teams import TEAMS
 from tests.errors.workers import WORKERS
 
-TABLE = [*SCENES, *BUNDLES, *REGIONS, *MOTIONS, *COVERS, *DRAWING, *SERVICE, *COMMANDS, *PYTHON, *PROOFS, *TEAMS, *WORKERS]
+TABLE = [*SCENES, *FORMATS, *BUNDLES, *REGIONS, *MOTIONS, *COVERS, *DRAWING, *SERVICE, *COMMANDS, *PYTHON, *PROOFS, *TEAMS, *WORKERS]
 
 DEMANDS = re.compile(r"\bmust\b|\bat most\b|\bonly\b")
 """Words of a message that says by itself what has to be."""

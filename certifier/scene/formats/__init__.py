@@ -1,0 +1,1 @@
+"""Model files are read strictly here, a module for each format."""

@@ -1,0 +1,121 @@
+"""URDF, SDFormat and MJCF files are read as written here. What Drake would read otherwise than it is written is refused.
+
+Drake takes ``1,5`` or ``0x10`` for 1 and 0 in some places and refuses them in others. It makes 1 of a size that is missing or negative,
+keeps the first of two elements, and leaves out elements that it does not know (docs/scenes.md has the table).
+
+This module looks only at what joints and collision geometries consist of, and at what a file includes. Drake decides whether that makes
+a robot.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import ClassVar, NoReturn
+from xml.parsers import expat
+
+from certifier.errors import SceneError
+from certifier.scene.xml import parse_xml
+
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+COLLISION = "collision"
+SHAPES = frozenset(["box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "drake:capsule", "drake:ellipsoid"])
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A reference is the name of another file, as written, and the line where it stands."""
+
+    file: str
+    line: int
+
+
+@dataclass
+class Element:
+    name: str
+    line: int
+    attributes: dict[str, str]
+    around: frozenset[str]
+    """The names of the elements that this one is in."""
+    children: set[str] = field(default_factory=set)
+    text: str = ""
+    interrupted: bool = False
+    """Whether something else interrupts the element's text. Drake reads the text only up to there."""
+
+
+class ModelFile:
+    """Reads and checks one model file; each format has a subclass.
+
+    Attributes:
+        includes: model files that this one includes.
+        meshes: files of collision geometry.
+        mesh_directories: directories of the meshes, relative to the model.
+
+    Raises:
+        SceneError: ``scene_model`` with the file and the line, when the file is not accepted.
+    """
+
+    ONCE: ClassVar[frozenset[str]]
+    """These elements may stand only once in their parent, because Drake reads the first one."""
+    UNREAD: ClassVar[frozenset[str]] = frozenset()
+    """Drake does not look into these elements."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        self.name = name
+        self.includes: list[Reference] = []
+        self.meshes: list[Reference] = []
+        self.mesh_directories = ["."]
+        self._open: list[Element] = []
+        parse_xml(path, name, "scene_model", self._install)
+
+    def _check(self, element: Element, parent: str) -> None:
+        raise NotImplementedError
+
+    def refuse(self, element: Element, what: str) -> NoReturn:
+        raise SceneError("scene_model", f"{self.name}:{element.line}: {what}", field="directives", hint="mend the model there")
+
+    def _check_order(self, element: Element, lower: float, upper: float) -> None:
+        if lower > upper:
+            self.refuse(element, f"the limits of a joint are {lower:g} and {upper:g}; the lower one must not be greater")
+
+    def _numbers(self, element: Element, what: str, text: str, counts: tuple[int, ...]) -> list[float]:
+        words = text.split()
+        numbers = [float(word) for word in words if _NUMBER.fullmatch(word)]
+        if not text.isascii() or len(numbers) < len(words) or len(numbers) not in counts or not all(map(math.isfinite, numbers)):
+            wanted = "1 finite decimal number" if counts == (1,) else f"{' or '.join(map(str, counts))} finite decimal numbers"
+            self.refuse(element, f"{what} is {text[:80]!a} instead of {wanted}")
+        return numbers
+
+    def _check_geometry(self, element: Element) -> None:
+        if element.name == "geometry" and COLLISION in element.around and len(element.children & SHAPES) > 1:
+            self.refuse(element, "<geometry> has more than one shape, and Drake would read one")
+
+    def _install(self, parser: expat.XMLParserType) -> None:
+        def start(name: str, attributes: dict[str, str]) -> None:
+            element = Element(name, parser.CurrentLineNumber, attributes, frozenset())
+            if self._open:
+                parent = self._open[-1]
+                element.around = parent.around | {parent.name}
+                if name in parent.children and name in self.ONCE and not element.around & self.UNREAD:
+                    self.refuse(element, f"<{parent.name}> has a second <{name}>, and Drake would read the first")
+                parent.children.add(name)
+                parent.interrupted = True
+            self._open.append(element)
+
+        def end(_: str) -> None:
+            element = self._open.pop()
+            if not element.around & self.UNREAD:
+                self._check(element, self._open[-1].name if self._open else "")
+
+        def text(data: str) -> None:
+            self._open[-1].text += data
+
+        def interrupt(*_: object) -> None:
+            if self._open:
+                self._open[-1].interrupted = True
+
+        parser.buffer_text = True
+        parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, text
+        parser.CommentHandler = parser.ProcessingInstructionHandler = parser.StartCdataSectionHandler = interrupt
