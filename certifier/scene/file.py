@@ -154,10 +154,10 @@ def compose(text: str, name: str) -> yaml.Node | None:
         raise SceneError("scene_yaml", f"{name} is not YAML: {str(error).splitlines()[0]}", hint=_MEND) from None
 
 
-def directive_files(text: str, name: str) -> list[tuple[str, str]]:
+def directive_files(text: str, name: str) -> list[tuple[str, str, str]]:
     """Returns the files that a document of Drake Model Directives names.
 
-    Each comes as ``add_model`` or ``add_directives`` and the file as written.
+    Each comes as ``add_model`` or ``add_directives``, the file as written, and the name of the model or of the models' namespace.
 
     Raises:
         SceneError: ``scene_yaml``, with the line.
@@ -165,7 +165,13 @@ def directive_files(text: str, name: str) -> list[tuple[str, str]]:
     root = compose(text, name)
     entries = root.value if isinstance(root, yaml.MappingNode) else []
     lists = [value for key, value in entries if key.value == "directives" and isinstance(value, yaml.SequenceNode)]
-    return [(kind, node.value) for directives in lists for kind, node in _file_nodes(directives)]
+    found = []
+    for directives in lists:
+        for entry in directives.value:
+            for kind, node in _file_nodes(yaml.SequenceNode("", [entry])):
+                values = {key.value: value.value for _, body in entry.value for key, value in body.value}
+                found.append((kind, node.value, values.get("name" if kind == "add_model" else "model_namespace", "")))
+    return found
 
 
 def _text(path: Path) -> str:
