@@ -72,6 +72,9 @@ class Urdf(ModelFile):
     def _begin(self, element: Element, parent: str) -> None:
         if is_macro(parent, element.name):
             self.refuse(element, f"<{element.name}> is a macro that was not expanded", hint=EXPAND)
+        for key, value in element.attributes.items():
+            if ("${" in value or "$(" in value) and "gazebo" not in element.around:
+                self.refuse(element, f"{key} of <{element.name}> is {value[:80]!a}, which was not expanded", hint=EXPAND)
         self._prefixes += [key.removeprefix("xmlns:") for key, uri in element.attributes.items() if uri == DRAKE]
         if element.around & self._opaque:
             if element.name in NAMES and not any(element.name in MAY_HOLD.get(place, ()) for place in element.around):
@@ -93,9 +96,7 @@ class Urdf(ModelFile):
             self._parts = {}
 
     def _check_attributes(self, element: Element, known: Known) -> None:
-        for key, value in element.attributes.items():
-            if "${" in value or "$(" in value:
-                self.refuse(element, f"{key} of <{element.name}> is {value[:80]!a}, which was not expanded", hint=EXPAND)
+        for key in element.attributes:
             if (element.name, f"@{key}") in REFUSED:
                 why, hint = REFUSED[element.name, f"@{key}"]
                 self.refuse(element, f"{key} of <{element.name}>: {why}", hint=hint)

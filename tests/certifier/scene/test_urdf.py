@@ -58,6 +58,7 @@ REFUSED_PARTS = [
     ({"more": '<macro name="m" params=""/>'}, 18, "<macro> is a macro", "expand the file with xacro"),
     ({"shape": '<sphere radius="${r}"/>'}, 15, "radius of <sphere> is '${r}'", "expand the file with xacro"),
     ({"shape": '<mesh filename="$(find robot)/m.obj"/>'}, 15, "filename of <mesh> is '$(find robot)/m.obj'", "expand the file"),
+    ({"in_link": '<visual><origin xyz="0 0 ${z}"/></visual>'}, 11, "xyz of <origin> is '0 0 ${z}'", "expand the file"),
     # elements with another name
     ({"in_link": OTHER.replace("collision", "colision")}, 11, "<colision> is not known in <link>", "did you mean collision"),
     ({"in_link": OTHER.replace("collision", "Collision")}, 11, "<Collision> is not known in <link>", "did you mean collision"),
@@ -162,7 +163,9 @@ def test_another_root_is_refused(tmp_path, root):
         Urdf(tmp_path / "a.urdf", "a.urdf")
 
 
-GAZEBO = '<gazebo reference="hand"><collision><x/></collision><link name="l"/><sensor><origin xyz="x"/><origin/></sensor></gazebo>'
+GAZEBO = (
+    '<gazebo reference="hand"><collision><x/></collision><link name="l"/><sensor f="$(find x)"><origin xyz="x"/><origin/></sensor></gazebo>'
+)
 ACCEPTED = [
     {"robot": 'version="1.1" xmlns:xacro="http://www.ros.org/wiki/xacro" xmlns="http://www.ros.org"'},
     {"link": 'type="laser"', "joint": 'dont_collapse="true"', "collision": 'group="default" concave="yes"'},
@@ -171,6 +174,8 @@ ACCEPTED = [
     {"in_link": "<contact><lateral_friction value='1'/></contact><self_collision_checking/><sensor><origin/><origin/></sensor>"},
     {"in_link": "<self_filter><geometry><box/></geometry></self_filter><gravity>1</gravity><surface><friction/></surface>"},
     {"in_collision": "<material name='m'/><verbose value='x'/><surface/><drake:proximity_properties><x/></drake:proximity_properties>"},
+    {"in_link": "<collision_checking><capsule name='palm'/></collision_checking><kinematic>0</kinematic><gazebo/><material/>"},
+    {"in_collision": "<surface><contact><ode><kp>1</kp></ode></contact><friction/></surface><contact_coefficients mu='0'/>"},
     {"in_joint": "<dynamics damping='1'/><safety_controller k_velocity='1'/><calibration rising='0'/>"},
     {"limit": LIMIT.replace("/>", ' drake:acceleration="1" jerk="1" command_effort="2"/>')},
     {"more": "<transmission name='t'><joint name='turn'><x/></joint><actuator name='a'/></transmission>"},
