@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 import re
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,6 +61,21 @@ def test_random_models_are_read_as_others_read_them(tmp_path, seed):
     found, held = ours(scene, at), followers(tree).keys()
     assert differences(found, in_mujoco(tree, files, at), held) == []
     assert differences(found, in_yourdfpy(tree, at), held) == []
+
+
+def test_the_comparison_sees_other_poses_limits_and_sizes(tmp_path):
+    rng = np.random.default_rng(0)
+    tree, files = robot(rng), meshes(rng)
+    at = positions(tree, scene := load(tmp_path, tree, files), rng)
+    found, held = ours(scene, at), followers(tree).keys()
+    elsewhere = {name: value + 1e-3 for name, value in at.items()}
+    assert any("pose of" in said for said in differences(found, in_mujoco(tree, files, elsewhere), held))
+    smaller = replace(found, supports={body: reach - 1e-4 for body, reach in found.supports.items()})
+    assert any("m farther" in said for said in differences(smaller, in_mujoco(tree, files, at), held))
+    fewer = replace(found, supports={body: reach[1:] for body, reach in found.supports.items()})
+    assert any("geometries" in said for said in differences(fewer, in_yourdfpy(tree, at), held))
+    wider = replace(found, limits={name: (lower - 1e-6, upper) for name, (lower, upper) in found.limits.items()})
+    assert any("limits of" in said for said in differences(wider, in_yourdfpy(tree, at), held))
 
 
 def typo(rng: np.random.Generator, name: str) -> str:
