@@ -106,7 +106,7 @@ def read_scene_file(path: Path) -> SceneFile:
         packages=_packages(values.get("packages", {}), path.parent),
         directives=text[directives.start_mark.index : directives.end_mark.index].rstrip(),
         resolved_directives=_resolved(text, directives, path.parent),
-        models=tuple(node.value for _, node in _file_nodes(directives)),
+        models=tuple(node.value for _, node, _ in _file_nodes(directives)),
         q_star=_q_star(values.get("q_star")),
         limits=_limits(values.get("limits", {})),
         fix={name: _number(value, f"fix.{name}") for name, value in _by_joint(values.get("fix", {}), "fix").items()},
@@ -154,10 +154,10 @@ def compose(text: str, name: str) -> yaml.Node | None:
         raise SceneError("scene_yaml", f"{name} is not YAML: {str(error).splitlines()[0]}", hint=_MEND) from None
 
 
-def directive_files(text: str, name: str) -> list[tuple[str, str]]:
+def directive_files(text: str, name: str) -> list[tuple[str, str, str]]:
     """Returns the files that a document of Drake Model Directives names.
 
-    Each comes as ``add_model`` or ``add_directives`` and the file as written.
+    Each comes as ``add_model`` or ``add_directives``, the file as written, and the name of the model or of the models' namespace.
 
     Raises:
         SceneError: ``scene_yaml``, with the line.
@@ -165,7 +165,7 @@ def directive_files(text: str, name: str) -> list[tuple[str, str]]:
     root = compose(text, name)
     entries = root.value if isinstance(root, yaml.MappingNode) else []
     lists = [value for key, value in entries if key.value == "directives" and isinstance(value, yaml.SequenceNode)]
-    return [(kind, node.value) for directives in lists for kind, node in _file_nodes(directives)]
+    return [(kind, node.value, named) for directives in lists for kind, node, named in _file_nodes(directives)]
 
 
 def _text(path: Path) -> str:
@@ -348,22 +348,20 @@ def _check_directives(node: yaml.Node) -> None:
     for i, entry in enumerate(node.value):
         if not isinstance(entry, yaml.MappingNode) or len(entry.value) != 1:
             raise _wrong(f"directives[{i}]", "must be a mapping with one key, the kind of directive, such as add_model")
-    for _, file in _file_nodes(node):
+    for _, file, _ in _file_nodes(node):
         if file.value.startswith(("/", "~", "file:")):
             hint = "name a directory above it under packages, and write package://NAME/FILE"
             raise _wrong("directives", f"line {file.start_mark.line + 1}: {file.value!a} is not a relative path", hint=hint)
 
 
-def _file_nodes(directives: yaml.Node) -> list[tuple[str, yaml.ScalarNode]]:
-    return [
-        (kind.value, value)
-        for entry in directives.value
-        if isinstance(entry, yaml.MappingNode)
-        for kind, body in entry.value
-        if kind.value in ("add_model", "add_directives") and isinstance(body, yaml.MappingNode)
-        for key, value in body.value
-        if key.value == "file" and isinstance(value, yaml.ScalarNode)
-    ]
+def _file_nodes(directives: yaml.Node) -> list[tuple[str, yaml.ScalarNode, str]]:
+    found = []
+    for kind, body in (pair for entry in directives.value if isinstance(entry, yaml.MappingNode) for pair in entry.value):
+        if kind.value in ("add_model", "add_directives") and isinstance(body, yaml.MappingNode):
+            said = [(key.value, value) for key, value in body.value if isinstance(value, yaml.ScalarNode)]
+            named = next((value.value for key, value in said if key == ("name" if kind.value == "add_model" else "model_namespace")), "")
+            found += [(kind.value, value, named) for key, value in said if key == "file"]
+    return found
 
 
 def with_relative_packages(path: Path) -> str:
@@ -389,7 +387,7 @@ def _replaced(text: str, start: int, end: int, changed: list[tuple[yaml.ScalarNo
 
 def _resolved(text: str, directives: yaml.Node, directory: Path) -> str:
     start, end = directives.start_mark.index, directives.end_mark.index
-    relative = [node for _, node in _file_nodes(directives) if "://" not in node.value]
+    relative = [node for _, node, _ in _file_nodes(directives) if "://" not in node.value]
     absolute = [json.dumps(f"file://{(directory / node.value).resolve()}", ensure_ascii=False) for node in relative]
     resolved = _replaced(text, start, end, list(zip(relative, absolute, strict=True)))
     line, column = directives.start_mark.line, directives.start_mark.column

@@ -36,8 +36,9 @@ def inventory(payload: dict[str, Any]) -> dict[str, Any]:
     path = Path(payload["path"])
     scene_file = read_scene_file(path)
     plant, _ = AddMultibodyPlantSceneGraph(DiagramBuilder(), time_step=0.0)
-    StrictReader(scene_file).check(scene_file.resolved_directives, path.name)
-    read_models(scene_file, plant)
+    strict = StrictReader(scene_file)
+    strict.check(scene_file.resolved_directives, path.name)
+    read_models(scene_file, strict, plant)
     free = plant.GetFloatingBaseBodies()
     every = [plant.get_joint(index) for index in plant.GetJointIndices()]
     joints = [joint_of(plant, joint) for joint in every if joint.child_body().index() not in free]

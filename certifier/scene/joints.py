@@ -23,6 +23,10 @@ EXACT = 1e-9
 """Positions at which coupled joints are held fit to each other this well, in radians or metres."""
 
 
+UNBOUNDED = 1e6
+"""A limit of so many radians or metres means that there is none: exporters write 1e9, 1e16 or the greatest double for it."""
+
+
 @dataclass(frozen=True)
 class Coupling:
     """A linear equation that joint positions keep to, as a mimic joint does: sum of factor times position = constant.
@@ -33,6 +37,11 @@ class Coupling:
 
     factors: Mapping[str, float]
     constant: float
+
+
+def counted(limit: float) -> float:
+    """Returns a limit of a model, which is infinite where its number means that there is none."""
+    return float(np.copysign(np.inf, limit)) if abs(limit) >= UNBOUNDED else limit
 
 
 def held(joints: Sequence[Joint], positions: Mapping[str, float], couplings: Sequence[Coupling]) -> list[Joint]:

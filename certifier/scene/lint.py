@@ -9,12 +9,12 @@ import numpy as np
 from certifier.model import Array, Geometry, Pair, Scene
 from certifier.scene.contacts import touching
 from certifier.scene.tree import Tree
+from certifier.scene.units import units
 from certifier.verify.decimals import at_most_mm
 
 _SAMPLES = 40
 _IGNORED_SAMPLES = 200
 _STEEP = 50.0
-_HUGE = 10.0
 
 
 def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn: set[str]) -> list[str]:
@@ -31,7 +31,7 @@ def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn:
         *_filtered(scene, tree, candidates),
         *_unguarded(scene, tree, drawn),
         *_steep(scene),
-        *_huge(scene),
+        *units(scene, tree),
         *_always_touching(scene),
         *(_never_touching(scene) if scene.ignored else []),
         *([] if scene.pairs else ["no pair of geometries can collide: there is nothing to certify"]),
@@ -100,14 +100,6 @@ def _steep(scene: Scene) -> list[str]:
         f"joint {j.name} comes close to q* +- pi, where s reaches {s:.3g}: narrower limits would condition the programs better"
         for j, s, revolute in zip(scene.moving, reach, scene.revolute, strict=True)
         if revolute and s > _STEEP
-    ]
-
-
-def _huge(scene: Scene) -> list[str]:
-    return [
-        f"geometry {g.name} is {size:.3g} m long: are its units metres?"
-        for g in scene.geometries
-        if g.shape["kind"] != "half_space" and (size := float(np.ptp(g.vertices, axis=0).max()) + 2 * g.radius) > _HUGE
     ]
 
 

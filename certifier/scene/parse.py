@@ -42,7 +42,7 @@ from certifier.model import ALPHABET, MAX_NAME, MAX_SENTENCE, WORLD, Array, Geom
 from certifier.scene import shapes
 from certifier.scene.file import SceneFile, read_scene_file
 from certifier.scene.hulls import with_hulls
-from certifier.scene.joints import Coupling, centered, held, narrowed
+from certifier.scene.joints import Coupling, centered, counted, held, narrowed
 from certifier.scene.lint import findings
 from certifier.scene.pairs import pairs
 from certifier.scene.strict import StrictReader
@@ -75,7 +75,7 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
     strict = StrictReader(scene_file)
     strict.check(scene_file.resolved_directives, path.name)
-    warnings = read_models(scene_file, plant)
+    warnings = read_models(scene_file, strict, plant)
     inspector = scene_graph.model_inspector()
     joints, q_star = centered(narrowed(held(_joints(plant), scene_file.fix, couplings(plant)), scene_file.limits), scene_file.q_star)
     tree = Tree(joints, _bodies(plant))
@@ -105,8 +105,8 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     return document
 
 
-def read_models(scene_file: SceneFile, plant: MultibodyPlant) -> list[str]:
-    """Adds the directives' models to the plant, finalises it and returns Drake's warnings.
+def read_models(scene_file: SceneFile, strict: StrictReader, plant: MultibodyPlant) -> list[str]:
+    """Adds the directives' models to the plant, finalises it and returns warnings: Drake's, and which limits do not count.
 
     It prints the models' names first, because only what is printed remains if Drake ends the process.
     """
@@ -128,7 +128,19 @@ def read_models(scene_file: SceneFile, plant: MultibodyPlant) -> list[str]:
     for warning in log.messages:
         if _IGNORED_SHAPE.search(warning):
             raise SceneError("unsupported_shape", _one_line(scene_file, warning), field="directives", hint="use a primitive or a mesh")
-    return list(dict.fromkeys(_one_line(scene_file, warning) for warning in log.messages))
+    return list(dict.fromkeys([*(_one_line(scene_file, warning) for warning in log.messages), *_without_limits(strict, plant)]))
+
+
+def _without_limits(strict: StrictReader, plant: MultibodyPlant) -> list[str]:
+    """Takes the limits off continuous joints of URDF, which Drake would apply, and says so."""
+    said = []
+    for model, name in strict.unlimited:
+        joint = plant.GetJointByName(name, plant.GetModelInstanceByName(model))
+        lower, upper = joint.position_lower_limits()[0], joint.position_upper_limits()[0]
+        joint.set_position_limits([-np.inf], [np.inf])
+        what = f"joint {_joint_name(plant, joint)} is continuous, so its limits {lower:g} and {upper:g} do not count in URDF"
+        said.append(f"{what}: it turns without limits (for limits, write type revolute, or limits in the scene file)")
+    return said
 
 
 class _DrakeLog(logging.Handler):
@@ -229,7 +241,7 @@ def joint_of(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
             planar = "write two slides and a turn, as docs/scenes.md does for a mobile base"
             hint = planar if joint.type_name() == "planar" else "replace it by such joints, or weld its bodies"
             raise SceneError("unsupported_joint", message, field="directives", hint=hint)
-    lower, upper = float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])
+    lower, upper = (counted(float(limit[0])) for limit in (joint.position_lower_limits(), joint.position_upper_limits()))
     return Joint(name, kind, parent, child, np.array(axis), X_PF, X_BM, joint.position_start(), lower, upper)
 
 

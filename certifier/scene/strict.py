@@ -21,12 +21,17 @@ _OBJ = ".obj"
 
 
 class StrictReader:
-    """Reads OBJ meshes and the model files that a scene's directives lead to, also through includes. It finds files as Drake does."""
+    """Reads OBJ meshes and the model files that a scene's directives lead to, also through includes. It finds files as Drake does.
+
+    Attributes:
+        unlimited: the continuous joints that have limits in a URDF file, where they do not count: Drake's names of model and joint.
+    """
 
     def __init__(self, scene_file: SceneFile) -> None:
         self._packages, self._root = scene_file.packages, scene_file.path.parent.resolve()
         self._points: dict[Path, Array] = {}
-        self._models: set[tuple[type[ModelFile], Path]] = set()
+        self._models: dict[tuple[type[ModelFile], Path], ModelFile] = {}
+        self.unlimited: list[tuple[str, str]] = []
 
     def points(self, path: Path) -> Array:
         """Returns every vertex of an OBJ file, (k, 3), as written there.
@@ -53,32 +58,38 @@ class StrictReader:
         Raises:
             SceneError: ``scene_model``, with file and line, or ``scene_yaml``.
         """
-        documents, read = [(directives, name)], set[Path]()
-        for text, document in documents:
-            for kind, reference in directive_files(text, document):
+        documents: list[tuple[str, str, tuple[str, ...], frozenset[Path]]] = [(directives, name, (), frozenset())]
+        for text, document, namespace, around in documents:
+            for kind, reference, named in directive_files(text, document):
                 path, suffix = self._located(reference, [self._root]), _suffix(reference)
-                if path is None or path in read:
+                if path is None or path in around:
                     continue
                 if path.is_dir():
                     raise SceneError(
                         "scene_model", f"{self._name(path)} is a directory", field="directives", hint="name a model file in it"
                     )
+                full = (*namespace, named) if named else namespace
                 if kind == "add_directives":
-                    read.add(path)
-                    documents.append((_text(path, self._name(path)), self._name(path)))
+                    documents.append((_text(path, self._name(path)), self._name(path), full, around | {path}))
                 elif suffix.lower() == _OBJ:
                     self.points(path)
                 elif suffix.lower() in _FORMATS:
-                    self._check_model(path, _FORMATS[suffix.lower()])
+                    model = self._check_model(path, _FORMATS[suffix.lower()])
+                    if isinstance(model, Urdf):
+                        self.unlimited += [("::".join(full), joint.file) for joint in model.unlimited]
 
-    def _check_model(self, path: Path, kind: type[ModelFile]) -> None:
+    def _check_model(self, path: Path, kind: type[ModelFile]) -> ModelFile:
         """Checks a model and what it includes. MJCF's paths start at the model's directory, SDFormat's in the working directory."""
-        waiting = [(path, kind)]
+        waiting, whole = [(path, kind)], (kind, path)
         for file, kind in waiting:
-            if (kind, file) in self._models:
+            known = self._models.get((kind, file))
+            model = self._models[kind, file] = known or kind(file, self._name(file))
+            if isinstance(model, Urdf) and model.unlimited and file != path:
+                joint = model.unlimited[0]
+                hint = "leave lower and upper out, or write type revolute"
+                self._refuse(model, joint, "is a continuous joint, whose limits do not count, and Drake would apply them", hint)
+            if known is not None:
                 continue
-            self._models.add((kind, file))
-            model = kind(file, self._name(file))
             start = Path.cwd() if kind is Sdf else path.parent
             for include in model.includes:
                 found = self._located(include.file, [start])
@@ -90,6 +101,7 @@ class StrictReader:
                 waiting.append((found, _FORMATS[_suffix(include.file)] if kind is Sdf else kind))
             for mesh in model.meshes:
                 self._check_mesh(model, mesh, file.parent if kind is not Mjcf else path.parent)
+        return self._models[whole]
 
     def _check_mesh(self, model: ModelFile, mesh: Reference, start: Path) -> None:
         if _suffix(mesh.file).lower() != _OBJ:

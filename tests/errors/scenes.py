@@ -42,6 +42,13 @@ def room(shape: str) -> dict[str, dict[str, str]]:
     return {"files": {"room.sdf": SDF_SHAPE.format(shape)}}
 
 
+def sdf_joint(kind: str, tag: str = "", more: str = "") -> dict[str, dict[str, str]]:
+    """The room with a joint of a kind; ``tag`` is ``drake:`` for those of Drake's own."""
+    ends = f"<{tag}parent>walls</{tag}parent><{tag}child>door</{tag}child>{more}"
+    model = '<sdf xmlns:drake="http://drake.mit.edu" version="1.7"><model name="room"><link name="walls"/><link name="door"/>'
+    return {"files": {"room.sdf": f'{model}<{tag}joint name="b" type="{kind}">{ends}</{tag}joint></model></sdf>'}}
+
+
 def mjcf(body: str) -> dict[str, object]:
     return {"scene": MUJOCO, "files": {"m.xml": f"<mujoco model='m'><worldbody><body name='b'>{body}</body></worldbody></mujoco>"}}
 
@@ -380,7 +387,7 @@ MODELS = [
             "directives",
             "{models}{message}",
             "mend the model or the directive",
-            lambda t: t.scene(shape='<sphere radius="-1"/>'),
+            lambda t: t.scene(shape='<mesh filename="nothing.obj"/>'),
         ),
         (
             "scene_model",
@@ -401,14 +408,14 @@ MODELS = [
             "directives",
             "joint {name} is a {...} joint; revolute, prismatic and fixed joints are supported",
             "replace it by such joints, or weld its bodies",
-            lambda t: t.scene(more=BALL_JOINT),
+            lambda t: t.scene(**sdf_joint("ball")),
         ),
         (
             "unsupported_joint",
             "directives",
             "joint {name} is a {...} joint; revolute, prismatic and fixed joints are supported",
             "write two slides and a turn, as docs/scenes.md does for a mobile base",
-            lambda t: t.scene(kind="planar"),
+            lambda t: t.scene(**sdf_joint("planar", "drake:", "<drake:damping>0 0 0</drake:damping>")),
         ),
         (
             "unsupported_joint",
@@ -454,6 +461,13 @@ MODELS = [
             "is no file that was found",
             "name the model's file; Drake searches where a check cannot",
             lambda t: t.scene(files={"room.sdf": INCLUDE.format("no.sdf")}),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "is a continuous joint, whose limits do not count, and Drake would apply them",
+            "leave lower and upper out, or write type revolute",
+            lambda t: t.scene(kind="continuous", files={"room.sdf": INCLUDE.format("arm.urdf")}),
         ),
         (
             "scene_model",

@@ -54,7 +54,7 @@ class ModelFile:
         mesh_directories: directories of the meshes, relative to the model.
 
     Raises:
-        SceneError: ``scene_model`` with the file and the line, when the file is not accepted.
+        SceneError: ``scene_model`` or ``unsupported_joint`` with the file and the line, when the file is not accepted.
     """
 
     ONCE: ClassVar[frozenset[str]]
@@ -70,11 +70,15 @@ class ModelFile:
         self._open: list[Element] = []
         parse_xml(path, name, "scene_model", self._install)
 
+    def _begin(self, element: Element, parent: str) -> None:
+        """Checks an element where it begins, before anything in it."""
+
     def _check(self, element: Element, parent: str) -> None:
+        """Checks an element where it ends."""
         raise NotImplementedError
 
-    def refuse(self, element: Element, what: str) -> NoReturn:
-        raise SceneError("scene_model", f"{self.name}:{element.line}: {what}", field="directives", hint="mend the model there")
+    def refuse(self, element: Element, what: str, hint: str = "mend the model there", code: str = "scene_model") -> NoReturn:
+        raise SceneError(code, f"{self.name}:{element.line}: {what}", field="directives", hint=hint)
 
     def _check_order(self, element: Element, lower: float, upper: float) -> None:
         if lower > upper:
@@ -102,6 +106,7 @@ class ModelFile:
                     self.refuse(element, f"<{parent.name}> has a second <{name}>, and Drake would read the first")
                 parent.children.add(name)
                 parent.interrupted = True
+            self._begin(element, self._open[-1].name if self._open else "")
             self._open.append(element)
 
         def end(_: str) -> None:

@@ -166,9 +166,9 @@ def floating(scene=SCENE):
         ({"limit": LIMIT.replace('"2"', '"-1"')}, "joint_range", "directives", "arm/turn cannot move"),
         ({"extra": "q_star: [0, 0]\n"}, "scene_field", "q_star", "2 numbers for 1 joints (in order: arm/turn)"),
         ({"kind": "fixed", "limit": ""}, "no_joints", "directives", "no joint"),
-        ({"kind": "planar"}, "unsupported_joint", "directives", "arm/turn is a planar joint"),
+        ({"kind": "planar"}, "unsupported_joint", "directives", "arm.urdf:3: joint 'turn' is a 'planar' joint"),
         ({"kind": "planar"}, "unsupported_joint", "directives", "two slides and a turn"),
-        ({"kind": "floating"}, "floating_body", "directives", "arm/hand"),
+        ({"kind": "floating"}, "unsupported_joint", "directives", "arm.urdf:3: joint 'turn' is a 'floating' joint"),
         ({"scene": floating()}, "floating_body", "directives", "add_weld: {parent: world, child: room::walls}"),
         ({"files": {"room.sdf": NESTED}}, "floating_body", "directives", "X_PF: {base_frame: room::shelf::board}}, and add_weld"),
         (
