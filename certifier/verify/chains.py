@@ -2,11 +2,27 @@
 
 The fixed poses between the joints are the exact ones of certifier.verify.kinematics, rounded to doubles once.
 
-All that is computed of a chain of m joints is a sum of products of rotations and offsets, whose lengths add up to its size at most. In the
-norm that belongs to lengths, a rotation of a fixed pose is wrong by at most 2^-51, one of a joint by at most 2^-45 and the error of its
-angle, and a product of two rotations by at most 2^-48 for its rounding. Rotations have the norm 1, so errors add up. So a position is wrong
-by at most the size times (m + 3) (2^-44 + twice the angles' error), its own sums and a scalar product with a unit vector included, as long
-as this factor is below 2^-10. What prismatic joints are wrong by is added.
+Let u = 2^-53, let Y be a computed number and y what it stands for, and let lengths and the norm that belongs to them measure errors. The
+size of a vertex is the sum of all lengths on the way to it: |v|, that of each of the m + 1 offsets, and that of each slide.
+
+- An offset or an axis, rounded to doubles, is wrong by at most u of its length, and a rotation by at most 2 u; both by 2^-200 more.
+- The cosine and the sine of a joint are wrong by at most 2^-47, besides the angle's error: each is one of certifier.verify.angles, wrong by
+  2^-49, or made of two such and of two quotients wrong by less than 5 u. So Rodrigues' formula is wrong by at most 2^-45 and the angle's
+  error, its 30 roundings of numbers that are at most 1 included.
+- A product of two rotations is rounded by at most 9 u. There are two for each joint.
+- So the rotation before an offset, and the one before v, is wrong by at most m + 1 times 2^-44.5 and the angles' error, to first order. It
+  multiplies a length, exactly one of those in the size. Both parts of the product, the rotation's error and what an entry's three products
+  round, 6 u, are parts of this length, whatever it is added to.
+- A position is a sum of 2 m + 1 vectors, each sum of which is at most the size. So they are rounded by (2 m + 1) u of it.
+- n'(R v + p) is computed as (R'n)'v + n'p with three products each, rounded by 15 u of |n| times the size.
+
+All that is a part of the size, (m + 3) (2^-44 + the angles' error) of it to first order, times |n|. Terms of higher order are a part of
+that which is below 2^-9, because error() sees to it that the whole is below 2^-10; twice the angles' error has room for it. That no two
+lengths are put together first is what makes this hold where they cancel. What is done with less of them, as n'R'v with the length of R v +
+offset, is wrong by a part of their sum nevertheless.
+
+What a slide is wrong by is added as it is: it moves what is behind it by that. Products that underflow are wrong by 2^-1074, times 1e8 m at
+most, and there are fewer than 2^14 of them. The least size is 1e-150 m, of which the part is more than that.
 """
 
 from __future__ import annotations
@@ -57,34 +73,50 @@ class Chain:
             X[:, :3, 3],
         )
 
-    def levers(self, vertices: Array, slid: Array) -> tuple[Array, Array]:
-        """Returns how far vertices can be from the joints' axes, and from the frame's origin, in metres, rounded upwards.
+    def levers(self, vertices: Array, slid: Array) -> Array:
+        """Returns how far vertices can be from the joints' axes, in metres, rounded upwards.
+
+        These bound motion. They may be much less than :meth:`sizes`, because a body's frame may be far from the body.
 
         Args:
             vertices: (V, 3) metres in the body's frame.
             slid: (K, m) how far each joint's position is from 0 at most, metres; only that of a prismatic joint matters.
 
         Returns:
-            (K, m) distances from the axes, 1 for a prismatic joint; (K,) the sizes. A change of one position moves no vertex farther than
-            by the joint's lever times the change.
+            (K, m) distances from the axes, 1 for a prismatic joint. A change of one position moves no vertex farther than by the joint's
+            lever times the change.
         """
         m = len(self.joints)
         levers = np.ones((len(slid), m))
+        if not m:
+            return levers
         tails = vertices @ self.rotations[m].T + self.offsets[m]
+        # What is rounded in the tails, and in the numbers that they are made of: fewer than 2^4 roundings of 2^-53 in each product.
         rounded = 2.0**-45 * (_longest(vertices) + _longest(self.offsets[m:]))
         behind = np.full(len(slid), _longest(tails) + rounded)
-        across: Array | float = _across(self.axes[m - 1], tails) + rounded if m else 0.0
+        across: Array | float = _across(self.axes[m - 1], tails) + rounded
         for k in range(m - 1, -1, -1):
-            if not self.slides[k]:
+            if self.slides[k]:
+                behind = behind + slid[:, k]
+            else:
                 levers[:, k] = across * UP
-            behind = behind + (slid[:, k] if self.slides[k] else 0.0)
             if k:
                 across = _across(self.axes[k - 1], self.offsets[k : k + 1]) + behind
-            behind = behind + _longest(self.offsets[k : k + 1])
-        return levers, behind * UP if m else behind
+                behind = behind + _longest(self.offsets[k : k + 1])
+        return levers
+
+    def sizes(self, vertices: Array, slid: Array) -> Array:
+        """Returns the sum of all lengths on the way to the farthest vertex, (K,) metres, rounded upwards: what rounding is a part of.
+
+        No two of the lengths are put together first, as what cancels in their sum does not cancel in what is rounded. The arguments are
+        those of :meth:`levers`.
+        """
+        lengths = _longest(vertices) + sum(_longest(offset[None]) for offset in self.offsets)
+        found: Array = (lengths + (slid * self.slides).sum(axis=1)) * UP
+        return found
 
     def error(self, size: Array, inexact: float) -> Array:
-        """Returns by how many metres a vertex' position, of sizes as :meth:`levers` returns them, is wrong at most.
+        """Returns by how many metres a vertex' position, of sizes as :meth:`sizes` returns them, is wrong at most.
 
         Args:
             inexact: by how much the joints' positions are wrong at most, in radians or metres.

@@ -171,7 +171,8 @@ class _Side:
     def levers(self, geometry: Geometry, piece: np.ndarray) -> tuple[Array, Array]:
         """Returns the levers and the sizes of a geometry on pieces, (I, m) and (I,)."""
         if geometry.name not in self._known:
-            self._known[geometry.name] = self.chain.levers(geometry.vertices, self._slid)
+            both = (self.chain.levers(geometry.vertices, self._slid), self.chain.sizes(geometry.vertices, self._slid))
+            self._known[geometry.name] = both
         row = piece if len(self._slid) > 1 else np.zeros_like(piece)
         levers, sizes = self._known[geometry.name]
         return levers[row], sizes[row]

@@ -52,7 +52,7 @@ def bounds(tree, frame, body, shape, motion, rho=0.0, t0=0.0, t1=1.0):
     check, chain = _Check(without_pairs(tree, motion, rho)), Chain.between(tree, ExactKinematics.by_joint(tree), frame, body)
     pieces = np.arange(motion.pieces)
     rates, changes = check._rates(pieces, np.full(len(pieces), t0), np.full(len(pieces), t1))
-    levers, _ = chain.levers(shape.vertices, check._slid[:, chain.joints])
+    levers = chain.levers(shape.vertices, check._slid[:, chain.joints])
     side = ours.side(ours.chain(Kinematics.of(tree), frame, body), shape, check._slid)
     searched = [acceleration(side, side.levers[k], rates[k], changes[k]) for k in pieces]
     return chain, levers, _acceleration(chain, levers, rates, changes), side, searched
@@ -139,7 +139,7 @@ def test_positions_are_as_exact_as_is_said(seed):
     """Against exact fractions, in s."""
     tree, frame, body, shape, motion = random_case(2 * seed + 1)
     check, chain = _Check(without_pairs(tree, motion, 0.0)), Chain.between(tree, ExactKinematics.by_joint(tree), frame, body)
-    _, size = chain.levers(shape.vertices, check._slid[:, chain.joints])
+    size = chain.sizes(shape.vertices, check._slid[:, chain.joints])
     pieces, times = np.array([0, 1, 0, 1, 1]), np.array([0.0, 1.0, 0.3, 0.7, 1e-9])
     (poses,) = check._poses([chain], pieces, times)
     for k, (piece, time) in enumerate(zip(pieces, times, strict=True)):
