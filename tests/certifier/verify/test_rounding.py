@@ -12,6 +12,7 @@ from flint import arb, ctx
 from certifier.errors import ProofError
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
 from certifier.proof import limits
+from certifier.proof.container import with_scene
 from certifier.proof.motion import Motion, MotionProof, Space
 from certifier.verify.chains import Chain
 from certifier.verify.kinematics import ExactKinematics, exact, rigid, unit
@@ -185,19 +186,28 @@ def far_body(seed: int):
     return before, true, float(rows @ v[0] + p[0, 0])
 
 
-def test_bodies_that_overlap_by_what_a_far_frame_rounds_are_not_apart():
-    """The wall's face is between where the vertex is and where doubles put it."""
-    found = 0
-    for seed in range(200):
+def far_proofs(seeds) -> Iterator[MotionProof]:
+    """Proofs about bodies that overlap: the wall's face is between where the vertex is and where doubles put it."""
+    for seed in seeds:
         before, true, computed = far_body(seed)
         if computed - true < 5e-11:
             continue
-        found += 1
         scene = before(computed - 0.2 * (computed - true))
         assert scene.geometries[1].vertices[:, 0].max() > true
-        one, ends = np.array([[1]], np.int32), np.ones(1)
-        still = Motion(Space.Q, np.zeros((2, 1)))
-        proof = MotionProof(scene, still, 1.0, 0.0, np.zeros(1, np.int32), one, ends, np.array([[1.0, 0.0, 0.0]]))
+        one, ends, rest = np.array([[1]], np.int32), np.ones(1), Motion(Space.Q, np.zeros((2, 1)))
+        yield MotionProof(scene, rest, 1.0, 0.0, np.zeros(1, np.int32), one, ends, np.array([[1.0, 0.0, 0.0]]))
+
+
+def far_proof() -> bytes:
+    """The file of one of them."""
+    proof = next(far_proofs(range(200)))
+    return with_scene(proof.to_bytes(), proof.scene)
+
+
+def test_bodies_that_overlap_by_what_a_far_frame_rounds_are_not_apart():
+    found = 0
+    for proof in far_proofs(range(200)):
+        found += 1
         with pytest.raises(ProofError, match="does not keep"):
             verify_motion(proof)
     assert found > 10
