@@ -82,7 +82,7 @@ def test_the_oracle_finds_what_a_weaker_verifier_would_accept(monkeypatch, owner
 
 def test_the_oracle_finds_an_overlap_that_only_rounding_hides(monkeypatch):
     """2e-10 m deep, with a body's frame a million metres off its joint."""
-    monkeypatch.setattr(Chain, "sizes", lambda self, vertices, slid: np.full(len(slid), 1.0))
+    monkeypatch.setattr(Chain, "sizes", lambda self, reach, slid: np.full(len(slid), 1.0))
     wrong = Campaign().judge("far", far_proof())
     assert wrong is not None
     assert "apart at most" in wrong

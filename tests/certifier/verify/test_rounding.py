@@ -14,9 +14,11 @@ from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
 from certifier.proof import limits
 from certifier.proof.container import with_scene
 from certifier.proof.motion import Motion, MotionProof, Space
-from certifier.verify.chains import Chain
-from certifier.verify.kinematics import ExactKinematics, exact, rigid, unit
-from certifier.verify.motion import _Check, verify_motion
+from certifier.verify.chains import poses
+from certifier.verify.kinematics import exact, rigid, unit
+from certifier.verify.motion import verify_motion
+from certifier.verify.pieces import Pieces
+from certifier.verify.places import Places
 from certifier.verify.scene import check_scene
 from tests.certifier.scenes import box, pose
 
@@ -107,27 +109,26 @@ def adversarial(seed: int):
     return scene, frame, names[-1], v, rng
 
 
-def still(scene: Scene, space: Space, rng) -> MotionProof:
+def still(scene: Scene, space: Space, rng) -> Motion:
     """A motion that rests at a configuration."""
     at = rng.uniform(-1.5, 1.5, scene.n) * np.where(scene.revolute, 1.0, 10.0 ** rng.uniform(-2, 5.5, scene.n))
     if rng.random() < 0.3:
         at *= 0
-    counts = np.zeros((0, 1), np.int32)
-    return MotionProof(scene, Motion(space, np.array([at, at])), 1.0, 0.0, np.zeros(0, np.int32), counts, np.zeros(0), np.zeros((0, 3)))
+    return Motion(space, np.array([at, at]))
 
 
 def wrong_by(seed: int):
     """The largest error of a projection in proportion to its normal, the bound, and what it would be if sums of offsets counted as one."""
     scene, frame, body, v, rng = adversarial(seed)
     space = Space.S if seed % 2 else Space.Q
-    proof = still(scene, space, rng)
-    check, chain = _Check(proof), Chain.between(scene, ExactKinematics.by_joint(scene), frame, body)
-    (poses,) = check._poses([chain], np.zeros(1, np.int64), np.zeros(1))
+    motion = still(scene, space, rng)
+    pieces, chain, none = Pieces(scene, motion, 0.0), Places(scene).chain(frame, body), np.zeros(1, np.int64)
+    R, p = poses([chain], none, none, *pieces.positions(none, np.zeros(1)))
     normal = rng.normal(size=3)
     normal *= rng.uniform(0.51, 1.99) / np.linalg.norm(normal)
-    found = poses.along(normal[None], np.zeros(1, np.int64), v)[0]
+    found = [float((R[0].T @ normal) @ vertex + p[0] @ normal) for vertex in v]
     with bits(600):
-        x = [arb(exact(value)) for value in proof.motion.controls[0]]
+        x = [arb(exact(value)) for value in motion.controls[0]]
         if space is Space.S:
             x = [2 * s.atan() if turns else s for s, turns in zip(x, scene.revolute, strict=True)]
             x = [s + arb(exact(base)) for s, base in zip(x, scene.q_star, strict=True)]
@@ -137,11 +138,11 @@ def wrong_by(seed: int):
             p = [sum((X[i][k] * arb(exact(vertex[k])) for k in range(3)), X[i][3]) for i in range(3)]
             truth = sum((arb(exact(a)) * b for a, b in zip(normal, p, strict=True)), arb(0))
             off = max(off, float(abs(arb(exact(value)) - truth).upper()))
-    slid = check._slid[:, chain.joints]
-    bound = float(chain.error(chain.sizes(v, slid), check._inexact)[0])
+    slid = pieces.slid[:, chain.joints]
+    bound = float(chain.error(chain.sizes(chain.reach(v), slid), pieces.inexact)[0])
     tails = np.linalg.norm(v @ chain.rotations[-1].T + chain.offsets[-1], axis=1).max()
     short = tails + np.linalg.norm(chain.offsets[:-1], axis=1).sum() + (slid * chain.slides).sum()
-    return off / float(np.linalg.norm(normal)), bound, float(chain.error(np.array([short]), check._inexact)[0])
+    return off / float(np.linalg.norm(normal)), bound, float(chain.error(np.array([short]), pieces.inexact)[0])
 
 
 def campaign(seeds) -> int:
@@ -177,8 +178,8 @@ def far_body(seed: int):
         return Scene("far", (joint,), (WORLD, "arm/link"), (point, behind), (Pair(point.name, "wall"),), (), np.zeros(1))
 
     scene = before(0.0)
-    chain = Chain.between(scene, ExactKinematics.by_joint(scene), WORLD, "arm/link")
-    R, p = chain.poses(np.zeros((1, 1)), np.ones((1, 1)), np.zeros((1, 1)))
+    chain, none = Places(scene).chain(WORLD, "arm/link"), np.zeros(1, np.int64)
+    R, p = poses([chain], none, none, np.zeros((1, 1)), np.ones((1, 1)), np.zeros((1, 1)))
     rows = R[0].T @ np.array([1.0, 0.0, 0.0])
     with bits(600):
         X = world_pose(scene, "arm/link", [arb(0)])
