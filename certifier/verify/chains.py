@@ -158,16 +158,26 @@ def poses(chains: Sequence[Chain], which: np.ndarray, at: np.ndarray, q: Array, 
     for k in range(int(count.max(initial=0))):
         some = slice(int(np.searchsorted(fewer, -k)))  # those that have more joints than k
         joint = first[some] + k
-        here, slide, behind = (at[some], joints[joint]), slides[joint], joint + which[some] + 1
+        behind = joint + which[some] + 1
+        if which[some][0] == which[some][-1]:  # one chain alone: its numbers are for all
+            joint, behind = joint[:1], behind[:1]
+        here, slide = (at[some], joints[joint]), slides[joint]
         if slide.any():
             p[some] += np.einsum("ijk,ik->ij", R[some], axes[joint]) * np.where(slide, q[here], 0.0)[:, None]
         if not slide.all():
-            turn = np.where(slide, 0.0, sines[here])[:, None, None] * skew[joint]
-            turn += np.where(slide, 0.0, 1.0 - cosines[here])[:, None, None] * square[joint]
-            R[some] = R[some] @ (np.eye(3) + turn)  # Rodrigues' formula
+            turn = np.where(slide, 0.0, sines[here])[:, None, None] * skew.take(joint, axis=0)
+            turn += np.where(slide, 0.0, 1.0 - cosines[here])[:, None, None] * square.take(joint, axis=0)
+            turn += np.eye(3)  # Rodrigues' formula
+            R[some] = R[some] @ turn
         p[some] += np.einsum("ijk,ik->ij", R[some], offsets[behind])
-        R[some] = R[some] @ rotations[behind]
+        R[some] = _times(R[some], rotations.take(behind, axis=0))
     return R, p
+
+
+def _times(R: Array, by: Array) -> Array:
+    """Returns products of rotations, (N, 3, 3), with others, (N, 3, 3) or one for all."""
+    found: Array = R @ by if len(by) > 1 else (R.reshape(-1, 3) @ by[0]).reshape(R.shape)
+    return found
 
 
 def _lengths(points: Array) -> Array:
