@@ -342,7 +342,7 @@ FORGERIES = (
     Forgery(
         "the box is around the polytope",
         smaller_box,
-        "box",
+        "the multipliers do not prove the box around the polytope",
         (separations, "verify_separation"),
         "check_ground(proof.scene, proof.ground)",
         "pass",
