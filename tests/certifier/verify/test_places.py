@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,8 @@ from flint import ctx
 from certifier.errors import ProofError
 from certifier.model import WORLD, Joint, JointKind, Pair, Scene
 from certifier.proof.motion import Motion, MotionProof, Space
-from certifier.verify import places
+from certifier.verify import motion, places
+from certifier.verify.chains import Chain
 from certifier.verify.kinematics import ExactKinematics
 from certifier.verify.motion import verify_motion
 from certifier.verify.places import Places
@@ -84,6 +86,43 @@ def test_a_proof_takes_what_is_shared_in_any_order():
         world = replace(scene, pairs=order)
         gaps.add(verify_motion(resting(world)).gap)
     assert len(gaps) == 1
+
+
+def test_what_is_computed_is_linear_in_the_file(monkeypatch):
+    """Every joint's frames once, and every geometry once for each chain to it, however many intervals and blocks of them there are."""
+    tree = random_tree(1, bodies=6)
+    shapes = tuple(ball(f"{body}/ball{i}", body, 0.01, (i, 0.0, 0.0)) for body in tree.bodies for i in range(4))
+    pairs = tuple(Pair(*sorted((a.name, b.name))) for a in shapes for b in shapes if a.body < b.body)
+    scene = replace(tree, geometries=shapes, pairs=pairs)
+    proof = resting(scene)
+    rng, each = np.random.default_rng(0), 5
+    ends, normals = np.tile(np.arange(1, each + 1) / each, len(pairs)), np.repeat(proof.normals, each, axis=0)
+    frames = rng.integers(0, len(scene.bodies), len(pairs)).astype(np.int32)
+    poses = [doubles_at(scene, scene.bodies[i], proof.motion.controls[0]) for i in frames]
+    turned = np.einsum("ijk,ij->ik", np.repeat([X[:3, :3] for X in poses], each, axis=0), normals)
+    many = replace(proof, frames=frames, counts=proof.counts * each, ends=ends, normals=turned)
+    calls = Counter()
+
+    def counted(owner, name):
+        function = getattr(owner, name)
+
+        def call(*args):
+            calls[name] += 1
+            return function(*args)
+
+        monkeypatch.setattr(owner, name, call)
+
+    counted(places, "_rigid")
+    counted(Chain, "reach")
+    counted(motion, "_least")
+    whole = verify_motion(many).gap
+    assert calls["_rigid"] <= 4 * len(scene.joints)
+    assert calls["reach"] <= 2 * len(pairs)
+    assert calls["_least"] == 2 * len(pairs)
+    calls.clear()
+    monkeypatch.setattr(motion, "BLOCK", 7)
+    assert verify_motion(many).gap == pytest.approx(whole, rel=1e-12)
+    assert calls["_least"] <= 2 * (len(pairs) + 1 + each * len(pairs) // 7)
 
 
 def resting(scene: Scene) -> MotionProof:
