@@ -55,6 +55,10 @@ class MotionFile:
         controls = self._arrays["controls"]
         self.pieces = np.array([controls[k : k + self.degree + 1] for k in range(0, len(controls) - 1, self.degree)])
         self._above = {joint["child"]: joint for joint in self.scene["joints"]}
+        self._frames = {
+            body: (np.array(joint["X_PF"], dtype=float), np.linalg.inv(np.array(joint["X_BM"], dtype=float)))
+            for body, joint in self._above.items()
+        }
         self._geometries = {geometry["name"]: geometry for geometry in self.scene["geometries"]}
         moving = [joint for joint in self.scene["joints"] if joint["index"] is not None]
         self._moving = sorted(moving, key=lambda joint: joint["index"])
@@ -149,8 +153,7 @@ class MotionFile:
         R, p, body = np.eye(3), np.zeros(3), geometry["body"]
         while body != "world":
             joint = self._above[body]
-            first, last = np.array(joint["X_PF"], dtype=float), np.linalg.inv(np.array(joint["X_BM"], dtype=float))
-            X = first.copy()
+            X, last = self._frames[body]
             if joint["index"] is not None:
                 x, axis = q[joint["index"]], np.array(joint["axis"], dtype=float)
                 motion = np.eye(4)
