@@ -209,20 +209,21 @@ class _Check:
         turned, at = self._reached(runs, ways, chains, piece, np.array([t0, t1]), normals)
         rates, changes = self._pieces.rates(piece, t0, t1)
         needed, ends = np.full(len(rows), 2 * self._scene.padding), np.empty((2, len(rows)))
-        known: dict[tuple[str, str, str], Reach] = {}
+        known: dict[tuple[str, str, str], tuple[Reach, tuple[Array, Array]]] = {}
         begin = 0
         for run, two in zip(runs, ways, strict=True):
             own = slice(begin, begin := begin + run.last - run.first)
             for k, (way, name) in enumerate(zip(two, self._names(run), strict=True)):
                 geometry, chain = self._scene.geometry(name), chains[way]
-                reach = known.get((*way, name)) or known.setdefault((*way, name), chain.reach(geometry.vertices))
+                if (*way, name) not in known:
+                    reach = chain.reach(geometry.vertices)
+                    known[*way, name] = reach, self._bounds(chain, reach, self._pieces.slid[:1])
+                reach, (levers, error) = known[*way, name]
+                if chain.slides.any():  # otherwise, one row of levers holds for every piece
+                    levers, error = self._bounds(chain, reach, self._pieces.slid[piece[own]])
                 ends[k, own] = _least(turned[k, :, own], at[k, :, own], geometry.vertices)
-                # Without a prismatic joint, one row of levers holds for every piece.
-                slid = (self._pieces.slid[piece[own]] if chain.slides.any() else self._pieces.slid[:1])[:, chain.joints]
-                levers = chain.levers(reach, slid)
                 bent = _acceleration(chain, levers, rates[own], changes[own])
-                needed[own] += geometry.radius + (t1 - t0)[own] ** 2 / 8 * bent + proof.rho * levers.sum(axis=1)
-                needed[own] += chain.error(chain.sizes(reach, slid), self._pieces.inexact)
+                needed[own] += geometry.radius + (t1 - t0)[own] ** 2 / 8 * bent + proof.rho * levers.sum(axis=1) + error
         gaps = ends.sum(axis=0) / (np.linalg.norm(normals, axis=1) * UP) - needed * UP
         worst = int(gaps.argmin())
         if not gaps[worst] > 0:
@@ -230,6 +231,11 @@ class _Check:
             problem = f"piece {piece[worst]}, time {t0[worst]:.6g} to {t1[worst]:.6g}: the plane does not keep {a} and {b} apart"
             raise ProofError("proof_motion", problem)
         return float(gaps[worst] / UP)
+
+    def _bounds(self, chain: Chain, reach: Reach, slid: Array) -> tuple[Array, Array]:
+        """Returns the levers, (K, m), and the bound of what is rounded, (K,) metres, for slides (K, n)."""
+        own = slid[:, chain.joints]
+        return chain.levers(reach, own), chain.error(chain.sizes(reach, own), self._pieces.inexact)
 
     def _names(self, run: _Run) -> tuple[str, str]:
         pair = self._scene.pairs[run.pair]
