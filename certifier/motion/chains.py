@@ -39,7 +39,7 @@ class Side(NamedTuple):
         vertices: (V, 3) metres in the body's frame.
         levers: (P, m) for every piece of the motion, how far a vertex can be from each joint's axis at most, in metres; 1 for a
             prismatic joint. A change of the joint's position moves no vertex farther than by the lever times the change.
-        size: metres; no vertex can be farther than this from the frame's origin.
+        size: metres, the sum of all lengths on the way from the frame to a vertex: what rounding is a part of.
     """
 
     chain: Chain
@@ -89,26 +89,30 @@ def side(chain: Chain, geometry: Geometry, reaches: Array) -> Side:
 @njit(cache=True)
 def _measure(chain: Chain, vertices: Array, reaches: Array, levers: Array) -> float:
     """Fills in the levers of revolute joints and returns the size of a side."""
-    m, longest, across = len(chain.joints), 0.0, 0.0
+    m, longest, across, size = len(chain.joints), 0.0, 0.0, 0.0
     for v in range(len(vertices)):
         tail = chain.rotations[m] @ vertices[v] + chain.offsets[m]
         longest = max(longest, _length(tail))
+        size = max(size, _length(vertices[v]))
         if m:
             across = max(across, _length(np.cross(chain.axes[m - 1], tail)))
-    size = longest
+    for k in range(m + 1):
+        size += _length(chain.offsets[k])
+    farthest = 0.0
     for piece in range(len(reaches)):
         # Behind a joint come a fixed offset, of which only the part across the axis counts, and what is behind the next joint.
-        lever, behind = across, longest
+        lever, behind, slid = across, longest, 0.0
         for k in range(m - 1, -1, -1):
             if chain.slides[k]:
                 behind += reaches[piece, chain.joints[k]]
+                slid += reaches[piece, chain.joints[k]]
             else:
                 levers[piece, k] = lever
             if k:
                 lever = _length(np.cross(chain.axes[k - 1], chain.offsets[k])) + behind
             behind += _length(chain.offsets[k])
-        size = max(size, behind)
-    return size
+        farthest = max(farthest, slid)
+    return size + farthest
 
 
 @njit(cache=True)

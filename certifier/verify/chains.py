@@ -1,27 +1,58 @@
 """Chains of joints are evaluated here at many configurations, in doubles, with a bound of the error. docs/algorithm.md, 11, has the bounds.
 
-The fixed poses between the joints are the exact ones of certifier.verify.kinematics, rounded to doubles once.
+Let u = 2^-53, let Y be a computed number and y what it stands for, and let lengths and the norm that belongs to them measure errors. The
+size of a vertex is the sum of all lengths on the way to it: |v|, that of each of the m + 1 offsets, and that of each slide.
 
-All that is computed of a chain of m joints is a sum of products of rotations and offsets, whose lengths add up to its size at most. In the
-norm that belongs to lengths, a rotation of a fixed pose is wrong by at most 2^-51, one of a joint by at most 2^-45 and the error of its
-angle, and a product of two rotations by at most 2^-48 for its rounding. Rotations have the norm 1, so errors add up. So a position is wrong
-by at most the size times (m + 3) (2^-44 + twice the angles' error), its own sums and a scalar product with a unit vector included, as long
-as this factor is below 2^-10. What prismatic joints are wrong by is added.
+- An offset or an axis, rounded to doubles, is wrong by at most 2 u of its length, and a rotation by at most 4 u; all by 2^-199 more, as
+  certifier.verify.places has it.
+- The cosine and the sine of a joint are wrong by at most 2^-47, besides the angle's error: each is one of certifier.verify.angles, wrong by
+  2^-49, or made of two such and of two quotients wrong by less than 5 u. So Rodrigues' formula is wrong by at most 2^-45 and the angle's
+  error, its 30 roundings of numbers that are at most 1 included.
+- A product of two rotations is rounded by at most 9 u. There are two for each joint.
+- So the rotation before an offset, and the one before v, is wrong by at most m + 1 times 2^-44.5 and the angles' error, to first order. It
+  multiplies a length, exactly one of those in the size. Both parts of the product, the rotation's error and what an entry's three products
+  round, 6 u, are parts of this length, whatever it is added to.
+- A position is a sum of 2 m + 1 vectors, each sum of which is at most the size. So they are rounded by (2 m + 1) u of it.
+- n'(R v + p) is computed as (R'n)'v + n'p with three products each, rounded by 15 u of |n| times the size.
+
+All that is a part of the size, (m + 3) (2^-44 + the angles' error) of it to first order, times |n|. Terms of higher order are a part of
+that which is below 2^-9, because error() sees to it that the whole is below 2^-10; twice the angles' error has room for it. That no two
+lengths are put together first is what makes this hold where they cancel. What is done with less of them, as n'R'v with the length of R v +
+offset, is wrong by a part of their sum nevertheless.
+
+What a slide is wrong by is added as it is: it moves what is behind it by that. The 2^-199 of offsets and rotations, and the 2^-1074 by
+which products that underflow are wrong, are multiplied by 2^30 m at most and by fewer than 2^14 numbers. The least size is 2^-100 m, a part
+of which is more than that.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from flint import fmpq
 
 from certifier.errors import ProofError
-from certifier.model import Array, JointKind, Scene
-from certifier.verify.kinematics import ExactKinematics
+from certifier.model import Array
 
 UP = 1 + 2.0**-40
 """What fewer than 2^12 sums, products and quotients of numbers that are not negative give, times this, is not below what it stands for."""
+
+
+class Reach(NamedTuple):
+    """Says how far a geometry reaches in the frame that the last joint of a chain moves, in metres, rounded upwards.
+
+    Attributes:
+        tail: from the frame's origin.
+        across: from the last joint's axis; 0 without a joint.
+        vertices: from the origin of the body's own frame.
+    """
+
+    tail: float
+    across: float
+    vertices: float
 
 
 @dataclass(frozen=True)
@@ -42,49 +73,57 @@ class Chain:
     rotations: Array
     offsets: Array
 
-    @classmethod
-    def between(cls, scene: Scene, kinematics: ExactKinematics, frame: str, body: str) -> Chain:
-        """Returns the chain from a body's frame to a body."""
-        moving = [(joint, upwards) for joint, upwards in kinematics.path(frame, body) if joint.index is not None]
-        axes, poses = kinematics.linkage(frame, body)
-        X = np.array([[[_rounded(x) for x in row] for row in pose] for pose in poses])
-        signs = np.array([-1.0 if upwards else 1.0 for _, upwards in moving])
-        return cls(
-            np.array([joint.index for joint, _ in moving], dtype=np.int64),
-            np.array([joint.kind is JointKind.PRISMATIC for joint, _ in moving], dtype=bool),
-            np.array([[_rounded(x) for x in axis] for axis in axes]).reshape(-1, 3) * signs[:, None],
-            X[:, :3, :3],
-            X[:, :3, 3],
-        )
+    @cached_property
+    def _lengths(self) -> Array:
+        """Returns the lengths of the offsets, (m + 1,), rounded upwards."""
+        return _lengths(self.offsets)
 
-    def levers(self, vertices: Array, slid: Array) -> tuple[Array, Array]:
-        """Returns how far vertices can be from the joints' axes, and from the frame's origin, in metres, rounded upwards.
+    @cached_property
+    def _across(self) -> Array:
+        """Returns how far the offset behind each joint but the last one leads from the joint's axis, (m - 1,), rounded upwards."""
+        return _across(self.axes[:-1], self.offsets[1:-1])
+
+    def reach(self, vertices: Array) -> Reach:
+        """Returns how far vertices, (V, 3) metres in the body's frame, reach."""
+        tails, farthest = vertices @ self.rotations[-1].T + self.offsets[-1], float(_lengths(vertices).max())
+        # What is rounded in the tails: their numbers' 2^-52 and fewer than 2^4 roundings.
+        rounded = 2.0**-45 * (farthest + float(self._lengths[-1]))
+        across = float(_across(self.axes[-1:], tails).max()) + rounded if len(self.joints) else 0.0
+        return Reach(float(_lengths(tails).max()) + rounded, across, farthest)
+
+    def levers(self, reach: Reach, slid: Array) -> Array:
+        """Returns how far vertices can be from the joints' axes, in metres, rounded upwards.
+
+        These bound motion. They may be much less than :meth:`sizes`, because a body's frame may be far from the body.
 
         Args:
-            vertices: (V, 3) metres in the body's frame.
+            reach: of the vertices.
             slid: (K, m) how far each joint's position is from 0 at most, metres; only that of a prismatic joint matters.
 
         Returns:
-            (K, m) distances from the axes, 1 for a prismatic joint; (K,) the sizes. A change of one position moves no vertex farther than
-            by the joint's lever times the change.
+            (K, m) distances from the axes, 1 for a prismatic joint. A change of one position moves no vertex farther than by the joint's
+            lever times the change.
         """
-        m = len(self.joints)
-        levers = np.ones((len(slid), m))
-        tails = vertices @ self.rotations[m].T + self.offsets[m]
-        rounded = 2.0**-45 * (_longest(vertices) + _longest(self.offsets[m:]))
-        behind = np.full(len(slid), _longest(tails) + rounded)
-        across: Array | float = _across(self.axes[m - 1], tails) + rounded if m else 0.0
-        for k in range(m - 1, -1, -1):
-            if not self.slides[k]:
-                levers[:, k] = across * UP
-            behind = behind + (slid[:, k] if self.slides[k] else 0.0)
-            if k:
-                across = _across(self.axes[k - 1], self.offsets[k : k + 1]) + behind
-            behind = behind + _longest(self.offsets[k : k + 1])
-        return levers, behind * UP if m else behind
+        slide = slid * self.slides
+        levers = np.empty_like(slide)
+        levers[:, -1:] = reach.across
+        # Behind joint k come the offset across its axis, the slide of joint k + 1, all lengths behind that, and the tail.
+        behind = np.cumsum((slide + self._lengths[:-1])[:, :0:-1], axis=1)[:, ::-1]
+        levers[:, :-1] = self._across + slide[:, 1:] + reach.tail
+        levers[:, :-2] += behind[:, 1:]
+        return np.where(self.slides, 1.0, levers * UP)
+
+    def sizes(self, reach: Reach, slid: Array) -> Array:
+        """Returns the sum of all lengths on the way to the farthest vertex, (K,) metres, rounded upwards: what rounding is a part of.
+
+        No two of the lengths are put together first, as what cancels in their sum does not cancel in what is rounded. The arguments are
+        those of :meth:`levers`.
+        """
+        found: Array = (reach.vertices + self._lengths.sum() + (slid * self.slides).sum(axis=1)) * UP
+        return found
 
     def error(self, size: Array, inexact: float) -> Array:
-        """Returns by how many metres a vertex' position, of sizes as :meth:`levers` returns them, is wrong at most.
+        """Returns by how many metres a vertex' position, of sizes as :meth:`sizes` returns them, is wrong at most.
 
         Args:
             inexact: by how much the joints' positions are wrong at most, in radians or metres.
@@ -97,46 +136,64 @@ class Chain:
             raise ProofError("proof_too_large", "the positions of the motion are too large for doubles to tell where the bodies are")
         return size * part + int(self.slides.sum()) * inexact
 
-    def poses(self, q: Array, cosines: Array, sines: Array) -> tuple[Array, Array]:
-        """Returns the rotations and the positions of the body in the frame at N configurations, (N, 3, 3) and (N, 3).
 
-        Args:
-            q: (N, n) positions, of which those of prismatic joints matter.
-            cosines, sines: (N, n) of the positions of revolute joints.
-        """
-        R = np.broadcast_to(self.rotations[0], (len(q), 3, 3))
-        p = np.broadcast_to(self.offsets[0], (len(q), 3))
-        for k, j in enumerate(self.joints):
-            if self.slides[k]:
-                p = p + (R @ self.axes[k]) * q[:, j, None]
-            else:
-                R = R @ _rotations(self.axes[k], cosines[:, j], sines[:, j])
-            p = p + R @ self.offsets[k + 1]
-            R = R @ self.rotations[k + 1]
-        return R, p
+def poses(chains: Sequence[Chain], which: np.ndarray, at: np.ndarray, q: Array, cosines: Array, sines: Array) -> tuple[Array, Array]:
+    """Returns the rotations and the positions of bodies in frames, (N, 3, 3) and (N, 3), at configurations.
+
+    Args:
+        chains: those with more joints first.
+        which: (N,) the number of the chain, ascending.
+        at: (N,) the number of the configuration.
+        q: (T, n) positions, of which those of prismatic joints matter.
+        cosines, sines: (T, n) of the positions of revolute joints.
+    """
+    joints, slides = (np.concatenate([getattr(chain, name) for chain in chains]) for name in ("joints", "slides"))
+    axes, rotations, offsets = (np.concatenate([getattr(chain, name) for chain in chains]) for name in ("axes", "rotations", "offsets"))
+    skew = np.moveaxis(_skew(axes), -1, 0)
+    square = skew @ skew
+    count = np.array([len(chain.joints) for chain in chains])
+    first = (np.cumsum(count) - count)[which]  # of the chain's joints; a chain has one fixed pose more
+    R, p = rotations[first + which], offsets[first + which]
+    fewer = -count[which]
+    for k in range(int(count.max(initial=0))):
+        some = slice(int(np.searchsorted(fewer, -k)))  # those that have more joints than k
+        joint = first[some] + k
+        behind = joint + which[some] + 1
+        if which[some][0] == which[some][-1]:  # one chain alone: its numbers are for all
+            joint, behind = joint[:1], behind[:1]
+        here, slide = (at[some], joints[joint]), slides[joint]
+        if slide.any():
+            p[some] += np.einsum("ijk,ik->ij", R[some], axes[joint]) * np.where(slide, q[here], 0.0)[:, None]
+        if not slide.all():
+            turn = np.where(slide, 0.0, sines[here])[:, None, None] * skew.take(joint, axis=0)
+            turn += np.where(slide, 0.0, 1.0 - cosines[here])[:, None, None] * square.take(joint, axis=0)
+            turn += np.eye(3)  # Rodrigues' formula
+            R[some] = R[some] @ turn
+        p[some] += np.einsum("ijk,ik->ij", R[some], offsets[behind])
+        R[some] = _times(R[some], rotations.take(behind, axis=0))
+    return R, p
 
 
-def _rounded(x: fmpq) -> float:
-    return float(int(x.p) / int(x.q))
+def _times(R: Array, by: Array) -> Array:
+    """Returns products of rotations, (N, 3, 3), with others, (N, 3, 3) or one for all."""
+    found: Array = R @ by if len(by) > 1 else (R.reshape(-1, 3) @ by[0]).reshape(R.shape)
+    return found
 
 
-def _longest(points: Array) -> float:
-    """Returns the largest length of points, (V, 3), rounded upwards; what underflows is less than what is added."""
-    return float(np.sqrt((points**2).sum(axis=1)).max()) * UP + 1e-150
+def _lengths(points: Array) -> Array:
+    """Returns the lengths of points, (V, 3), rounded upwards; what underflows is less than what is added."""
+    found: Array = np.sqrt((points**2).sum(axis=1)) * UP + 2.0**-100
+    return found
 
 
-def _across(axis: Array, points: Array) -> float:
-    """Returns the largest distance of points, (V, 3), from the line along an axis through 0, rounded upwards."""
-    return _longest(points @ _skew(axis).T) + 2.0**-45 * _longest(points)
+def _across(axes: Array, points: Array) -> Array:
+    """Returns the distances of points, (V, 3), from the lines along axes through 0, (V, 3) or one for all, rounded upwards."""
+    products = axes[:, [1, 2, 0]] * points[:, [2, 0, 1]] - axes[:, [2, 0, 1]] * points[:, [1, 2, 0]]
+    return _lengths(products) + 2.0**-45 * _lengths(points)
 
 
-def _rotations(axis: Array, cosines: Array, sines: Array) -> Array:
-    """Returns the rotations about an axis, (N, 3, 3), by Rodrigues' formula."""
-    K = _skew(axis)
-    return np.eye(3) + sines[:, None, None] * K + (1.0 - cosines)[:, None, None] * (K @ K)
-
-
-def _skew(axis: Array) -> Array:
-    """Returns the matrix K, (3, 3), with K p the vector product of the axis and p."""
-    x, y, z = axis
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+def _skew(axes: Array) -> Array:
+    """Returns the matrices K, (3, 3, V), with K p the vector product of an axis, (V, 3), and p."""
+    x, y, z = axes.T
+    zero = np.zeros_like(x)
+    return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])

@@ -5,31 +5,31 @@ from p(t0) to p(t1). A plane is constant in the frame that the proof names. If i
 other at t0 and at t1, with room for these bulges, for the radii and paddings, for the tube and for what doubles are wrong by, it keeps the
 bodies apart in all of the interval. The bounds of |p''| and of the tube are computed here, from the scene and the control points alone.
 
-Doubles and de Casteljau's algorithm evaluate a piece, a polynomial of degree m whose control points are at most M in magnitude. With
-u = 2^-53, a step from a to b, a + t (b - a), is wrong by less than 8 u M, and what was wrong in a and b is averaged. So after m steps a
-coordinate is wrong by less than 8 m u M, and what is a tangent's counts twice in its angle. A k-th derivative is k + 1 of the values
-before the last k steps, differenced k times and multiplied by m (m - 1) ... (m - k + 1): for k of 1 and 2 it is wrong by less than
-2^5 u m (m - 1)^k M. The same differences of the control points, whose hull bounds it, are wrong by less than 2^8 u m (m - 1)^(k - 1) M for
-k of 2 to 4. A first difference of two doubles is wrong by a part of itself, which rounding upwards makes good.
+What a plane leaves is computed as follows. Its normal n is a double and exact, of a length from 0.5 to 2. The projections n'(R v + p) of
+the vertices are wrong by at most |n| times the bound of certifier.verify.chains. So their sum over |n| is wrong by both bodies' bounds,
+which are part of what is needed. |n| is wrong by a part of itself, as each quotient, sum and difference here is, whose parts UP makes good:
+a sum that is divided by too much is positive, or else the plane fails; what is needed is a sum of numbers that are not negative; and the
+last difference is divided by UP. A comparison with NaN fails, so no NaN passes.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from certifier.errors import ProofError
-from certifier.model import Array, Geometry, Scene
+from certifier.model import Array, Scene
 from certifier.proof import limits
-from certifier.proof.motion import Motion, MotionProof, Space
-from certifier.verify.angles import cosines_and_sines
-from certifier.verify.chains import UP, Chain
+from certifier.proof.motion import Motion, MotionProof
+from certifier.verify.chains import UP, Chain, Reach, poses
 from certifier.verify.decimals import exactly, rounded_down
 from certifier.verify.kinematics import ExactKinematics
+from certifier.verify.pieces import Pieces
+from certifier.verify.places import Places
 from certifier.verify.scene import check_scene
 from certifier.verify.uncovered import not_covered
 
@@ -37,6 +37,11 @@ BLOCK = 1 << 14
 """At most this many intervals are looked at together."""
 PRODUCTS = 1 << 20
 """At most this many vertices, each at one time, are looked at together."""
+RUNS = 1 << 10
+"""At most this many pairs are looked at together, each with its chains."""
+
+Way = tuple[str, str]
+"""A frame and a body, from which and to which a chain leads."""
 
 
 @dataclass(frozen=True)
@@ -134,73 +139,29 @@ def _starts(proof: MotionProof) -> Array:
     return starts
 
 
-@dataclass(frozen=True)
-class _Poses:
-    """Holds where a body is in a frame at N times.
+class _Run(NamedTuple):
+    """Holds intervals of one pair that follow each other in the file, from one number up to another."""
 
-    Attributes:
-        R, p: (N, 3, 3) and (N, 3).
-    """
-
-    R: Array
-    p: Array
-
-    def along(self, normals: Array, at: np.ndarray, vertices: Array) -> Array:
-        """Returns n'(R v + p), (I, V), for normals (I, 3) and the poses' numbers (I,)."""
-        rows = np.einsum("ijk,ij->ik", self.R[at], normals)
-        return rows @ vertices.T + np.einsum("ij,ij->i", self.p[at], normals)[:, None]
-
-
-class _Side:
-    """Holds the geometries of one of two bodies, and what is known of them on every piece.
-
-    Attributes:
-        geometries: every one once.
-        number: (P,) which of them belongs to each pair of the group.
-    """
-
-    def __init__(self, chain: Chain, geometries: list[Geometry], slid: Array) -> None:
-        self.chain = chain
-        self.geometries = list({geometry.name: geometry for geometry in geometries}.values())
-        numbers = {geometry.name: i for i, geometry in enumerate(self.geometries)}
-        self.number = np.array([numbers[geometry.name] for geometry in geometries])
-        # Without a prismatic joint, one row of levers holds for every piece.
-        self._slid = slid[:, chain.joints] if chain.slides.any() else slid[:1, chain.joints]
-        self._known: dict[str, tuple[Array, Array]] = {}
-
-    def levers(self, geometry: Geometry, piece: np.ndarray) -> tuple[Array, Array]:
-        """Returns the levers and the sizes of a geometry on pieces, (I, m) and (I,)."""
-        if geometry.name not in self._known:
-            self._known[geometry.name] = self.chain.levers(geometry.vertices, self._slid)
-        row = piece if len(self._slid) > 1 else np.zeros_like(piece)
-        levers, sizes = self._known[geometry.name]
-        return levers[row], sizes[row]
+    pair: int
+    first: int
+    last: int
 
 
 class _Check:
-    """Checks the intervals of all pairs; those of the same two bodies in the same frame share the poses."""
+    """Checks the intervals of all pairs, some at a time. Those that need the same chain at the same time share its pose."""
 
     def __init__(self, proof: MotionProof) -> None:
-        self._proof, self._scene, self._motion = proof, proof.scene, proof.motion
-        self._kinematics = ExactKinematics.by_joint(proof.scene)
+        self._proof, self._scene = proof, proof.scene
+        self._places, self._pieces = Places(proof.scene), Pieces(proof.scene, proof.motion, proof.rho)
         self._starts = _starts(proof)
         per_pair = proof.counts.sum(axis=1, dtype=np.int64)
         self._first = np.cumsum(per_pair) - per_pair
         self._count = per_pair
-        self._piece = (
-            np.concatenate([np.repeat(np.arange(proof.motion.pieces), row) for row in proof.counts]) if len(per_pair) else per_pair
-        )
-        self._turns = self._scene.revolute & (self._motion.space is Space.S)
-        self._base = self._scene.q_star if self._motion.space is Space.S else np.zeros(self._scene.n)
-        self._bezier = np.moveaxis(self._motion.bezier, 1, 0)
-        self._degree = degree = self._motion.degree
-        largest, base = float(np.abs(self._motion.controls).max()), float(np.abs(self._base).max(initial=0.0))
-        # A coordinate of a tangent counts twice in its angle, and one of a slide is added to q*.
-        self._inexact = 2.0**-49 * (degree + 1) * (largest + base)
-        self._wrong = [2.0**-45 * degree * (degree - 1) ** k * largest for k in range(1, 4)]
-        farthest = replace(self._motion, controls=np.abs(self._motion.controls + self._base)).bezier.max(axis=1)
-        self._slid = farthest * UP + self._inexact + proof.rho
-        self._hulls = self._bounds()
+        self._piece = np.repeat(np.tile(np.arange(proof.motion.pieces), len(per_pair)), proof.counts.reshape(-1))
+        self._bodies = [
+            (scene_frame, self._scene.geometry(pair.a).body, self._scene.geometry(pair.b).body)
+            for scene_frame, pair in zip((self._scene.bodies[i] for i in proof.frames), self._scene.pairs, strict=True)
+        ]
 
     def gaps(self) -> Iterator[float]:
         """Yields, for some intervals at a time, how far the padded bodies are apart in them at least, in metres.
@@ -208,133 +169,117 @@ class _Check:
         Raises:
             ProofError: one of the planes does not keep them apart, or it takes too long to see whether they do.
         """
-        groups: dict[tuple[str, str, str], list[int]] = defaultdict(list)
-        for i, pair in enumerate(self._scene.pairs):
-            frame = self._scene.bodies[self._proof.frames[i]]
-            groups[frame, self._scene.geometry(pair.a).body, self._scene.geometry(pair.b).body].append(i)
-        self._check_cost(groups)
-        chains: dict[tuple[str, str], Chain] = {}
-        for (frame, *bodies), pairs in groups.items():
-            for body in bodies:
-                if (frame, body) not in chains:
-                    chains[frame, body] = Chain.between(self._scene, self._kinematics, frame, body)
-            yield from self._group([chains[frame, body] for body in bodies], pairs)
+        self._check_cost()
+        for runs in self._blocks():
+            yield self._gap(runs)
 
-    def _check_cost(self, groups: dict[tuple[str, str, str], list[int]]) -> None:
-        cost = 0
-        for (frame, *bodies), pairs in groups.items():
-            joints = sum(len(self._kinematics.path(frame, body)) for body in bodies)
-            for i in pairs:
-                vertices = sum(len(self._scene.geometry(name).vertices) for name in (self._scene.pairs[i].a, self._scene.pairs[i].b))
-                cost += int(self._count[i]) * (vertices + limits.JOINT_COST * joints + self._scene.n * self._degree**2)
+    def _check_cost(self) -> None:
+        kinematics, joints, cost = ExactKinematics.by_joint(self._scene), dict[tuple[str, ...], int](), 0
+        for i, (pair, bodies) in enumerate(zip(self._scene.pairs, self._bodies, strict=True)):
+            if bodies not in joints:
+                joints[bodies] = sum(len(kinematics.path(bodies[0], body)) for body in bodies[1:])
+            vertices = sum(len(self._scene.geometry(name).vertices) for name in (pair.a, pair.b))
+            cost += int(self._count[i]) * (vertices + limits.JOINT_COST * joints[bodies] + self._scene.n * self._proof.motion.degree**2)
         if cost > limits.SWEPT:
             raise ProofError("proof_too_large", "the intervals have more vertices, behind more joints, than are checked")
 
-    def _group(self, chains: list[Chain], pairs: list[int]) -> Iterator[float]:
-        """Yields the gaps of pairs of the same two bodies, some intervals at a time."""
-        both = [[self._scene.geometry(name) for name in (self._scene.pairs[i].a, self._scene.pairs[i].b)] for i in pairs]
-        most = max(1, min(BLOCK // self._degree, PRODUCTS // max(len(geometry.vertices) for two in both for geometry in two)))
-        rows = np.concatenate([np.arange(self._first[i], self._first[i] + self._count[i]) for i in pairs])
-        owner = np.repeat(np.arange(len(pairs)), self._count[pairs])
-        sides = [_Side(chain, [two[k] for two in both], self._slid) for k, chain in enumerate(chains)]
-        for first in range(0, len(rows), most):
-            yield self._gap(sides, rows[first : first + most], owner[first : first + most])
+    def _blocks(self) -> Iterator[list[_Run]]:
+        """Yields all intervals, some at a time; those of pairs with the same bodies follow each other."""
+        most = max(1, BLOCK // self._proof.motion.degree)
+        runs, room = list[_Run](), most
+        for i in sorted(range(len(self._bodies)), key=lambda i: self._bodies[i]):
+            first, last = int(self._first[i]), int(self._first[i] + self._count[i])
+            while first < last:
+                then = min(last, first + room)
+                runs.append(_Run(i, first, then))
+                first, room = then, room - (then - first)
+                if not room or len(runs) == RUNS:
+                    yield runs
+                    runs, room = [], most
+        if runs:
+            yield runs
 
-    def _gap(self, sides: list[_Side], rows: np.ndarray, owner: np.ndarray) -> float:
-        """Returns how far the padded bodies are apart at least in some intervals, whose pairs' numbers in the group are ``owner``."""
+    def _gap(self, runs: list[_Run]) -> float:
+        """Returns how far the padded bodies are apart at least in some intervals."""
         proof = self._proof
+        rows = np.concatenate([np.arange(run.first, run.last) for run in runs])
         normals, piece, t0, t1 = proof.normals[rows], self._piece[rows], self._starts[rows], proof.ends[rows]
-        # A number with a piece as its real and a time as its imaginary part, as numbers of this kind are sorted and compared exactly.
-        times, at = np.unique(piece + 1j * np.array([t0, t1]), return_inverse=True)
-        poses = self._poses([side.chain for side in sides], times.real.astype(np.int64), times.imag)
-        rates, changes = self._rates(piece, t0, t1)
-        needed = np.full(len(rows), 2 * self._scene.padding)
-        ends = np.empty((2, len(rows)))
-        for k, (side, pose, sign) in enumerate(zip(sides, poses, (1.0, -1.0), strict=True)):
-            for number, geometry in enumerate(side.geometries):
-                own = np.flatnonzero(side.number[owner] == number)
-                if not own.size:
-                    continue
-                levers, size = side.levers(geometry, piece[own])
-                bent = _acceleration(side.chain, levers, rates[own], changes[own])
-                needed[own] += geometry.radius + (t1 - t0)[own] ** 2 / 8 * bent + proof.rho * levers.sum(axis=1)
-                needed[own] += side.chain.error(size, self._inexact)
-                reached = [pose.along(sign * normals[own], at.reshape(2, -1)[end, own], geometry.vertices).min(axis=1) for end in (0, 1)]
-                ends[k, own] = np.minimum(*reached)
+        ways = [[(frame, body) for body in bodies] for frame, *bodies in (self._bodies[run.pair] for run in runs)]
+        chains = {way: self._places.chain(*way) for two in ways for way in two}
+        turned, at = self._reached(runs, ways, chains, piece, np.array([t0, t1]), normals)
+        rates, changes = self._pieces.rates(piece, t0, t1)
+        needed, ends = np.full(len(rows), 2 * self._scene.padding), np.empty((2, len(rows)))
+        known: dict[tuple[str, str, str], tuple[Reach, tuple[Array, Array]]] = {}
+        begin = 0
+        for run, two in zip(runs, ways, strict=True):
+            own = slice(begin, begin := begin + run.last - run.first)
+            for k, (way, name) in enumerate(zip(two, self._names(run), strict=True)):
+                geometry, chain = self._scene.geometry(name), chains[way]
+                if (*way, name) not in known:
+                    reach = chain.reach(geometry.vertices)
+                    known[*way, name] = reach, self._bounds(chain, reach, self._pieces.slid[:1])
+                reach, (levers, error) = known[*way, name]
+                if chain.slides.any():  # otherwise, one row of levers holds for every piece
+                    levers, error = self._bounds(chain, reach, self._pieces.slid[piece[own]])
+                ends[k, own] = _least(turned[k, :, own], at[k, :, own], geometry.vertices)
+                bent = _acceleration(chain, levers, rates[own], changes[own])
+                needed[own] += geometry.radius + (t1 - t0)[own] ** 2 / 8 * bent + proof.rho * levers.sum(axis=1) + error
         gaps = ends.sum(axis=0) / (np.linalg.norm(normals, axis=1) * UP) - needed * UP
         worst = int(gaps.argmin())
         if not gaps[worst] > 0:
-            a, b = (side.geometries[side.number[owner[worst]]].name for side in sides)
+            a, b = self._names(runs[int(np.searchsorted(np.cumsum([run.last - run.first for run in runs]), worst, side="right"))])
             problem = f"piece {piece[worst]}, time {t0[worst]:.6g} to {t1[worst]:.6g}: the plane does not keep {a} and {b} apart"
             raise ProofError("proof_motion", problem)
         return float(gaps[worst] / UP)
 
-    def _poses(self, chains: list[Chain], piece: np.ndarray, time: Array) -> list[_Poses]:
-        """Returns the poses of both bodies at times of pieces, (N,) each."""
-        x, _, _ = self._at(piece, time)
-        if self._motion.space is Space.Q:
-            cosines, sines = cosines_and_sines(np.where(self._scene.revolute, x, 0.0))
-        else:
-            c, s = cosines_and_sines(self._base)
-            square = x * x
-            cosine, sine = (1.0 - square) / (1.0 + square), 2.0 * x / (1.0 + square)
-            cosines, sines = c * cosine - s * sine, s * cosine + c * sine
-        return [_Poses(*chain.poses(x + self._base, cosines, sines)) for chain in chains]
+    def _bounds(self, chain: Chain, reach: Reach, slid: Array) -> tuple[Array, Array]:
+        """Returns the levers, (K, m), and the bound of what is rounded, (K,) metres, for slides (K, n)."""
+        own = slid[:, chain.joints]
+        return chain.levers(reach, own), chain.error(chain.sizes(reach, own), self._pieces.inexact)
 
-    def _at(self, piece: np.ndarray, time: Array) -> tuple[Array, Array, Array]:
-        """Returns the coordinates, their rates and the rates' changes at times of pieces, (N, n) each."""
-        m, points = self._degree, self._bezier[:, piece]
-        rates = changes = np.zeros(points.shape[1:])
-        while len(points) > 1:
-            steps = points[1:] - points[:-1]
-            if len(steps) == 2:
-                changes = m * (m - 1) * (steps[1] - steps[0])
-            rates = m * steps[0]
-            points = points[:-1] + time[:, None] * steps
-        return points[0], rates, changes
+    def _names(self, run: _Run) -> tuple[str, str]:
+        pair = self._scene.pairs[run.pair]
+        return pair.a, pair.b
 
-    def _bounds(self) -> list[Array]:
-        """Returns bounds of the first four derivatives of the coordinates on every piece, (P, n) each, from their control points."""
-        m, steps, bounds = self._degree, self._bezier, []
-        for k in range(4):
-            steps = (m - k) * (steps[1:] - steps[:-1])
-            wrong = self._wrong[k - 1] if k else 0.0
-            bounds.append(np.abs(steps).max(axis=0) + wrong if len(steps) else np.broadcast_to(0.0, steps.shape[1:]))
-        return bounds
+    def _reached(
+        self, runs: list[_Run], ways: list[list[Way]], chains: dict[Way, Chain], piece: np.ndarray, times: Array, normals: Array
+    ) -> tuple[Array, Array]:
+        """Returns R'n and n'p of both bodies, (2, 2, I, 3) and (2, 2, I), at both times of I intervals, with n reversed for the second one.
 
-    def _rates(self, piece: np.ndarray, t0: Array, t1: Array) -> tuple[Array, Array]:
-        """Returns bounds of |dq/dt| and |d2q/dt2| in intervals of pieces, (I, n) each, rounded upwards.
-
-        A function is at most what it is at the ends of an interval and h^2/8 of its second derivative's bound. For a tangent of half an
-        angle, q = q* + 2 atan(x), the bounds are 2 |x'|/(1 + x^2) and 2 |x''|/(1 + x^2) + 4 |x'|^2 |x|/(1 + x^2)^2.
+        Args:
+            ways: of each run, the frame and the body of either side.
+            times: (2, I).
         """
-        (x0, rate0, change0), (x1, rate1, change1) = self._at(piece, t0), self._at(piece, t1)
-        first, second, third, fourth = (bound[piece] for bound in self._hulls)
-        bulge = ((t1 - t0) ** 2 / 8)[:, None]
-        rates = np.minimum(first, np.maximum(np.abs(rate0), np.abs(rate1)) + bulge * third + self._wrong[0])
-        changes = np.minimum(second, np.maximum(np.abs(change0), np.abs(change1)) + bulge * fourth + self._wrong[1])
-        if self._motion.space is Space.Q:
-            return rates * UP, changes * UP
-        off = self._inexact + bulge * changes * UP
-        least = np.where(x0 * x1 > 0, np.minimum(np.abs(x0), np.abs(x1)) - off, 0.0).clip(0.0)
-        most = np.maximum(np.abs(x0), np.abs(x1)) + off
-        norm = 1 + least**2
-        turning, bending = 2 * rates / norm, 2 * changes / norm + 4 * rates**2 * most / norm**2
-        return np.where(self._turns, turning, rates) * UP, np.where(self._turns, bending, changes) * UP
+        # A number with a piece as its real and a time as its imaginary part, as numbers of this kind are sorted and compared exactly.
+        moments, at = np.unique(piece + 1j * times, return_inverse=True)
+        known = sorted(chains, key=lambda way: -len(chains[way].joints))
+        number = {way: i for i, way in enumerate(known)}
+        lengths = [run.last - run.first for run in runs]
+        which = np.repeat(np.array([[number[two[k]] for two in ways] for k in (0, 1)]), lengths, axis=1)
+        rows, own = np.unique(which[:, None] * len(moments) + at.reshape(times.shape), return_inverse=True)
+        positions = self._pieces.positions(moments.real.astype(np.int64), moments.imag)
+        R, p = poses([chains[way] for way in known], rows // len(moments), rows % len(moments), *positions)
+        own = own.reshape(2, *times.shape)
+        signed = np.array([normals, -normals])[:, None]
+        return np.einsum("seijk,seij->seik", R[own], np.broadcast_to(signed, (2, *times.shape, 3))), (p[own] * signed).sum(axis=-1)
+
+
+def _least(rows: Array, at: Array, vertices: Array) -> Array:
+    """Returns the least of n'(R v + p), (I,), at both ends of intervals, for R'n (2, I, 3), n'p (2, I) and vertices (V, 3)."""
+    most = max(1, PRODUCTS // (2 * len(vertices)))
+    parts = [(rows[:, i : i + most] @ vertices.T).min(axis=2) for i in range(0, rows.shape[1], most)]
+    return (np.concatenate(parts, axis=1) + at).min(axis=0)
 
 
 def _acceleration(chain: Chain, levers: Array, rates: Array, changes: Array) -> Array:
-    """Returns a bound of the acceleration of every vertex, (I,), from levers (I, m), rates and their changes (I, n), rounded upwards.
+    """Returns a bound of the acceleration of every vertex, (I,), from levers (I, m) or (1, m), rates and changes (I, n), rounded upwards.
 
     Joints i and then k on the path contribute twice the product of their rates times the lever of k, where i is revolute, and nothing where
     it is prismatic; a revolute joint alone contributes its lever times the square of its rate, and every joint its lever times its change.
+    Nothing here is negative, so what is rounded is a part of it that UP makes good.
     """
-    total, turning = np.zeros(len(levers)), np.zeros(len(levers))
-    for k, j in enumerate(chain.joints):
-        total += 2 * turning * rates[:, j] * levers[:, k]
-        if chain.slides[k]:
-            total += changes[:, j]
-        else:
-            total += levers[:, k] * (rates[:, j] ** 2 + changes[:, j])
-            turning += rates[:, j]
-    return total * UP
+    rates, changes = rates[:, chain.joints], changes[:, chain.joints]
+    turning = np.zeros_like(rates)  # of the revolute joints before each one
+    np.cumsum(np.where(chain.slides, 0.0, rates)[:, :-1], axis=1, out=turning[:, 1:])
+    total = levers * (2 * turning * rates + np.where(chain.slides, 0.0, rates**2) + changes)
+    return total.sum(axis=1) * UP

@@ -223,6 +223,9 @@ def _largest_square_norm(normal: Sequence[Sequence[fmpq]]) -> fmpq:
 
 
 def _lower_root(x: fmpq) -> float:
-    """Returns a double below the square root of x > 0."""
+    """Returns a double below the square root of x > 0.
+
+    The root's first bits, rounded down to a multiple of 2^-128, become the nearest double; the one before it is below the root.
+    """
     root = math.isqrt((int(x.p) << 256) // int(x.q))
     return float(np.nextafter(root * 2.0**-128, 0.0)) if root < 1 << 1000 else 0.0

@@ -149,6 +149,15 @@ class CellCheck:
         return least
 
     def _check_empty(self, cells: Cells) -> None:
+        """Checks that the cells without a plane miss the polytope: on them, -sum_j lambda_j g_j = lambda'C s - lambda'd > 0.
+
+        Its least value over a box is a sum over at most 64 joints of products with one end of each range, less lambda'd. M multipliers make
+        M + 1 roundings in C and d, and this sum 66 more: fewer than those that the bound has. It is NaN or infinite where numbers are too
+        large, and then compares as false.
+
+        Raises:
+            ProofError: they may not.
+        """
         empty = np.flatnonzero(cells.empty)
         if not empty.size:
             return
@@ -229,7 +238,12 @@ class CellCheck:
         return _Batch(Control.together(controls, np.argsort(order)), *(x[order] for x in (axis, at, cell, vertex)))
 
     def _margins(self, side: Side, name: str, batch: _Batch, number: np.ndarray, vertex: int) -> Array:
-        """Checks P pieces that are halved no more, and returns of each, (P,), t with f >= t, infinite where it misses the polytope."""
+        """Checks P pieces that are halved no more, and returns of each, (P,), t with f >= t, infinite where it misses the polytope.
+
+        F less its bound is at most what F stands for, and D with its bound is at least what D stands for, but for the rounding of one
+        difference and one sum. These are parts of the results, and _DOWN makes them good. So F >= t D where D is positive; where it is
+        not, any t > 0 does. F that is NaN or infinite is not below infinity, or not above 0.
+        """
         z0, number, rank = self._pieces.kind(batch.at) == PLANE, number[batch.cell], self._pieces.rank(batch.at)
         sums = self._multipliers.of_pieces(number[:, None], rank[:, None])
         F, bound = (x[:, 0] for x in side.values(batch.control, z0[:, None].astype(float), sums, self._box))
@@ -272,7 +286,9 @@ class _Batch(NamedTuple):
 def _norms(plane: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
     """Returns of B boxes an upper bound of |a|, at least LEAST, and a lower bound of kappa - |a| over the corners.
 
-    Both |a| and |a| - kappa are convex, so what holds at the corners holds on the box.
+    Both |a| and |a| - kappa are convex, so what holds at the corners holds on the box. A value there is a sum of 1 + PLAY products, with
+    fewer than 2^6 roundings. The error has room for more than 2^9 of them, so also for the two differences behind it. It is at least
+    2^-83, whose square does not underflow. Squares, their sum and the root are rounded by a part that _UP makes good.
 
     Args:
         plane: (B, 5, 1 + k), the three rows of a, that of b, and kappa, all affine in s.

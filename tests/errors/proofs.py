@@ -170,6 +170,10 @@ PROOFS: list[Row] = [
         ("proof_too_large", "the positions of the motion are too large for doubles to tell where the bodies are"),
     ),
     *proofs(
+        "certifier/verify/places.py",
+        ("proof_too_large", "the fixed poses of the model are too large to be told to 2^-200 m"),
+    ),
+    *proofs(
         "certifier/verify/motion.py",
         ("proof_motion", "the scene has no pair to keep apart"),
         ("proof_motion", "a control point has a number larger than {MAGNITUDE}"),

@@ -11,10 +11,12 @@ from certifier.kinematics import Kinematics
 from certifier.model import JointKind
 from certifier.motion import chains as ours
 from certifier.motion.intervals import acceleration, place
-from certifier.proof.motion import Motion, MotionProof, Space
-from certifier.verify.chains import Chain
+from certifier.proof.motion import Motion, Space
+from certifier.verify.chains import poses
 from certifier.verify.kinematics import ExactKinematics, exact
-from certifier.verify.motion import _acceleration, _Check
+from certifier.verify.motion import _acceleration
+from certifier.verify.pieces import Pieces
+from certifier.verify.places import Places
 from certifier.verify.volume import placed
 from tests.certifier.motions import coordinates
 from tests.certifier.scenes import box, random_tree
@@ -42,18 +44,13 @@ def positions(tree, motion, piece, times):
     return (x, tree.to_q(x)) if motion.space is Space.S else (tree.to_s(x), x)
 
 
-def without_pairs(tree, motion, rho):
-    counts = np.zeros((0, motion.pieces), np.int32)
-    return MotionProof(tree, motion, 1.0, rho, np.zeros(0, np.int32), counts, np.zeros(0), np.zeros((0, 3)))
-
-
 def bounds(tree, frame, body, shape, motion, rho=0.0, t0=0.0, t1=1.0):
     """Levers, and the bounds of the acceleration in a part of each piece, as the verifier and as the search computes them."""
-    check, chain = _Check(without_pairs(tree, motion, rho)), Chain.between(tree, ExactKinematics.by_joint(tree), frame, body)
+    check, chain = Pieces(tree, motion, rho), Places(tree).chain(frame, body)
     pieces = np.arange(motion.pieces)
-    rates, changes = check._rates(pieces, np.full(len(pieces), t0), np.full(len(pieces), t1))
-    levers, _ = chain.levers(shape.vertices, check._slid[:, chain.joints])
-    side = ours.side(ours.chain(Kinematics.of(tree), frame, body), shape, check._slid)
+    rates, changes = check.rates(pieces, np.full(len(pieces), t0), np.full(len(pieces), t1))
+    levers = chain.levers(chain.reach(shape.vertices), check.slid[:, chain.joints])
+    side = ours.side(ours.chain(Kinematics.of(tree), frame, body), shape, check.slid)
     searched = [acceleration(side, side.levers[k], rates[k], changes[k]) for k in pieces]
     return chain, levers, _acceleration(chain, levers, rates, changes), side, searched
 
@@ -108,11 +105,11 @@ def test_rates_and_their_changes_are_bounded_and_nearly_reached_in_short_interva
     """Against differences of positions that are sampled finely; the tree has revolute and prismatic joints."""
     rng, tree = np.random.default_rng(degree), random_tree(1, bodies=6)
     motion = Motion(space, rng.uniform(-1.5, 1.5, (3 * degree + 1, tree.n)), degree)
-    check = _Check(without_pairs(tree, motion, 0.0))
+    check = Pieces(tree, motion, 0.0)
     for width in (1.0, 0.2, 1e-2):
         t0 = rng.uniform(0, 1 - width, 12)
         piece = np.arange(12) % 3
-        rates, changes = check._rates(piece, t0, t0 + width)
+        rates, changes = check.rates(piece, t0, t0 + width)
         for i in range(12):
             at = np.linspace(t0[i], t0[i] + width, 201)
             q, step = positions(tree, motion, piece[i], at)[1], width / 200
@@ -138,20 +135,20 @@ def exactly_at(motion, piece, time):
 def test_positions_are_as_exact_as_is_said(seed):
     """Against exact fractions, in s."""
     tree, frame, body, shape, motion = random_case(2 * seed + 1)
-    check, chain = _Check(without_pairs(tree, motion, 0.0)), Chain.between(tree, ExactKinematics.by_joint(tree), frame, body)
-    _, size = chain.levers(shape.vertices, check._slid[:, chain.joints])
+    check, chain = Pieces(tree, motion, 0.0), Places(tree).chain(frame, body)
+    size = chain.sizes(chain.reach(shape.vertices), check.slid[:, chain.joints])
     pieces, times = np.array([0, 1, 0, 1, 1]), np.array([0.0, 1.0, 0.3, 0.7, 1e-9])
-    (poses,) = check._poses([chain], pieces, times)
+    R, p = poses([chain], np.zeros(5, np.int64), np.arange(5), *check.positions(pieces, times))
     for k, (piece, time) in enumerate(zip(pieces, times, strict=True)):
         s = exactly_at(motion, piece, time)
-        off = [exact(x) - truth for x, truth in zip(check._at(pieces, times)[0][k].tolist(), s, strict=True)]
-        assert max(abs(float(x.p) / float(x.q)) for x in off) <= check._inexact / 2
+        off = [exact(x) - truth for x, truth in zip(check.at(pieces, times)[0][k].tolist(), s, strict=True)]
+        assert max(abs(float(x.p) / float(x.q)) for x in off) <= check.inexact / 2
         X = ExactKinematics.at(tree, s).pose(frame, body)
         X = [[x / X[3][3] for x in row] for row in X]
         for v in shape.vertices:
             truth = np.array([float(int(x.p) / int(x.q)) for x in placed(X, tuple(map(exact, v)))])
-            assert np.linalg.norm(poses.R[k] @ v + poses.p[k] - truth) <= chain.error(size, check._inexact).max()
-    assert chain.error(size, check._inexact).max() < 1e-10
+            assert np.linalg.norm(R[k] @ v + p[k] - truth) <= chain.error(size, check.inexact).max()
+    assert chain.error(size, check.inexact).max() < 1e-10
 
 
 @pytest.mark.parametrize("degree", [2, 3, 6, 15])
@@ -159,8 +156,8 @@ def test_derivatives_are_wrong_by_no_more_than_is_said(degree):
     """At the ends of intervals and as hulls on the pieces, against exact fractions, of control points that are large and nearly one."""
     rng, tree = np.random.default_rng(degree), random_tree(1, bodies=6)
     motion = Motion(Space.Q, 1e3 + 1e-9 * rng.normal(size=(2 * degree + 1, tree.n)), degree)
-    check, t = _Check(without_pairs(tree, motion, 0.0)), float(rng.uniform())
-    _, rates, changes = check._at(np.array([0]), np.array([t]))
+    check, t = Pieces(tree, motion, 0.0), float(rng.uniform())
+    _, rates, changes = check.at(np.array([0]), np.array([t]))
     for i in range(tree.n):
         steps, hulls = [exact(x) for x in motion.bezier[0, :, i].tolist()], []
         for k in range(4):

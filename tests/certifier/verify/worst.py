@@ -212,6 +212,75 @@ def motion() -> bytes:
     return with_scene(MotionProof(scene, still, 1.0, 0.0, frames, counts, ends, normals).to_bytes(), scene)
 
 
+def motion_chains() -> bytes:
+    """Pairs that each have a frame and two bodies of their own, each at the end of as many welds as there may be."""
+    chains, welds, rng = 156, limits.PATH, np.random.default_rng(0)
+    first, last = (pose(rng.uniform(-1, 1, 3) * [0.1, 1e-300, 3e-308], rng.normal(size=3), rng.uniform(-3, 3)) for _ in range(2))
+    step = first @ np.linalg.inv(last)
+    ends = [np.linalg.matrix_power(step, k) for k in range(welds + 1)]
+    joints, bodies = [], [WORLD]
+    for c, k in itertools.product(range(chains), range(welds)):
+        turns = (JointKind.REVOLUTE, np.array([0.0, 0.0, 1.0]), first, last, 0, -1.0, 1.0)
+        kind, *rest = turns if c == 0 and k == welds - 1 else (JointKind.WELD, np.zeros(3), first, last)
+        joints.append(Joint(f"j{c}/{k}", kind, f"{c}/{k - 1}" if k else WORLD, f"{c}/{k}", *rest))
+        bodies.append(f"{c}/{k}")
+    points = np.array([np.linalg.solve(ends[welds], [c, 0.0, 0.0, 1.0])[:3] for c in range(chains)])
+    geometries = tuple(Geometry(f"g{c:03}", f"{c}/{welds - 1}", points[c : c + 1], 0.0, {}) for c in range(chains))
+    pairs, frames, normals, used = [], [], [], set()
+    for a, b in itertools.combinations(range(chains), 2):
+        for off in range(2 * chains):
+            c, k = (a + b + off) % chains, welds - 1 - (a * b + off) % 2
+            if c not in (a, b) and not used & {(c, k, a), (c, k, b)}:
+                used |= {(c, k, a), (c, k, b)}
+                pairs.append(Pair(f"g{a:03}", f"g{b:03}"))
+                frames.append(1 + c * welds + k)
+                normals.append(ends[k + 1][:3, :3].T @ [-1.0, 0.0, 0.0])
+                break
+    scene = Scene("chains", tuple(joints), tuple(bodies), geometries, tuple(pairs), (), np.zeros(1))
+    return _resting(scene, frames, np.ones(len(pairs), int), np.ones(len(pairs)), np.array(normals))
+
+
+def motion_joints() -> bytes:
+    """Pairs whose frames are behind all joints that move, and whose bodies are not: each chain has all of them."""
+    eye, leaves, rng = np.eye(4), 200, np.random.default_rng(0)
+    moving = limits.PATH - 1
+    joints = [
+        Joint(f"j{i}", JointKind.REVOLUTE, f"b{i - 1}" if i else WORLD, f"b{i}", eye[2, :3], pose((0.01, 0, 0)), eye, i, -1.0, 1.0)
+        for i in range(moving)
+    ]
+    joints += [Joint(f"f{i}", JointKind.WELD, f"b{moving - 1}", f"f{i}", np.zeros(3), pose((0, 0, i)), eye) for i in range(leaves)]
+    joints += [Joint(f"a{i}", JointKind.WELD, WORLD, f"a{i:03}", np.zeros(3), pose((i, 0, 0)), eye) for i in range(leaves)]
+    geometries = tuple(Geometry(f"g{i:03}", f"a{i:03}", np.zeros((1, 3)), 0.0, {}) for i in range(leaves))
+    pairs = tuple(Pair(a.name, b.name) for a, b in itertools.combinations(geometries, 2))
+    bodies = (WORLD, *(joint.child for joint in joints))
+    scene = Scene("joints", tuple(joints), bodies, geometries, pairs, (), np.zeros(moving))
+    frames = 1 + moving + rng.integers(0, leaves, len(pairs))
+    return _resting(scene, frames, np.ones(len(pairs), int), np.ones(len(pairs)), np.tile([-1.0, 0.0, 0.0], (len(pairs), 1)))
+
+
+def motion_geometries() -> bytes:
+    """Pairs of the same two bodies with as many geometries and intervals as there may be, one of them with many vertices."""
+    eye, count = np.eye(4), limits.GEOMETRIES - 1
+    joint = Joint("j", JointKind.REVOLUTE, WORLD, "a", eye[2, :3], eye, eye, 0, -1.0, 1.0)
+    one = np.array([[-3.0, 0.0, 0.0]])
+    others = [Geometry(f"g{i:05}", WORLD, np.repeat(one, limits.VERTICES if i == 0 else 1, axis=0), 0.0, {}) for i in range(count)]
+    tip = Geometry("a", "a", np.array([[0.1, 0.0, 0.0]]), 0.0, {})
+    scene = Scene("geometries", (joint,), (WORLD, "a"), (tip, *others), tuple(Pair("a", g.name) for g in others), (), np.zeros(1))
+    each = limits.INTERVALS // count
+    ends = np.tile(np.arange(1, each + 1) / each, count)
+    normals = np.tile([1.0, 0.0, 0.0], (count * each, 1))
+    some = normals[::40, 1:]
+    some[:] = np.random.default_rng(0).uniform(-0.01, 0.01, some.shape)  # a file that is smaller may not unpack to that much
+    return _resting(scene, np.zeros(count), np.full(count, each), ends, normals)
+
+
+def _resting(scene: Scene, frames: Any, counts: np.ndarray, ends: np.ndarray, normals: np.ndarray) -> bytes:
+    """The file of a motion of one piece that rests where all positions are 0."""
+    still = Motion(Space.Q, np.zeros((2, scene.n)))
+    proof = MotionProof(scene, still, 1.0, 0.0, np.array(frames, np.int32), counts[:, None].astype(np.int32), ends, normals)
+    return with_scene(proof.to_bytes(), scene)
+
+
 FILES: tuple[Callable[[], bytes], ...] = (
     header_of_nothing,
     header_of_numbers,
@@ -224,6 +293,9 @@ FILES: tuple[Callable[[], bytes], ...] = (
     polytope,
     dual,
     motion,
+    motion_chains,
+    motion_joints,
+    motion_geometries,
 )
 
 
