@@ -9,6 +9,9 @@ import numpy as np
 
 from certifier.model import Array
 
+NO_ROOM = ", which leaves no room for a region"
+"""These words are in ``info["no_room"]`` of a proposal."""
+
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
@@ -20,6 +23,7 @@ class Proposal:
         contain: (k, n) what else the region has to contain, in s, inside all faces and limits as well.
         info: JSON-able: method, guarantee (``sampled`` when IRIS passed its statistical test, else ``none``), faces, seconds, and for
             IRIS termination, iterations, epsilon, delta, Drake's warnings, the random seed, and how many random seeds were tried.
+            ``no_room`` says why, should no region come of it, where the seed is next to contact.
     """
 
     C: Array
