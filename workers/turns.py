@@ -136,7 +136,7 @@ def _at_deadline(session: Session, job: JobRow) -> Finish:
         return Finish(Outcome.CERTIFIED, DEADLINE)
     growth = jobs.growth(session, job.id) if job.kind == JobKind.GROW else None
     start = (growth or {}).get("start") or {}
-    return Finish(Outcome.INCONCLUSIVE, at_deadline(start.get("no_room", "")))
+    return Finish(Outcome.INCONCLUSIVE, at_deadline(start.get("hindrance", "")))
 
 
 def _report(session: Session, job: JobRow, growth: dict[str, Any] | None) -> Report | cover.Report | motions.Verdict | None:

@@ -55,20 +55,20 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
 
 def advance(scene: Scene, state: GrowthState, report: Report) -> Transition:
     """Returns what follows a report; the state is the one of the last transition and is not changed."""
-    no_room = _no_room(state, report)
+    hindrance = _hindrance(state, report)
     try:
         transition = _advanced(scene, state, report)
     except RegionError as error:
-        transition = _failed(state, Failed(ended_by(error, no_room)))
-    if no_room and isinstance(transition.action, Finish) and transition.state.best is None:
-        return replace(transition, action=replace(transition.action, reason=no_room))
+        transition = _failed(state, Failed(ended_by(error, hindrance)))
+    if hindrance and isinstance(transition.action, Finish) and transition.state.best is None:
+        return replace(transition, action=replace(transition.action, reason=hindrance))
     return transition
 
 
-def _no_room(state: GrowthState, report: Report) -> str:
+def _hindrance(state: GrowthState, report: Report) -> str:
     if isinstance(report, Proposal):
-        return str(report.info.get("no_room", ""))
-    return "" if state.start is None else state.start.no_room
+        return str(report.info.get("hindrance", ""))
+    return "" if state.start is None else state.start.hindrance
 
 
 def _advanced(scene: Scene, state: GrowthState, report: Report) -> Transition:
@@ -92,17 +92,17 @@ def _proposed(scene: Scene, state: GrowthState, proposal: Proposal) -> Transitio
     norms = np.linalg.norm(limited.C, axis=1)
     rows = Polytope(limited.C / norms[:, None], limited.d / norms)
     method = proposal.info.get("method")
-    given, no_room = method in (Method.BOX, Method.POLYTOPE), _no_room(state, proposal)
+    given, hindrance = method in (Method.BOX, Method.POLYTOPE), _hindrance(state, proposal)
     contraction = state.options.contraction or ("whole" if method in IRIS else "targeted")
     if contraction != "uniform":
-        start = Start(rows, proposal.center, np.concatenate([proposal.center[None], proposal.contain]), given, no_room)
+        start = Start(rows, proposal.center, np.concatenate([proposal.center[None], proposal.contain]), given, hindrance)
         if contraction == "whole":
             return begin_whole(scene, replace(state, start=start), start)
         transition = next_contraction(scene, replace(state, start=start), start)
         assert transition is not None, "before there is a region every contraction is worth it"
         return transition
     center, radius = chebyshev_center(rows)
-    start = Start(rows, proposal.center, center[None], given, no_room)
+    start = Start(rows, proposal.center, center[None], given, hindrance)
     return shrink(scene, replace(state, start=start), start, Bisection(center, radius, state.options.bisection_steps, 1.0))
 
 

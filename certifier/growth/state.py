@@ -25,14 +25,14 @@ class Start:
         seed: (n,) the seed in s.
         keep: (k, n) points that stay inside, the first of them well inside.
         given: the proposal is a box or a polytope of the user's; beyond it nothing is known.
-        no_room: why, should no region come of it; "" where the seed is not next to contact.
+        hindrance: why, should no region come of it; "" where nothing is known.
     """
 
     rows: Polytope
     seed: Array
     keep: Array
     given: bool
-    no_room: str = ""
+    hindrance: str = ""
 
 
 @dataclass(frozen=True, eq=False)

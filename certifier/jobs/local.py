@@ -238,7 +238,7 @@ def _carried_out(run: _Run, options: GrowthOptions, deliver: Deliver | None = No
         try:
             report = run.carry_out(transition.action)
         except CirisError as error:
-            failure = error if transition.state.start is None else ended_by(error, transition.state.start.no_room)
+            failure = error if transition.state.start is None else ended_by(error, transition.state.start.hindrance)
             report = Failed(failure)
         transition = advance(scene, transition.state, report)
         if failure and run.candidate is None:
@@ -252,7 +252,7 @@ def _carried_out(run: _Run, options: GrowthOptions, deliver: Deliver | None = No
             start = transition.state.start
             end = Finish(Outcome.CERTIFIED, DEADLINE)
             if run.candidate is None:
-                end = Finish(Outcome.INCONCLUSIVE, at_deadline("" if start is None else start.no_room))
+                end = Finish(Outcome.INCONCLUSIVE, at_deadline("" if start is None else start.hindrance))
             transition = Transition(transition.state, end)
         if deliver is not None and run.has_news and not isinstance(transition.action, Finish):
             deliver(run.make_region(options, "growing"))

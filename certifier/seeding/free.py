@@ -1,7 +1,4 @@
-"""A seed in collision is refused here, with the pair, how deep it is in, and a free configuration nearby.
-
-What is free may still be next to contact. Whether a region can be grown there is seen by trying; where it cannot, the reason is here.
-"""
+"""A seed in collision is refused here, with the pair, how deep it is in, and a free configuration nearby."""
 
 from __future__ import annotations
 
@@ -13,16 +10,9 @@ from pydrake.geometry import QueryObject
 from certifier.errors import RegionError
 from certifier.model import Array, JointKind, Pair, Scene
 from certifier.scene.drake_model import build_diagram, geometry_name
-from certifier.seeding.proposal import NO_ROOM
 
 SHELLS, EACH = np.geomspace(0.004, 1.0, 12), 40
 """A free configuration is looked for at these parts of the joints' half ranges from the seed, EACH times."""
-NEAR = 5e-3
-"""Where no region comes of a seed that is nearer to contact than this, in metres, that is the reason."""
-ROOM = (20e-3, 10e-3, 5e-3)
-"""Such a seed has a neighbour named where every pair has the first of these distances, in metres, that is found within reach."""
-REACH = 0.3
-"""The neighbour is within this part of the joints' half ranges."""
 STEPS = 8
 """What was found is moved back towards the seed in so many steps of bisection."""
 
@@ -103,21 +93,6 @@ def check_free(scene: Scene, q: Array, field: str) -> Nearest:
     found = nearest_free(scene, clearance, scene.in_windows(q))
     hint = "move the seed, or ignore the pair in the scene" if found is None else _said(scene, scene.in_windows(q), found)
     raise RegionError("seed_in_collision", f"{pair.a} and {pair.b} {how}", field=field, hint=hint)
-
-
-def no_room(scene: Scene, nearest: Nearest) -> str:
-    """Returns why no region comes of a configuration, should none come, with a neighbour that has room; "" where nothing is near."""
-    if nearest.pair is None or nearest.distance > NEAR:
-        return ""
-    where = "the seed" if nearest.field == "seed.q" else nearest.field
-    a, b = nearest.pair.a, nearest.pair.b
-    text = f"{where} is {1e3 * nearest.distance:.3g} mm from contact of {a} and {b}{NO_ROOM}"
-    clearance, q = Clearance(scene), scene.in_windows(nearest.q)
-    found = ((room, nearest_free(scene, clearance, q, room, REACH)) for room in ROOM)
-    room, roomy = next((known for known in found if known[1] is not None), (0.0, None))
-    if roomy is None:
-        return text
-    return f"{text}; at q = {', '.join(f'{x:.4f}' for x in roomy)} every pair is {1e3 * room:g} mm apart or more"
 
 
 def nearest_free(scene: Scene, clearance: Clearance, q: Array, room: float = 0.0, reach: float = 1.0) -> Array | None:

@@ -10,7 +10,15 @@ import numpy as np
 from certifier.model import Array
 
 NO_ROOM = ", which leaves no room for a region"
-"""These words are in ``info["no_room"]`` of a proposal."""
+TOO_LONG = ", which is too little to be seen beside it"
+"""One of these is in ``info["hindrance"]`` of a proposal."""
+
+
+def mend(hindrance: str) -> str:
+    """Returns what to do about a hindrance."""
+    return (
+        "move the seed away from the contact" if NO_ROOM in hindrance else "give the joint narrower limits, under limits in the scene file"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +31,7 @@ class Proposal:
         contain: (k, n) what else the region has to contain, in s, inside all faces and limits as well.
         info: JSON-able: method, guarantee (``sampled`` when IRIS passed its statistical test, else ``none``), faces, seconds, and for
             IRIS termination, iterations, epsilon, delta, Drake's warnings, the random seed, and how many random seeds were tried.
-            ``no_room`` says why, should no region come of it, where the seed is next to contact.
+            ``hindrance`` says why, should no region come of it, where something is known (:mod:`certifier.seeding.hindrance`).
     """
 
     C: Array

@@ -13,13 +13,12 @@ from certifier.errors import RegionError
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.polytope import chebyshev_center, drop_redundant
-from certifier.seeding.free import Nearest, check_free, no_room
+from certifier.seeding.free import Nearest, check_free
+from certifier.seeding.hindrance import hindrance
 from certifier.seeding.limits import check_limits, off_limits
 from certifier.seeding.options import Method, SeedOptions
-from certifier.seeding.proposal import Proposal
+from certifier.seeding.proposal import Proposal, mend
 from certifier.seeding.tries import best_of_tries
-
-MOVE = "move the seed away from the contact"
 
 
 def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> Nearest:
@@ -51,7 +50,7 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
     IRIS may take minutes, and it runs native code, so call it in a process that may die.
 
     Raises:
-        RegionError: as :func:`check_seed` and ``polytope.chebyshev_center``; ``polytope_shape``; ``center_outside``; ``seed_without_room``;
+        RegionError: as :func:`check_seed` and ``polytope.chebyshev_center``; ``polytope_shape``; ``center_outside``; ``seed_hindered``;
             ``seed_cut_off`` when the polytope does not contain the seed and ``contain``; ``seeding_failed`` with Drake's words.
     """
     start = time.perf_counter()
@@ -74,31 +73,28 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
         else:
             try:
                 C, d, said = best_of_tries(scene, np.concatenate([center[None], contain]), replace(options, method=method))
-            except RegionError as error:
-                if without_room := _without_room(scene, checked):
-                    raise without_room from error
+            except RegionError:
+                _refuse_hindered(scene, checked)
                 raise
     if not (d[:, None] > C @ np.concatenate([center[None], contain]).T).all():
-        if without_room := _without_room(scene, checked):
-            raise without_room
+        _refuse_hindered(scene, checked)
         problem = f"the polytope of {method} does not contain the seed" + (" and all of contain" if options.contain else "")
         raise RegionError("seed_cut_off", problem, field="seed", hint="allow fewer iterations, or give points that see one another")
     guarantee = said.pop("guarantee", Guarantee.NONE)
     info = {"method": method.value, "guarantee": guarantee.value, "faces": len(d), "seconds": time.perf_counter() - start, **said}
-    if tight := _tight(scene, checked):
-        info["no_room"] = tight
+    if known := hindrance(scene, checked):
+        info["hindrance"] = known
     return Proposal(C, d, center, contain, info)
 
 
-def _tight(scene: Scene, checked: list[Nearest]) -> str:
-    """Returns what :func:`certifier.seeding.free.no_room` says of the configuration that is nearest to contact."""
-    return no_room(scene, min(checked, key=lambda one: one.distance)) if checked else ""
+def _refuse_hindered(scene: Scene, checked: list[Nearest]) -> None:
+    """Refuses a seed of which no proposal came, if it is known what hinders one.
 
-
-def _without_room(scene: Scene, checked: list[Nearest]) -> RegionError | None:
-    """Returns the error of a seed next to contact of which no proposal came; None where nothing is near."""
-    tight = _tight(scene, checked)
-    return RegionError("seed_without_room", tight, field="seed", hint=MOVE) if tight else None
+    Raises:
+        RegionError: ``seed_hindered``.
+    """
+    if known := hindrance(scene, checked):
+        raise RegionError("seed_hindered", known, field="seed", hint=mend(known))
 
 
 def warm_up() -> None:
