@@ -16,9 +16,7 @@ TOO_LONG = ", which is too little to be seen beside it"
 
 def mend(hindrance: str) -> str:
     """Returns what to do about a hindrance."""
-    return (
-        "move the seed away from the contact" if NO_ROOM in hindrance else "give the joint narrower limits, under limits in the scene file"
-    )
+    return "move the seed away from the contact" if NO_ROOM in hindrance else "set narrower limits for the joint in the scene file"
 
 
 @dataclass(frozen=True, eq=False)

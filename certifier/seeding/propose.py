@@ -71,13 +71,15 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
             C, d = _box(scene, np.concatenate([center[None], contain]), options.half_width)
             said = {}
         else:
+            points = np.concatenate([center[None], contain])
             try:
-                C, d, said = best_of_tries(scene, np.concatenate([center[None], contain]), replace(options, method=method))
+                C, d, said = best_of_tries(scene, points, replace(options, method=method))
             except RegionError:
                 _refuse_hindered(scene, checked)
                 raise
+            if not (d[:, None] > C @ points.T).all():
+                _refuse_hindered(scene, checked)
     if not (d[:, None] > C @ np.concatenate([center[None], contain]).T).all():
-        _refuse_hindered(scene, checked)
         problem = f"the polytope of {method} does not contain the seed" + (" and all of contain" if options.contain else "")
         raise RegionError("seed_cut_off", problem, field="seed", hint="allow fewer iterations, or give points that see one another")
     guarantee = said.pop("guarantee", Guarantee.NONE)

@@ -31,14 +31,10 @@ def mixed_arm(rng: np.random.Generator, n: int, longest: float = 1e3) -> Scene:
         X_PF[:3, :3] = rotation(_unit(rng), rng.uniform(-1, 1))
         X_PF[:3, 3] = 0.0 if i == 0 else rng.normal(size=3) * 0.2
         kind = JointKind.REVOLUTE if turns else JointKind.PRISMATIC
-        joints.append(
-            Joint(f"arm/j{i}", kind, bodies[-1], f"arm/l{i}", axis / np.linalg.norm(axis), X_PF, np.eye(4), i, lower, upper)
-        )
+        joints.append(Joint(f"arm/j{i}", kind, bodies[-1], f"arm/l{i}", axis / np.linalg.norm(axis), X_PF, np.eye(4), i, lower, upper))
         bodies.append(f"arm/l{i}")
         links.append(_body(rng, f"arm/l{i}/body", f"arm/l{i}", rng.normal(size=3) * 0.15, 0.1))
-    obstacles = [
-        _body(rng, f"world/o{k}", WORLD, _unit(rng) * rng.uniform(0.3, 0.9), 0.3) for k in range(rng.integers(2, 5))
-    ]
+    obstacles = [_body(rng, f"world/o{k}", WORLD, _unit(rng) * rng.uniform(0.3, 0.9), 0.3) for k in range(rng.integers(2, 5))]
     pairs = [Pair(link.name, obstacle.name) for link in links for obstacle in obstacles]
     pairs += [Pair(a.name, b.name) for i, a in enumerate(links) for b in links[i + 2 :]]
     q_star = np.array([0.0 if joint.upper == WINDOW else (joint.lower + joint.upper) / 2 for joint in joints])
