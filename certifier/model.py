@@ -505,7 +505,10 @@ class Box:
     def around(cls, lower: Array, upper: Array) -> Box:
         """Returns the box of these bounds, rounded outwards."""
         mid = (lower + upper) / 2
-        return cls(mid, np.nextafter(np.maximum(upper - mid, mid - lower) * (1 + 1e-12), np.inf))
+        half = np.maximum(upper - mid, mid - lower)
+        # Of a small box far from 0, the corners are rounded by more than the first of these.
+        far = 8 * np.spacing(np.maximum(np.abs(lower), np.abs(upper)))
+        return cls(mid, np.maximum(np.nextafter(half * (1 + 1e-12), np.inf), half + far))
 
     @property
     def lower(self) -> Array:

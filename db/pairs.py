@@ -93,7 +93,7 @@ def add_iteration(
     hard: Sequence[int],
     failures: int | None,
     cells: int = 1,
-    box: tuple[ArrayLike, ArrayLike] | None = None,
+    box: Mapping[str, ArrayLike] | None = None,
     begun: int | None = None,
     parts: Mapping[int, int] | None = None,
     ending: Sequence[int] = (),
@@ -102,9 +102,9 @@ def add_iteration(
     """Adds an iteration and its pairs. An iteration without pairs is certified at once. The caller holds the job's lock.
 
     Args:
-        box: the middle and the half widths of the root cell of all partitions, in s.
+        box: the arrays of the root cell of all partitions, by their names: ``mid``, ``half``, and the multipliers that prove it.
     """
-    given = {"C": C, "d": d, "center": center} | ({} if box is None else {"mid": box[0], "half": box[1]})
+    given = {"C": C, "d": d, "center": center, **(box or {})}
     certified = {} if pairs else {"state": IterationState.CERTIFIED, "finished_at": utcnow()}
     session.add(
         IterationRow(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from certifier.growth.actions import Certify
-from certifier.model import Box, Polytope
+from certifier.model import Polytope
+from certifier.polytopes.proved import ProvedBox
 from db.models import IterationRow
 
 
@@ -24,7 +25,7 @@ def certify_action(iteration: IterationRow, pairs: list[int]) -> Certify:
         hard=iteration.hard,
         failures=iteration.failures,
         cells=iteration.cells,
-        box=Box(arrays["mid"], arrays["half"]) if "mid" in arrays else None,
+        box=ProvedBox(*(arrays[name] for name in ("mid", "half", "Y_lower", "Y_upper"))) if "mid" in arrays else None,
         begun=iteration.begun,
         parts={int(pair): count for pair, count in iteration.parts.items()},
         ending=iteration.ending,

@@ -18,7 +18,7 @@ from sqlalchemy.orm import Session
 from certifier.errors import CirisError
 from certifier.growth.actions import Candidate, Certify, Finish, Outcomes, Propose, Report, Step, Transition
 from certifier.growth.options import GrowthOptions
-from certifier.growth.refusal import DEADLINE
+from certifier.growth.refusal import DEADLINE, at_deadline
 from certifier.outcome import Outcome
 from certifier.pair.forecast import PairCost, forecast
 from certifier.pair.result import Weakness
@@ -109,8 +109,7 @@ def _begin(job_id: str) -> Turn | None:
         if job.state == JobState.CANCELLING:
             _finish_growth(session, job, Finish(Outcome.INCONCLUSIVE, "cancelled"), afterwards)
         elif _is_late(session, job, now):
-            outcome = Outcome.CERTIFIED if steps.accepted(session, job_id) else Outcome.INCONCLUSIVE
-            _finish_growth(session, job, Finish(outcome, DEADLINE), afterwards)
+            _finish_growth(session, job, _at_deadline(session, job), afterwards)
         elif jobs.kills_coordinators(job, now, settings().max_attempts):
             problem = "the coordinator died or hung each time it decided about this job"
             job.error = CirisError("coordination_failed", problem, hint=IN_LOG).to_document()
@@ -130,6 +129,14 @@ def _is_late(session: Session, job: JobRow, now: datetime) -> bool:
     """Says whether the deadline ends the job. A cover ends itself, and a motion that has its verdict ends with it."""
     passed = job.deadline_at is not None and job.deadline_at <= now
     return passed and job.kind != JobKind.COVER and steps.verdict(session, job.id) is None
+
+
+def _at_deadline(session: Session, job: JobRow) -> Finish:
+    if steps.accepted(session, job.id):
+        return Finish(Outcome.CERTIFIED, DEADLINE)
+    growth = jobs.growth(session, job.id) if job.kind == JobKind.GROW else None
+    start = (growth or {}).get("start") or {}
+    return Finish(Outcome.INCONCLUSIVE, at_deadline(start.get("hindrance", "")))
 
 
 def _report(session: Session, job: JobRow, growth: dict[str, Any] | None) -> Report | cover.Report | motions.Verdict | None:
@@ -235,7 +242,7 @@ def _add_iteration(session: Session, job: JobRow, action: Certify, afterwards: A
         hard=action.hard,
         failures=action.failures,
         cells=action.cells,
-        box=None if action.box is None else (action.box.mid, action.box.half),
+        box=None if action.box is None else vars(action.box),
         begun=action.begun,
         parts=action.parts,
         ending=action.ending,

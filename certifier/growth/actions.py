@@ -13,9 +13,10 @@ from typing import Any, ClassVar, Self
 from certifier.errors import CirisError
 from certifier.growth.obstacles import Obstacle
 from certifier.growth.state import GrowthState
-from certifier.model import Array, Box, Polytope
+from certifier.model import Array, Polytope
 from certifier.outcome import Outcome, combine
 from certifier.pair.result import Weakness
+from certifier.polytopes.proved import ProvedBox
 from certifier.seeding.proposal import Proposal
 from certifier.step.stepped import Stepped
 
@@ -44,7 +45,7 @@ class Certify:
         failures: end after this many failures, in the order of ``pairs`` (B.3); pairs not reached are left out of the report. None to
             certify all pairs.
         cells: so many cells of each pair are looked at; 1 for the program (11) of the papers on all of the polytope.
-        box: the root cell of all partitions; None for the polytope's smallest box.
+        box: the root cell of all partitions, proved around the polytope of the first of them; None for the polytope's smallest box.
         begun: the iteration in which the partitions of all pairs were begun; None where they begin in this one.
         parts: pair index -> how many parts its open cells are dealt to; 1 for a pair that is left out.
         ending: pairs whose open cells are going to be cut off where the volumes touch that these are tried with next; all of them where the
@@ -62,7 +63,7 @@ class Certify:
     hard: list[int]
     failures: int | None
     cells: int = 1
-    box: Box | None = None
+    box: ProvedBox | None = None
     begun: int | None = None
     parts: dict[int, int] = field(default_factory=dict)
     ending: list[int] = field(default_factory=list)

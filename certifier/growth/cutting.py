@@ -17,11 +17,14 @@ from scipy.optimize import linprog
 from certifier.growth.obstacles import lost_together
 from certifier.model import Array, Polytope, Scene
 from certifier.polytopes.gibbs import uniform_in_q
+from certifier.polytopes.proved import cleaned
 
 CHAINS, EACH = 1000, 16
 """So many chains give so many samples each, for the faces of one round."""
 ENOUGH = 2000
 """With fewer samples left, others are drawn."""
+FEWEST = 200
+"""With fewer samples left in the middle of a round, others are drawn: a program that sees none loses what it likes."""
 DRAWN = 4
 TAIL, AGAIN, MARGIN = 400, 3, 0.1
 """A program sees TAIL samples, the farthest ones on the way to a corner, and others that it loses in AGAIN rounds. The hinge loss begins
@@ -37,6 +40,8 @@ BETTER = 2.0
 """A new face has to be so many times as good as one that is moved in, because every face makes later cells dearer."""
 CLEAR, CLEARER = 0.005, 0.2
 """A face is moved away from what it cuts off, by CLEAR standard deviations and by CLEARER of the depth of what it cuts off."""
+LEAST_ROOM = 1e-6
+"""A face is not put nearer to a point to keep than this, in standard deviations. Nearer ones would halve their distance again and again."""
 BARELY = 1e-6
 """A point that is beyond a face by less than this is on it, as far as rounding can tell."""
 
@@ -101,7 +106,7 @@ def cut(
     made = []
 
     def cutting_off(near: Array, J: list[int]) -> list[_Face]:
-        faces = [*_moved_in(C, d, limits, near, J, keep, scale), *_new(near, J, keep, samples, scale)]
+        faces = [*_moved_in(C, d, limits, near, J, keep, scale), *_new(scene, near, J, keep, samples, scale)]
         # Where a point to keep is too near, a face would hardly move, and the same points would have to go again and again.
         return [face for face in faces if (near @ face.row >= face.offset + beyond).all()]
 
@@ -136,6 +141,8 @@ def cut(
             losses.append((loss, near[0]))
             left_to_lose -= loss
             samples = samples[samples @ best.row <= best.offset]
+            if len(samples) < FEWEST:
+                samples = samples_of(scene, Polytope(C, d))
         worst = max(losses, key=lambda lost: lost[0], default=(0.0, None))
         made.append(Made(len(losses), lost_together(*(loss for loss, _ in losses)), worst[1]))
     if not any(one.faces for one in made):
@@ -168,20 +175,21 @@ def _moved_in(C: Array, d: Array, limits: int, beyond: Array, joints: list[int],
     faces = []
     for k in usable[np.argsort((depths / norms)[usable], kind="stable")[:TRIED]]:
         room = d[k] - depths[k] - float((keep @ C[k]).max())
-        if room > 0:
+        if room > LEAST_ROOM * norms[k]:
             clear = min(CLEAR * norms[k] + CLEARER * depths[k], 0.5 * room)
             faces.append(_Face(C[k], float(d[k] - depths[k] - clear), int(k) if k < len(d) - limits else None))
     return faces
 
 
-def _new(beyond: Array, joints: list[int], keep: Array, samples: Array, scale: Array) -> list[_Face]:
+def _new(scene: Scene, beyond: Array, joints: list[int], keep: Array, samples: Array, scale: Array) -> list[_Face]:
     """Returns the new face in these joints that cuts off the points and loses least, if there is one."""
     found = _face(beyond[:, joints], keep[:, joints], samples[:, joints], scale[joints])
     if found is None:
         return []
     row = np.zeros(len(scale))
     row[joints] = found[0]
-    return [_Face(row, found[1])]
+    (row,), (offset,) = cleaned(row[None], np.array([found[1]]), scene.s_lower, scene.s_upper, keep)
+    return [_Face(row, float(offset))]
 
 
 _drawn: OrderedDict[tuple[str, bytes, bytes], Array] = OrderedDict()
@@ -199,7 +207,7 @@ def samples_of(scene: Scene, polytope: Polytope) -> Array:
 
 
 def _face(beyond: Array, keep: Array, samples: Array, scale: Array) -> tuple[Array, float] | None:
-    """Returns a face (k,), offset in the pair's joints, |c| = 1; None where no face has both on their sides."""
+    """Returns a face (k,), offset in the pair's joints, |c| = 1; None where no face has both on their sides, with room."""
     middle = keep[0]
     far, near, rest = ((points - middle) / scale for points in (beyond, keep, samples))
     # Only samples on the way to what is cut off can be lost; those that are lost all the same join them.
@@ -217,6 +225,8 @@ def _face(beyond: Array, keep: Array, samples: Array, scale: Array) -> tuple[Arr
         return None
     x, offset = found
     depth, room = float((far @ x).max()) - offset, offset - float((near @ x).max())
+    if room <= LEAST_ROOM * float(np.linalg.norm(x)):
+        return None
     offset -= min(CLEAR * float(np.linalg.norm(x)) + CLEARER * depth, 0.5 * room)
     normal = x / scale
     length = float(np.linalg.norm(normal))

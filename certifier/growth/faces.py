@@ -25,6 +25,7 @@ from scipy.optimize import nnls
 from certifier.model import Array, Polytope, Scene
 from certifier.pair.result import Weakness
 from certifier.polytopes.polytope import bounds, drop_redundant
+from certifier.polytopes.proved import cleaned
 
 BACKOFF, BACKOFF_GROWTH, LARGEST_BACKOFF = 0.2, 1.2, 0.6
 """A face moves from the mean towards the hull by a part of the distance.
@@ -114,8 +115,9 @@ def contract(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: Array, 
             found = _shorter_range(scene, polytope, ellipsoid, keep, failure)
         if found is None:
             return None
-        C.append(found[0])
-        d.append(found[1])
+        rows, offsets = cleaned(*found, scene.s_lower, scene.s_upper, keep)
+        C.append(rows)
+        d.append(offsets)
     limited = scene.polytope(np.concatenate(C), np.concatenate(d))
     kept = drop_redundant(limited, fixed=limits)
     return Polytope(limited.C[kept], limited.d[kept])

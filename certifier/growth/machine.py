@@ -17,6 +17,7 @@ from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcome
 from certifier.growth.again import begin_again
 from certifier.growth.options import GrowthOptions
 from certifier.growth.pushes import further, less, next_push
+from certifier.growth.refusal import ended_by
 from certifier.growth.rounds import after_round, certify_step, next_round
 from certifier.growth.state import Best, Bisection, GrowthState, Start
 from certifier.growth.targeted import contraction_starts, cut, next_contraction
@@ -54,6 +55,23 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
 
 def advance(scene: Scene, state: GrowthState, report: Report) -> Transition:
     """Returns what follows a report; the state is the one of the last transition and is not changed."""
+    hindrance = _hindrance(state, report)
+    try:
+        transition = _advanced(scene, state, report)
+    except RegionError as error:
+        transition = _failed(state, Failed(ended_by(error, hindrance)))
+    if hindrance and isinstance(transition.action, Finish) and transition.state.best is None:
+        return replace(transition, action=replace(transition.action, reason=hindrance))
+    return transition
+
+
+def _hindrance(state: GrowthState, report: Report) -> str:
+    if isinstance(report, Proposal):
+        return str(report.info.get("hindrance", ""))
+    return "" if state.start is None else state.start.hindrance
+
+
+def _advanced(scene: Scene, state: GrowthState, report: Report) -> Transition:
     if isinstance(report, Outcomes):
         return _certified(scene, state, report)
     if isinstance(report, Proposal):
@@ -74,17 +92,17 @@ def _proposed(scene: Scene, state: GrowthState, proposal: Proposal) -> Transitio
     norms = np.linalg.norm(limited.C, axis=1)
     rows = Polytope(limited.C / norms[:, None], limited.d / norms)
     method = proposal.info.get("method")
-    given = method in (Method.BOX, Method.POLYTOPE)
+    given, hindrance = method in (Method.BOX, Method.POLYTOPE), _hindrance(state, proposal)
     contraction = state.options.contraction or ("whole" if method in IRIS else "targeted")
     if contraction != "uniform":
-        start = Start(rows, proposal.center, np.concatenate([proposal.center[None], proposal.contain]), given)
+        start = Start(rows, proposal.center, np.concatenate([proposal.center[None], proposal.contain]), given, hindrance)
         if contraction == "whole":
             return begin_whole(scene, replace(state, start=start), start)
         transition = next_contraction(scene, replace(state, start=start), start)
         assert transition is not None, "before there is a region every contraction is worth it"
         return transition
     center, radius = chebyshev_center(rows)
-    start = Start(rows, proposal.center, center[None], given)
+    start = Start(rows, proposal.center, center[None], given, hindrance)
     return shrink(scene, replace(state, start=start), start, Bisection(center, radius, state.options.bisection_steps, 1.0))
 
 

@@ -2,11 +2,29 @@
 
 from __future__ import annotations
 
-from certifier.errors import CirisError
+from certifier.errors import CirisError, RegionError
 from certifier.growth.whole import REVOKED
+from certifier.seeding.proposal import NO_ROOM, TOO_LONG, mend
 
 DEADLINE = "the deadline was reached"
 """The reason of a growth that had no time left."""
+THIN = "what is left around the seed is too thin to go on with"
+"""The reason of a growth that has come to a polytope without an interior that doubles can tell. Users have not given that polytope."""
+
+
+def ended_by(error: CirisError, hindrance: str) -> CirisError:
+    """Returns what to say of an error that has ended a growth after its seeding, in terms of what users have given.
+
+    Args:
+        hindrance: as :class:`certifier.growth.state.Start` has it.
+    """
+    about_polytope = isinstance(error, RegionError) and error.field == "polytope"
+    return refusal(hindrance or THIN, late=False) if about_polytope else error
+
+
+def at_deadline(hindrance: str) -> str:
+    """Returns the reason of a growth without a region whose time has run out; more time does not help where something hinders it."""
+    return hindrance or DEADLINE
 
 
 def refusal(reason: str, late: bool) -> CirisError:
@@ -18,4 +36,6 @@ def refusal(reason: str, late: bool) -> CirisError:
     """
     if reason.startswith(REVOKED):
         return CirisError("revoked", reason, hint="grow a region of the new scene from another seed")
+    if NO_ROOM in reason or TOO_LONG in reason:
+        return CirisError("not_grown", reason, hint=mend(reason))
     return CirisError("not_grown", reason, hint="allow more time" if late else "try another seed, or look at the pair named")

@@ -9,6 +9,7 @@ from certifier.growth.state import GrowthState, Round, Start
 from certifier.growth.trials import certify, effort
 from certifier.model import Polytope, Scene
 from certifier.outcome import Outcome
+from certifier.polytopes.proved import cleaned
 from certifier.step.stepped import Stepped
 
 
@@ -24,8 +25,11 @@ def next_round(scene: Scene, state: GrowthState, start: Start) -> Transition:
 def certify_step(scene: Scene, state: GrowthState, stepped: Stepped) -> Transition:
     """Asks to certify the polytope that a step has come to."""
     assert state.best is not None
-    round_ = Round(stepped.base, state.best.center, stepped.polytope, stepped.center, stepped.growth)
-    return certify(scene, replace(state, round=round_), "round", stepped.polytope, stepped.center)
+    assert state.start is not None, "a step follows a region, which comes from a proposal"
+    C, d = cleaned(stepped.polytope.C, stepped.polytope.d, scene.s_lower, scene.s_upper, state.start.keep)
+    target = Polytope(C, d)
+    round_ = Round(stepped.base, state.best.center, target, stepped.center, stepped.growth)
+    return certify(scene, replace(state, round=round_), "round", target, stepped.center)
 
 
 def after_round(scene: Scene, state: GrowthState, start: Start, accepted: bool) -> Transition:

@@ -25,12 +25,14 @@ class Start:
         seed: (n,) the seed in s.
         keep: (k, n) points that stay inside, the first of them well inside.
         given: the proposal is a box or a polytope of the user's; beyond it nothing is known.
+        hindrance: why, should no region come of it; "" where nothing is known.
     """
 
     rows: Polytope
     seed: Array
     keep: Array
     given: bool
+    hindrance: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +112,7 @@ class Whole:
             first stage, where it is 1 at most (certifier.growth.whole).
         kept: the share of the proposal that the best region kept when this stage began.
         polytope: what is left of it; faces are added before the joint limits, which are its last 2n rows, and none is dropped.
-        mid, half: (n,) of the box that is the root cell of all partitions of this stage.
+        mid, half, Y_lower, Y_upper: of the :class:`ProvedBox` that is the root cell of all partitions of this stage.
         holds: pair index -> iteration whose proof, on a larger polytope, holds on the present one.
         begun: the iteration with which this stage began; None before it.
         open_cells: pair index -> how many cells of its partition are open.
@@ -126,6 +128,8 @@ class Whole:
     polytope: Polytope
     mid: Array
     half: Array
+    Y_lower: Array
+    Y_upper: Array
     holds: dict[int, int] = field(default_factory=dict)
     begun: int | None = None
     open_cells: dict[int, int] = field(default_factory=dict)

@@ -22,11 +22,11 @@ from certifier.growth.options import MOST_CELLS
 from certifier.growth.state import GrowthState, Start, Whole
 from certifier.growth.targeted import pushed
 from certifier.growth.trials import by_joints, joints_between
-from certifier.model import Array, Box, Polytope, Scene
+from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.pair.result import Weakness
 from certifier.partition.together import THIN, Together, together
-from certifier.polytopes.polytope import bounds
+from certifier.polytopes.proved import ProvedBox
 
 FIRST = 0.7
 """In the first stage the faces of the proposal lie this part of their distance from the seed."""
@@ -93,10 +93,10 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
 
 def begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float = 0.0, passed: float = 0.0) -> Transition:
     """Asks to certify all pairs on a polytope; what was proved on the one of the stage before says nothing about it."""
-    box = Box.around(*bounds(polytope))
+    box = ProvedBox.of_program(scene, polytope)
     stage = 1 if state.whole is None else state.whole.stage + 1
     joined = _together(scene, state)
-    begun = Whole(reach, kept, polytope, box.mid, box.half, since=passed, passed=passed, stage=stage, together=joined)
+    begun = Whole(reach, kept, polytope, **vars(box), since=passed, passed=passed, stage=stage, together=joined)
     return _next(scene, replace(state, whole=begun))
 
 
@@ -248,7 +248,7 @@ def _next(scene: Scene, state: GrowthState) -> Transition:
         hard=[i for i in pairs if HARD <= spent[i] < effort[i] or spent[i] >= effort[i] + ending],
         failures=None,
         cells=SLICE,
-        box=Box(whole.mid, whole.half),
+        box=ProvedBox(whole.mid, whole.half, whole.Y_lower, whole.Y_upper),
         begun=whole.begun,
         parts=_parts(pairs, whole),
         ending=[i for i in pairs if spent[i] >= effort[i]],

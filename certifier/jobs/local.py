@@ -12,7 +12,7 @@ from certifier.errors import CirisError
 from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Step, Transition
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
-from certifier.growth.refusal import DEADLINE, refusal
+from certifier.growth.refusal import DEADLINE, at_deadline, ended_by, refusal
 from certifier.growth.state import Start
 from certifier.growth.trials import alike
 from certifier.jobs.former import Former
@@ -238,7 +238,8 @@ def _carried_out(run: _Run, options: GrowthOptions, deliver: Deliver | None = No
         try:
             report = run.carry_out(transition.action)
         except CirisError as error:
-            failure, report = error, Failed(error)
+            failure = error if transition.state.start is None else ended_by(error, transition.state.start.hindrance)
+            report = Failed(failure)
         transition = advance(scene, transition.state, report)
         if failure and run.candidate is None:
             raise failure
@@ -248,8 +249,11 @@ def _carried_out(run: _Run, options: GrowthOptions, deliver: Deliver | None = No
         run.cuts = run.cuts if transition.state.whole is None else transition.state.whole.cuts
         late = run.passed >= 1
         if late and not isinstance(transition.action, Finish):
-            outcome = Outcome.INCONCLUSIVE if run.candidate is None else Outcome.CERTIFIED
-            transition = Transition(transition.state, Finish(outcome, DEADLINE))
+            start = transition.state.start
+            end = Finish(Outcome.CERTIFIED, DEADLINE)
+            if run.candidate is None:
+                end = Finish(Outcome.INCONCLUSIVE, at_deadline("" if start is None else start.hindrance))
+            transition = Transition(transition.state, end)
         if deliver is not None and run.has_news and not isinstance(transition.action, Finish):
             deliver(run.make_region(options, "growing"))
     if run.candidate is None:

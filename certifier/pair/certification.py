@@ -29,7 +29,8 @@ from certifier.pair.program import Sides, build
 from certifier.pair.result import PairResult, Weakness
 from certifier.pair.screen import Contact, Screen
 from certifier.pair.weakness import pull, weak_points
-from certifier.polytopes.polytope import bound_multipliers, chebyshev_center, drop_redundant
+from certifier.polytopes.polytope import chebyshev_center, drop_redundant
+from certifier.polytopes.proved import ProvedBox
 from certifier.polytopes.sampling import hit_and_run
 from certifier.proof.ground import Ground
 from certifier.proof.negative import WitnessProof
@@ -65,10 +66,10 @@ class Certification:
         self.center = middle if center is None else center
         kept = drop_redundant(polytope, inside=middle)
         self._faces = faces = Polytope(polytope.C[kept], polytope.d[kept])
-        lower, upper, Y_lower, Y_upper = bound_multipliers(scene.polytope(faces.C, faces.d), middle)
+        around = ProvedBox.of(scene, faces, middle)
         self._whole = None if box is None else PairCheck(scene, Ground.of_box(box.mid, box.half))
-        self._box = Box.around(lower, upper) if box is None else box
-        self.ground = Ground(faces.C, faces.d, self._box.mid, self._box.half, Y_lower, Y_upper)
+        self._box = around if box is None else box
+        self.ground = Ground(faces.C, faces.d, self._box.mid, self._box.half, around.Y_lower, around.Y_upper)
         check_ground(scene, self.ground)
         self._check = PairCheck(scene, self.ground)
         self._samples = hit_and_run(faces, self.center, CONE_SAMPLES, seed)

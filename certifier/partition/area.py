@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from certifier.kinematics import Kinematics
-from certifier.model import Array, Box, Polytope, Scene
+from certifier.model import Array, Polytope, Scene
 from certifier.polytopes.gibbs import uniform_in_q
-from certifier.polytopes.polytope import bound_multipliers, chebyshev_center
+from certifier.polytopes.polytope import chebyshev_center
+from certifier.polytopes.proved import ProvedBox
 from certifier.proof.ground import Ground
 
 CHAINS, EACH = 100, 20
@@ -55,19 +56,18 @@ class Area:
     unit: Polytope
 
     @classmethod
-    def of(cls, scene: Scene, polytope: Polytope, seed: int, box: Box | None = None) -> Area:
+    def of(cls, scene: Scene, polytope: Polytope, seed: int, box: ProvedBox | None = None) -> Area:
         """Looks at a polytope.
 
         Args:
-            box: a box around the polytope; None for the smallest one.
+            box: a box around a polytope of which this one is a part (:meth:`ProvedBox.on`); None for the smallest one around this one.
 
         Raises:
             RegionError: the polytope is empty or unbounded.
         """
         center = chebyshev_center(polytope, tuple(joint.name for joint in scene.moving))[0]
-        lower, upper, Y_lower, Y_upper = bound_multipliers(scene.polytope(polytope.C, polytope.d), center)
-        box = Box.around(lower, upper) if box is None else box
-        ground = Ground(polytope.C, polytope.d, box.mid, box.half, Y_lower, Y_upper)
+        box = ProvedBox.of(scene, polytope, center) if box is None else box.on(len(polytope.d))
+        ground = Ground(polytope.C, polytope.d, box.mid, box.half, box.Y_lower, box.Y_upper)
         samples = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, seed).reshape(-1, scene.n)
         norms = np.linalg.norm(polytope.C, axis=1)
         unit = Polytope(polytope.C / norms[:, None], polytope.d / norms)

@@ -21,7 +21,7 @@ import numpy as np
 
 from certifier.errors import ProofError
 from certifier.kinematics import Kinematics
-from certifier.model import Array, Box, Polytope, Scene
+from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair.broad_phase import BroadPhase, Volumes
 from certifier.pair.closest import closest
@@ -36,6 +36,7 @@ from certifier.partition.shared import Shared
 from certifier.partition.subtrees import Subtrees, dealt, open_cells, put_together
 from certifier.partition.together import Together, volumes_of
 from certifier.partition.tree import Node, OpenCell, to_streams
+from certifier.polytopes.proved import ProvedBox
 from certifier.polytopes.simplex import deepest
 from certifier.proof.negative import WitnessProof
 from certifier.proof.outline import OPEN, Outline, Silhouette, Tree
@@ -81,7 +82,8 @@ class CellCertification:
     Args:
         polytope: its last 2n rows are the joint limits.
         seed: seeds the samples.
-        box: the root cell, which contains P; None for P's smallest box. What was begun must have had the same one.
+        box: the root cell, proved around a polytope of which P is a part (:meth:`ProvedBox.on`); None for P's smallest box. What was begun
+            must have had the same one.
         together: pairs that are certified as one with others; None for none. What was begun must have had the same ones.
         faces: faces will be added to the polytope where pairs are hard, and so their cells are cut in other ways.
 
@@ -94,7 +96,7 @@ class CellCertification:
         scene: Scene,
         polytope: Polytope,
         seed: int = 0,
-        box: Box | None = None,
+        box: ProvedBox | None = None,
         together: Together | None = None,
         faces: bool = False,
     ) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from pydrake.geometry import QueryObject
 
@@ -40,13 +42,14 @@ class Clearance:
                 least, nearest = distance, pair
         return float(least), nearest
 
-    def free(self, q: Array) -> bool:
-        """Returns whether all pairs are farther apart at q, (n,), than twice the padding."""
+    def free(self, q: Array, room: float = 0.0) -> bool:
+        """Returns whether all pairs are farther apart at q, (n,), than twice the padding and the room, in metres."""
+        least = 2 * self._scene.padding + room
         try:
-            near = self._query(q).ComputeSignedDistancePairwiseClosestPoints(2 * self._scene.padding)
+            near = self._query(q).ComputeSignedDistancePairwiseClosestPoints(least)
         except RuntimeError:  # as above
             return False
-        return all(pair.distance > 2 * self._scene.padding for pair in near)
+        return all(pair.distance > least for pair in near)
 
     def _query(self, q: Array) -> QueryObject:
         self._diagram.plant().SetPositions(self._diagram.mutable_plant_context(self._context), q)
@@ -56,18 +59,35 @@ class Clearance:
         return found
 
 
-def check_free(scene: Scene, q: Array, field: str) -> None:
-    """Refuses a configuration in which a pair is not farther apart than twice the padding.
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """The pair that is nearest at a configuration.
+
+    Attributes:
+        q: (n,) the configuration.
+        field: where in the user's input it is.
+        distance: of the padded bodies, in metres; infinite in a scene without pairs.
+        pair: None in a scene without pairs.
+    """
+
+    q: Array
+    field: str
+    distance: float
+    pair: Pair | None
+
+
+def check_free(scene: Scene, q: Array, field: str) -> Nearest:
+    """Refuses a configuration in which a pair is not farther apart than twice the padding, and returns the nearest pair of others.
 
     Raises:
         RegionError: ``seed_in_collision``; the hint names a free configuration near by, if one was found.
     """
     if not scene.pairs:
-        return
+        return Nearest(q, field, np.inf, None)
     clearance = Clearance(scene)
     distance, pair = clearance.least(q)
     if distance > 2 * scene.padding:
-        return
+        return Nearest(q, field, distance - 2 * scene.padding, pair)
     overlap = f"overlap by {-distance:.3g} m" if np.isfinite(distance) else "overlap"
     how = overlap if distance <= 0 else f"are {distance:.3g} m apart, with a padding of {scene.padding:g} m on each"
     found = nearest_free(scene, clearance, scene.in_windows(q))
@@ -75,28 +95,33 @@ def check_free(scene: Scene, q: Array, field: str) -> None:
     raise RegionError("seed_in_collision", f"{pair.a} and {pair.b} {how}", field=field, hint=hint)
 
 
-def nearest_free(scene: Scene, clearance: Clearance, q: Array) -> Array | None:
-    """Returns a free configuration near q, (n,), within the joint limits; None where none was found."""
+def nearest_free(scene: Scene, clearance: Clearance, q: Array, room: float = 0.0, reach: float = 1.0) -> Array | None:
+    """Returns a free configuration near q, (n,), within the joint limits; None where none was found.
+
+    Args:
+        room: all pairs are farther apart by this, in metres.
+        reach: it is looked for within this part of the joints' half ranges.
+    """
     half = (scene.q_upper - scene.q_lower) / 2
     lower, upper = scene.q_lower + 1e-3 * half, scene.q_upper - 1e-3 * half
     rng = np.random.default_rng(0)
-    for shell in SHELLS:
+    for shell in SHELLS[reach >= SHELLS]:
         directions = rng.normal(size=(EACH, scene.n))
         directions *= shell / np.linalg.norm(directions, axis=1, keepdims=True)
         near = np.clip(q + directions * half, lower, upper)
-        found = [x for x in near if clearance.free(x)]
+        found = [x for x in near if clearance.free(x, room)]
         if found:
             best = min(found, key=lambda x: float(np.linalg.norm((x - q) / half)))
-            return _towards(clearance, q, best)
+            return _towards(clearance, q, best, room)
     return None
 
 
-def _towards(clearance: Clearance, q: Array, free: Array) -> Array:
+def _towards(clearance: Clearance, q: Array, free: Array, room: float) -> Array:
     """Returns the free configuration nearest to q that bisection finds on the way to a free one."""
     inside, outside = free, q
     for _ in range(STEPS):
         middle = (inside + outside) / 2
-        inside, outside = (middle, outside) if clearance.free(middle) else (inside, middle)
+        inside, outside = (middle, outside) if clearance.free(middle, room) else (inside, middle)
     return inside
 
 

@@ -38,6 +38,7 @@ from certifier.errors import RegionError
 from certifier.model import Array, Joint, JointKind, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.polytope import drop_redundant
+from certifier.polytopes.proved import cleaned
 from certifier.scene.drake_model import build_diagram
 from certifier.seeding.coarse_pairs import CoarsePairs, coarse_pairs_of, with_coarse_pairs
 from certifier.seeding.options import Method, SeedOptions
@@ -89,7 +90,8 @@ def iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Arra
         ) from error
     C, d = _faces(scene, region)
     kept = drop_redundant(scene.polytope(C, d), fixed=2 * scene.n)[: -2 * scene.n]
-    return C[kept], d[kept], {"delta": options.delta, **account}
+    C, d = cleaned(C[kept], d[kept], scene.s_lower, scene.s_upper, points)
+    return C, d, {"delta": options.delta, **account}
 
 
 def _region(scene: Scene, points: Array, options: SeedOptions) -> tuple[HPolyhedron, dict[str, Any]]:

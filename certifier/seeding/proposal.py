@@ -9,6 +9,15 @@ import numpy as np
 
 from certifier.model import Array
 
+NO_ROOM = ", which leaves no room for a region"
+TOO_LONG = ", which is too little to be seen beside it"
+"""One of these is in ``info["hindrance"]`` of a proposal."""
+
+
+def mend(hindrance: str) -> str:
+    """Returns what to do about a hindrance."""
+    return "move the seed away from the contact" if NO_ROOM in hindrance else "set narrower limits for the joint in the scene file"
+
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
@@ -20,6 +29,7 @@ class Proposal:
         contain: (k, n) what else the region has to contain, in s, inside all faces and limits as well.
         info: JSON-able: method, guarantee (``sampled`` when IRIS passed its statistical test, else ``none``), faces, seconds, and for
             IRIS termination, iterations, epsilon, delta, Drake's warnings, the random seed, and how many random seeds were tried.
+            ``hindrance`` says why, should no region come of it, where something is known (:mod:`certifier.seeding.hindrance`).
     """
 
     C: Array

@@ -13,15 +13,16 @@ from certifier.errors import RegionError
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.polytope import chebyshev_center, drop_redundant
-from certifier.seeding.free import check_free
+from certifier.seeding.free import Nearest, check_free
+from certifier.seeding.hindrance import hindrance
 from certifier.seeding.limits import check_limits, off_limits
 from certifier.seeding.options import Method, SeedOptions
-from certifier.seeding.proposal import Proposal
+from certifier.seeding.proposal import Proposal, mend
 from certifier.seeding.tries import best_of_tries
 
 
-def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> None:
-    """Refuses joint positions around which no region can be certified.
+def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> Nearest:
+    """Refuses joint positions around which no region can be certified, and returns the pair that is nearest at others.
 
     Raises:
         RegionError: ``seed_wrong_length``, ``seed_not_finite``, ``seed_in_collision``, or as
@@ -38,7 +39,7 @@ def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> None:
             message = f"joint {joint.name} is at {value}"
             raise RegionError("seed_not_finite", message, field=f"{field}[{joint.index}]", hint="give a finite number")
     check_limits(scene, q, field)
-    check_free(scene, q, field)
+    return check_free(scene, q, field)
 
 
 def propose(scene: Scene, options: SeedOptions) -> Proposal:
@@ -49,20 +50,19 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
     IRIS may take minutes, and it runs native code, so call it in a process that may die.
 
     Raises:
-        RegionError: as :func:`check_seed` and ``polytope.chebyshev_center``; ``polytope_shape``; ``center_outside``;
+        RegionError: as :func:`check_seed` and ``polytope.chebyshev_center``; ``polytope_shape``; ``center_outside``; ``seed_hindered``;
             ``seed_cut_off`` when the polytope does not contain the seed and ``contain``; ``seeding_failed`` with Drake's words.
     """
     start = time.perf_counter()
     method = options.method or Method.IRIS_NP2
-    for i, q in enumerate(options.contain):
-        check_seed(scene, q, f"seed.contain[{i}]")
+    checked = [check_seed(scene, q, f"seed.contain[{i}]") for i, q in enumerate(options.contain)]
     contain = scene.to_s(off_limits(scene, options.contain)) if options.contain else np.zeros((0, scene.n))
     if method is Method.POLYTOPE:
         C, d, center = _given(scene, options)
         said: dict[str, Any] = {}
     else:
         assert options.q is not None, "every method but polytope has a seed"
-        check_seed(scene, options.q)
+        checked.insert(0, check_seed(scene, options.q))
         center = scene.to_s(off_limits(scene, options.q))
         if method is Method.LIMITS:
             C, d = np.zeros((0, scene.n)), np.zeros(0)
@@ -71,13 +71,32 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
             C, d = _box(scene, np.concatenate([center[None], contain]), options.half_width)
             said = {}
         else:
-            C, d, said = best_of_tries(scene, np.concatenate([center[None], contain]), replace(options, method=method))
+            points = np.concatenate([center[None], contain])
+            try:
+                C, d, said = best_of_tries(scene, points, replace(options, method=method))
+            except RegionError:
+                _refuse_hindered(scene, checked)
+                raise
+            if not (d[:, None] > C @ points.T).all():
+                _refuse_hindered(scene, checked)
     if not (d[:, None] > C @ np.concatenate([center[None], contain]).T).all():
         problem = f"the polytope of {method} does not contain the seed" + (" and all of contain" if options.contain else "")
         raise RegionError("seed_cut_off", problem, field="seed", hint="allow fewer iterations, or give points that see one another")
     guarantee = said.pop("guarantee", Guarantee.NONE)
     info = {"method": method.value, "guarantee": guarantee.value, "faces": len(d), "seconds": time.perf_counter() - start, **said}
+    if known := hindrance(scene, checked):
+        info["hindrance"] = known
     return Proposal(C, d, center, contain, info)
+
+
+def _refuse_hindered(scene: Scene, checked: list[Nearest]) -> None:
+    """Refuses a seed of which no proposal came, if it is known what hinders one.
+
+    Raises:
+        RegionError: ``seed_hindered``.
+    """
+    if known := hindrance(scene, checked):
+        raise RegionError("seed_hindered", known, field="seed", hint=mend(known))
 
 
 def warm_up() -> None:

@@ -187,7 +187,8 @@ GROWTH = [
             "allow more time",
             lambda t: local.grow(slider(), grow(seed={"q": [0.0], "method": "limits"}), deadline_s=1e-6),
         ),
-        ("not_grown", "", "{...}", "try another seed, or look at the pair named", "bodies that nearly touch at the seed"),
+        ("not_grown", "", "{...}", "{...}", "a seed next to contact: tests/certifier/jobs/test_next_to_contact.py"),
+        ("not_grown", "", "{...}", "try another seed, or look at the pair named", "bodies that come too close between points to keep"),
         ("revoked", "", "{...}", "grow a region of the new scene from another seed", "tests/certifier/jobs/test_recertify.py"),
     ),
     *rows(
@@ -411,6 +412,7 @@ SEEDS = [
             "allow fewer iterations, or give points that see one another",
             "IRIS cutting off its own seed",
         ),
+        ("seed_hindered", "seed", "{...}", "{...}", "a seed so near to contact that IRIS finds no polytope around it"),
         (
             "center_outside",
             "seed.center",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -226,3 +228,25 @@ def polytope_corner(polytope):
     """A point close to the corner of a box of joint limits, (1, n)."""
     n = polytope.C.shape[1]
     return 0.98 * polytope.d[-2 * n : -n][None]
+
+
+def test_where_few_samples_are_left_in_a_round_others_are_drawn():
+    """A face that loses all samples left nothing for the next one to see: numpy warned of the mean of nothing."""
+    scene, rng = planar_arm(3), np.random.default_rng(0)
+    polytope = scene.polytope(np.zeros((0, 3)), np.zeros(0))
+    samples = uniform_in_q(polytope, scene.revolute, 200, 10, 1).reshape(-1, 3)
+    beyond = samples[np.linalg.norm(samples, axis=1) > 0.02]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        smaller = cut(scene, polytope, np.zeros((1, 3)), [(ALL, beyond, 1.0), (ALL, rng.uniform(-0.05, 0.05, (50, 3)), 1.0)], polytope)
+    assert smaller.polytope is not None
+    assert len(smaller.polytope.d) > len(polytope.d)
+    assert smaller.polytope.contains(np.zeros(3))
+
+
+@pytest.mark.parametrize(("distance", "blocked"), [(1e-3, False), (1e-8, True), (1e-12, True)])
+def test_a_face_is_not_put_within_a_hair_of_a_point_to_keep(distance, blocked):
+    scene = planar_arm(2)
+    polytope = scene.polytope([[1.0, 0.0]], [0.5])
+    point = np.array([[distance, 0.0]])
+    assert (cut(scene, polytope, np.zeros((1, 2)), [((0, 1), point, 1.0)], polytope).polytope is None) is blocked

@@ -203,7 +203,9 @@ def test_after_a_slow_first_stage_the_faces_move_out_less(gone, reach):
 @pytest.mark.parametrize(("passed", "parts"), [(0.0, PARTS), (LATE, 1)])
 def test_rounds_of_many_pairs_are_shorter_when_a_stage_is_late(passed, parts):
     pairs = range(2 * PIECES)
-    state = Whole(1.2, 0.5, SCENE.polytope([], []), np.zeros(2), np.ones(2), open_cells=dict.fromkeys(pairs, 50), passed=passed)
+    state = Whole(
+        1.2, 0.5, SCENE.polytope([], []), *np.zeros((2, 2)), *np.zeros((2, 2, 8)), open_cells=dict.fromkeys(pairs, 50), passed=passed
+    )
     assert whole._parts(pairs, state) == (dict.fromkeys(pairs, parts) if parts > 1 else {})
 
 

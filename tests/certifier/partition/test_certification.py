@@ -10,7 +10,7 @@ import pytest
 from benchmarks import catalogue
 from certifier.errors import ProofError, RegionError
 from certifier.kinematics import Kinematics
-from certifier.model import WORLD, Box, Geometry, Joint, JointKind, Pair, Polytope
+from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Polytope
 from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import certify_pair
 from certifier.pair.closest import first_within
@@ -23,7 +23,7 @@ from certifier.partition.subtrees import open_cells
 from certifier.partition.together import volumes_of
 from certifier.partition.tree import OPEN
 from certifier.polytopes.gibbs import uniform_in_q
-from certifier.polytopes.polytope import bounds
+from certifier.polytopes.proved import ProvedBox
 from certifier.proof.container import pack, unpack
 from certifier.proof.negative import WitnessProof
 from certifier.proof.partition import EMPTY, PLANE, PartitionProof
@@ -199,7 +199,7 @@ def test_bodies_that_nearly_touch_are_too_close_and_the_distance_is_the_one_ther
 @pytest.mark.usefixtures("one_piece")
 def test_a_search_that_runs_out_of_cells_goes_on_from_where_it_was():
     scene, polytope = passing(0.6, replace(TIP, radius=0.08))
-    box_ = Box.around(*bounds(polytope))
+    box_ = ProvedBox.of_program(scene, polytope)
     shared = CellCertification(scene, polytope, box=box_)
     at_once = shared.certify(0, CELLS)
     check_certified(scene, polytope, 0, at_once)
@@ -277,7 +277,7 @@ def with_face(scene, polytope, c, d):
 @pytest.mark.usefixtures("one_piece")
 def test_what_was_begun_goes_on_when_a_face_has_cut_the_contact_off(monkeypatch):
     scene, polytope = passing(0.64, replace(TIP, radius=0.09))
-    around = Box.around(*bounds(polytope))
+    around = ProvedBox.of_program(scene, polytope)
     with monkeypatch.context() as patched:
         # A search that does not look for contacts proves some cells before one is met.
         patched.setattr(Search, "scout", lambda *_: [])
@@ -311,7 +311,7 @@ def gone_on_with(shared, first):
 @pytest.mark.usefixtures("one_piece")
 def test_cells_that_a_new_face_leaves_outside_are_shown_to_miss_the_polytope():
     scene, polytope = passing(0.6, CLOSE)
-    around = Box.around(*bounds(polytope))
+    around = ProvedBox.of_program(scene, polytope)
     first = certify(scene, polytope, cells=1, box=around)
     arrays = unpack(first.subtrees, "subtrees")[1]
     joint, value = arrays["nodes"][0], arrays["cuts"][0]
@@ -327,7 +327,7 @@ def test_multipliers_of_the_joint_limits_stay_theirs_when_faces_are_added():
     scene = planar_arm(2, box("world/block", WORLD, (0.1, 0.1, 0.1), (1.2, 1.0, 0.0)), limit=2 * np.arctan(0.6))
     scene = replace(scene, geometries=(*scene.geometries, TIP), pairs=(Pair(TIP.name, "world/block"),))
     limits = scene.polytope([], [])
-    around = Box(np.zeros(2), np.full(2, 0.7))
+    around = replace(ProvedBox.of_program(scene, limits), mid=np.zeros(2), half=np.full(2, 0.7))
     shared = CellCertification(scene, limits, box=around)
     partial = next(r for r in (shared.certify(0, cells) for cells in range(1, 50)) if len(faces(r)))
     assert partial.outcome is Outcome.INCONCLUSIVE

@@ -1,0 +1,52 @@
+"""What hinders a region is said here, in terms of what users have given, should no region come of their seed.
+
+A seed may be free and still next to contact. A slide may be so long that nothing about the robot is large beside it. Whether a region can
+be grown all the same is seen by trying.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from certifier.model import JointKind, Scene
+from certifier.seeding.free import Clearance, Nearest, nearest_free
+from certifier.seeding.proposal import NO_ROOM, TOO_LONG
+
+NEAR = 5e-3
+"""A seed that is nearer to contact than this, in metres, is next to it."""
+ROOM = (20e-3, 10e-3, 5e-3)
+"""Such a seed has a neighbour named where every pair has the first of these distances, in metres, that is found within reach."""
+REACH = 0.3
+"""The neighbour is within this part of the joints' half ranges."""
+LONG = 100.0
+"""A slide is too long for the scene if it goes this many times as far as the largest body is wide."""
+
+
+def hindrance(scene: Scene, checked: Sequence[Nearest]) -> str:
+    """Returns what is likely to keep a region from growing around these configurations; "" where nothing is known.
+
+    Args:
+        checked: the nearest pair at the seed and at every other configuration to keep.
+    """
+    tight = min(checked, key=lambda one: one.distance, default=None)
+    if tight is not None and tight.pair is not None and tight.distance <= NEAR:
+        return _next_to_contact(scene, tight)
+    size = max((float(np.ptp(g.vertices, axis=0).max()) + 2 * g.radius for g in scene.geometries), default=0.0)
+    for joint, length in zip(scene.moving, scene.q_upper - scene.q_lower, strict=True):
+        if joint.kind is JointKind.PRISMATIC and length > LONG * size:
+            return f"joint {joint.name} slides {length:.3g} m, and the largest body is {size:.3g} m wide{TOO_LONG}"
+    return ""
+
+
+def _next_to_contact(scene: Scene, tight: Nearest) -> str:
+    assert tight.pair is not None
+    where = "the seed" if tight.field == "seed.q" else tight.field
+    text = f"{where} is {1e3 * tight.distance:.3g} mm from contact of {tight.pair.a} and {tight.pair.b}{NO_ROOM}"
+    clearance, q = Clearance(scene), scene.in_windows(tight.q)
+    found = ((room, nearest_free(scene, clearance, q, room, REACH)) for room in ROOM)
+    room, roomy = next((known for known in found if known[1] is not None), (0.0, None))
+    if roomy is None:
+        return text
+    return f"{text}; at q = {', '.join(f'{x:.4f}' for x in roomy)} every pair is {1e3 * room:g} mm apart or more"

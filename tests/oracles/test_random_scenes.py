@@ -1,0 +1,39 @@
+"""Regions of random scenes that are written as files hold no configuration that Drake alone finds in collision."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from certifier.scene import load_scene
+from client.cores import cores
+from tests.oracles.distances import Distances
+from tests.oracles.random_scenes import SAMPLES, campaign
+from tests.oracles.written_scenes import FORMATS, write_scene
+
+SCENES, DEADLINE = 30, 60.0
+
+
+@pytest.mark.slow
+def test_drake_finds_no_collision_in_the_regions_of_random_scenes(tmp_path):
+    results = campaign(0, SCENES, tmp_path, DEADLINE, SAMPLES, cores())
+    assert [result.problem for result in results if result.problem] == []
+    assert sum(result.region for result in results) >= SCENES / 2, "a campaign without regions shows nothing"
+
+
+def test_the_scenes_have_every_format_and_are_read_as_drake_reads_them(tmp_path):
+    written = set()
+    for seed in range(4):
+        path = write_scene(tmp_path / str(seed), np.random.default_rng(seed), 5)
+        scene, distances = load_scene(path), Distances(path)
+        assert scene.n == distances.n == 5
+        assert sorted(distances.order([joint.name for joint in scene.moving])) == list(range(5))
+        written |= {file.suffix[1:] for file in path.parent.iterdir()}
+    assert written >= {*FORMATS, "obj"}
+
+
+def test_the_distances_see_a_collision(tmp_path):
+    """The oracle can fail: among free and other configurations, the least distance of random ones is negative."""
+    distances = Distances(write_scene(tmp_path, np.random.default_rng(0), 5))
+    found = [distances.least(q, 0.1) for q in np.random.default_rng(0).uniform(*distances.limits, (200, 5))]
+    assert min(found) < 0 < max(found)
