@@ -15,6 +15,7 @@ from pydrake.systems.framework import DiagramBuilder
 from certifier.model import Joint
 from certifier.scene.file import read_scene_file
 from certifier.scene.mimics import Mimic, mimic_of
+from certifier.scene.names import Names
 from certifier.scene.parse import couplings, joint_of, read_models
 from certifier.scene.strict import StrictReader
 from certifier.scene.xml import parse_xml
@@ -35,13 +36,15 @@ def inventory(payload: dict[str, Any]) -> dict[str, Any]:
     """
     path = Path(payload["path"])
     scene_file = read_scene_file(path)
-    plant, _ = AddMultibodyPlantSceneGraph(DiagramBuilder(), time_step=0.0)
-    StrictReader(scene_file).check(scene_file.resolved_directives, path.name)
-    read_models(scene_file, plant)
+    plant, scene_graph = AddMultibodyPlantSceneGraph(DiagramBuilder(), time_step=0.0)
+    strict = StrictReader(scene_file)
+    strict.check(scene_file.resolved_directives, path.name)
+    read_models(scene_file, plant, strict.working_directory)
+    names = Names(plant, scene_graph.model_inspector())
     free = plant.GetFloatingBaseBodies()
     every = [plant.get_joint(index) for index in plant.GetJointIndices()]
-    joints = [joint_of(plant, joint) for joint in every if joint.child_body().index() not in free]
-    read = [mimic for mimic in map(mimic_of, couplings(plant)) if mimic is not None]
+    joints = [joint_of(joint, names) for joint in every if joint.child_body().index() not in free]
+    read = [mimic for mimic in map(mimic_of, couplings(plant, names)) if mimic is not None]
     unread = [mimic for name, file in payload["models"].items() for mimic in _unread(Path(file), name, joints)]
     return {
         "roots": _roots(plant),

@@ -5,6 +5,7 @@ Only here do user files meet Drake, which ends the process on some of them. So `
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 import logging
 import re
@@ -32,25 +33,25 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.inverse_kinematics import AddMultibodyPlantConstraints
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.multibody.tree import BodyIndex, PrismaticJoint, QuaternionFloatingJoint, RevoluteJoint, RigidBody, RpyFloatingJoint, WeldJoint
 from pydrake.multibody.tree import Joint as DrakeJoint
+from pydrake.multibody.tree import PrismaticJoint, QuaternionFloatingJoint, RevoluteJoint, RpyFloatingJoint, WeldJoint
 from pydrake.solvers import MathematicalProgram
 from pydrake.systems.framework import DiagramBuilder
 
 from certifier.errors import SceneError
-from certifier.model import ALPHABET, MAX_NAME, MAX_SENTENCE, WORLD, Array, Geometry, Joint, JointKind, Scene, escaped, is_name
+from certifier.model import MAX_SENTENCE, Array, Geometry, Joint, JointKind, Scene, escaped
 from certifier.scene import shapes
+from certifier.scene.census import check_counts
 from certifier.scene.file import SceneFile, read_scene_file
 from certifier.scene.hulls import with_hulls
 from certifier.scene.joints import Coupling, centered, held, narrowed
 from certifier.scene.lint import findings
+from certifier.scene.names import Names
 from certifier.scene.pairs import pairs
 from certifier.scene.strict import StrictReader
 from certifier.scene.tree import Tree, floating
 
-_IGNORED_SHAPE = re.compile(
-    r"Ignoring unsupported SDFormat element in geometry|geom \S+ specified unknown mesh|The geom type|The fromto tag"
-)
+_IGNORED_SHAPE = re.compile(r"geom \S+ specified unknown mesh|The geom type|The fromto tag")
 """These are Drake's warnings about collision geometry that it leaves out."""
 _SEVERAL_MODELS = re.compile(r"must have a single <model>|can only contain one model")
 """So Drake says that a file holds no model or several."""
@@ -74,15 +75,17 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
     strict = StrictReader(scene_file)
-    strict.check(scene_file.resolved_directives, path.name)
-    warnings = read_models(scene_file, plant)
+    written = strict.check(scene_file.resolved_directives, path.name)
+    warnings = read_models(scene_file, plant, strict.working_directory)
     inspector = scene_graph.model_inspector()
-    joints, q_star = centered(narrowed(held(_joints(plant), scene_file.fix, couplings(plant)), scene_file.limits), scene_file.q_star)
-    tree = Tree(joints, _bodies(plant))
-    parts = _geometries(scene_file, strict, plant, inspector, tree)
-    by_id = with_hulls(parts, scene_file.hulls, tree.bodies, scene_file.max_vertices)
+    names = Names(plant, inspector)
+    every = [joint_of(plant.get_joint(index), names) for index in plant.GetJointIndices()]
+    joints, q_star = centered(narrowed(held(every, scene_file.fix, couplings(plant, names)), scene_file.limits), scene_file.q_star)
+    tree = Tree(joints, list(names.bodies))
+    parts = _geometries(scene_file, strict, plant, inspector, tree, names)
+    by_id = with_hulls(parts, scene_file.hulls, tree.bodies, scene_file.max_vertices, names.register)
     candidates = list(dict.fromkeys((by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()))
-    geometries = tuple({geometry.name: geometry for geometry in by_id.values()}.values())
+    geometries = tuple({id(geometry): geometry for geometry in by_id.values()}.values())
     wanted, ignored, unused = pairs(candidates, geometries, tree, scene_file.ignore)
     scene = Scene(
         name=scene_file.name,
@@ -99,16 +102,20 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
             "drake": importlib.metadata.version("drake"),
         },
     )
-    drawn = {_body_name(plant, plant.GetBodyFromFrameId(inspector.GetFrameId(i))) for i in inspector.GetAllGeometryIds(Role.kIllustration)}
+    check_counts(written, inspector.NumGeometriesWithRole(Role.kProximity), scene)
+    drawn = {names.body(plant.GetBodyFromFrameId(inspector.GetFrameId(i))) for i in inspector.GetAllGeometryIds(Role.kIllustration)}
     document = scene.to_document()
     document["warnings"] = warnings + unused + findings(scene, tree, candidates, drawn)
     return document
 
 
-def read_models(scene_file: SceneFile, plant: MultibodyPlant) -> list[str]:
+def read_models(scene_file: SceneFile, plant: MultibodyPlant, working_directory: Path) -> list[str]:
     """Adds the directives' models to the plant, finalises it and returns Drake's warnings.
 
     It prints the models' names first, because only what is printed remains if Drake ends the process.
+
+    Args:
+        working_directory: Drake looks there for what SDFormat includes by relative paths.
     """
     parser = Parser(plant)
     packages = parser.package_map()
@@ -117,7 +124,7 @@ def read_models(scene_file: SceneFile, plant: MultibodyPlant) -> list[str]:
     for name, root in scene_file.packages.items():
         packages.Add(name, str(root))
     print(f"reading {', '.join(scene_file.models)}", file=sys.stderr, flush=True)
-    with _DrakeLog() as log:
+    with _DrakeLog() as log, contextlib.chdir(working_directory):
         try:
             parser.AddModelsFromString(scene_file.resolved_directives, "dmd.yaml")
             plant.Finalize()
@@ -172,44 +179,13 @@ def _one_line(scene_file: SceneFile, message: str) -> str:
     return textwrap.shorten(escaped(" ".join(message.removeprefix("error: ").split())), MAX_SENTENCE, placeholder=" ...")
 
 
-def _named(name: str, what: str) -> str:
-    """Returns the name of a joint, a body or a geometry, once it is known that statements may print it.
-
-    Raises:
-        SceneError: ``scene_name``, when they may not.
-    """
-    if not is_name(name):
-        message = f"the {what} {name[:MAX_NAME]!a} has a name that is not accepted"
-        raise SceneError("scene_name", message, field="directives", hint=f"names have {ALPHABET}")
-    return name
-
-
-def _body_name(plant: MultibodyPlant, body: RigidBody) -> str:
-    if body.index() == plant.world_body().index():
-        return WORLD
-    return _named(f"{plant.GetModelInstanceName(body.model_instance())}/{body.name()}", "body")
-
-
-def _joints(plant: MultibodyPlant) -> list[Joint]:
-    return [joint_of(plant, plant.get_joint(index)) for index in plant.GetJointIndices()]
-
-
-def _bodies(plant: MultibodyPlant) -> list[str]:
-    return [_body_name(plant, plant.get_body(BodyIndex(i))) for i in range(plant.num_bodies())]
-
-
-def _joint_name(plant: MultibodyPlant, joint: DrakeJoint) -> str:
-    return _named(f"{plant.GetModelInstanceName(joint.model_instance())}/{joint.name()}", "joint")
-
-
-def joint_of(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
+def joint_of(joint: DrakeJoint, names: Names) -> Joint:
     """Returns a joint of the plant.
 
     Raises:
-        SceneError: ``unsupported_joint``, ``floating_body`` or ``scene_name``.
+        SceneError: ``unsupported_joint`` or ``floating_body``.
     """
-    parent, child = _body_name(plant, joint.parent_body()), _body_name(plant, joint.child_body())
-    name = _joint_name(plant, joint)
+    parent, child, name = names.body(joint.parent_body()), names.body(joint.child_body()), names.joint(joint)
     X_PF = joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4()
     X_BM = joint.frame_on_child().GetFixedPoseInBodyFrame().GetAsMatrix4()
     match joint:
@@ -233,7 +209,7 @@ def joint_of(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
     return Joint(name, kind, parent, child, np.array(axis), X_PF, X_BM, joint.position_start(), lower, upper)
 
 
-def couplings(plant: MultibodyPlant) -> list[Coupling]:
+def couplings(plant: MultibodyPlant, names: Names) -> list[Coupling]:
     """Returns what mimic joints keep to.
 
     Raises:
@@ -244,8 +220,8 @@ def couplings(plant: MultibodyPlant) -> list[Coupling]:
     program = MathematicalProgram()
     q = program.NewContinuousVariables(plant.num_positions(), "q")
     AddMultibodyPlantConstraints(plant=plant, q=q, prog=program, plant_context=plant.CreateDefaultContext())
-    names = {joint.position_start(): joint for joint in map(plant.get_joint, plant.GetJointIndices()) if joint.num_positions()}
-    position = {v.get_id(): _joint_name(plant, names[i]) for i, v in enumerate(q) if i in names}
+    joints_at = {joint.position_start(): joint for joint in map(plant.get_joint, plant.GetJointIndices()) if joint.num_positions()}
+    position = {v.get_id(): names.joint(joints_at[i]) for i, v in enumerate(q) if i in joints_at}
     found = []
     for binding in program.linear_equality_constraints():
         matrix, constants = binding.evaluator().GetDenseA(), binding.evaluator().lower_bound()
@@ -261,19 +237,13 @@ def couplings(plant: MultibodyPlant) -> list[Coupling]:
 
 
 def _geometries(
-    scene_file: SceneFile, strict: StrictReader, plant: MultibodyPlant, inspector: SceneGraphInspector, tree: Tree
+    scene_file: SceneFile, strict: StrictReader, plant: MultibodyPlant, inspector: SceneGraphInspector, tree: Tree, names: Names
 ) -> dict[GeometryId, Geometry]:
-    """Returns every geometry of the proximity role, half-spaces last because their size depends on the reach of the others.
-
-    Drake makes names unique within a body by appending an index. Its prefix, the model's name, is dropped.
-    """
+    """Returns every geometry of the proximity role, half-spaces last because their size depends on the reach of the others."""
     found: dict[GeometryId, Geometry] = {}
     half_spaces = []
     for i in inspector.GetAllGeometryIds(Role.kProximity):
-        body = plant.GetBodyFromFrameId(inspector.GetFrameId(i))
-        body_name = _body_name(plant, body)
-        short = inspector.GetName(i).removeprefix(f"{plant.GetModelInstanceName(body.model_instance())}::")
-        name = _named(f"{body_name}/{short}", "geometry")
+        name, body_name = names.geometry(i), names.body(plant.GetBodyFromFrameId(inspector.GetFrameId(i)))
         if isinstance(inspector.GetShape(i), HalfSpace):
             half_spaces.append((i, name, body_name))
         else:

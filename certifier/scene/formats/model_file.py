@@ -21,12 +21,12 @@ from certifier.scene.xml import parse_xml
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 COLLISION = "collision"
-SHAPES = frozenset(["box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "drake:capsule", "drake:ellipsoid"])
+SHAPES = frozenset(["box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "drake:capsule", "drake:ellipsoid", "empty"])
 
 
 @dataclass(frozen=True)
 class Reference:
-    """A reference is the name of another file, as written, and the line where it stands."""
+    """A reference is the name of another file or of a geometry, as written, and the line where it stands."""
 
     file: str
     line: int
@@ -52,6 +52,7 @@ class ModelFile:
         includes: model files that this one includes.
         meshes: files of collision geometry.
         mesh_directories: directories of the meshes, relative to the model.
+        collisions: the collision geometries of this file, each by its name or shape; None where the format does not count them.
 
     Raises:
         SceneError: ``scene_model`` with the file and the line, when the file is not accepted.
@@ -67,14 +68,15 @@ class ModelFile:
         self.includes: list[Reference] = []
         self.meshes: list[Reference] = []
         self.mesh_directories = ["."]
+        self.collisions: list[Reference] | None = None
         self._open: list[Element] = []
         parse_xml(path, name, "scene_model", self._install)
 
     def _check(self, element: Element, parent: str) -> None:
         raise NotImplementedError
 
-    def refuse(self, element: Element, what: str) -> NoReturn:
-        raise SceneError("scene_model", f"{self.name}:{element.line}: {what}", field="directives", hint="mend the model there")
+    def refuse(self, element: Element, what: str, hint: str = "mend the model there") -> NoReturn:
+        raise SceneError("scene_model", f"{self.name}:{element.line}: {what}", field="directives", hint=hint)
 
     def _check_order(self, element: Element, lower: float, upper: float) -> None:
         if lower > upper:
