@@ -79,9 +79,7 @@ class StrictReader:
         if path.is_dir():
             raise SceneError("scene_model", f"{self._name(path)} is a directory", field="directives", hint="name a model file in it")
         if kind == "add_directives":
-            return self._once(
-                (path, None, None), around, lambda around: self._added_by(path, around), f"{self._name(path)}: the file adds itself"
-            )
+            return self._once((path, None, None), around, lambda around: self._added_by(path, around))
         if suffix == _OBJ:
             self.points(path)
             return 1
@@ -98,8 +96,7 @@ class StrictReader:
             start: the directory of the model that was added. MJCF's paths start there, and those of the other formats beside their file.
         """
         start = start if kind is Mjcf else file.parent
-        recursion = f"{self._name(file)}: the model includes itself"
-        return self._once((file, kind, start), around, lambda around: self._model_and_includes(file, kind, start, around), recursion)
+        return self._once((file, kind, start), around, lambda around: self._model_and_includes(file, kind, start, around))
 
     def _model_and_includes(self, file: Path, kind: type[ModelFile], start: Path, around: tuple[_Read, ...]) -> int | None:
         model = kind(file, self._name(file))
@@ -135,10 +132,11 @@ class StrictReader:
             if (self.working_directory / include.file).resolve() != found:
                 self._refuse(model, include, "is beside a model for which Drake would look in another directory", _BY_PACKAGE)
 
-    def _once(self, read: _Read, around: tuple[_Read, ...], count: Callable[[tuple[_Read, ...]], int | None], recursion: str) -> int | None:
+    def _once(self, read: _Read, around: tuple[_Read, ...], count: Callable[[tuple[_Read, ...]], int | None]) -> int | None:
         """Returns the count of a file, which is read only once."""
         if read in around:
-            raise SceneError("scene_model", recursion, field="directives", hint="remove the circle")
+            message = f"{self._name(read[0])} includes itself, or a file that includes it"
+            raise SceneError("scene_model", message, field="directives", hint="remove the circle")
         if read not in self._counts:
             self._counts[read] = count((*around, read))
         return self._counts[read]

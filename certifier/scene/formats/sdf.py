@@ -84,19 +84,15 @@ class Sdf(ModelFile):
         if parent in sdf_names.READ:
             if (instead := sdf_names.REFUSED.get(parent, {}).get(name)) is not None:
                 self.refuse(element, f"<{name}> in <{parent}> is not read", instead)
-            self._check_known(element, f"<{name}> is not known in <{parent}>", name, sdf_names.known(parent))
+            if name not in (known := sdf_names.known(parent)):
+                self.refuse(element, f"<{name}> is not known in <{parent}>", _nearest(name, known))
         if name not in sdf_names.READ or name in sdf_names.HARMLESS.get(parent, ()):
             return
         for key in element.attributes:
-            if not key.startswith("xmlns"):
-                message = f"the attribute {key[:80]!a} of <{name}> is not known"
-                self._check_known(element, message, key, list(sdf_names.ATTRIBUTES.get(name, ())))
+            if key not in (known := list(sdf_names.ATTRIBUTES.get(name, ()))) and not key.startswith("xmlns"):
+                self.refuse(element, f"the attribute {key[:80]!a} of <{name}> is not known", _nearest(key, known))
         if name in sdf_names.CONTAINERS and element.text.strip():
             self.refuse(element, f"<{name}> holds the text {element.text.strip()[:80]!a}, which nobody reads")
-
-    def _check_known(self, element: Element, message: str, name: str, known: list[str]) -> None:
-        if name not in known:
-            self.refuse(element, message, close_matches(name, known) or f"known there: {', '.join(known) or 'nothing'}")
 
     def _check_structure(self, element: Element) -> None:
         match element.name:
@@ -137,6 +133,8 @@ class Sdf(ModelFile):
         rotation = element.attributes.get("rotation_format", "euler_rpy")
         if rotation not in self._POSES:
             self.refuse(element, f"rotation_format of <pose> is {rotation[:80]!a}", f"known: {', '.join(self._POSES)}")
+        if "frame" in element.attributes and self._open[0].attributes.get("version") not in sdf_names.WITH_POSE_FRAMES:
+            self.refuse(element, "SDFormat 1.7 and later have no frame of <pose>", "write relative_to")
         numbers = self._text(element, (0, self._POSES[rotation]))
         if "degrees" in element.attributes:
             self._check_switch(element, "degrees of <pose>", element.attributes["degrees"])
@@ -150,3 +148,7 @@ class Sdf(ModelFile):
 
     def _text(self, element: Element, counts: tuple[int, ...]) -> list[float]:
         return self._numbers(element, f"<{element.name}>", self._whole(element), counts)
+
+
+def _nearest(name: str, known: list[str]) -> str:
+    return close_matches(name, known) or f"known there: {', '.join(known) or 'nothing'}"

@@ -107,11 +107,13 @@ ATTRIBUTES: dict[str, tuple[str, ...]] = {
     "xyz": ("expressed_in",),
     "pose": ("relative_to", "rotation_format", "degrees", "frame"),
 }
-"""The attributes of the elements that are read; those that are not named here have none. The frame of a pose is that of SDFormat 1.6."""
+"""The attributes of the elements that are read; those that are not named here have none."""
 
 JOINTS = ("revolute", "prismatic", "continuous", "fixed", "ball", "universal", "screw", "revolute2", "gearbox")
 """The types of joints. Those after the first four are refused when the tree is made."""
 VERSIONS = ("1.4", "1.5", "1.6", "1.7", "1.8", "1.9", "1.10", "1.11", "1.12")
+WITH_POSE_FRAMES = VERSIONS[:3]
+"""In these versions a pose has a frame; in later ones it has relative_to."""
 
 
 READ = frozenset(["sdf"]).union(*ONCE.values(), *MANY.values())
