@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.geometry import (
     Box,
     Capsule,
@@ -43,6 +44,7 @@ from certifier.model import MAX_SENTENCE, Array, Geometry, Joint, JointKind, Sce
 from certifier.scene import shapes
 from certifier.scene.census import check_counts
 from certifier.scene.file import SceneFile, read_scene_file
+from certifier.scene.hollow import recorded
 from certifier.scene.hulls import with_hulls
 from certifier.scene.joints import Coupling, centered, held, narrowed
 from certifier.scene.lint import findings
@@ -82,8 +84,9 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     every = [joint_of(plant.get_joint(index), names) for index in plant.GetJointIndices()]
     joints, q_star = centered(narrowed(held(every, scene_file.fix, couplings(plant, names)), scene_file.limits), scene_file.q_star)
     tree = Tree(joints, list(names.bodies))
-    parts = _geometries(scene_file, strict, plant, inspector, tree, names)
-    by_id = with_hulls(parts, scene_file.hulls, tree.bodies, scene_file.max_vertices, names.register)
+    reached: dict[str, float] = {}
+    parts = _geometries(scene_file, strict, plant, inspector, tree, names, reached)
+    by_id = with_hulls(parts, scene_file.hulls, tree.bodies, scene_file.max_vertices, names.register, reached)
     candidates = list(dict.fromkeys((by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()))
     geometries = tuple({id(geometry): geometry for geometry in by_id.values()}.values())
     wanted, ignored, unused = pairs(candidates, geometries, tree, scene_file.ignore)
@@ -100,6 +103,7 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
             "directives": scene_file.directives,
             "packages": {name: escaped(root.name) for name, root in scene_file.packages.items()},
             "drake": importlib.metadata.version("drake"),
+            **recorded({geometry.name: reached[geometry.name] for geometry in geometries if geometry.name in reached}),
         },
     )
     check_counts(written, inspector.NumGeometriesWithRole(Role.kProximity), scene)
@@ -237,9 +241,19 @@ def couplings(plant: MultibodyPlant, names: Names) -> list[Coupling]:
 
 
 def _geometries(
-    scene_file: SceneFile, strict: StrictReader, plant: MultibodyPlant, inspector: SceneGraphInspector, tree: Tree, names: Names
+    scene_file: SceneFile,
+    strict: StrictReader,
+    plant: MultibodyPlant,
+    inspector: SceneGraphInspector,
+    tree: Tree,
+    names: Names,
+    reached: dict[str, float],
 ) -> dict[GeometryId, Geometry]:
-    """Returns every geometry of the proximity role, half-spaces last because their size depends on the reach of the others."""
+    """Returns every geometry of the proximity role, half-spaces last because their size depends on the reach of the others.
+
+    Args:
+        reached: gets the names of hulls that reach beyond their meshes, and how far, in metres.
+    """
     found: dict[GeometryId, Geometry] = {}
     half_spaces = []
     for i in inspector.GetAllGeometryIds(Role.kProximity):
@@ -248,7 +262,10 @@ def _geometries(
             half_spaces.append((i, name, body_name))
         else:
             X_BG = inspector.GetPoseInFrame(i)
-            found[i] = _placed(name, body_name, _convex(inspector.GetShape(i), name, scene_file, strict), X_BG)
+            convex = _convex(inspector.GetShape(i), name, scene_file, strict)
+            found[i] = _placed(name, body_name, convex, X_BG)
+            if convex.beyond:
+                reached[name] = convex.beyond
     reach = tree.reach(list(found.values()), scene_file.padding)
     for i, name, body_name in half_spaces:
         if body_name not in tree.anchored:
@@ -284,24 +301,27 @@ def _convex(shape: Shape, name: str, scene_file: SceneFile, strict: StrictReader
                 "file": escaped(Path(shape.source().description()).name),
                 "scale": shape.scale3().tolist(),
             }
-            return shapes.polytope(said, _mesh_points(shape, strict), scene_file.max_vertices)
+            points, triangles = _mesh(shape, strict)
+            return shapes.polytope(said, points, triangles, scene_file.max_vertices)
         case _:
             message = f"geometry {name} is a {type(shape).__name__}, which is not supported"
             raise SceneError("unsupported_shape", message, field="directives", hint="use a primitive or a mesh")
 
 
-def _mesh_points(shape: Convex | Mesh, strict: StrictReader) -> Array:
-    """Returns the points of a mesh, (k, 3), as its file has them, times the scale.
+def _mesh(shape: Convex | Mesh, strict: StrictReader) -> tuple[Array, NDArray[np.int64]]:
+    """Returns the points of a mesh, (k, 3), as its file has them, times the scale, and the numbers of the points of its triangles, (t, 3).
 
     First come those that are vertices of Drake's hull, in Drake's order, on which the hashes of scenes depend.
 
     Raises:
         SceneError: the file is not what a collision mesh may be, or a scaled point is not finite.
     """
-    points = strict.points(shape.source().path()) * shape.scale3()
+    mesh = strict.mesh(shape.source().path())
+    points = mesh.points * shape.scale3()
     if not np.isfinite(points).all():
         message = f"scaled by {shape.scale3().tolist()}, a point of {escaped(shape.source().path().name)} is not finite"
         raise SceneError("scene_model", message, field="directives", hint="mend the file or the scale")
     hull = shape.GetConvexHull()
     rank = {tuple(hull.vertex(k)): k for k in range(hull.num_vertices())}
-    return points[np.argsort([rank.get(tuple(point), len(rank)) for point in points.tolist()], kind="stable")]
+    order = np.argsort([rank.get(tuple(point), len(rank)) for point in points.tolist()], kind="stable")
+    return points[order], np.argsort(order)[mesh.triangles]

@@ -7,13 +7,13 @@ from pathlib import Path, PurePosixPath
 from typing import NoReturn
 
 from certifier.errors import SceneError
-from certifier.model import Array, escaped
+from certifier.model import escaped
 from certifier.scene.file import SceneFile, directive_files
 from certifier.scene.formats.mjcf import Mjcf
 from certifier.scene.formats.model_file import ModelFile, Reference
 from certifier.scene.formats.sdf import Sdf
 from certifier.scene.formats.urdf import Urdf
-from certifier.scene.obj import read_points
+from certifier.scene.obj import ObjMesh, read_mesh
 from certifier.scene.references import resolve
 
 _FORMATS: dict[str, type[ModelFile]] = {".urdf": Urdf, ".sdf": Sdf, ".xml": Mjcf}
@@ -32,7 +32,7 @@ class StrictReader:
 
     def __init__(self, scene_file: SceneFile) -> None:
         self._packages, self._root = scene_file.packages, scene_file.path.parent.resolve()
-        self._points: dict[Path, Array] = {}
+        self._meshes: dict[Path, ObjMesh] = {}
         self._counts: dict[_Read, int | None] = {}
         self._starts: set[Path] = set()
 
@@ -40,8 +40,8 @@ class StrictReader:
     def working_directory(self) -> Path:
         return next(iter(self._starts), self._root)
 
-    def points(self, path: Path) -> Array:
-        """Returns every vertex of an OBJ file, (k, 3), as written there.
+    def mesh(self, path: Path) -> ObjMesh:
+        """Returns the mesh of an OBJ file, as written there.
 
         Raises:
             SceneError: ``scene_model``, with file and line, when the file is not accepted or is a mesh of another kind.
@@ -49,9 +49,9 @@ class StrictReader:
         if path.suffix.lower() != _OBJ:
             raise _not_read(self._name(path))
         path = path.resolve()
-        if path not in self._points:
-            self._points[path] = read_points(path, self._name(path))
-        return self._points[path]
+        if path not in self._meshes:
+            self._meshes[path] = read_mesh(path, self._name(path))
+        return self._meshes[path]
 
     def check(self, directives: str, name: str) -> int | None:
         """Checks every model file and every collision mesh that is found.
@@ -81,7 +81,7 @@ class StrictReader:
         if kind == "add_directives":
             return self._once((path, None, None), around, lambda around: self._added_by(path, around))
         if suffix == _OBJ:
-            self.points(path)
+            self.mesh(path)
             return 1
         return self._model(path, _FORMATS[suffix], path.parent, around) if suffix in _FORMATS else None
 
@@ -145,7 +145,7 @@ class StrictReader:
         if _suffix(mesh.file).lower() != _OBJ:
             raise _not_read(f"{model.name}:{mesh.line}: {mesh.file[:200]!a}")
         if (path := self._located(mesh.file, [start / directory for directory in model.mesh_directories])) is not None:
-            self.points(path)
+            self.mesh(path)
 
     def _located(self, reference: str, directories: Iterable[Path]) -> Path | None:
         reference = reference.removeprefix("file://")

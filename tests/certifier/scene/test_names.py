@@ -49,7 +49,9 @@ def model(name: str, file: str, weld: str = "") -> str:
                 "scene": SCENE + model("world", "cube.sdf", "b") + model("floor", "floor.xml"),
                 "files": {
                     "floor.xml": WORLD_GEOM.format("b/c"),
-                    "cube.sdf": f'<sdf version="1.9"><model name="m"><link name="b"><collision name="c">{BOX}</collision></link></model></sdf>',
+                    "cube.sdf": ROOM.format("")
+                    .replace("<link", f'<link name="b"><collision name="c">{BOX}</collision></link><link')
+                    .replace("</model>", '<joint name="j" type="fixed"><parent>b</parent><child>walls</child></joint></model>'),
                 },
             },
             "world/b/c",
@@ -68,8 +70,9 @@ def model(name: str, file: str, weld: str = "") -> str:
                 "scene": SCENE,
                 "files": {
                     "room.sdf": ROOM.format(
-                        f'<link name="a"><collision name="b/c">{BOX}</collision></link><link name="a/b"><collision name="c">{BOX}</collision>'
-                        '</link><joint name="i" type="fixed"><parent>walls</parent><child>a</child></joint>'
+                        f'<link name="a"><collision name="b/c">{BOX}</collision></link>'
+                        f'<link name="a/b"><collision name="c">{BOX}</collision></link>'
+                        '<joint name="i" type="fixed"><parent>walls</parent><child>a</child></joint>'
                         '<joint name="j" type="fixed"><parent>walls</parent><child>a/b</child></joint>'
                     )
                 },
