@@ -69,6 +69,11 @@ FORMATS = [
                 ("the attribute {...} of <{name}> is not known", "known there: {...}", lambda t: t.scene(**linked("<pose zzz='1'/>"))),
                 ("<{name}> in <{parent}> is not read", "{...}", lambda t: t.scene(**room("<cone/>"))),
                 ("<{name}> holds the text {...}, which nobody reads", MEND, lambda t: t.scene(**linked("1 2 3"))),
+                (
+                    "a second <{name}> is called {...}, or another frame is",
+                    MEND,
+                    lambda t: t.scene(**linked("</link><link name='walls'>")),
+                ),
                 ("<collision> has no <geometry>", MEND, lambda t: t.scene(**linked("<collision name='x'/>"))),
                 ("<geometry> has no shape; <empty/> would say that there is none", MEND, lambda t: t.scene(**room(""))),
                 (

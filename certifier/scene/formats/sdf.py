@@ -36,6 +36,7 @@ class Sdf(ModelFile):
         "drake:ignored_collision_filter_group"
     }
     """The text of these elements is a name."""
+    _FRAMES = frozenset(["link", "joint", "frame", "model"])
     _SWITCHES = frozenset(["static", "use_parent_model_frame", "kinematic", "must_be_base_link"])
     _OFF = frozenset(["kinematic", "must_be_base_link"])
     _TRUE, _FALSE = frozenset(["true", "1"]), frozenset(["false", "0"])
@@ -52,6 +53,7 @@ class Sdf(ModelFile):
 
     def _check(self, element: Element, parent: str) -> None:
         self._check_name(element, parent)
+        self._check_twice(element)
         dimensions = self._DIMENSIONS.get(parent, {})
         if element.name in dimensions:
             if min(self._text(element, (dimensions[element.name],))) <= 0:
@@ -93,6 +95,14 @@ class Sdf(ModelFile):
                 self.refuse(element, f"the attribute {key[:80]!a} of <{name}> is not known", _nearest(key, known))
         if name in sdf_names.CONTAINERS and element.text.strip():
             self.refuse(element, f"<{name}> holds the text {element.text.strip()[:80]!a}, which nobody reads")
+
+    def _check_twice(self, element: Element) -> None:
+        """Refuses a name that a sibling has. Links, joints, frames and models share their names."""
+        if self._open and "name" in element.attributes:
+            name = "frame" if element.name in self._FRAMES else element.name, element.attributes["name"]
+            if name in self._open[-1].names:
+                self.refuse(element, f"a second <{element.name}> is called {name[1][:80]!a}, or another frame is")
+            self._open[-1].names.add(name)
 
     def _check_structure(self, element: Element) -> None:
         match element.name:
