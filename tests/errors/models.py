@@ -70,8 +70,8 @@ FORMATS = [
                 ("<{name}> in <{parent}> is not read", "{...}", lambda t: t.scene(**room("<cone/>"))),
                 ("<{name}> holds the text {...}, which nobody reads", MEND, lambda t: t.scene(**linked("1 2 3"))),
                 (
-                    "a second <{name}> is called {...}, or another frame is",
-                    MEND,
+                    "a second <{name}> is called {...}",
+                    "give each its own name",
                     lambda t: t.scene(**linked("</link><link name='walls'>")),
                 ),
                 ("<collision> has no <geometry>", MEND, lambda t: t.scene(**linked("<collision name='x'/>"))),

@@ -41,7 +41,7 @@ class Element:
     """The names of the elements that this one is in."""
     children: set[str] = field(default_factory=set)
     names: set[tuple[str, str]] = field(default_factory=set)
-    """The names that its children have, each with the kind of thing that must not have it twice."""
+    """The names that its children have: the child's element, and its name."""
     text: str = ""
     interrupted: bool = False
     """Whether something else interrupts the element's text. Drake reads the text only up to there."""

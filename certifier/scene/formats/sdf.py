@@ -36,7 +36,6 @@ class Sdf(ModelFile):
         "drake:ignored_collision_filter_group"
     }
     """The text of these elements is a name."""
-    _FRAMES = frozenset(["link", "joint", "frame", "model"])
     _SWITCHES = frozenset(["static", "use_parent_model_frame", "kinematic", "must_be_base_link"])
     _OFF = frozenset(["kinematic", "must_be_base_link"])
     _TRUE, _FALSE = frozenset(["true", "1"]), frozenset(["false", "0"])
@@ -97,11 +96,11 @@ class Sdf(ModelFile):
             self.refuse(element, f"<{name}> holds the text {element.text.strip()[:80]!a}, which nobody reads")
 
     def _check_twice(self, element: Element) -> None:
-        """Refuses a name that a sibling has. Links, joints, frames and models share their names."""
+        """Refuses a name that a sibling of the same kind has."""
         if self._open and "name" in element.attributes:
-            name = "frame" if element.name in self._FRAMES else element.name, element.attributes["name"]
+            name = element.name, element.attributes["name"]
             if name in self._open[-1].names:
-                self.refuse(element, f"a second <{element.name}> is called {name[1][:80]!a}, or another frame is")
+                self.refuse(element, f"a second <{element.name}> is called {name[1][:80]!a}", "give each its own name")
             self._open[-1].names.add(name)
 
     def _check_structure(self, element: Element) -> None:
