@@ -74,7 +74,8 @@ def _unread(file: Path, model: str, joints: list[Joint]) -> list[Mimic]:
         parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = tree.start, tree.end, tree.data
 
     parse_xml(file, file.name, "scene_model", install)
-    full = {j.name.rsplit("/", 1)[-1]: j.name for j in joints if j.name.startswith((f"{model}/", f"{model}::"))}
+    own = [j.name for j in joints if j.name.startswith((f"{model}/", f"{model}::"))]
+    full = {name.removeprefix(model).partition("/")[2]: name for name in own}
     found = []
     for joint in tree.close().iter("joint"):
         for mimic in joint.iterfind("axis/mimic"):
