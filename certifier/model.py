@@ -105,7 +105,7 @@ class Geometry:
         shape: what the file said, JSON-able: ``{"kind": "box", "size": [x, y, z], "X_BG": 4x4 list}`` and so on.
         substitution: None when vertices and radius describe the shape exactly, else a sentence that names the conservative
             replacement (mesh -> hull with V vertices, cylinder -> prism ...).
-        inflation: upper bound in metres on how far the replacement reaches outside the shape.
+        inflation: upper bound in metres on how far the replacement reaches outside the shape, or outside the hull of a mesh.
     """
 
     name: str
@@ -148,7 +148,8 @@ class Scene:
         q_star: (n,) centre of the parametrisation, radians or metres.
         padding: metres that are added around every geometry of every pair (both sides).
         warnings: lint findings, sentences for people.
-        provenance: how the scene was made (directives, package roots, Drake's version); not part of the hash.
+        provenance: how the scene was made (directives, package roots, Drake's version, how far hulls reach beyond their meshes); not part
+            of the hash.
     """
 
     name: str

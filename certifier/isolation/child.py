@@ -31,7 +31,7 @@ _TAIL_BYTES = 2000
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
-def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes: int, directory: Path | None = None) -> Any:
+def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes: int) -> Any:
     """Returns ``function(payload)``, computed by a child process that is killed when it takes too long or outlives this process.
 
     Args:
@@ -39,15 +39,13 @@ def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes:
         payload: JSON-able data; NumPy arrays are allowed anywhere in it, as in the result.
         timeout_s: wall-clock limit in seconds.
         memory_bytes: limit of the child's address space in bytes.
-        directory: the child's working directory; None for this process's own.
 
     Raises:
         CirisError: the function's own error, of the class it was raised with; or ``child_timeout``, ``child_memory``, or
             ``child_died`` with the tail of its standard error.
     """
     module, _, name = function.partition(":")
-    where = str(directory or Path.cwd())
-    request = encode({"function": name, "payload": payload, "memory_bytes": int(memory_bytes), "directory": where})
+    request = encode({"function": name, "payload": payload, "memory_bytes": int(memory_bytes), "directory": str(Path.cwd())})
     nursery = _idle.pop(module, None)
     if nursery is None or nursery.process.poll() is not None:
         nursery = _Nursery(module)

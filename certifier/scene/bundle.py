@@ -65,8 +65,7 @@ def pack_bundle(path: str | Path) -> bytes:
         file = waiting.pop()
         if file not in files and file.is_file():
             files.add(file)
-            places = starts(file, scene_file.path)
-            waiting += [resolve(r, place, scene_file.packages) for r in references(file) for place in places]
+            waiting += [resolve(r, file.parent, scene_file.packages) for r in references(file)]
     root = Path(os.path.commonpath([f.parent for f in files] + list(scene_file.packages.values())))
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -101,18 +100,10 @@ def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
         root.mkdir()
         payload = {"archive": str(archive), "root": str(root), "limits": asdict(limits)}
         try:
-            return Scene.from_document(read_in_child(_READER, payload, "the bundle", None, limits.timeout_s, limits.memory_bytes))
+            return Scene.from_document(read_in_child(_READER, payload, "the bundle", limits.timeout_s, limits.memory_bytes))
         except CirisError as error:
             error.message = error.message.replace(f"{root}/", "")
             raise
-
-
-def starts(file: Path, scene: Path) -> set[Path]:
-    """Returns the directories at which a relative reference in ``file`` may start.
-
-    They are the file's own directory and, for SDFormat's include, the working directory, which is that of the scene file.
-    """
-    return {file.parent, scene.parent} if file.suffix.lower() == ".sdf" else {file.parent}
 
 
 def _write(archive: zipfile.ZipFile, name: str, content: bytes) -> None:

@@ -168,7 +168,7 @@ def _inventory(text: str, models: Mapping[str, Path], directory: Path) -> dict[s
     """Returns what the models of a scene file hold (:mod:`certifier.scene.inventory`)."""
     with _scene_file(text, directory) as path:
         payload = {"path": str(path), "models": {name: str(model.resolve()) for name, model in models.items()}}
-        return read_in_child("certifier.scene.inventory:inventory", payload, "the draft", directory, TIMEOUT_S, MEMORY_BYTES)
+        return read_in_child("certifier.scene.inventory:inventory", payload, "the draft", TIMEOUT_S, MEMORY_BYTES)
 
 
 def _directives(add: Mapping[str, str], roots: Sequence[Mapping[str, Any]]) -> list[str]:

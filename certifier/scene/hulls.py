@@ -5,7 +5,6 @@ Pairs are what certifying costs. Two links of fifteen parts each make 225 of the
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Collection, Mapping, Sequence
 from typing import TypeVar
 
@@ -13,13 +12,20 @@ import numpy as np
 
 from certifier.errors import SceneError, close_matches
 from certifier.model import Geometry
+from certifier.scene.hollow import beyond_parts
 from certifier.scene.hull import outer
+from certifier.scene.names import Register
 
 _Key = TypeVar("_Key")
 
 
 def with_hulls(
-    geometries: Mapping[_Key, Geometry], hulls: Sequence[str], bodies: Collection[str], max_vertices: int
+    geometries: Mapping[_Key, Geometry],
+    hulls: Sequence[str],
+    bodies: Collection[str],
+    max_vertices: int,
+    names: Register,
+    reached: dict[str, float],
 ) -> dict[_Key, Geometry]:
     """Returns the geometries with one hull in the place of all polytopes of each body named; balls and capsules remain.
 
@@ -27,6 +33,8 @@ def with_hulls(
         hulls: names of bodies, as the scene file has them.
         bodies: all bodies of the scene.
         max_vertices: so many vertices has a hull at most; it is a polytope around the hull where that has more.
+        names: the names that bodies and geometries have; the hulls get theirs there.
+        reached: gets the names of hulls that reach beyond their parts, and how far, in metres.
 
     Raises:
         SceneError: ``unknown_name``; ``few_parts`` for a body with fewer than two polytopes; ``hull``, as :func:`outer`.
@@ -40,9 +48,12 @@ def with_hulls(
         if len(parts) < 2:
             message = f"{body} must have two or more boxes, cylinders and meshes; it has {len(parts)}"
             raise SceneError("few_parts", message, field=f"hulls[{k}]", hint="leave it out of hulls")
-        taken = {geometry.name for geometry in found.values()}
-        name = next(name for i in itertools.count(1) if (name := f"{body}/hull{i if i > 1 else ''}") not in taken)
-        found |= dict.fromkeys(parts, _hull(name, list(parts.values()), max_vertices))
+        name = names.give(names.unused(f"{body}/hull"), "hull", f"the hull of {body}")
+        hull = _hull(name, list(parts.values()), max_vertices)
+        found |= dict.fromkeys(parts, hull)
+        beyond = beyond_parts(hull.vertices, [part.vertices for part in parts.values()], hull.inflation)
+        if beyond := max(beyond, *(reached.get(part.name, 0.0) for part in parts.values())):
+            reached[name] = beyond
     return found
 
 

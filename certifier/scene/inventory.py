@@ -15,7 +15,8 @@ from pydrake.systems.framework import DiagramBuilder
 from certifier.model import Joint
 from certifier.scene.file import read_scene_file
 from certifier.scene.mimics import Mimic, mimic_of
-from certifier.scene.parse import couplings, joint_of, read_models
+from certifier.scene.names import Names
+from certifier.scene.parse import couplings, joint_of, read_models, without_limits
 from certifier.scene.strict import StrictReader
 from certifier.scene.xml import parse_xml
 
@@ -35,14 +36,16 @@ def inventory(payload: dict[str, Any]) -> dict[str, Any]:
     """
     path = Path(payload["path"])
     scene_file = read_scene_file(path)
-    plant, _ = AddMultibodyPlantSceneGraph(DiagramBuilder(), time_step=0.0)
+    plant, scene_graph = AddMultibodyPlantSceneGraph(DiagramBuilder(), time_step=0.0)
     strict = StrictReader(scene_file)
     strict.check(scene_file.resolved_directives, path.name)
-    read_models(scene_file, strict, plant)
+    read_models(scene_file, plant, strict.working_directory)
+    names = Names(plant, scene_graph.model_inspector())
+    without_limits(strict, plant, names)
     free = plant.GetFloatingBaseBodies()
     every = [plant.get_joint(index) for index in plant.GetJointIndices()]
-    joints = [joint_of(plant, joint) for joint in every if joint.child_body().index() not in free]
-    read = [mimic for mimic in map(mimic_of, couplings(plant)) if mimic is not None]
+    joints = [joint_of(joint, names) for joint in every if joint.child_body().index() not in free]
+    read = [mimic for mimic in map(mimic_of, couplings(plant, names)) if mimic is not None]
     unread = [mimic for name, file in payload["models"].items() for mimic in _unread(Path(file), name, joints)]
     return {
         "roots": _roots(plant),
@@ -72,7 +75,8 @@ def _unread(file: Path, model: str, joints: list[Joint]) -> list[Mimic]:
         parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = tree.start, tree.end, tree.data
 
     parse_xml(file, file.name, "scene_model", install)
-    full = {j.name.rsplit("/", 1)[-1]: j.name for j in joints if j.name.startswith((f"{model}/", f"{model}::"))}
+    own = [j.name for j in joints if j.name.startswith((f"{model}/", f"{model}::"))]
+    full = {name.removeprefix(model).partition("/")[2]: name for name in own}
     found = []
     for joint in tree.close().iter("joint"):
         for mimic in joint.iterfind("axis/mimic"):

@@ -8,6 +8,7 @@ import numpy as np
 
 from certifier.model import Array, Geometry, Pair, Scene
 from certifier.scene.contacts import touching
+from certifier.scene.hollow import CONVEX_PARTS, beyond, standing_for
 from certifier.scene.tree import Tree
 from certifier.scene.units import units
 from certifier.verify.decimals import at_most_mm
@@ -26,6 +27,7 @@ def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn:
     """
     return [
         *_substituted(scene),
+        *_hollow(scene),
         *_windows(scene),
         *_off_center(scene),
         *_filtered(scene, tree, candidates),
@@ -48,9 +50,20 @@ def _substituted(scene: Scene) -> list[str]:
     for substitution, group in groups.items():
         others = f" and {len(group) - 1} more" if len(group) > 1 else ""
         inflation = max(g.inflation for g in group)
-        reach = f", reaching at most {at_most_mm(inflation)} outside" if inflation else ""
+        of = " of that hull" if "around its hull" in substitution else ""
+        reach = f", reaching at most {at_most_mm(inflation)} outside{of}" if inflation else ""
         findings.append(f"{group[0].name}{others}: {substitution}{reach}")
     return findings
+
+
+def _hollow(scene: Scene) -> list[str]:
+    """Returns a finding about every hull that reaches notably beyond what it stands for."""
+    return [
+        f"{g.name}: the hull reaches at least {1000 * distance:.3g} mm beyond {standing_for(g)}, which is not convex, and closes what is "
+        f"open there: {CONVEX_PARTS}, where that matters"
+        for g in scene.geometries
+        if (distance := beyond(scene, g.name))
+    ]
 
 
 def _windows(scene: Scene) -> list[str]:

@@ -25,25 +25,21 @@ def load_scene(path: str | Path, *, timeout_s: float = TIMEOUT_S, memory_bytes: 
         SceneError: what is wrong and where; ``scene_model_crash`` when reading the models ended the child.
     """
     path = existing(path)
-    # SDFormat looks for included files in the working directory.
-    document = read_in_child("certifier.scene.parse:parse", {"path": str(path)}, path.name, path.parent, timeout_s, memory_bytes)
+    document = read_in_child("certifier.scene.parse:parse", {"path": str(path)}, path.name, timeout_s, memory_bytes)
     return Scene.from_document(document)
 
 
-def read_in_child(
-    function: str, payload: dict[str, Any], name: str, directory: Path | None, timeout_s: float, memory_bytes: int
-) -> dict[str, Any]:
+def read_in_child(function: str, payload: dict[str, Any], name: str, timeout_s: float, memory_bytes: int) -> dict[str, Any]:
     """Returns the document that ``function(payload)`` returns in a child process.
 
     Args:
         name: name of what is read, for people.
-        directory: the child's working directory; None for this process's own.
 
     Raises:
         SceneError: whatever the function raises, or ``scene_model_crash``.
     """
     try:
-        document: dict[str, Any] = run_in_child(function, payload, timeout_s=timeout_s, memory_bytes=memory_bytes, directory=directory)
+        document: dict[str, Any] = run_in_child(function, payload, timeout_s=timeout_s, memory_bytes=memory_bytes)
     except SceneError:
         raise
     except CirisError as death:

@@ -1,19 +1,22 @@
-"""The points of an OBJ mesh are read strictly here.
+"""An OBJ mesh is read strictly here.
 
 Drake's reader makes 0 of ``nan`` and 1 of ``1,5``, and leaves out what it does not know, without a word. So collision meshes are read here,
 and whatever is in doubt is refused. Only vertices count for a convex hull. Faces are checked because a face whose vertex is missing is a
-sign of a file that was cut short.
+sign of a file that was cut short, and they say how far the hull reaches beyond the mesh.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from array import array
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from certifier.errors import SceneError
 from certifier.model import Array
@@ -29,8 +32,21 @@ _OTHER = frozenset([b"vt", b"vn", b"g", b"o", b"s", b"l", b"p", b"mtllib", b"use
 """These statements move no point of the surface."""
 
 
-def read_points(path: Path, name: str) -> Array:
-    """Returns every vertex of an OBJ file, (k, 3), as written there. Those that no face uses are among them.
+@dataclass(frozen=True)
+class ObjMesh:
+    """A mesh as its file has it.
+
+    Attributes:
+        points: (k, 3) every vertex; those that no face uses are among them.
+        triangles: (t, 3) the numbers of the points of every triangle, from 0. A face of more points is a fan of triangles.
+    """
+
+    points: Array
+    triangles: NDArray[np.int64]
+
+
+def read_mesh(path: Path, name: str) -> ObjMesh:
+    """Returns the mesh of an OBJ file.
 
     Args:
         name: the file's name for people.
@@ -40,7 +56,7 @@ def read_points(path: Path, name: str) -> Array:
             exist, or a statement is not known.
     """
     data = path.read_bytes().removeprefix(_BOM)
-    coordinates = array("d")
+    coordinates, triangles = array("d"), array("q")
     farthest, farthest_line = 0, 0
 
     def refuse(line: int, what: str, hint: str = "export the mesh again") -> NoReturn:
@@ -66,6 +82,9 @@ def read_points(path: Path, name: str) -> Array:
             corners = [int(corner) for corner in _CORNERS.findall(line)]
             if 0 in corners or -min(corners) > len(coordinates) // 3:
                 refuse(number, f"{_shown(line)} names a vertex that does not exist")
+            first, *rest = [corner - 1 if corner > 0 else len(coordinates) // 3 + corner for corner in corners]
+            for pair in itertools.pairwise(rest):
+                triangles.extend((first, *pair))
             if max(corners) > farthest:
                 farthest, farthest_line = max(corners), number
         elif words[0] not in _OTHER:
@@ -74,7 +93,7 @@ def read_points(path: Path, name: str) -> Array:
         refuse(farthest_line, f"the face names vertex {farthest} of {len(coordinates) // 3}")
     if not coordinates:
         refuse(1, "the file has no vertices")
-    return np.array(coordinates).reshape(-1, 3)
+    return ObjMesh(np.array(coordinates).reshape(-1, 3), np.array(triangles, dtype=np.int64).reshape(-1, 3))
 
 
 def _vertex(line: bytes, words: list[bytes]) -> list[float] | None:

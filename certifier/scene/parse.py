@@ -5,6 +5,7 @@ Only here do user files meet Drake, which ends the process on some of them. So `
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 import logging
 import re
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.geometry import (
     Box,
     Capsule,
@@ -32,25 +34,26 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.inverse_kinematics import AddMultibodyPlantConstraints
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.multibody.tree import BodyIndex, PrismaticJoint, QuaternionFloatingJoint, RevoluteJoint, RigidBody, RpyFloatingJoint, WeldJoint
 from pydrake.multibody.tree import Joint as DrakeJoint
+from pydrake.multibody.tree import PrismaticJoint, QuaternionFloatingJoint, RevoluteJoint, RpyFloatingJoint, WeldJoint
 from pydrake.solvers import MathematicalProgram
 from pydrake.systems.framework import DiagramBuilder
 
 from certifier.errors import SceneError
-from certifier.model import ALPHABET, MAX_NAME, MAX_SENTENCE, WORLD, Array, Geometry, Joint, JointKind, Scene, escaped, is_name
+from certifier.model import MAX_SENTENCE, Array, Geometry, Joint, JointKind, Scene, escaped
 from certifier.scene import shapes
+from certifier.scene.census import check_counts
 from certifier.scene.file import SceneFile, read_scene_file
+from certifier.scene.hollow import recorded
 from certifier.scene.hulls import with_hulls
 from certifier.scene.joints import Coupling, centered, counted, held, narrowed
 from certifier.scene.lint import findings
+from certifier.scene.names import Names
 from certifier.scene.pairs import pairs
 from certifier.scene.strict import StrictReader
 from certifier.scene.tree import Tree, floating
 
-_IGNORED_SHAPE = re.compile(
-    r"Ignoring unsupported SDFormat element in geometry|geom \S+ specified unknown mesh|The geom type|The fromto tag"
-)
+_IGNORED_SHAPE = re.compile(r"geom \S+ specified unknown mesh|The geom type|The fromto tag")
 """These are Drake's warnings about collision geometry that it leaves out."""
 _SEVERAL_MODELS = re.compile(r"must have a single <model>|can only contain one model")
 """So Drake says that a file holds no model or several."""
@@ -74,15 +77,19 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
     strict = StrictReader(scene_file)
-    strict.check(scene_file.resolved_directives, path.name)
-    warnings = read_models(scene_file, strict, plant)
+    written = strict.check(scene_file.resolved_directives, path.name)
+    warnings = read_models(scene_file, plant, strict.working_directory)
     inspector = scene_graph.model_inspector()
-    joints, q_star = centered(narrowed(held(_joints(plant), scene_file.fix, couplings(plant)), scene_file.limits), scene_file.q_star)
-    tree = Tree(joints, _bodies(plant))
-    parts = _geometries(scene_file, strict, plant, inspector, tree)
-    by_id = with_hulls(parts, scene_file.hulls, tree.bodies, scene_file.max_vertices)
+    names = Names(plant, inspector)
+    warnings += without_limits(strict, plant, names)
+    every = [joint_of(plant.get_joint(index), names) for index in plant.GetJointIndices()]
+    joints, q_star = centered(narrowed(held(every, scene_file.fix, couplings(plant, names)), scene_file.limits), scene_file.q_star)
+    tree = Tree(joints, list(names.bodies))
+    reached: dict[str, float] = {}
+    parts = _geometries(scene_file, strict, plant, inspector, tree, names, reached)
+    by_id = with_hulls(parts, scene_file.hulls, tree.bodies, scene_file.max_vertices, names.register, reached)
     candidates = list(dict.fromkeys((by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()))
-    geometries = tuple({geometry.name: geometry for geometry in by_id.values()}.values())
+    geometries = tuple({id(geometry): geometry for geometry in by_id.values()}.values())
     wanted, ignored, unused = pairs(candidates, geometries, tree, scene_file.ignore)
     scene = Scene(
         name=scene_file.name,
@@ -97,18 +104,23 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
             "directives": scene_file.directives,
             "packages": {name: escaped(root.name) for name, root in scene_file.packages.items()},
             "drake": importlib.metadata.version("drake"),
+            **recorded({geometry.name: reached[geometry.name] for geometry in geometries if geometry.name in reached}),
         },
     )
-    drawn = {_body_name(plant, plant.GetBodyFromFrameId(inspector.GetFrameId(i))) for i in inspector.GetAllGeometryIds(Role.kIllustration)}
+    check_counts(written, inspector.NumGeometriesWithRole(Role.kProximity), scene)
+    drawn = {names.body(plant.GetBodyFromFrameId(inspector.GetFrameId(i))) for i in inspector.GetAllGeometryIds(Role.kIllustration)}
     document = scene.to_document()
     document["warnings"] = warnings + unused + findings(scene, tree, candidates, drawn)
     return document
 
 
-def read_models(scene_file: SceneFile, strict: StrictReader, plant: MultibodyPlant) -> list[str]:
-    """Adds the directives' models to the plant, finalises it and returns warnings: Drake's, and which limits do not count.
+def read_models(scene_file: SceneFile, plant: MultibodyPlant, working_directory: Path) -> list[str]:
+    """Adds the directives' models to the plant, finalises it and returns Drake's warnings.
 
     It prints the models' names first, because only what is printed remains if Drake ends the process.
+
+    Args:
+        working_directory: Drake looks there for what SDFormat includes by relative paths.
     """
     parser = Parser(plant)
     packages = parser.package_map()
@@ -117,7 +129,7 @@ def read_models(scene_file: SceneFile, strict: StrictReader, plant: MultibodyPla
     for name, root in scene_file.packages.items():
         packages.Add(name, str(root))
     print(f"reading {', '.join(scene_file.models)}", file=sys.stderr, flush=True)
-    with _DrakeLog() as log:
+    with _DrakeLog() as log, contextlib.chdir(working_directory):
         try:
             parser.AddModelsFromString(scene_file.resolved_directives, "dmd.yaml")
             plant.Finalize()
@@ -128,17 +140,17 @@ def read_models(scene_file: SceneFile, strict: StrictReader, plant: MultibodyPla
     for warning in log.messages:
         if _IGNORED_SHAPE.search(warning):
             raise SceneError("unsupported_shape", _one_line(scene_file, warning), field="directives", hint="use a primitive or a mesh")
-    return list(dict.fromkeys([*(_one_line(scene_file, warning) for warning in log.messages), *_without_limits(strict, plant)]))
+    return list(dict.fromkeys(_one_line(scene_file, warning) for warning in log.messages))
 
 
-def _without_limits(strict: StrictReader, plant: MultibodyPlant) -> list[str]:
-    """Takes the limits off continuous joints of URDF, which Drake would apply, and says so."""
+def without_limits(strict: StrictReader, plant: MultibodyPlant, names: Names) -> list[str]:
+    """Takes the limits off continuous joints of URDF, which Drake would apply, and returns warnings that say so."""
     said = []
     for model, name in strict.unlimited:
         joint = plant.GetJointByName(name, plant.GetModelInstanceByName(model))
         lower, upper = joint.position_lower_limits()[0], joint.position_upper_limits()[0]
         joint.set_position_limits([-np.inf], [np.inf])
-        what = f"joint {_joint_name(plant, joint)} is continuous, so its limits {lower:g} and {upper:g} do not count in URDF"
+        what = f"joint {names.joint(joint)} is continuous, so its limits {lower:g} and {upper:g} do not count in URDF"
         said.append(f"{what}: it turns without limits (for limits, write type revolute, or limits in the scene file)")
     return said
 
@@ -184,44 +196,13 @@ def _one_line(scene_file: SceneFile, message: str) -> str:
     return textwrap.shorten(escaped(" ".join(message.removeprefix("error: ").split())), MAX_SENTENCE, placeholder=" ...")
 
 
-def _named(name: str, what: str) -> str:
-    """Returns the name of a joint, a body or a geometry, once it is known that statements may print it.
-
-    Raises:
-        SceneError: ``scene_name``, when they may not.
-    """
-    if not is_name(name):
-        message = f"the {what} {name[:MAX_NAME]!a} has a name that is not accepted"
-        raise SceneError("scene_name", message, field="directives", hint=f"names have {ALPHABET}")
-    return name
-
-
-def _body_name(plant: MultibodyPlant, body: RigidBody) -> str:
-    if body.index() == plant.world_body().index():
-        return WORLD
-    return _named(f"{plant.GetModelInstanceName(body.model_instance())}/{body.name()}", "body")
-
-
-def _joints(plant: MultibodyPlant) -> list[Joint]:
-    return [joint_of(plant, plant.get_joint(index)) for index in plant.GetJointIndices()]
-
-
-def _bodies(plant: MultibodyPlant) -> list[str]:
-    return [_body_name(plant, plant.get_body(BodyIndex(i))) for i in range(plant.num_bodies())]
-
-
-def _joint_name(plant: MultibodyPlant, joint: DrakeJoint) -> str:
-    return _named(f"{plant.GetModelInstanceName(joint.model_instance())}/{joint.name()}", "joint")
-
-
-def joint_of(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
+def joint_of(joint: DrakeJoint, names: Names) -> Joint:
     """Returns a joint of the plant.
 
     Raises:
-        SceneError: ``unsupported_joint``, ``floating_body`` or ``scene_name``.
+        SceneError: ``unsupported_joint`` or ``floating_body``.
     """
-    parent, child = _body_name(plant, joint.parent_body()), _body_name(plant, joint.child_body())
-    name = _joint_name(plant, joint)
+    parent, child, name = names.body(joint.parent_body()), names.body(joint.child_body()), names.joint(joint)
     X_PF = joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4()
     X_BM = joint.frame_on_child().GetFixedPoseInBodyFrame().GetAsMatrix4()
     match joint:
@@ -245,7 +226,7 @@ def joint_of(plant: MultibodyPlant, joint: DrakeJoint) -> Joint:
     return Joint(name, kind, parent, child, np.array(axis), X_PF, X_BM, joint.position_start(), lower, upper)
 
 
-def couplings(plant: MultibodyPlant) -> list[Coupling]:
+def couplings(plant: MultibodyPlant, names: Names) -> list[Coupling]:
     """Returns what mimic joints keep to.
 
     Raises:
@@ -256,8 +237,8 @@ def couplings(plant: MultibodyPlant) -> list[Coupling]:
     program = MathematicalProgram()
     q = program.NewContinuousVariables(plant.num_positions(), "q")
     AddMultibodyPlantConstraints(plant=plant, q=q, prog=program, plant_context=plant.CreateDefaultContext())
-    names = {joint.position_start(): joint for joint in map(plant.get_joint, plant.GetJointIndices()) if joint.num_positions()}
-    position = {v.get_id(): _joint_name(plant, names[i]) for i, v in enumerate(q) if i in names}
+    joints_at = {joint.position_start(): joint for joint in map(plant.get_joint, plant.GetJointIndices()) if joint.num_positions()}
+    position = {v.get_id(): names.joint(joints_at[i]) for i, v in enumerate(q) if i in joints_at}
     found = []
     for binding in program.linear_equality_constraints():
         matrix, constants = binding.evaluator().GetDenseA(), binding.evaluator().lower_bound()
@@ -273,24 +254,31 @@ def couplings(plant: MultibodyPlant) -> list[Coupling]:
 
 
 def _geometries(
-    scene_file: SceneFile, strict: StrictReader, plant: MultibodyPlant, inspector: SceneGraphInspector, tree: Tree
+    scene_file: SceneFile,
+    strict: StrictReader,
+    plant: MultibodyPlant,
+    inspector: SceneGraphInspector,
+    tree: Tree,
+    names: Names,
+    reached: dict[str, float],
 ) -> dict[GeometryId, Geometry]:
     """Returns every geometry of the proximity role, half-spaces last because their size depends on the reach of the others.
 
-    Drake makes names unique within a body by appending an index. Its prefix, the model's name, is dropped.
+    Args:
+        reached: gets the names of hulls that reach beyond their meshes, and how far, in metres.
     """
     found: dict[GeometryId, Geometry] = {}
     half_spaces = []
     for i in inspector.GetAllGeometryIds(Role.kProximity):
-        body = plant.GetBodyFromFrameId(inspector.GetFrameId(i))
-        body_name = _body_name(plant, body)
-        short = inspector.GetName(i).removeprefix(f"{plant.GetModelInstanceName(body.model_instance())}::")
-        name = _named(f"{body_name}/{short}", "geometry")
+        name, body_name = names.geometry(i), names.body(plant.GetBodyFromFrameId(inspector.GetFrameId(i)))
         if isinstance(inspector.GetShape(i), HalfSpace):
             half_spaces.append((i, name, body_name))
         else:
             X_BG = inspector.GetPoseInFrame(i)
-            found[i] = _placed(name, body_name, _convex(inspector.GetShape(i), name, scene_file, strict), X_BG)
+            convex = _convex(inspector.GetShape(i), name, scene_file, strict)
+            found[i] = _placed(name, body_name, convex, X_BG)
+            if convex.beyond:
+                reached[name] = convex.beyond
     reach = tree.reach(list(found.values()), scene_file.padding)
     for i, name, body_name in half_spaces:
         if body_name not in tree.anchored:
@@ -326,24 +314,27 @@ def _convex(shape: Shape, name: str, scene_file: SceneFile, strict: StrictReader
                 "file": escaped(Path(shape.source().description()).name),
                 "scale": shape.scale3().tolist(),
             }
-            return shapes.polytope(said, _mesh_points(shape, strict), scene_file.max_vertices)
+            points, triangles = _mesh(shape, strict)
+            return shapes.polytope(said, points, triangles, scene_file.max_vertices)
         case _:
             message = f"geometry {name} is a {type(shape).__name__}, which is not supported"
             raise SceneError("unsupported_shape", message, field="directives", hint="use a primitive or a mesh")
 
 
-def _mesh_points(shape: Convex | Mesh, strict: StrictReader) -> Array:
-    """Returns the points of a mesh, (k, 3), as its file has them, times the scale.
+def _mesh(shape: Convex | Mesh, strict: StrictReader) -> tuple[Array, NDArray[np.int64]]:
+    """Returns the points of a mesh, (k, 3), as its file has them, times the scale, and the numbers of the points of its triangles, (t, 3).
 
     First come those that are vertices of Drake's hull, in Drake's order, on which the hashes of scenes depend.
 
     Raises:
         SceneError: the file is not what a collision mesh may be, or a scaled point is not finite.
     """
-    points = strict.points(shape.source().path()) * shape.scale3()
+    mesh = strict.mesh(shape.source().path())
+    points = mesh.points * shape.scale3()
     if not np.isfinite(points).all():
         message = f"scaled by {shape.scale3().tolist()}, a point of {escaped(shape.source().path().name)} is not finite"
         raise SceneError("scene_model", message, field="directives", hint="mend the file or the scale")
     hull = shape.GetConvexHull()
     rank = {tuple(hull.vertex(k)): k for k in range(hull.num_vertices())}
-    return points[np.argsort([rank.get(tuple(point), len(rank)) for point in points.tolist()], kind="stable")]
+    order = np.argsort([rank.get(tuple(point), len(rank)) for point in points.tolist()], kind="stable")
+    return points[order], np.argsort(order)[mesh.triangles]

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from certifier.model import Array
+from certifier.scene.hollow import beyond_mesh
 from certifier.scene.hull import outer
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
@@ -28,7 +30,8 @@ class Body:
         radius: metres.
         shape: the original shape, JSON-able.
         substitution: what replaced the original; None when the body is exact.
-        inflation: upper bound in metres on how far the replacement reaches outside the original.
+        inflation: upper bound in metres on how far the replacement reaches outside the original, or outside the hull of a mesh.
+        beyond: lower estimate in metres of how far the hull of a mesh reaches beyond the mesh.
     """
 
     vertices: Array
@@ -36,6 +39,7 @@ class Body:
     shape: dict[str, Any]
     substitution: str | None = None
     inflation: float = 0.0
+    beyond: float = 0.0
 
 
 def box(size: tuple[float, float, float]) -> Body:
@@ -71,15 +75,20 @@ def ellipsoid(semi_axes: tuple[float, float, float], max_vertices: int) -> Body:
     return Body(scale * points * np.array(semi_axes), 0.0, shape, substitution, (scale - 1) * max(semi_axes))
 
 
-def polytope(shape: dict[str, Any], points: Array, max_vertices: int) -> Body:
-    """Returns the hull of points (k, 3), or a polytope of at most max_vertices around it; the shape's ``kind`` is "convex" or "mesh"."""
+def polytope(shape: dict[str, Any], points: Array, triangles: NDArray[np.int64], max_vertices: int) -> Body:
+    """Returns the hull of points (k, 3), or a polytope of at most max_vertices around it; the shape's ``kind`` is "convex" or "mesh".
+
+    Args:
+        triangles: (t, 3) the points of the mesh's triangles.
+    """
     vertices, inflation, count = outer(points, max_vertices)
     if inflation > 0:
         hull = f"polytope of {len(vertices)} vertices around its hull of {count}"
     else:
         hull = f"convex hull with {len(vertices)} vertices"
-    exact = shape["kind"] == "convex" and inflation == 0
-    return Body(vertices, 0.0, shape, None if exact else f"{shape['kind']} -> {hull}", inflation)
+    if shape["kind"] == "convex":
+        return Body(vertices, 0.0, shape, f"convex -> {hull}" if inflation else None, inflation)
+    return Body(vertices, 0.0, shape, f"mesh -> {hull}", inflation, beyond_mesh(points, triangles, vertices, inflation))
 
 
 def half_space(center: Array, reach: float) -> Body:

@@ -2,39 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path, PurePosixPath
 from typing import NoReturn
 
 from certifier.errors import SceneError
-from certifier.model import Array, escaped
+from certifier.model import escaped
 from certifier.scene.file import SceneFile, directive_files
 from certifier.scene.formats.mjcf import Mjcf
 from certifier.scene.formats.model_file import ModelFile, Reference
 from certifier.scene.formats.sdf import Sdf
 from certifier.scene.formats.urdf import Urdf
-from certifier.scene.obj import read_points
+from certifier.scene.obj import ObjMesh, read_mesh
 from certifier.scene.references import resolve
 
 _FORMATS: dict[str, type[ModelFile]] = {".urdf": Urdf, ".sdf": Sdf, ".xml": Mjcf}
 _OBJ = ".obj"
+_BY_PACKAGE = "write model://NAME/FILE, and name the directory of the file as NAME under packages in the scene file"
+_Read = tuple[Path, type[ModelFile] | None, tuple[str, ...]]
+"""A model file and its format; or a file of directives, None, and the namespace of what it adds."""
 
 
 class StrictReader:
     """Reads OBJ meshes and the model files that a scene's directives lead to, also through includes. It finds files as Drake does.
 
     Attributes:
+        working_directory: the directory in which Drake has to read the models. Relative paths of SDFormat's includes start there.
         unlimited: the continuous joints that have limits in a URDF file, where they do not count: Drake's names of model and joint.
     """
 
     def __init__(self, scene_file: SceneFile) -> None:
         self._packages, self._root = scene_file.packages, scene_file.path.parent.resolve()
-        self._points: dict[Path, Array] = {}
-        self._models: dict[tuple[type[ModelFile], Path], ModelFile] = {}
         self.unlimited: list[tuple[str, str]] = []
+        self._meshes: dict[Path, ObjMesh] = {}
+        self._models: dict[tuple[Path, type[ModelFile]], ModelFile] = {}
+        self._counts: dict[_Read, int] = {}
+        self._starts: set[Path] = set()
 
-    def points(self, path: Path) -> Array:
-        """Returns every vertex of an OBJ file, (k, 3), as written there.
+    @property
+    def working_directory(self) -> Path:
+        return next(iter(self._starts), self._root)
+
+    def mesh(self, path: Path) -> ObjMesh:
+        """Returns the mesh of an OBJ file, as written there.
 
         Raises:
             SceneError: ``scene_model``, with file and line, when the file is not accepted or is a mesh of another kind.
@@ -42,11 +52,11 @@ class StrictReader:
         if path.suffix.lower() != _OBJ:
             raise _not_read(self._name(path))
         path = path.resolve()
-        if path not in self._points:
-            self._points[path] = read_points(path, self._name(path))
-        return self._points[path]
+        if path not in self._meshes:
+            self._meshes[path] = read_mesh(path, self._name(path))
+        return self._meshes[path]
 
-    def check(self, directives: str, name: str) -> None:
+    def check(self, directives: str, name: str) -> int:
         """Checks every model file and every collision mesh that is found.
 
         What is not found, or is no model, is left to Drake.
@@ -55,59 +65,107 @@ class StrictReader:
             directives: a YAML document of Drake Model Directives; its relative paths have no directory of their own to start from.
             name: the document's name for people.
 
+        Returns:
+            the number of collision geometries that the models have, those of a file once for each time that it is added or included.
+
         Raises:
             SceneError: ``scene_model``, with file and line, or ``scene_yaml``.
         """
-        documents: list[tuple[str, str, tuple[str, ...], frozenset[Path]]] = [(directives, name, (), frozenset())]
-        for text, document, namespace, around in documents:
-            for kind, reference, named in directive_files(text, document):
-                path, suffix = self._located(reference, [self._root]), _suffix(reference)
-                if path is None or path in around:
-                    continue
-                if path.is_dir():
-                    raise SceneError(
-                        "scene_model", f"{self._name(path)} is a directory", field="directives", hint="name a model file in it"
-                    )
-                full = (*namespace, named) if named else namespace
-                if kind == "add_directives":
-                    documents.append((_text(path, self._name(path)), self._name(path), full, around | {path}))
-                elif suffix.lower() == _OBJ:
-                    self.points(path)
-                elif suffix.lower() in _FORMATS:
-                    model = self._check_model(path, _FORMATS[suffix.lower()])
-                    if isinstance(model, Urdf):
-                        self.unlimited += [("::".join(full), joint.file) for joint in model.unlimited]
+        return self._added_by(directives, name, (), ())
 
-    def _check_model(self, path: Path, kind: type[ModelFile]) -> ModelFile:
-        """Checks a model and what it includes. MJCF's paths start at the model's directory, SDFormat's in the working directory."""
-        waiting, whole = [(path, kind)], (kind, path)
-        for file, kind in waiting:
-            known = self._models.get((kind, file))
-            model = self._models[kind, file] = known or kind(file, self._name(file))
-            if isinstance(model, Urdf) and model.unlimited and file != path:
-                joint = model.unlimited[0]
+    def _added_by(self, directives: str, name: str, namespace: tuple[str, ...], around: tuple[_Read, ...]) -> int:
+        """Returns the number of collision geometries that a document of directives adds.
+
+        Args:
+            namespace: Drake's names of the models begin with it.
+            around: the files that led here, from the first to the last.
+        """
+        return sum(
+            self._added(kind, reference, (*namespace, named) if named else namespace, around)
+            for kind, reference, named in directive_files(directives, name)
+        )
+
+    def _added(self, kind: str, reference: str, named: tuple[str, ...], around: tuple[_Read, ...]) -> int:
+        """Returns the number of collision geometries that an ``add_model`` or ``add_directives`` adds under a name or namespace."""
+        path, suffix = self._located(reference, [self._root]), _suffix(reference).lower()
+        if path is None:
+            return 0
+        if path.is_dir():
+            raise SceneError("scene_model", f"{self._name(path)} is a directory", field="directives", hint="name a model file in it")
+        if kind == "add_directives":
+            name = self._name(path)
+            return self._once((path, None, named), around, lambda around: self._added_by(_text(path, name), name, named, around))
+        if suffix == _OBJ:
+            self.mesh(path)
+            return 1
+        if suffix not in _FORMATS:
+            raise SceneError(
+                "scene_model", f"{self._name(path)} is no model", field="directives", hint=f"models end in {', '.join(_FORMATS)}"
+            )
+        model = self._read(path, _FORMATS[suffix])
+        if isinstance(model, Urdf):
+            self.unlimited += [("::".join(named), joint.file) for joint in model.unlimited]
+        return self._counted(model, path, around)
+
+    def _read(self, file: Path, kind: type[ModelFile]) -> ModelFile:
+        if (file, kind) not in self._models:
+            self._models[file, kind] = kind(file, self._name(file))
+        return self._models[file, kind]
+
+    def _counted(self, model: ModelFile, file: Path, around: tuple[_Read, ...]) -> int:
+        """Checks the meshes and the includes of a model, and returns how many collision geometries it has with them."""
+        return self._once((file, type(model), ()), around, lambda around: self._with_includes(model, file, around))
+
+    def _with_includes(self, model: ModelFile, file: Path, around: tuple[_Read, ...]) -> int:
+        for mesh in model.meshes:
+            self._check_mesh(model, mesh, file.parent)
+        count = len(model.collisions)
+        for include in model.includes:
+            found = self._included(model, include, file.parent)
+            included = self._read(found, _FORMATS[_suffix(include.file)])
+            if isinstance(included, Urdf) and included.unlimited:
                 hint = "leave lower and upper out, or write type revolute"
-                self._refuse(model, joint, "is a continuous joint, whose limits do not count, and Drake would apply them", hint)
-            if known is not None:
-                continue
-            start = Path.cwd() if kind is Sdf else path.parent
-            for include in model.includes:
-                found = self._located(include.file, [start])
-                if found is None or not found.is_file():
-                    hint = "name the model's file; Drake searches where a check cannot"
-                    self._refuse(model, include, "is no file that was found", hint)
-                if kind is Sdf and _suffix(include.file) not in _FORMATS:
-                    self._refuse(model, include, "would be left out by Drake", f"models that can be included end in {', '.join(_FORMATS)}")
-                waiting.append((found, _FORMATS[_suffix(include.file)] if kind is Sdf else kind))
-            for mesh in model.meshes:
-                self._check_mesh(model, mesh, file.parent if kind is not Mjcf else path.parent)
-        return self._models[whole]
+                self._refuse(included, included.unlimited[0], "is a continuous joint, whose limits do not count, and Drake would apply them", hint)
+            count += self._counted(included, found, around)
+        return count
+
+    def _included(self, model: ModelFile, include: Reference, start: Path) -> Path:
+        found = self._located(include.file, [start])
+        if found is None:
+            hint = f"a relative path starts at the directory of the model; or {_BY_PACKAGE}"
+            self._refuse(model, include, "is no file that was found", hint)
+        if not found.is_file():
+            self._refuse(model, include, "is a directory", "name the model's file in it")
+        self._check_included(model, include, found, start)
+        return found
+
+    def _check_included(self, model: ModelFile, include: Reference, found: Path, start: Path) -> None:
+        """Refuses what Drake would not read where the model says. It looks for all relative includes of a scene in one directory."""
+        if _suffix(include.file) not in _FORMATS:
+            self._refuse(model, include, "would be left out by Drake", f"models that can be included end in {', '.join(_FORMATS)}")
+        if _FORMATS[_suffix(include.file)] is Mjcf:
+            self._refuse(
+                model, include, "is MJCF, which Drake would place in the world and not in the model", "add it by a directive of its own"
+            )
+        if "://" not in include.file:
+            self._starts = self._starts or {start}
+            if (self.working_directory / include.file).resolve() != found:
+                self._refuse(model, include, "is beside a model for which Drake would look in another directory", _BY_PACKAGE)
+
+    def _once(self, read: _Read, around: tuple[_Read, ...], count: Callable[[tuple[_Read, ...]], int]) -> int:
+        """Returns the count of a file, which is read only once."""
+        if read in around:
+            message = f"{self._name(read[0])} includes itself, or a file that includes it"
+            raise SceneError("scene_model", message, field="directives", hint="remove the circle")
+        if read not in self._counts:
+            self._counts[read] = count((*around, read))
+        return self._counts[read]
 
     def _check_mesh(self, model: ModelFile, mesh: Reference, start: Path) -> None:
         if _suffix(mesh.file).lower() != _OBJ:
             raise _not_read(f"{model.name}:{mesh.line}: {mesh.file[:200]!a}")
         if (path := self._located(mesh.file, [start / directory for directory in model.mesh_directories])) is not None:
-            self.points(path)
+            self.mesh(path)
 
     def _located(self, reference: str, directories: Iterable[Path]) -> Path | None:
         reference = reference.removeprefix("file://")
@@ -142,3 +200,4 @@ def _text(path: Path, name: str) -> str:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         raise SceneError("scene_yaml", f"{name} cannot be read as UTF-8 text", field="directives", hint="is it a YAML file?") from None
+

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 import zipfile
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from certifier.errors import SceneError
-from certifier.scene.bundle import INDEX, SMALLER, BundleLimits, starts
+from certifier.scene.bundle import INDEX, SMALLER, BundleLimits
 from certifier.scene.file import read_scene_file
 from certifier.scene.parse import parse
 from certifier.scene.references import references, resolve
@@ -33,7 +32,6 @@ def parse_bundle(payload: dict[str, Any]) -> dict[str, Any]:
     root = Path(payload["root"])
     scene = root / unpack(Path(payload["archive"]), root, BundleLimits(**payload["limits"]))
     check_bundle(root, scene)
-    os.chdir(scene.parent)  # where SDFormat looks for included files
     return parse({"path": str(scene)})
 
 
@@ -51,8 +49,7 @@ def check_bundle(root: Path, scene: Path) -> None:
         for reference in references(file):
             if file.suffix.lower() in (".mjcf", ".xml") and ".." in PurePosixPath(reference).parts:
                 raise SceneError("bundle_uri", f"{where}: {reference!r}: .. is not accepted here", hint=_BELOW)
-            for start in starts(file, scene):
-                _inside(resolve(reference, start, packages), root, f"{where}: {reference!r}")
+            _inside(resolve(reference, file.parent, packages), root, f"{where}: {reference!r}")
 
 
 def _inside(path: Path, root: Path, what: str) -> None:

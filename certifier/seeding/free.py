@@ -10,6 +10,7 @@ from pydrake.geometry import QueryObject
 from certifier.errors import RegionError
 from certifier.model import Array, JointKind, Pair, Scene
 from certifier.scene.drake_model import build_diagram, geometry_name
+from certifier.scene.hollow import CONVEX_PARTS, beyond, standing_for
 
 SHELLS, EACH = np.geomspace(0.004, 1.0, 12), 40
 """A free configuration is looked for at these parts of the joints' half ranges from the seed, EACH times."""
@@ -91,8 +92,16 @@ def check_free(scene: Scene, q: Array, field: str) -> Nearest:
     overlap = f"overlap by {-distance:.3g} m" if np.isfinite(distance) else "overlap"
     how = overlap if distance <= 0 else f"are {distance:.3g} m apart, with a padding of {scene.padding:g} m on each"
     found = nearest_free(scene, clearance, scene.in_windows(q))
+    hollow = _hollow(scene, pair) if distance <= 0 else ""
     hint = "move the seed, or ignore the pair in the scene" if found is None else _said(scene, scene.in_windows(q), found)
-    raise RegionError("seed_in_collision", f"{pair.a} and {pair.b} {how}", field=field, hint=hint)
+    raise RegionError("seed_in_collision", f"{pair.a} and {pair.b} {how}{hollow}", field=field, hint=hint)
+
+
+def _hollow(scene: Scene, pair: Pair) -> str:
+    """Returns that a pair may overlap only in a hull, where one of the two is the hull of something that is not convex."""
+    hollow = [(beyond(scene, name), scene.geometry(name)) for name in (pair.a, pair.b) if beyond(scene, name)]
+    said = [f"the hull of {g.name} reaches at least {1000 * distance:.3g} mm beyond {standing_for(g)}" for distance, g in hollow]
+    return f"; {' and '.join(said)}, so they may overlap in the hull only ({CONVEX_PARTS})" if said else ""
 
 
 def nearest_free(scene: Scene, clearance: Clearance, q: Array, room: float = 0.0, reach: float = 1.0) -> Array | None:

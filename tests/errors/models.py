@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tests.certifier.scene.workshop import BOX, LIMIT
 from tests.errors.rows import rows
-from tests.errors.scenes import BALL_JOINT, MEND, mjcf, room
+from tests.errors.scenes import BALL_JOINT, MEND, linked, mjcf, room
 
 EXPAND = "expand the file with xacro first: xacro FILE > robot.urdf"
 LINK = "<link name='more'/><joint name='{}' type='fixed'><parent link='{}'/><child link='{}'/></joint>"
@@ -202,6 +202,64 @@ FORMATS = [
             "<{name}> holds more than text, and Drake would read a part of it",
             MEND,
             lambda t: t.scene(**room("<sphere><radius>1<!-- --> 5</radius></sphere>")),
+        ),
+        *(
+            ("scene_model", "directives", message, hint, provoke)
+            for message, hint, provoke in [
+                ("<{name}> is not known in <{parent}>", "did you mean {...}?", lambda t: t.scene(**linked("<colision/>"))),
+                ("<{name}> is not known in <{parent}>", "known there: {...}", lambda t: t.scene(**linked("<zzz/>"))),
+                ("the attribute {...} of <{name}> is not known", "did you mean {...}?", lambda t: t.scene(**linked("<pose degres='1'/>"))),
+                ("the attribute {...} of <{name}> is not known", "known there: {...}", lambda t: t.scene(**linked("<pose zzz='1'/>"))),
+                ("<{name}> in <{parent}> is not read", "{...}", lambda t: t.scene(**room("<cone/>"))),
+                ("<{name}> holds the text {...}, which nobody reads", MEND, lambda t: t.scene(**linked("1 2 3"))),
+                (
+                    "a second <{name}> is called {...}",
+                    "give each its own name",
+                    lambda t: t.scene(**linked("</link><link name='walls'>")),
+                ),
+                ("<collision> has no <geometry>", MEND, lambda t: t.scene(**linked("<collision name='x'/>"))),
+                ("<geometry> has no shape; <empty/> would say that there is none", MEND, lambda t: t.scene(**room(""))),
+                (
+                    "<joint> has an <axis2>, which its type does not have",
+                    MEND,
+                    lambda t: t.scene(**linked("</link><joint name='j' type='fixed'><axis2/></joint><link name='z'>")),
+                ),
+                (
+                    "{key} of <{name}> is {...}",
+                    "did you mean {...}?",
+                    lambda t: t.scene(**linked("</link><joint name='j' type='revolut'/><link name='z'>")),
+                ),
+                (
+                    "{key} of <{name}> is {...}",
+                    "known: {...}",
+                    lambda t: t.scene(**linked("</link><joint name='j' type=''/><link name='z'>")),
+                ),
+                (
+                    "{what} is {...} instead of true or false",
+                    MEND,
+                    lambda t: t.scene(**linked("</link><static>yes</static><link name='z'>")),
+                ),
+                (
+                    "{what} is true, and Drake does not read it",
+                    "say by joints what holds the link",
+                    lambda t: t.scene(**linked("<kinematic>true</kinematic>")),
+                ),
+                (
+                    "rotation_format of <pose> is {...}",
+                    "known: {...}",
+                    lambda t: t.scene(**linked("<pose rotation_format='quat_wxyz'>0 0 0 1 0 0 0</pose>")),
+                ),
+                (
+                    "SDFormat 1.7 and later have no frame of <pose>",
+                    "write relative_to",
+                    lambda t: t.scene(**linked("<pose frame='x'/>")),
+                ),
+                (
+                    "the quaternion of <pose> is 0 0 0 0, which is no rotation",
+                    MEND,
+                    lambda t: t.scene(**linked("<pose rotation_format='quat_xyzw'>0 0 0 0 0 0 0</pose>")),
+                ),
+            ]
         ),
     ),
     *rows(

@@ -332,14 +332,14 @@ SEEDS = [
         (
             "seed_in_collision",
             "seed.q",
-            "{a} and {b} {how}",
+            "{a} and {b} {how}{hollow}",
             "the nearest free configuration found is q = {...}",
             lambda t: seeded(q=[1.5, 1.57]),
         ),
         (
             "seed_in_collision",
             "seed.q",
-            "{a} and {b} {how}",
+            "{a} and {b} {how}{hollow}",
             "move the seed, or ignore the pair in the scene",
             lambda t: propose(crane(padding=9.0), SeedOptions(q=(0.0, 0.0))),
         ),

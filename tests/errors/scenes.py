@@ -17,6 +17,7 @@ BELOW = "name a directory above it under packages, and write package://NAME/FILE
 MODEL = "name a model file: URDF, SDFormat or MJCF"
 MESH = "export the mesh again"
 MEND = "mend the model there"
+BY_PACKAGE = "write model://NAME/FILE, and name the directory of the file as NAME under packages in the scene file"
 NOT_YAML = "line {...}: a key must be text"
 
 MIMIC = '<joint name="follow" type="revolute"><parent link="hand"/><child link="tip"/><axis xyz="0 0 1"/><mimic joint="turn"/>'
@@ -49,6 +50,11 @@ def sdf_joint(kind: str, tag: str = "", more: str = "") -> dict[str, dict[str, s
     return {"files": {"room.sdf": f'{model}<{tag}joint name="b" type="{kind}">{ends}</{tag}joint></model></sdf>'}}
 
 
+def linked(more: str) -> dict[str, dict[str, str]]:
+    """Returns a room with more in its link."""
+    return {"files": {"room.sdf": SDF_SHAPE.format("<box><size>1 1 1</size></box>").replace("</collision>", f"</collision>{more}")}}
+
+
 def mjcf(body: str) -> dict[str, object]:
     return {"scene": MUJOCO, "files": {"m.xml": f"<mujoco model='m'><worldbody><body name='b'>{body}</body></worldbody></mujoco>"}}
 
@@ -59,6 +65,18 @@ def mesh(text: str | bytes) -> dict[str, object]:
 
 def drafted(t: Trial, robot: Path) -> None:
     draft(robot, [], t.directory / "scene.yaml", {})
+
+
+def beside(t: Trial) -> None:
+    """Loads two models in two directories, each of which includes a file beside it."""
+    for name in ("one", "two"):
+        (t.directory / name).mkdir()
+        for file, text in (
+            ("a.sdf", INCLUDE.format("b.sdf")),
+            ("b.sdf", '<sdf version="1.9"><model name="b"><link name="l"/></model></sdf>'),
+        ):
+            (t.directory / name / file).write_text(text)
+    t.load("directives:\n- add_model: {name: a, file: one/a.sdf}\n- add_model: {name: b, file: two/a.sdf}\n")
 
 
 FILES = rows(
@@ -380,7 +398,7 @@ MODELS = [
             "directives",
             "{...}",
             "use a primitive or a mesh",
-            lambda t: t.scene(**room("<heightmap><uri>h.png</uri></heightmap>")),
+            lambda t: t.scene(**mjcf("<joint name='j' range='-1 1'/><geom type='hfield' size='1'/>")),
         ),
         (
             "scene_model",
@@ -395,13 +413,6 @@ MODELS = [
             "{models}{message}",
             ONE_MODEL,
             lambda t: t.scene(files={"room.sdf": '<sdf version="1.9"><world name="w"/></sdf>'}),
-        ),
-        (
-            "scene_name",
-            "directives",
-            "the {what} {...} has a name that is not accepted",
-            NAMES,
-            lambda t: t.scene(more='<link name="a&#9;b"/><joint name="f" type="fixed"><parent link="hand"/><child link="a&#9;b"/></joint>'),
         ),
         (
             "unsupported_joint",
@@ -447,6 +458,42 @@ MODELS = [
         ),
     ),
     *rows(
+        "certifier/scene/names.py",
+        (
+            "scene_name",
+            "directives",
+            "the {what} {...} has a name that is not accepted",
+            NAMES,
+            lambda t: t.scene(more='<link name="a&#9;b"/><joint name="f" type="fixed"><parent link="hand"/><child link="a&#9;b"/></joint>'),
+        ),
+        (
+            "scene_name",
+            "directives",
+            "{...} and {owner} would both be called {name}",
+            "rename one of them in its model; names are made of the model's, the body's and the geometry's, with / between them",
+            lambda t: t.scene(
+                more='<link name="hand/palm"/><joint name="f" type="fixed"><parent link="hand"/><child link="hand/palm"/></joint>'
+            ),
+        ),
+    ),
+    *rows(
+        "certifier/scene/census.py",
+        (
+            "scene_geometries",
+            "directives",
+            "the model files have {written} collision geometries, and Drake has read {read}",
+            "find the one that Drake leaves out or makes up, and write it otherwise; docs/scenes.md says what is read of a model",
+            "Drake leaves out a collision geometry that is read of its file",
+        ),
+        (
+            "scene_geometries",
+            "directives",
+            "Drake has read {read} collision geometries, and the scene must have each of them; it has {kept}",
+            "report this with the models: it is a fault of ciris",
+            "ciris loses a geometry",
+        ),
+    ),
+    *rows(
         "certifier/scene/strict.py",
         (
             "scene_model",
@@ -459,7 +506,7 @@ MODELS = [
             "scene_model",
             "directives",
             "is no file that was found",
-            "name the model's file; Drake searches where a check cannot",
+            f"a relative path starts at the directory of the model; or {BY_PACKAGE}",
             lambda t: t.scene(files={"room.sdf": INCLUDE.format("no.sdf")}),
         ),
         (
@@ -468,6 +515,34 @@ MODELS = [
             "is a continuous joint, whose limits do not count, and Drake would apply them",
             "leave lower and upper out, or write type revolute",
             lambda t: t.scene(kind="continuous", files={"room.sdf": INCLUDE.format("arm.urdf")}),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "is a directory",
+            "name the model's file in it",
+            lambda t: t.scene(files={"room.sdf": INCLUDE.format(".")}),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "is MJCF, which Drake would place in the world and not in the model",
+            "add it by a directive of its own",
+            lambda t: t.scene(files={"room.sdf": INCLUDE.format("m.xml"), "m.xml": "<mujoco/>"}),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "is beside a model for which Drake would look in another directory",
+            BY_PACKAGE,
+            beside,
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{...} includes itself, or a file that includes it",
+            "remove the circle",
+            lambda t: t.scene(files={"room.sdf": INCLUDE.format("room.sdf")}),
         ),
         (
             "scene_model",

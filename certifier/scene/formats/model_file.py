@@ -21,12 +21,12 @@ from certifier.scene.xml import parse_xml
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 COLLISION = "collision"
-SHAPES = frozenset(["box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "drake:capsule", "drake:ellipsoid"])
+SHAPES = frozenset(["box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "drake:capsule", "drake:ellipsoid", "empty"])
 
 
 @dataclass(frozen=True)
 class Reference:
-    """A reference is the name of another file, as written, and the line where it stands."""
+    """A reference is the name of another file or of a geometry, as written, and the line where it stands."""
 
     file: str
     line: int
@@ -40,6 +40,8 @@ class Element:
     around: frozenset[str]
     """The names of the elements that this one is in."""
     children: set[str] = field(default_factory=set)
+    names: set[tuple[str, str]] = field(default_factory=set)
+    """The names that its children have: the child's element, and its name."""
     text: str = ""
     interrupted: bool = False
     """Whether something else interrupts the element's text. Drake reads the text only up to there."""
@@ -52,6 +54,7 @@ class ModelFile:
         includes: model files that this one includes.
         meshes: files of collision geometry.
         mesh_directories: directories of the meshes, relative to the model.
+        collisions: the collision geometries of this file, each by its name or shape; None where the format does not count them.
 
     Raises:
         SceneError: ``scene_model`` or ``unsupported_joint`` with the file and the line, when the file is not accepted.
@@ -67,6 +70,7 @@ class ModelFile:
         self.includes: list[Reference] = []
         self.meshes: list[Reference] = []
         self.mesh_directories = ["."]
+        self.collisions: list[Reference] | None = None
         self._open: list[Element] = []
         parse_xml(path, name, "scene_model", self._install)
 

@@ -6,7 +6,9 @@ import math
 from pathlib import Path
 from typing import ClassVar
 
-from certifier.scene.formats.model_file import COLLISION, SHAPES, Element, ModelFile, Reference
+from certifier.errors import close_matches
+from certifier.scene.formats import sdf_names
+from certifier.scene.formats.model_file import Element, ModelFile, Reference
 
 
 class Sdf(ModelFile):
@@ -21,6 +23,7 @@ class Sdf(ModelFile):
     }
     _COUNTS: ClassVar[dict[tuple[str, str], tuple[int, ...]]] = {
         ("axis", "xyz"): (3,),
+        ("axis2", "xyz"): (3,),
         ("limit", "lower"): (1,),
         ("limit", "upper"): (1,),
         ("plane", "normal"): (3,),
@@ -29,24 +32,33 @@ class Sdf(ModelFile):
         ("mimic", "offset"): (1,),
         ("mimic", "reference"): (1,),
     }
-    ONCE = SHAPES.union(
-        ["pose", "geometry", "axis", "limit", "uri", "parent", "child"],
-        [name for _, name in _COUNTS],
-        [name for shape in _DIMENSIONS.values() for name in shape],
-    )
-    UNREAD = frozenset(["plugin", "sensor", "gui"])
+    _TEXTS = frozenset(["parent", "child", "uri", "name", "placement_frame", "drake:member", "drake:member_group"]) | {
+        "drake:ignored_collision_filter_group"
+    }
+    """The text of these elements is a name."""
+    _SWITCHES = frozenset(["static", "use_parent_model_frame", "kinematic", "must_be_base_link"])
+    _OFF = frozenset(["kinematic", "must_be_base_link"])
+    _TRUE, _FALSE = frozenset(["true", "1"]), frozenset(["false", "0"])
+    _TWO_AXES = frozenset(["universal", "revolute2", "gearbox"])
+    _POSES: ClassVar[dict[str, int]] = {"euler_rpy": 6, "quat_xyzw": 7}
+    ONCE = frozenset().union(*sdf_names.ONCE.values()).difference(*sdf_names.MANY.values())
+    UNREAD = frozenset().union(*sdf_names.HARMLESS.values()) - sdf_names.READ
 
     def __init__(self, path: Path, name: str) -> None:
         self._limits: dict[str, float] = {}
+        self._found: list[Reference] = []
         super().__init__(path, name)
+        self.collisions = self._found
 
     def _check(self, element: Element, parent: str) -> None:
-        dimensions = self._DIMENSIONS.get(parent, {}) if COLLISION in element.around else {}
+        self._check_name(element, parent)
+        self._check_twice(element)
+        dimensions = self._DIMENSIONS.get(parent, {})
         if element.name in dimensions:
             if min(self._text(element, (dimensions[element.name],))) <= 0:
                 self.refuse(element, f"<{element.name}> must be positive, and Drake would read another number")
         elif element.name == "pose":
-            self._text(element, (0, 6, 7))
+            self._check_pose(element)
         elif (counts := self._COUNTS.get((parent, element.name))) is not None:
             numbers = self._text(element, counts)
             if parent == "limit":
@@ -55,16 +67,88 @@ class Sdf(ModelFile):
             self._check_order(element, self._limits.pop("lower", -math.inf), self._limits.pop("upper", math.inf))
         elif element.name == "uri" and parent == "include":
             self.includes.append(Reference(self._whole(element), element.line))
-        elif element.name == "uri" and parent == "mesh" and COLLISION in element.around:
+        elif element.name == "uri" and parent == "mesh":
             self.meshes.append(Reference(self._whole(element), element.line))
-        elif element.name in self._DIMENSIONS and parent == "geometry" and COLLISION in element.around:
+        elif element.name in self._DIMENSIONS and parent == "geometry":
             for missing in self._DIMENSIONS[element.name].keys() - element.children:
                 self.refuse(element, f"<{element.name}> has no <{missing}>, and Drake would make one up")
-        elif element.name == "drake:mimic":
-            for key in ("multiplier", "offset"):
-                if key in element.attributes:
+        elif element.name in self._TEXTS:
+            self._whole(element)
+        elif element.name in self._SWITCHES:
+            self._check_switch(element, f"<{element.name}>", self._whole(element))
+        else:
+            self._check_structure(element)
+
+    def _check_name(self, element: Element, parent: str) -> None:
+        """Refuses an element, or an attribute of it, that is not known where it stands. What an unknown parent has, is left to that."""
+        name = element.name
+        if parent in sdf_names.READ:
+            if (instead := sdf_names.REFUSED.get(parent, {}).get(name)) is not None:
+                self.refuse(element, f"<{name}> in <{parent}> is not read", instead)
+            if name not in (known := sdf_names.known(parent)):
+                self.refuse(element, f"<{name}> is not known in <{parent}>", _nearest(name, known))
+        if name not in sdf_names.READ or name in sdf_names.HARMLESS.get(parent, ()):
+            return
+        for key in element.attributes:
+            if key not in (known := list(sdf_names.ATTRIBUTES.get(name, ()))) and not key.startswith("xmlns"):
+                self.refuse(element, f"the attribute {key[:80]!a} of <{name}> is not known", _nearest(key, known))
+        if name in sdf_names.CONTAINERS and element.text.strip():
+            self.refuse(element, f"<{name}> holds the text {element.text.strip()[:80]!a}, which nobody reads")
+
+    def _check_twice(self, element: Element) -> None:
+        """Refuses a name that a sibling of the same kind has."""
+        if self._open and "name" in element.attributes:
+            name = element.name, element.attributes["name"]
+            if name in self._open[-1].names:
+                self.refuse(element, f"a second <{element.name}> is called {name[1][:80]!a}", "give each its own name")
+            self._open[-1].names.add(name)
+
+    def _check_structure(self, element: Element) -> None:
+        match element.name:
+            case "sdf":
+                self._check_one_of(element, "version", sdf_names.VERSIONS)
+            case "include" if "merge" in element.attributes:
+                self._check_switch(element, "merge of <include>", element.attributes["merge"])
+            case "collision" if "geometry" not in element.children:
+                self.refuse(element, "<collision> has no <geometry>")
+            case "geometry":
+                self._check_geometry(element)
+                for shape in element.children:
+                    if shape != "empty":
+                        self._found.append(Reference(shape, element.line))
+                if not element.children:
+                    self.refuse(element, "<geometry> has no shape; <empty/> would say that there is none")
+            case "joint":
+                self._check_one_of(element, "type", sdf_names.JOINTS)
+                if "axis2" in element.children and element.attributes["type"].lower() not in self._TWO_AXES:
+                    self.refuse(element, "<joint> has an <axis2>, which its type does not have")
+            case "drake:mimic":
+                for key in {"multiplier", "offset"} & element.attributes.keys():
                     self._numbers(element, f"{key} of <drake:mimic>", element.attributes[key], (1,))
-        self._check_geometry(element)
+
+    def _check_one_of(self, element: Element, key: str, known: tuple[str, ...]) -> None:
+        value = element.attributes.get(key, "")
+        if value.lower() not in known:
+            message = f"{key} of <{element.name}> is {value[:80]!a}"
+            self.refuse(element, message, close_matches(value, list(known)) or f"known: {', '.join(known)}")
+
+    def _check_switch(self, element: Element, what: str, text: str) -> None:
+        if text not in self._TRUE | self._FALSE:
+            self.refuse(element, f"{what} is {text[:80]!a} instead of true or false")
+        if element.name in self._OFF and text in self._TRUE:
+            self.refuse(element, f"{what} is true, and Drake does not read it", "say by joints what holds the link")
+
+    def _check_pose(self, element: Element) -> None:
+        rotation = element.attributes.get("rotation_format", "euler_rpy")
+        if rotation not in self._POSES:
+            self.refuse(element, f"rotation_format of <pose> is {rotation[:80]!a}", f"known: {', '.join(self._POSES)}")
+        if "frame" in element.attributes and self._open[0].attributes.get("version") not in sdf_names.WITH_POSE_FRAMES:
+            self.refuse(element, "SDFormat 1.7 and later have no frame of <pose>", "write relative_to")
+        numbers = self._text(element, (0, self._POSES[rotation]))
+        if "degrees" in element.attributes:
+            self._check_switch(element, "degrees of <pose>", element.attributes["degrees"])
+        if len(numbers) == 7 and not any(numbers[3:]):
+            self.refuse(element, "the quaternion of <pose> is 0 0 0 0, which is no rotation")
 
     def _whole(self, element: Element) -> str:
         if element.interrupted:
@@ -73,3 +157,7 @@ class Sdf(ModelFile):
 
     def _text(self, element: Element, counts: tuple[int, ...]) -> list[float]:
         return self._numbers(element, f"<{element.name}>", self._whole(element), counts)
+
+
+def _nearest(name: str, known: list[str]) -> str:
+    return close_matches(name, known) or f"known there: {', '.join(known) or 'nothing'}"

@@ -156,3 +156,17 @@ def test_a_model_in_the_robot_is_a_part_of_it(tmp_path: Path) -> None:
     made = draft(tmp_path / "robot.sdf", [], tmp_path / "scene.yaml", {})
     assert [(pair.a, pair.b) for pair in made.ignored] == [("r/base/c", "r::hand/palm/c")]
     assert made.overlapping == ()
+
+
+def test_a_mimic_joint_follows_the_joint_of_the_whole_name(tmp_path: Path) -> None:
+    """``x/lead`` is another joint than ``lead``, whose position it does not follow."""
+    joint = """<link name="{0}"/><joint name="{0}" type="revolute"><parent>base</parent><child>l{0}</child><axis><limit><lower>{1}</lower>
+      <upper>1</upper></limit>{2}</axis></joint>""".replace('link name="{0}"', 'link name="l{0}"')
+    joints = joint.format("lead", 0.25, "") + joint.format("x/lead", 0.5, "")
+    joints += joint.format("follow", -1, '<mimic joint="lead"><multiplier>1</multiplier><offset>0</offset><reference>0</reference></mimic>')
+    text = f'<sdf version="1.11"><model name="arm"><link name="base"/>{joints}</model></sdf>'
+    (tmp_path / "arm.sdf").write_text(text)
+    made = draft(tmp_path / "arm.sdf", [], tmp_path / "scene.yaml", {})
+    assert "  arm/lead: 0.25\n" in made.text
+    assert "  arm/follow: 0.25\n" in made.text
+    assert [joint.name for joint in made.scene.moving] == ["arm/x/lead"]

@@ -100,7 +100,7 @@ def test_no_point_is_outside_by_a_rounding_error(seed, size, offset, thinness):
     assert all(tuple(p) in own or in_a_tetrahedron(p, vertices) for p in points)
     assert inflation < 1e-7 * size
     if inflation > 0:
-        assert shapes.polytope({"kind": "convex"}, points, 32).substitution is not None
+        assert shapes.polytope({"kind": "convex"}, points, np.zeros((0, 3), dtype=np.int64), 32).substitution is not None
         for v in vertices:
             assert np.linalg.norm(points - v, axis=1).min() <= inflation
 

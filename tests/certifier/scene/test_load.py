@@ -179,29 +179,41 @@ def test_the_ur3es_reach_is_what_its_data_sheet_says(examples):
     assert p[0] == pytest.approx(0.24355 + 0.2132)
 
 
+def doubled(levels):
+    """SDFormat files, each of which includes the next one twice; the first is arm.sdf."""
+    files = {}
+    for level in range(levels):
+        twice = "".join(f"<include><uri>arm{level + 1}.sdf</uri><name>{name}</name></include>" for name in "ab")
+        files[f"arm{level or ''}.sdf"] = f'<sdf version="1.9"><model name="arm"><link name="base"/>{twice}</model></sdf>'
+    return files | {f"arm{levels}.sdf": '<sdf version="1.9"><model name="arm"><link name="base"/></model></sdf>'}
+
+
 @pytest.mark.parametrize(
-    ("arm", "limits", "words"),
-    [
-        (
-            '<sdf version="1.7"><model name="arm"><link name="base"/><include><uri>arm.sdf</uri></include></model></sdf>',
-            {},
-            ["SIGSEGV", "arm.sdf"],
-        ),
-        (
-            '<mujoco model="arm"><include file="arm.xml"/><worldbody><body name="base"/></worldbody></mujoco>',
-            {"memory_bytes": 500 * 2**20},
-            ["memory", "arm.xml"],
-        ),
-    ],
+    ("levels", "limits", "words"), [(16, {"timeout_s": 3}, ["took more than 3 s"]), (13, {"memory_bytes": 500 * 2**20}, ["memory"])]
 )
-def test_a_model_that_ends_drakes_process_ends_nothing_else(tmp_path, arm, limits, words):
-    name = words[-1]
-    path = write(tmp_path, SCENE.replace("arm.urdf", name), files={name: arm})
+def test_a_model_that_ends_drakes_process_ends_nothing_else(tmp_path, levels, limits, words):
+    path = write(tmp_path, SCENE.replace("arm.urdf", "arm.sdf"), files=doubled(levels))
     with pytest.raises(SceneError) as caught:
         load_scene(path, **limits)
     assert (caught.value.code, caught.value.field) == ("scene_model_crash", "directives")
-    for word in words:
+    for word in [*words, "arm.sdf"]:
         assert word in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("arm.sdf", '<sdf version="1.7"><model name="arm"><link name="base"/><include><uri>arm.sdf</uri></include></model></sdf>'),
+        ("arm.xml", '<mujoco model="arm"><include file="arm.xml"/><worldbody><body name="base"/></worldbody></mujoco>'),
+        ("arm.yaml", "directives: [{add_directives: {file: package://mine/arm.yaml}}]"),
+    ],
+)
+def test_a_file_that_includes_itself_is_refused(tmp_path, name, text):
+    kind = "add_directives: {" if name.endswith("yaml") else "add_model: {name: arm, "
+    scene = f"packages: {{mine: .}}{SCENE.replace('add_model: {name: arm, file: arm.urdf', f'{kind}file: {name}')}"
+    with pytest.raises(SceneError, match=rf"{name} includes itself") as caught:
+        load_scene(write(tmp_path, scene, files={name: text}))
+    assert caught.value.code == "scene_model"
 
 
 def test_a_missing_scene_file_is_named(tmp_path):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydrake.geometry import Convex
 
 from certifier.errors import SceneError
-from certifier.scene.obj import read_points
+from certifier.scene.obj import read_mesh
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 WORDS = ["nan", "inf", "-inf", "infinity", "abc", "1e400"]
@@ -22,7 +22,7 @@ HOSTILE = [*WORDS, *HALF, "-", "+", "--1", "\u0661", "\\"]
 def points(tmp_path, text):
     path = tmp_path / "m.obj"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return read_points(path, "meshes/m.obj")
+    return read_mesh(path, "meshes/m.obj").points
 
 
 def drakes_hull(path):

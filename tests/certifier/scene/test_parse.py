@@ -196,9 +196,9 @@ def floating(scene=SCENE):
         ({"files": {"room.sdf": "<sdf version='1.7'><model"}}, "scene_model", "directives", "room.sdf"),
         (
             {"files": {"room.sdf": re.sub("<box>.*</box>", "<cone><radius>1</radius></cone>", ROOM)}},
-            "unsupported_shape",
+            "scene_model",
             "directives",
-            "cone",
+            "room.sdf:2: <cone> in <geometry> is not read",
         ),
         ({"scene": SCENE.replace("file: arm.urdf", "file: nothing.urdf")}, "scene_model", "directives", "nothing.urdf"),
         ({"scene": SCENE.replace("add_weld", "add_wled", 1)}, "scene_model", "directives[1]", "scene.yaml:4:5"),

@@ -7,6 +7,7 @@ import pytest
 
 from certifier.errors import SceneError
 from certifier.scene import load_bundle, load_scene, pack_bundle
+from certifier.scene.draft import draft
 from tests.certifier.scene.workshop import ROOM, SCENE, parsed, write
 
 TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -170,7 +171,7 @@ def test_a_model_directory_is_refused(tmp_path):
     (tmp_path / "thing" / "model.config").write_text("<model><sdf>odd.sdf</sdf></model>")
     (tmp_path / "thing" / "odd.sdf").write_text(MORE.format(pose=POSE, shape=BOX, more=""))
     path = write(tmp_path, f"packages: {{mine: .}}{SCENE}", **sdf(more="<include><uri>model://mine/thing</uri></include>"))
-    with pytest.raises(SceneError, match="name the model's file"):
+    with pytest.raises(SceneError, match=r"room\.sdf:5: 'model://mine/thing' is a directory .name the model's file"):
         load_scene(path)
 
 
@@ -205,3 +206,69 @@ def test_what_drake_prints_comes_in_one_printable_line(tmp_path):
     (said,) = (w for w in parsed(write(tmp_path, **mjcf(top='<asset><mesh name="m\u202e&#10;m"/></asset>'))).warnings if "mesh asset" in w)
     assert "m\\u202e m" in said
     assert said.isprintable()
+
+
+PART = '<sdf version="1.9"><model name="part"><link name="p"/></model></sdf>'
+WITH_PART = """<sdf version="1.9"><model name="{0}"><link name="walls"/><include><uri>{1}</uri><name>part</name></include>
+  <joint name="j" type="fixed"><parent>walls</parent><child>part::{2}</child></joint></model></sdf>"""
+
+
+def laid_out(directory, **files):
+    """Writes files, whose names have __ for / in them, and a scene file in cell/ that adds each of the models first.sdf and second.sdf."""
+    scene = SCENE.replace("arm.urdf", "../arm.urdf")
+    for place, text in files.items():
+        path = directory / (place.replace("__", "/") + ".sdf")
+        path.parent.mkdir(exist_ok=True, parents=True)
+        path.write_text(text)
+        if path.stem in ("first", "second"):
+            scene += f"  - add_model: {{name: {path.stem}, file: ../{path.relative_to(directory)}}}\n"
+            scene += f"  - add_weld: {{parent: world, child: {path.stem}::walls}}\n"
+    write(directory)
+    (directory / "cell").mkdir(exist_ok=True)
+    (directory / "cell" / "room.sdf").write_text(ROOM)
+    (directory / "cell" / "scene.yaml").write_text(scene)
+    return directory / "cell" / "scene.yaml"
+
+
+def test_an_include_is_beside_the_model_and_not_beside_the_scene(tmp_path):
+    path = laid_out(tmp_path, models__first=WITH_PART.format("first", "part.sdf", "p"), models__part=PART, cell__part="no model")
+    scene = load_scene(path)
+    assert "first::part/p" in scene.bodies
+    assert scene.hash == load_bundle(pack_bundle(path)).hash
+
+
+def test_models_of_one_directory_may_all_include(tmp_path):
+    first, second = (WITH_PART.format(name, "deep/part.sdf", "p") for name in ("first", "second"))
+    path = laid_out(tmp_path, models__first=first, models__second=second, models__deep__part=PART)
+    assert {"first::part/p", "second::part/p"} <= set(load_scene(path).bodies)
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        {"one__first": WITH_PART.format("a", "part.sdf", "p"), "two__second": WITH_PART.format("b", "part.sdf", "p")},
+        {"one__first": WITH_PART.format("a", "deep/mid.sdf", "walls"), "one__deep__mid": WITH_PART.format("m", "part.sdf", "p")},
+    ],
+)
+def test_includes_that_drake_would_look_for_elsewhere_are_refused(tmp_path, files):
+    """It might find another file there, or none."""
+    places = {f"{directory}__part": PART for directory in ("one", "two", "one__deep", "cell")}
+    with pytest.raises(SceneError, match=r"(second|mid)\.sdf:1: 'part\.sdf' is beside a model for which Drake") as caught:
+        load_scene(laid_out(tmp_path, **files, **places))
+    assert "write model://NAME/FILE" in caught.value.hint
+
+
+def test_an_include_by_package_is_read_from_anywhere(tmp_path):
+    first, mid = WITH_PART.format("a", "model://here/deep/mid.sdf", "walls"), WITH_PART.format("m", "model://here/deep/part.sdf", "p")
+    path = laid_out(tmp_path, one__first=first, one__deep__mid=mid, one__deep__part=PART)
+    path.write_text(f"packages: {{here: ../one}}{path.read_text()}")
+    assert "first::part::part/p" in load_scene(path).bodies
+
+
+def test_the_draft_of_a_model_that_includes_does_not_depend_on_its_place(tmp_path):
+    model = WITH_PART.format("first", "part.sdf", "p").replace(
+        "<include>", '<link name="l"/>' + TURN.format("").replace("door", "d") + "<include>"
+    )
+    laid_out(tmp_path, models__first=model, models__part=PART)
+    drafts = [draft(tmp_path / "models" / "first.sdf", [], tmp_path / place / "scene.yaml", {}) for place in ("models", "cell", ".")]
+    assert len({made.scene.hash for made in drafts}) == 1

@@ -1,0 +1,142 @@
+"""How far a hull reaches beyond what it stands for is estimated here, from below.
+
+The hull of a bin closes its opening. A configuration inside of the opening then counts as a collision, and people need to be told why. So
+points are spread over the faces of the hull, and their distances from the mesh are taken. The greatest is one that the hull reaches beyond
+the mesh without doubt, but for rounding. Other points, those inside of the hull among them, may be farther away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from certifier.model import Array, Geometry, Scene
+
+_POINTS = 500
+"""About so many points are spread over the faces of a hull."""
+_CLIMBS = 12
+_MOVES = np.eye(3)[[0, 1, 2, 0, 1, 2]] - np.eye(3)[[1, 2, 0, 2, 0, 1]]
+_NOTABLE = 1e-3
+"""A hull that reaches less than this fraction of its length beyond the mesh is as good as the mesh."""
+_KEY = "beyond"
+CONVEX_PARTS = "write it as several convex meshes or shapes"
+"""This is what to do about a hull that closes an opening."""
+
+
+def beyond_mesh(points: Array, triangles: NDArray[np.int64], around: Array, inflation: float) -> float:
+    """Returns a lower estimate, in metres, of how far the hull of points (k, 3) reaches beyond the triangles, (t, 3) indices of points.
+
+    It is 0 where that is next to nothing, or where there are no triangles.
+
+    Args:
+        around: vertices (v, 3) of a polytope around the hull, which has a volume where the hull has none.
+        inflation: the polytope reaches at most so far outside of the hull, metres.
+    """
+    try:
+        corners, slack = points[ConvexHull(points).simplices], 0.0
+    except QhullError:
+        corners, slack = around[ConvexHull(around).simplices], inflation
+    return _beyond(corners, points[triangles], slack)
+
+
+def beyond_parts(hull: Array, parts: Sequence[Array], inflation: float) -> float:
+    """Returns a lower estimate, in metres, of how far the hull of vertices (v, 3) reaches beyond the hulls of the parts, (k, 3) each.
+
+    ``inflation`` says how far the vertices may be outside of the parts' common hull, metres.
+    """
+    triangles = np.concatenate([part[ConvexHull(part).simplices] for part in parts])
+    return _beyond(hull[ConvexHull(hull).simplices], triangles, inflation)
+
+
+def recorded(found: dict[str, float]) -> dict[str, dict[str, float]]:
+    """Returns what goes into a scene's provenance: by geometry, how far it reaches beyond, metres."""
+    return {_KEY: found} if found else {}
+
+
+def beyond(scene: Scene, name: str) -> float:
+    """Returns how far a geometry reaches beyond what it stands for, at least, in metres; 0 where it is next to nothing or not known."""
+    found = scene.provenance.get(_KEY)
+    distance = found.get(name, 0.0) if isinstance(found, dict) else 0.0
+    return distance if isinstance(distance, float) else 0.0
+
+
+def standing_for(geometry: Geometry) -> str:
+    """Returns what a hull stands for, for people."""
+    return "its parts" if geometry.shape["kind"] == "hull" else "its mesh"
+
+
+def _beyond(hull: Array, triangles: Array, slack: float) -> float:
+    """Returns the estimate for triangles (h, 3, 3) of a hull and (t, 3, 3) of what is in it; 0 where it is not notable."""
+    if not len(triangles):
+        return 0.0
+    distances = _Distances(triangles)
+    farthest, reached = max(((point, distances.of(point[0] @ point[1])) for point in _spread(hull)), key=lambda found: found[1])
+    reached = _climbed(*farthest, reached, distances) - slack
+    return reached if reached > _NOTABLE * float(np.ptp(hull.reshape(-1, 3), axis=0).max()) else 0.0
+
+
+def _spread(triangles: Array) -> list[tuple[Array, Array]]:
+    """Returns points of the largest of triangles (t, 3, 3), by their areas, on a lattice in each: weights (3,), and the triangle."""
+    areas = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1) / 2
+    found = []
+    for k in np.argsort(areas)[-_POINTS:]:
+        steps = max(1, int(np.ceil(np.sqrt(2 * _POINTS * areas[k] / areas.sum()))))
+        lattice = [((i + 1 / 3) / steps, (j + 1 / 3) / steps) for i in range(steps) for j in range(steps - i)]
+        found += [(np.array([1 - x - y, x, y]), triangles[k]) for x, y in lattice]
+    return found
+
+
+def _climbed(weights: Array, triangle: Array, reached: float, distances: _Distances) -> float:
+    """Returns the greatest distance that a climb within the triangle finds."""
+    step = 1 / 4
+    for _ in range(_CLIMBS):
+        moved = [np.maximum(weights + step * move, 0.0) for move in _MOVES]
+        found = [(distances.of(w @ triangle / w.sum()), k) for k, w in enumerate(moved)]
+        distance, k = max(found)
+        if distance > reached:
+            reached, weights = distance, moved[k] / moved[k].sum()
+        else:
+            step /= 2
+    return reached
+
+
+class _Distances:
+    """Gives the distances of points from the nearest of triangles (t, 3, 3)."""
+
+    def __init__(self, triangles: Array) -> None:
+        self._triangles, self._middles = triangles, triangles.mean(axis=1)
+        self._reach = np.linalg.norm(triangles - self._middles[:, None], axis=2).max(axis=1)
+
+    def of(self, point: Array) -> float:
+        """Returns the distance of a point (3,).
+
+        That from a triangle is at least the distance from its middle less the middle's from the corners. So few have to be looked at.
+        """
+        far = np.linalg.norm(self._middles - point, axis=1)
+        return float(np.sqrt(_squared(point, self._triangles[far - self._reach <= far.min()]).min()))
+
+
+def _squared(point: Array, triangles: Array) -> Array:
+    """Returns the squared distances of a point (3,) from triangles (t, 3, 3), (t,).
+
+    The nearest point is on an edge, or it is the foot of the perpendicular where that is inside.
+    """
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    best = np.minimum.reduce([_squared_from_edge(point, p, q) for p, q in ((a, b), (b, c), (c, a))])
+    normal = np.cross(b - a, c - a)
+    area = np.einsum("ij,ij->i", normal, normal)
+    sides = np.array([np.einsum("ij,ij->i", np.cross(q - p, point - p), normal) for p, q in ((a, b), (b, c), (c, a))])
+    inside = (area > 0) & (sides >= 0).all(axis=0)
+    height = np.einsum("ij,ij->i", point - a, normal)
+    return np.where(inside, np.minimum(best, height**2 / np.where(area > 0, area, 1.0)), best)
+
+
+def _squared_from_edge(point: Array, p: Array, q: Array) -> Array:
+    along = q - p
+    length = np.einsum("ij,ij->i", along, along)
+    t = np.clip(np.einsum("ij,ij->i", point - p, along) / np.where(length > 0, length, 1.0), 0.0, 1.0)
+    rest = point - p - t[:, None] * along
+    return np.einsum("ij,ij->i", rest, rest)
