@@ -24,6 +24,19 @@ COLLISION = "collision"
 SHAPES = frozenset(["box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "drake:capsule", "drake:ellipsoid"])
 
 
+def decimals(text: str, counts: tuple[int, ...]) -> list[float] | None:
+    """Returns the numbers in a text, or None where it is anything but finite decimal numbers, as many as one of ``counts``."""
+    words = text.split()
+    numbers = [float(word) for word in words if _NUMBER.fullmatch(word)]
+    plain = text.isascii() and len(numbers) == len(words) and len(numbers) in counts
+    return numbers if plain and all(map(math.isfinite, numbers)) else None
+
+
+def wanted(counts: tuple[int, ...]) -> str:
+    """Returns what :func:`decimals` takes, for people."""
+    return "1 finite decimal number" if counts == (1,) else f"{' or '.join(map(str, counts))} finite decimal numbers"
+
+
 @dataclass(frozen=True)
 class Reference:
     """A reference is the name of another file, as written, and the line where it stands."""
@@ -68,7 +81,10 @@ class ModelFile:
         self.meshes: list[Reference] = []
         self.mesh_directories = ["."]
         self._open: list[Element] = []
-        parse_xml(path, name, "scene_model", self._install)
+        self._read(path)
+
+    def _read(self, path: Path) -> None:
+        parse_xml(path, self.name, "scene_model", self._install)
 
     def _check(self, element: Element, parent: str) -> None:
         raise NotImplementedError
@@ -81,11 +97,8 @@ class ModelFile:
             self.refuse(element, f"the limits of a joint are {lower:g} and {upper:g}; the lower one must not be greater")
 
     def _numbers(self, element: Element, what: str, text: str, counts: tuple[int, ...]) -> list[float]:
-        words = text.split()
-        numbers = [float(word) for word in words if _NUMBER.fullmatch(word)]
-        if not text.isascii() or len(numbers) < len(words) or len(numbers) not in counts or not all(map(math.isfinite, numbers)):
-            wanted = "1 finite decimal number" if counts == (1,) else f"{' or '.join(map(str, counts))} finite decimal numbers"
-            self.refuse(element, f"{what} is {text[:80]!a} instead of {wanted}")
+        if (numbers := decimals(text, counts)) is None:
+            self.refuse(element, f"{what} is {text[:80]!a} instead of {wanted(counts)}")
         return numbers
 
     def _check_geometry(self, element: Element) -> None:

@@ -180,22 +180,18 @@ def test_the_ur3es_reach_is_what_its_data_sheet_says(examples):
 
 
 @pytest.mark.parametrize(
-    ("arm", "limits", "words"),
+    ("name", "arm", "limits", "words"),
     [
         (
+            "arm.sdf",
             '<sdf version="1.7"><model name="arm"><link name="base"/><include><uri>arm.sdf</uri></include></model></sdf>',
             {},
             ["SIGSEGV", "arm.sdf"],
         ),
-        (
-            '<mujoco model="arm"><include file="arm.xml"/><worldbody><body name="base"/></worldbody></mujoco>',
-            {"memory_bytes": 500 * 2**20},
-            ["memory", "arm.xml"],
-        ),
+        ("arm.xml", f'<mujoco model="arm"><!-- {"x" * 2**26} --></mujoco>', {"memory_bytes": 2**26}, ["memory", "scene.yaml"]),
     ],
 )
-def test_a_model_that_ends_drakes_process_ends_nothing_else(tmp_path, arm, limits, words):
-    name = words[-1]
+def test_a_model_that_ends_the_child_ends_nothing_else(tmp_path, name, arm, limits, words):
     path = write(tmp_path, SCENE.replace("arm.urdf", name), files={name: arm})
     with pytest.raises(SceneError) as caught:
         load_scene(path, **limits)
