@@ -99,7 +99,7 @@ FORMATS = [
         (
             "scene_model",
             "directives",
-            "the model begins with <{name}> instead of <mujoco>",
+            "the model begins with <{...}> instead of <mujoco>",
             MEND,
             lambda t: t.scene(scene=MUJOCO, files={"m.xml": "<mujocoinclude/>"}),
         ),
@@ -304,7 +304,13 @@ FORMATS = [
             MEND,
             lambda t: t.scene(**body("<geom type='capsule' fromto='0 0 0 0 0 0' size='1'/>")),
         ),
-        ("scene_model", "directives", "size of a {kind} has too few numbers: {...} instead of {count}", MEND, lambda t: t.scene(**body("<geom/>"))),
+        (
+            "scene_model",
+            "directives",
+            "size of a {kind} has too few numbers: {...} instead of {count}",
+            MEND,
+            lambda t: t.scene(**body("<geom/>")),
+        ),
         (
             "scene_model",
             "directives",

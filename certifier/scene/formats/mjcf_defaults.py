@@ -7,6 +7,7 @@ without an element of the kind: a geom of a class without <geom> gets nothing fr
 from __future__ import annotations
 
 from certifier.errors import close_matches
+from certifier.model import escaped
 from certifier.scene.formats.mjcf_names import ELEMENTS, ORIENTATIONS
 from certifier.scene.formats.mjcf_tree import MEND, Node, refuse
 
@@ -49,7 +50,7 @@ class Defaults:
         for key in sorted(ELEMENTS[node.name].read):
             if found.get(key) != drakes.get(key):
                 empty = next(name for name in chain if (name, node.name) not in self._elements)
-                hint = f'write <{node.name}/> into <default class="{empty[:80]}">'
+                hint = f'write <{node.name}/> into <default class="{escaped(empty[:80])}">'
                 refuse(
                     node,
                     f"{key} comes from a class around {empty[:80]!a}, which has no <{node.name}>: Drake does not look there",

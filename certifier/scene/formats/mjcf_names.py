@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from certifier.errors import close_matches
+from certifier.model import escaped
 from certifier.scene.formats.mjcf_tree import MEND, Node, refuse
 
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
@@ -161,7 +162,7 @@ def check_names(root: Node) -> None:
         SceneError: ``scene_model`` with file and line, for a name that is refused or not known.
     """
     if root.name != "mujoco":
-        refuse(root, f"the model begins with <{root.name}> instead of <mujoco>")
+        refuse(root, f"the model begins with <{escaped(root.name[:80])}> instead of <mujoco>")
     waiting = [root]
     for node in waiting:
         known = ELEMENTS[node.name]
@@ -171,7 +172,11 @@ def check_names(root: Node) -> None:
             if child.name in known.refused_elements:
                 refuse(child, f"<{child.name}> in <{node.name}> is refused: {known.refused_elements[child.name]}")
             if child.name not in names:
-                refuse(child, f"<{child.name[:80]}> in <{node.name}> is not known", hint=close_matches(child.name, sorted(names)) or MEND)
+                refuse(
+                    child,
+                    f"<{escaped(child.name[:80])}> in <{node.name}> is not known",
+                    hint=close_matches(child.name, sorted(names)) or MEND,
+                )
         waiting += node.under(*known.elements)
 
 
@@ -182,4 +187,4 @@ def _check_attributes(node: Node, known: Known) -> None:
         if key in known.refused:
             refuse(node, f"{key} of <{node.name}> is refused: {known.refused[key]}")
         if key not in names:
-            refuse(node, f"{key[:80]} of <{node.name}> is not known", hint=close_matches(key, sorted(names)) or MEND)
+            refuse(node, f"{escaped(key[:80])} of <{node.name}> is not known", hint=close_matches(key, sorted(names)) or MEND)
