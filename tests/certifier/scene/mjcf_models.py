@@ -246,6 +246,8 @@ class Maker:
             element.append(Element("freejoint") if self.maybe() else Element("joint", type="free"))
         for kind in kinds:
             self.joint(element, cls, kind, f"j{self.joints}")
+            if len(kinds) == 1 and self.joints > 1 and self.maybe(0.15):
+                del element[-1].attrib["name"]
         if self.maybe(0.3):
             SubElement(element, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
         still = still and not kinds and not free
@@ -390,6 +392,12 @@ def _gap(maker: Maker) -> None:
     SubElement(body, "geom", {"class": "gap", "size": "0.1 0.1 0.1"})
 
 
+def _without_range(maker: Maker) -> None:
+    for joint in maker.root.iter("joint"):
+        joint.attrib.pop("range", None)
+    next(joint for world in maker.root.iter("worldbody") for joint in world.iter("joint") if "name" in joint.attrib).set("limited", "true")
+
+
 def _without_size(maker: Maker) -> None:
     for geom in maker.root.iter("geom"):
         geom.attrib.pop("size", None)
@@ -438,7 +446,7 @@ SPOILERS: dict[str, Callable[[Maker], None]] = {
     ),
     "huge quat": _into_body("geom", type="box", size="0.1 0.2 0.3", quat="1e200 0 0 1e200"),
     "range without room": _on_some("joint", range="0.1 0.1", limited="auto"),
-    "limited without range": _into_body("joint", limited="true"),
+    "limited without range": _without_range,
     "mocap": _on_some("body", mocap="true"),
     "weld": _into_root("<equality><weld body1='BODY'/></equality>"),
     "coupled joints": _into_root("<equality><joint joint1='JOINT' polycoef='0.1 0 0 0 0'/></equality>"),

@@ -64,13 +64,15 @@ class Oracle:
         """Compares the joints and returns where the position of each stands in MuJoCo, by its number here."""
         model, found = self.model, {}
         ours = {joint.name.removeprefix("robot/"): joint for joint in self.scene.moving}
+        of_body = {joint.child.removeprefix("robot/"): name for name, joint in ours.items()}
         lower, upper = self.scene.own_limits
         for j in range(model.njnt):
             if model.jnt_type[j] not in (_HINGE, _SLIDE):
                 continue
-            joint = ours.pop(model.joint(j).name, None)
+            name = model.joint(j).name or of_body.get(model.body(model.jnt_bodyid[j]).name, "")
+            joint = ours.pop(name, None)
             if joint is None or joint.index is None:
-                self.found.append(f"the joint {model.joint(j).name} is missing")
+                self.found.append(f"the joint {name} is missing")
                 continue
             kind = "revolute" if model.jnt_type[j] == _HINGE else "prismatic"
             limits = model.jnt_range[j] if model.jnt_limited[j] else (-np.inf, np.inf)
