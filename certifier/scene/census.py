@@ -9,18 +9,18 @@ from certifier.errors import SceneError
 from certifier.model import Geometry, Scene
 
 
-def check_counts(written: int | None, read: int, scene: Scene) -> None:
+def check_counts(written: int, read: int, scene: Scene) -> None:
     """Refuses a scene that does not have every collision geometry of its models.
 
     Args:
-        written: the number of collision geometries that the model files have; None where it was not counted.
+        written: the number of collision geometries that the model files have.
         read: the number of proximity geometries that Drake has.
 
     Raises:
         SceneError: ``scene_geometries``.
     """
     kept = sum(map(_parts, scene.geometries))
-    if written is not None and written != read:
+    if written != read:
         message = f"the model files have {written} collision geometries, and Drake has read {read}"
         hint = "find the one that Drake leaves out or makes up, and write it otherwise; docs/scenes.md says what is read of a model"
         raise SceneError("scene_geometries", message, field="directives", hint=hint)

@@ -125,7 +125,8 @@ class StrictReader:
             included = self._read(found, _FORMATS[_suffix(include.file)])
             if isinstance(included, Urdf) and included.unlimited:
                 hint = "leave lower and upper out, or write type revolute"
-                self._refuse(included, included.unlimited[0], "is a continuous joint, whose limits do not count, and Drake would apply them", hint)
+                what = "is a continuous joint, whose limits do not count, and Drake would apply them"
+                self._refuse(included, included.unlimited[0], what, hint)
             count += self._counted(included, found, around)
         return count
 
@@ -200,4 +201,3 @@ def _text(path: Path, name: str) -> str:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         raise SceneError("scene_yaml", f"{name} cannot be read as UTF-8 text", field="directives", hint="is it a YAML file?") from None
-

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from tests.certifier.scene.workshop import BOX, LIMIT
 from tests.errors.rows import rows
-from tests.errors.scenes import BALL_JOINT, MEND, linked, mjcf, room
+from tests.errors.scenes import BALL_JOINT, MEND, MUJOCO, linked, room
+from tests.errors.scenes import mjcf as body
 
 EXPAND = "expand the file with xacro first: xacro FILE > robot.urdf"
 LINK = "<link name='more'/><joint name='{}' type='fixed'><parent link='{}'/><child link='{}'/></joint>"
@@ -13,6 +14,13 @@ ZERO_AXIS = "<joint name='j' type='continuous'><parent link='hand'/><child link=
 
 def turn(limit: str) -> dict[str, str]:
     return {"limit": f"<limit {limit}/>"}
+
+
+PAIR = "<contact><pair geom1='a' geom2='a'/></contact>"
+
+
+def model(text: str) -> dict[str, object]:
+    return {"scene": MUJOCO, "files": {"m.xml": f"<mujoco model='m'>{text}</mujoco>"}}
 
 
 FORMATS = [
@@ -28,7 +36,7 @@ FORMATS = [
         (
             "scene_model",
             "directives",
-            "{what} is {...} instead of {wanted}",
+            "{what} is {...} instead of {...}",
             MEND,
             lambda t: t.scene(shape='<sphere radius="1,5"/>'),
         ),
@@ -263,15 +271,364 @@ FORMATS = [
         ),
     ),
     *rows(
-        "certifier/scene/formats/mjcf.py",
-        ("scene_model", "directives", "<{name}> in a body is not read by Drake", MEND, lambda t: t.scene(**mjcf("<frame/>"))),
-        ("scene_model", "directives", "{key} of <{name}> is not read by Drake", MEND, lambda t: t.scene(**mjcf("<joint refpos='1'/>"))),
+        "certifier/scene/formats/mjcf_tree.py",
+        ("scene_model", "directives", "{key} of <{name}> is {...} instead of {...}", MEND, lambda t: t.scene(**body("<geom size='1,5'/>"))),
         (
             "scene_model",
             "directives",
-            "ref of <{name}> is not read by Drake: measure the joint's positions from 0",
+            "<include> must have the attribute file and nothing else",
             MEND,
-            lambda t: t.scene(**mjcf("<joint ref='1'/>")),
+            lambda t: t.scene(**model("<include/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{...} is no file that was found",
+            "paths start at the directory of the model's first file, also in files that it includes",
+            lambda t: t.scene(**model("<include file='x.xml'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{...} is included twice, which MuJoCo does not accept",
+            MEND,
+            lambda t: t.scene(**model("<include file='m.xml'/>")),
+        ),
+    ),
+    *rows(
+        "certifier/scene/formats/mjcf_names.py",
+        (
+            "scene_model",
+            "directives",
+            "the model begins with <{...}> instead of <mujoco>",
+            MEND,
+            lambda t: t.scene(scene=MUJOCO, files={"m.xml": "<mujocoinclude/>"}),
+        ),
+        ("scene_model", "directives", "<{name}> in <{name}> is refused: {...}", MEND, lambda t: t.scene(**body("<frame/>"))),
+        (
+            "scene_model",
+            "directives",
+            "<{...}> in <{name}> is not known",
+            "did you mean geom?",
+            lambda t: t.scene(**body("<goem size='1'/>")),
+        ),
+        ("scene_model", "directives", "{key} of <{name}> is refused: {...}", MEND, lambda t: t.scene(**body("<geom fitscale='1'/>"))),
+        (
+            "scene_model",
+            "directives",
+            "{...} of <{name}> is not known",
+            "did you mean {...}?",
+            lambda t: t.scene(**body("<geom siez='1'/>")),
+        ),
+    ),
+    *rows(
+        "certifier/scene/formats/mjcf_defaults.py",
+        (
+            "scene_model",
+            "directives",
+            "{key} comes from a class around {...}, which has no <{name}>: Drake does not look there",
+            'write <{name}/> into <default class="{...}">',
+            lambda t: t.scene(**model("<default><geom type='box'/><default class='c'/></default><worldbody><geom class='c'/></worldbody>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "the class of the outer <default> is {...}, and MuJoCo calls it main",
+            "put a <default> around it",
+            lambda t: t.scene(**model("<default class='c'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "a <default> in another one must have a class of its own, and {...} is none",
+            MEND,
+            lambda t: t.scene(**model("<default><default/></default>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "the class {...} has a second <{name}>, and Drake would read only this one",
+            MEND,
+            lambda t: t.scene(**model("<default><geom/><geom/></default>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "the class {...} is not known",
+            "did you mean {...}?",
+            lambda t: t.scene(**body("<geom class='mains'/>")),
+        ),
+    ),
+    *rows(
+        "certifier/scene/formats/mjcf_bodies.py",
+        (
+            "scene_model",
+            "directives",
+            "zaxis is so near to -z that Drake turns it about another axis than MuJoCo",
+            "write it as quat",
+            lambda t: t.scene(**body("<geom zaxis='1e-8 0 -1'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "<{name}> has {...}, and only one orientation is read",
+            MEND,
+            lambda t: t.scene(**body("<geom quat='1 0 0 0' euler='0 0 0'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "the limits of a joint are {lower} and {upper}; the lower one must be less",
+            MEND,
+            lambda t: t.scene(**body("<joint range='1 1'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "a joint of the type {...} is not read",
+            "write a body with a hinge for each of its axes",
+            lambda t: t.scene(**body("<joint type='ball'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "a joint of the type {...} is not read",
+            "types that are read: hinge, slide, free",
+            lambda t: t.scene(**body("<joint type='revolute'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "limited is {...}, and must be true, false or auto",
+            MEND,
+            lambda t: t.scene(**body("<joint limited='yes'/>")),
+        ),
+        ("scene_model", "directives", "the joint is limited and has no range", MEND, lambda t: t.scene(**body("<joint limited='true'/>"))),
+        (
+            "scene_model",
+            "directives",
+            "the joint has a range and autolimits is false, so it must say whether it is limited",
+            MEND,
+            lambda t: t.scene(**model("<compiler autolimits='false'/><worldbody><body><joint range='0 1'/></body></worldbody>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "mocap of <body> is refused: Drake does not read it",
+            "remove it, and weld the body where it stands",
+            lambda t: t.scene(**model("<worldbody><body mocap='true'/></worldbody>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "the body {...} has several joints and a pose that {what}, which Drake puts behind all joints but the last",
+            "write a body for each joint: the outer one has the pose and the first joint, and each of the others is in the one before",
+            lambda t: t.scene(**model("<worldbody><body pos='1 0 0'><joint/><joint/></body></worldbody>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "a body with a free joint must have no other joint",
+            MEND,
+            lambda t: t.scene(**body("<joint/><freejoint/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "a free joint is only read in a body of <worldbody>",
+            MEND,
+            lambda t: t.scene(**body("<body><freejoint/></body>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "align of <freejoint> is refused: MuJoCo moves the body's frame, and Drake does not",
+            "remove it",
+            lambda t: t.scene(**body("<freejoint align='true'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "the axes in xyaxes of <{name}> must not be parallel",
+            MEND,
+            lambda t: t.scene(**body("<geom xyaxes='1 0 0 2 0 0'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{key} of <{name}> has the length {length}; it must be from {...} to {...}",
+            MEND,
+            lambda t: t.scene(**body("<joint axis='0 0 0'/>")),
+        ),
+    ),
+    *rows(
+        "certifier/scene/formats/mjcf_geoms.py",
+        (
+            "scene_model",
+            "directives",
+            "{key} of <geom> is {...} instead of a whole number of at most 9 digits",
+            MEND,
+            lambda t: t.scene(**body("<geom contype='0x1'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "a geom of the type {...} is not read",
+            "types that are read: {...}",
+            lambda t: t.scene(**body("<geom type='hfield'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "a {kind} with a mesh is not read: MuJoCo fits it to the mesh",
+            "remove mesh, and write the size",
+            lambda t: t.scene(**body("<geom mesh='m'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "fromto of a {kind} is not read",
+            "write pos, an orientation and size",
+            lambda t: t.scene(**body("<geom type='box' fromto='0 0 0 1 0 0' size='1'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "<geom> has fromto and {...}, and MuJoCo accepts only one of them",
+            MEND,
+            lambda t: t.scene(**body("<geom type='capsule' fromto='0 0 0 1 0 0' pos='1 0 0' size='1'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "the ends of fromto must be at least {_SHORT} m from each other",
+            MEND,
+            lambda t: t.scene(**body("<geom type='capsule' fromto='0 0 0 0 0 0' size='1'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "size of a {kind} has too few numbers: {...} instead of {count}",
+            MEND,
+            lambda t: t.scene(**body("<geom/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "size of a {kind} must be positive, and {...} is in it",
+            MEND,
+            lambda t: t.scene(**body("<geom size='0'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "a plane needs 3 numbers in size: two that are not negative, and one that is positive",
+            MEND,
+            lambda t: t.scene(**body("<geom type='plane'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "a plane is only read on a body that does not move",
+            "use a box",
+            lambda t: t.scene(**body("<joint/><geom type='plane' size='1 1 1'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "a second mesh is called {...}",
+            MEND,
+            lambda t: t.scene(**model("<asset><mesh file='m.obj'/><mesh name='m' file='n.obj'/></asset>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "the mesh {...} of <geom> is not known",
+            MEND,
+            lambda t: t.scene(**body("<geom type='mesh' mesh='m'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "the <mesh> has no file, and Drake reads meshes only from files",
+            MEND,
+            lambda t: t.scene(**model("<asset><mesh name='m'/></asset><worldbody><geom type='mesh' mesh='m'/></worldbody>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{...} {what} only OBJ meshes are read",
+            "convert it to OBJ, or remove what is only drawn",
+            lambda t: t.scene(**model("<asset><mesh file='m.stl'/></asset>")),
+        ),
+    ),
+    *rows(
+        "certifier/scene/formats/mjcf_contacts.py",
+        (
+            "scene_model",
+            "directives",
+            "Drake leaves out this <pair>: contype and conaffinity of {...} are 0",
+            "give its geoms the bits 1, and name pairs that never collide in <exclude>",
+            lambda t: t.scene(**model("<worldbody><geom name='a' size='1' contype='0' conaffinity='0'/></worldbody>" + PAIR)),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{message}: their bodies are one, neighbours or excluded",
+            "remove the <pair>, or the <exclude>",
+            lambda t: t.scene(**model("<worldbody><geom name='a' size='1'/></worldbody><contact><pair geom1='a' geom2='a'/></contact>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{key} of <{name}> is {...}, which is no {what} of the model",
+            "did you mean {...}?",
+            lambda t: t.scene(**model("<worldbody><geom name='a' size='1'/></worldbody><contact><pair geom1='aa' geom2='a'/></contact>")),
+        ),
+    ),
+    *rows(
+        "certifier/scene/formats/mjcf.py",
+        (
+            "scene_model",
+            "directives",
+            "{key} of <compiler> is {...}, and must be {...}",
+            MEND,
+            lambda t: t.scene(**model("<compiler angle='rad'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{...} is what Drake calls another geom of the body as well, which has no name",
+            "name both",
+            lambda t: t.scene(**body("<geom size='1'/><geom name='geom0' size='1'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "the name {...} of <{name}> is empty or taken",
+            "give it a name of its own",
+            lambda t: t.scene(**body("<geom name='a' size='1'/><geom name='a' size='1'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "<{name}> in <equality> is refused: only joints that move freely are read",
+            "remove it, or set active to false; a region then holds for joints that move freely, and so for coupled ones",
+            lambda t: t.scene(**model("<equality><weld/></equality>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "range of <{name}> is refused: limits of tendons are not read",
+            "remove the range; a region then holds for joints that move freely, and so for limited ones",
+            lambda t: t.scene(**model("<tendon><fixed range='0 1'/></tendon>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "filterparent of <flag> is refused: bodies that a joint connects make no pair here",
+            "remove it",
+            lambda t: t.scene(**model("<option><flag filterparent='disable'/></option>")),
         ),
     ),
 ]

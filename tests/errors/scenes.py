@@ -25,6 +25,9 @@ MIMIC += '<limit lower="-1" upper="2" effort="1" velocity="1"/></joint><link nam
 FREE = SCENE.replace("  - add_weld: {parent: world, child: room::walls}\n", "")
 SDF_SHAPE = """<sdf version="1.7"><model name="room"><link name="walls"><collision name="wall"><geometry>{}</geometry></collision></link>
 </model></sdf>"""
+MOVING_PLANE = """<sdf version="1.7"><model name="arm"><link name="base"/><link name="hand"><collision name="palm">
+<geometry><plane/></geometry></collision></link>
+<joint name="turn" type="revolute"><parent>base</parent><child>hand</child><axis><xyz>0 0 1</xyz></axis></joint></model></sdf>"""
 FAR = (
     """<robot name="r"><link name="base"/><link name="hand"/>
 <joint name="turn" type="revolute"><parent link="base"/><child link="hand"/><axis xyz="0 0 1"/>
@@ -440,7 +443,7 @@ MODELS = [
             "directives",
             "geometry {name} is a half-space on a body that moves",
             "use a box",
-            lambda t: t.scene(**mjcf("<joint name='j' range='-60 60'/><geom size='0.1'/><geom type='plane' size='1 1 1'/>")),
+            lambda t: t.scene(SCENE.replace("arm.urdf", "arm.sdf"), files={"arm.sdf": MOVING_PLANE}),
         ),
         (
             "unsupported_shape",

@@ -24,6 +24,19 @@ COLLISION = "collision"
 SHAPES = frozenset(["box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "drake:capsule", "drake:ellipsoid", "empty"])
 
 
+def decimals(text: str, counts: tuple[int, ...]) -> list[float] | None:
+    """Returns the numbers in a text, or None where it is anything but finite decimal numbers, as many as one of ``counts``."""
+    words = text.split()
+    numbers = [float(word) for word in words if _NUMBER.fullmatch(word)]
+    plain = text.isascii() and len(numbers) == len(words) and len(numbers) in counts
+    return numbers if plain and all(map(math.isfinite, numbers)) else None
+
+
+def wanted(counts: tuple[int, ...]) -> str:
+    """Returns what :func:`decimals` takes, for people."""
+    return "1 finite decimal number" if counts == (1,) else f"{' or '.join(map(str, counts))} finite decimal numbers"
+
+
 @dataclass(frozen=True)
 class Reference:
     """A reference is the name of another file or of a geometry, as written, and the line where it stands."""
@@ -54,7 +67,7 @@ class ModelFile:
         includes: model files that this one includes.
         meshes: files of collision geometry.
         mesh_directories: directories of the meshes, relative to the model.
-        collisions: the collision geometries of this file, each by its name or shape; None where the format does not count them.
+        collisions: the collision geometries of this file, each by its name or else its shape.
 
     Raises:
         SceneError: ``scene_model`` or ``unsupported_joint`` with the file and the line, when the file is not accepted.
@@ -70,9 +83,12 @@ class ModelFile:
         self.includes: list[Reference] = []
         self.meshes: list[Reference] = []
         self.mesh_directories = ["."]
-        self.collisions: list[Reference] | None = None
+        self.collisions: list[Reference] = []
         self._open: list[Element] = []
-        parse_xml(path, name, "scene_model", self._install)
+        self._read(path)
+
+    def _read(self, path: Path) -> None:
+        parse_xml(path, self.name, "scene_model", self._install)
 
     def _begin(self, element: Element, parent: str) -> None:
         """Checks an element where it begins, before anything in it."""
@@ -89,11 +105,8 @@ class ModelFile:
             self.refuse(element, f"the limits of a joint are {lower:g} and {upper:g}; the lower one must not be greater")
 
     def _numbers(self, element: Element, what: str, text: str, counts: tuple[int, ...]) -> list[float]:
-        words = text.split()
-        numbers = [float(word) for word in words if _NUMBER.fullmatch(word)]
-        if not text.isascii() or len(numbers) < len(words) or len(numbers) not in counts or not all(map(math.isfinite, numbers)):
-            wanted = "1 finite decimal number" if counts == (1,) else f"{' or '.join(map(str, counts))} finite decimal numbers"
-            self.refuse(element, f"{what} is {text[:80]!a} instead of {wanted}")
+        if (numbers := decimals(text, counts)) is None:
+            self.refuse(element, f"{what} is {text[:80]!a} instead of {wanted(counts)}")
         return numbers
 
     def _check_geometry(self, element: Element) -> None:

@@ -46,9 +46,7 @@ class Sdf(ModelFile):
 
     def __init__(self, path: Path, name: str) -> None:
         self._limits: dict[str, float] = {}
-        self._found: list[Reference] = []
         super().__init__(path, name)
-        self.collisions = self._found
 
     def _check(self, element: Element, parent: str) -> None:
         self._check_name(element, parent)
@@ -115,7 +113,7 @@ class Sdf(ModelFile):
                 self._check_geometry(element)
                 for shape in element.children:
                     if shape != "empty":
-                        self._found.append(Reference(shape, element.line))
+                        self.collisions.append(Reference(shape, element.line))
                 if not element.children:
                     self.refuse(element, "<geometry> has no shape; <empty/> would say that there is none")
             case "joint":

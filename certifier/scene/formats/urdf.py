@@ -36,7 +36,6 @@ class Urdf(ModelFile):
     """Reads URDF, where numbers are attributes.
 
     Attributes:
-        collisions: the collision geometries, each by its name or else its shape.
         unlimited: the continuous joints that have limits, which do not count in URDF.
     """
 
@@ -53,7 +52,6 @@ class Urdf(ModelFile):
     _SIZES = frozenset(["size", "radius", "length", "a", "b", "c"])
 
     def __init__(self, path: Path, name: str) -> None:
-        self.collisions: list[Reference] = []
         self.unlimited: list[Reference] = []
         self._opaque = set(OPAQUE)
         """Elements that are not looked into."""

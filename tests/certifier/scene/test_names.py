@@ -138,9 +138,9 @@ def test_geometries_of_files_that_are_added_again_count_again(tmp_path: Path, mo
         "<child>t</child><axis><limit><lower>-1</lower><upper>1</upper></limit></axis></joint></model></sdf>",
         "more.yaml": f"directives:\n{model('third', 'package://here/room.sdf', 'walls')}{model('fourth', 'package://here/arm.sdf', 'b')}",
     }
-    scene = "packages: {here: .}\n" + SCENE.replace("arm.urdf", "arm.sdf").replace("arm::base", "arm::b")
+    scene = "packages: {here: .}\n" + SCENE
     read = parsed(write(tmp_path, scene + model("second", "room.sdf", "walls") + more, files=files))
-    assert counted == [len(read.geometries)] == [5 + 3 * bool(more)]
+    assert counted == [len(read.geometries)] == [6 + 3 * bool(more)]
 
 
 def test_a_geometry_that_drake_leaves_out_is_missed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -85,13 +85,12 @@ REFUSED = [
     (mjcf(geom='size="0.1" quat="1 0 0 1abc"'), "arm.xml:5", "quat of <geom>"),
     (mjcf(body='pos="0 0 1,5"'), "arm.xml:3", "pos of <body>"),
     (mjcf(body='mocap="true"'), "arm.xml:3", "mocap"),
-    (mjcf(joint='ref="0.5"'), "arm.xml:4", "ref of <joint>"),
     (mjcf(top='<default><geom pos="0 0 1,5"/></default>'), "arm.xml:1", "pos of <geom>"),
     (mjcf(more='<frame pos="5 0 0"><geom size="2"/></frame>'), "arm.xml:6", "<frame>"),
     (mjcf(more='<replicate count="3"><geom size="2"/></replicate>'), "arm.xml:6", "<replicate>"),
     (mjcf(top='<asset><mesh file="t.obj" refpos="1 0 0"/></asset>', **{"t.obj": TETRAHEDRON}), "arm.xml:1", "refpos"),
     (mjcf(more='<include file="p.txt"/>', **{"p.txt": '<mujoco>\n<geom size="1,5"/></mujoco>'}), "p.txt:2", "size of <geom>"),
-    (mjcf(more='<geom type="mesh" mesh="none"/>'), "arm.xml:6", "unknown mesh"),
+    (mjcf(more='<geom type="mesh" mesh="none"/>'), "arm.xml:6", "the mesh 'none' of <geom> is not known"),
     (mjcf(more='<geom type="hfield" size="1"/>'), "arm.xml:6", "hfield"),
 ]
 
@@ -134,7 +133,7 @@ def test_a_drawn_mesh_may_be_of_another_kind(tmp_path):
         sdf(more='<plugin name="p" filename="p.so"><pose>x</pose><pose>y</pose></plugin>'),
         mjcf(),
         mjcf(top='<asset><mesh name="m" file="t.obj"/></asset>', geom='type="mesh" mesh="m"', **{"t.obj": TETRAHEDRON}),
-        mjcf(geom='type="capsule" fromto="0 0 0 0.3 0 0" size="0.05 9"', joint='ref="0"', body='euler="0 0 90"'),
+        mjcf(geom='type="capsule" fromto="0 0 0 0.3 0 0" size="0.05 9"', joint='ref="20"', body='euler="0 0 90"'),
         mjcf(more='<site size="x"/>', top='<option timestep="abc"/>'),
     ],
 )
