@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from certifier.errors import ProofError, RegionError
+from certifier.errors import ProofError
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
 from certifier.motion.given import motion_of, padding_of
 from certifier.motion.search import Approach, Stop, search
@@ -106,8 +106,8 @@ def certify(scene: Scene, motion: Motion, tube: bool = False, padding: float = 0
     data = found.proof.to_bytes()
     statement = verify_motion(MotionProof.from_bytes(data, scene))
     if statement.gap < 2 * padding:
-        problem = f"the planes keep the bodies {statement.gap} m apart and not {2 * padding} m, as the padding of the request asks for"
-        raise ProofError("proof_motion", problem)
+        problem = f"the proof shows that the bodies are {statement.gap} m apart, and the padding of the request asks for {2 * padding} m"
+        raise ProofError("proof_motion", problem, field="padding", hint="ask for a little less")
     verified = time.perf_counter()
     proof, intervals, seconds = with_scene(data, scene), len(found.proof.ends), (verified - start, verified - searched)
     return MotionVerdict(scene, motion, statement, proof, found.stop, found.nearest, padding, intervals, *seconds)

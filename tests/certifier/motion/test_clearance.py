@@ -134,7 +134,7 @@ def test_a_proof_that_shows_less_than_the_padding_is_not_handed_out(monkeypatch)
     monkeypatch.setattr("certifier.jobs.motion.verify_motion", lambda proof: MotionStatement(scene, motion, 1.0, 0.0, 0.09))
     with pytest.raises(ProofError) as refusal:
         certify(scene, motion, padding=0.0499)
-    assert refusal.value.code == "proof_motion"
+    assert (refusal.value.code, refusal.value.field) == ("proof_motion", "padding")
 
 
 @pytest.mark.parametrize("padding", [-1e-9, np.inf, np.nan, 1e7])
