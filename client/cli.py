@@ -387,6 +387,13 @@ def _parser() -> argparse.ArgumentParser:
     verify.add_argument("proof", metavar="PROOF")
     verify.set_defaults(run="client.verify:verify")
 
+    clearance = verbs.add_parser(
+        "clearance", parents=[json], help="prove how far apart the bodies are all over a region, from its proof file"
+    )
+    clearance.add_argument("proof", metavar="PROOF")
+    clearance.add_argument("--out", metavar="FILE", help="new file for the proof of the clearance; default: none")
+    clearance.set_defaults(run="client.clearance:clearance")
+
     job = _group(verbs.add_parser("job", help="list, show, follow, cancel, retry and delete jobs of the service"))
     ls = job.add_parser("ls", parents=[remote, json], help="list jobs, newest first")
     ls.add_argument("--state", help="list only jobs in this state: queued, running, succeeded, failed, cancelled and others")

@@ -188,7 +188,9 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     service.ended(ask("POST", "/v1/jobs", certify))
     wide = {**certify, "polytope": {"C": [[1, 0]], "d": [2.0]}, "cells": 20}
     service.ended(ask("POST", "/v1/jobs", wide))
-    motion = service.ended(ask("POST", "/v1/jobs", {"kind": "certify-path", "scene": name, "q": [home, away], "tube": True, "clearance": True}))
+    motion = service.ended(
+        ask("POST", "/v1/jobs", {"kind": "certify-path", "scene": name, "q": [home, away], "tube": True, "clearance": True})
+    )
     ask("GET", "/v1/jobs/{job_id}/motion", job_id=motion["id"])
     other = ask("POST", "/v1/jobs", {"kind": "cover", "scene": name, "options": {"coverage": 0.6, "regions": 3}, "deadline_seconds": 40})
     service.ended(other)
@@ -287,7 +289,15 @@ def offered(scene: str, home: list[float], away: list[float], region: str) -> di
             {**more, "kind": "grow", "seed": {"method": "polytope", "q": home, **faces, "half_width": 0.1}},
             {**more, "kind": "certify", "polytope": faces, "cells": 100, "random_seed": 1},
             {**more, "kind": "recertify", "region": region, "random_seed": 1},
-            {**more, "kind": "certify-path", "s": [[0.2, 0.15], [0.3, 0.25]], "space": "s", "tube": True, "padding": 0.002, "clearance": True},
+            {
+                **more,
+                "kind": "certify-path",
+                "s": [[0.2, 0.15], [0.3, 0.25]],
+                "space": "s",
+                "tube": True,
+                "padding": 0.002,
+                "clearance": True,
+            },
             {**more, "kind": "certify-path", "bezier": [curve]},
             {**more, "kind": "certify-path", "knots": knots, "control_points": curve},
             {**more, "kind": "cover", "options": {**covering, "cells": 1000, "stages": 1, "random_seed": 1}},
