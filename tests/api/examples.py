@@ -29,6 +29,12 @@ from tests.workers.service import environment
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FILE = Path(__file__).parents[2] / "api" / "examples.json"
 PAIR = {"a": "arm/upper/bar", "b": "arm/lower/bar"}
+CERTAIN = {
+    "tube": 0.012,
+    "clearance": 0.0141,
+    "nearest": {"a": "arm/upper/bar", "b": "world/post", "piece": 0, "time": 0.25, "q": [0.4, 0.3], "distance": 0.0142},
+}
+"""A motion that is certified has these."""
 SELDOM: dict[str, dict[str, Any]] = {
     "IgnoredPair": {**PAIR, "reason": "neighbours: the joint between them always overlaps"},
     "Substitution": {"geometry": "arm/flange/disc", "substitution": "a capsule around a cylinder", "inflation": 0.003},
@@ -41,10 +47,10 @@ SELDOM: dict[str, dict[str, Any]] = {
         "trace": "0af7651916cd43dd8448eb211c80319c",
     },
     "HeldWork": {"job": "1f9b2a7c-5b0e-4b58-9c39-2f1d6a3c8e10"},
-    "JobMotion": {"tube": 0.012},
+    "JobMotion": CERTAIN,
     "KeyPage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
     "KeySummary": {"revoked_at": "2026-05-01T08:00:00Z"},
-    "MotionResponse": {"tube": 0.012},
+    "MotionResponse": CERTAIN,
     "Obstacle": {"faces": 4, "lost": 0.013},
     "PairCell": {"witness_q": [0.4, 0.3], "open_cells": 12},
     "PairMatrix": {"next": "3.41"},
