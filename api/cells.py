@@ -82,6 +82,7 @@ def of_region(scene: Scene, region: RegionRow, known: Sequence[ProofOutline]) ->
             b=pair.b,
             kind=_kind(known[number[index]]),
             cells=sum(known[number[index]].cells.counts),
+            proved_distance=proved[index]["margin"],
             margin=proved[index]["margin"],
             shares_with=[other for other in covers[number[index]] if other != index],
         )

@@ -15,7 +15,7 @@ from api.schemas.motions import GivenMotion
 from certifier.carry.robot import same_bodies
 from certifier.errors import CirisError, RegionError
 from certifier.model import Array, Scene
-from certifier.motion.given import motion_of
+from certifier.motion.given import motion_of, padding_of
 from certifier.proof.motion import Space
 from certifier.seeding.limits import check_limits
 from certifier.seeding.options import SeedOptions
@@ -82,11 +82,13 @@ def polytope(scene: Scene, body: PolytopeBody) -> None:
 
 
 def motion(scene: Scene, body: GivenMotion) -> dict[str, Any]:
-    """Returns the motion of a request as certifier.motion.given.motion_of takes it, with ``space`` where it was given, and ``tube``.
+    """Returns the motion of a request as certifier.motion.given.motion_of takes it, with ``space`` where it was given, ``tube``,
+    ``padding`` and ``clearance``.
 
     Raises:
         RegionError: as motion_of; the field names the place.
     """
+    padding_of(body.padding)
     document = body.model_dump(mode="json", include=set(GivenMotion.model_fields), exclude_none=True)
     motion_of(scene, document, Space(body.space) if body.space else None)
     return document

@@ -289,13 +289,13 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Contact(Place):
-    """Where a motion first could not be certified."""
+class Approach(Place):
+    """A place on a motion, and a pair of bodies with its distance there."""
 
     a: str
     b: str
     distance: float
-    """How far the padded bodies are apart there, in metres; 0 where they overlap."""
+    """How far the bodies, with the scene's padding, are apart there, in metres, in floating point; 0 where they overlap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,14 +304,23 @@ class Motion:
 
     outcome: Outcome
     guarantee: Guarantee
-    margin: float | None
-    """A lower bound of all padded distances as far as it is certified, in metres."""
+    padding: float
+    """Metres that were added around every body, beyond the scene's padding."""
+    proved_distance: float | None
+    """The distance of the padded bodies that the proof happens to show as far as the motion is certified, in metres. They may be many times
+    as far apart; ``clearance`` says how far."""
+    clearance: float | None
+    """A proved lower bound in metres of the distance of the padded bodies, in the tube as well. Without a tube, it is that of ``nearest``
+    to 10 % and to 0.1 mm. None where it was not asked for, and as docs/motions.md says."""
+    nearest: Approach | None
+    """Where the padded bodies come closest; None where ``clearance`` is."""
     tube: float | None
     """Joint positions that are off by this much, in radians or metres, are certified as well."""
     certified_to: Place | None
     """Up to where every pair is proved to be apart; None where nothing is proved."""
-    stop: Contact | None
-    """The first contact, or where bodies come too close; None for a motion that is certified."""
+    stop: Approach | None
+    """The first contact, or where bodies first come nearer than ``padding`` allows, or too close to tell; None for a motion that is
+    certified."""
     seconds: float
     proof: bytes | None = field(repr=False)
     """The proof file; None where it was not asked for."""
@@ -322,6 +331,11 @@ class Motion:
     def __repr__(self) -> str:
         where = "" if self.stop is None else f": {self.stop.a} and {self.stop.b}"
         return f"Motion({self.outcome.value}{where})"
+
+    @property
+    def margin(self) -> float | None:
+        """Returns ``proved_distance``, by the name that it had first."""
+        return self.proved_distance
 
 
 @dataclass(frozen=True)

@@ -367,6 +367,16 @@ def _parser() -> argparse.ArgumentParser:
         "--space", choices=["q", "s"], help="straight in q or s; default: as given. Of a spline, what its control points are; default: q"
     )
     motion.add_argument("--tube", action="store_true", help="look for the largest certified tube about the motion")
+    motion.add_argument(
+        "--clearance", action="store_true", help="prove nearly the least distance of the bodies, to 10 %% and 0.1 mm, and say where it is"
+    )
+    motion.add_argument(
+        "--padding",
+        type=float,
+        metavar="METRES",
+        default=0.0,
+        help="prove the motion with this much added around every body, beyond the scene's padding; default: 0",
+    )
     motion.add_argument("--local", action="store_true", help="certify in this process, without a service")
     motion.add_argument("--job", action="store_true", help="have it done by a job of the service, for a motion that takes minutes")
     motion.add_argument("--deadline", type=float, metavar="SECONDS", help="with --job: end after so long without a verdict; default: none")
@@ -376,6 +386,13 @@ def _parser() -> argparse.ArgumentParser:
     verify = verbs.add_parser("verify", parents=[json], help="check a proof file offline and say what was proved")
     verify.add_argument("proof", metavar="PROOF")
     verify.set_defaults(run="client.verify:verify")
+
+    clearance = verbs.add_parser(
+        "clearance", parents=[json], help="prove how far apart the bodies are all over a region, from its proof file"
+    )
+    clearance.add_argument("proof", metavar="PROOF")
+    clearance.add_argument("--out", metavar="FILE", help="new file for the proof of the clearance; default: none")
+    clearance.set_defaults(run="client.clearance:clearance")
 
     job = _group(verbs.add_parser("job", help="list, show, follow, cancel, retry and delete jobs of the service"))
     ls = job.add_parser("ls", parents=[remote, json], help="list jobs, newest first")

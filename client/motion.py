@@ -8,6 +8,7 @@ from argparse import Namespace
 from typing import Any
 
 from certifier.errors import CirisError
+from certifier.motion.given import padding_of
 from certifier.proof.motion import Space
 from certifier.verify.decimals import at_least_mm, rounded_down
 from ciris.answers import Document
@@ -56,15 +57,17 @@ def _here(args: Namespace, path: PathFile) -> tuple[dict[str, Any], bytes | None
     from certifier.jobs.motion import certify
     from certifier.motion.given import motion_of
 
-    verdict = certify(scene, motion_of(scene, path.motion, Space(args.space) if args.space else None), args.tube)
+    motion = motion_of(scene, path.motion, Space(args.space) if args.space else None)
+    verdict = certify(scene, motion, args.tube, padding_of(args.padding), args.clearance)
     return verdict.document(), verdict.proof
 
 
 def _by_service(args: Namespace, path: PathFile) -> tuple[dict[str, Any], bytes | None]:
     """Returns the document of the service's verdict, and the proof where it was asked for and there is one."""
+    padding_of(args.padding)
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)["id"]
-        asked = {"scene": scene, **path.document(), "space": args.space, "tube": args.tube}
+        asked = {"scene": scene, **path.document(), **{name: getattr(args, name) for name in ("space", "tube", "padding", "clearance")}}
         if args.job:
             return _by_job(client, {**asked, "kind": "certify-path", "deadline_seconds": args.deadline}, args.out is not None)
         document = client.certify_path({**asked, "prove": args.out is not None})
@@ -80,7 +83,7 @@ def _by_job(client: Client, request: Document, prove: bool) -> tuple[dict[str, A
 
 def _timed(document: dict[str, Any], path: PathFile) -> dict[str, Any]:
     """Returns the document with the file's own time, ``t``, at each place on the motion; None where the file has no times."""
-    places = {name: document[name] for name in ("certified_to", "stop") if document[name]}
+    places = {name: document[name] for name in ("certified_to", "nearest", "stop") if document[name]}
     for place in places.values():
         start = place["piece"]
         place["t"] = None if path.times is None else float(path.times[start] + place["time"] * (path.times[start + 1] - path.times[start]))
@@ -90,10 +93,8 @@ def _timed(document: dict[str, Any], path: PathFile) -> dict[str, Any]:
 def _print(document: dict[str, Any]) -> None:
     stop, certified, tube, degree = (document[name] for name in ("stop", "certified_to", "tube", "degree"))
     if stop:
-        apart = f"are {at_least_mm(stop['distance'])} apart"
-        how = {"refuted": "touch", "too_close": f"{apart}, too close to tell,"}.get(document["outcome"], f"{apart} where the search ended,")
-        print(f"{stop['a']} and {stop['b']} {how} {_place(stop, degree)}")
-        print(f"q = {', '.join(f'{value:.6g}' for value in stop['q'])}")
+        print(f"{stop['a']} and {stop['b']} {_how(document)} {_place(stop, degree)}")
+        print(f"q = {_joints(stop)}")
         print(f"all pairs are certified up to {_place(certified, degree)}" if certified else "nothing is certified before that")
     pieces = document["waypoints"] - 1
     what = f"{pieces + 1} waypoints, straight" if degree == 1 else f"{pieces} piece{'s' * (pieces > 1)} of degree {degree}"
@@ -101,8 +102,10 @@ def _print(document: dict[str, Any]) -> None:
         ("motion", f"{document['scene']['name']}, {what} in {document['space']}"),
         ("outcome", f"{output.plain(document['outcome'])}, guarantee {document['guarantee']}"),
     ]
+    if document["padding"]:
+        facts.append(("padding", f"{document['padding']:.9g} m around every body, beyond the scene's"))
     if not stop:
-        facts.append(("margin", f"at least {output.margin(document['margin'])}, padded"))
+        facts += _distances(document)
     if tube:
         facts.append(("tube", f"every joint up to {rounded_down(tube)} rad ({rounded_down(math.degrees(tube))} deg) or m off the motion"))
     facts.append(("time", f"{output.seconds(document['seconds'])}, {document['intervals']} intervals"))
@@ -111,6 +114,33 @@ def _print(document: dict[str, Any]) -> None:
     elif certified:
         facts.append(("proof", "verified and not kept; --out FILE keeps it"))
     output.print_facts(facts)
+
+
+def _how(document: dict[str, Any]) -> str:
+    """Returns what the two bodies do where a motion first could not be certified."""
+    apart = f"are {at_least_mm(document['stop']['distance'])} apart"
+    if document["outcome"] == "refuted":
+        return f"{apart}, less than the padding asks for," if document["padding"] else "touch"
+    return f"{apart}, too close to tell," if document["outcome"] == "too_close" else f"{apart} where the search ended,"
+
+
+def _distances(document: dict[str, Any]) -> list[tuple[str, str]]:
+    """Returns how far apart the bodies of a motion that is certified are."""
+    nearest, where = document["nearest"], " in the tube" if document["tube"] else ""
+    if nearest is None:
+        shown = f"at least {at_least_mm(document['proved_distance'])}, padded{where}; they may be much farther apart (--clearance)"
+        return [("proved distance", shown)]
+    closest = f"{nearest['a']} - {nearest['b']}, {1000 * nearest['distance']:.6g} mm apart {_place(nearest, document['degree'])}"
+    return [
+        ("clearance", f"at least {at_least_mm(document['clearance'])}, padded, proved{where}"),
+        ("closest", closest),
+        ("", f"q = {_joints(nearest)}"),
+    ]
+
+
+def _joints(place: dict[str, Any]) -> str:
+    """Returns the joint positions of a place for people."""
+    return ", ".join(f"{value:.6g}" for value in place["q"])
 
 
 def _place(place: dict[str, Any], degree: int) -> str:

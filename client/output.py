@@ -109,7 +109,7 @@ def seconds(value: float | None, whole: bool = False) -> str:
     return f"{value:.2f} s" if value < 10 and not whole else f"{value:.0f} s" if value < 600 else f"{value / 60:.0f} min"
 
 
-def margin(value: float | None) -> str:
+def distance(value: float | None) -> str:
     """Returns a lower bound of a distance, in metres, as a text for people that is no larger."""
     return "-" if value is None else at_least_mm(value)
 
@@ -134,10 +134,10 @@ def print_pairs(pairs: Iterable[dict[str, Any]]) -> None:
     ordered = sorted(pairs, key=lambda pair: pair["outcome"] != "certified")
     timed = any("stage" in pair for pair in ordered)
     rows = [
-        (f"{p['a']} - {p['b']}", plain(p["outcome"]), margin(p["margin"]), *((plain(p["stage"]), seconds(p["seconds"])) if timed else ()))
+        (f"{p['a']} - {p['b']}", plain(p["outcome"]), distance(p["margin"]), *((plain(p["stage"]), seconds(p["seconds"])) if timed else ()))
         for p in ordered
     ]
-    print_table(("pair", "outcome", "margin", *(("stage", "time") if timed else ())), rows, right="margin time")
+    print_table(("pair", "outcome", "proved_distance", *(("stage", "time") if timed else ())), rows, right="proved_distance time")
 
 
 def _range(known: dict[str, Any]) -> str:
@@ -157,7 +157,7 @@ def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()
     pairs, space = manifest["pairs"], manifest["space"]
     limits = 2 * len(space["joints"])
     faces = len(manifest["halfspace_offsets"])
-    closest = min((p for p in pairs if p["margin"] is not None), key=lambda p: p["margin"], default=None)
+    least = min((p for p in pairs if p["margin"] is not None), key=lambda p: p["margin"], default=None)
     # Regions that an earlier checkout stored have neither.
     ranges, kept = manifest.get("joint_ranges", {}), manifest.get("share")
     moves = [f"{name}: {_range(r)}" for name, r in ranges.items()] or space["joints"]
@@ -169,7 +169,7 @@ def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()
             ("volume", q_volume(manifest.get("q_volume"))),
             *([("share", f"{share(kept)} of the proposal's collision-free part")] if kept else []),
             ("pairs", f"{sum(p['outcome'] == 'certified' for p in pairs)} of {len(pairs)} certified, {len(manifest['ignored'])} ignored"),
-            *([("margin", f"at least {margin(closest['margin'])}: {closest['a']} - {closest['b']}")] if closest else []),
+            *([("proved distance", f"at least {distance(least['margin'])}: {least['a']} - {least['b']}")] if least else []),
             ("guarantee", manifest["guarantee"]),
             *extra,
         ]

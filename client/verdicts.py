@@ -32,5 +32,5 @@ def document(
         "outcome": outcome.value,
         "guarantee": guarantee.value,
         "seconds": seconds,
-        "pairs": [{key: pair[key] for key in ("a", "b", *_RESULT)} for pair in pairs],
+        "pairs": [{**{key: pair[key] for key in ("a", "b", *_RESULT)}, "proved_distance": pair["margin"]} for pair in pairs],
     }

@@ -37,7 +37,7 @@ def verify(args: Namespace) -> int:
     Raises:
         CirisError: the file cannot be read.
     """
-    with _readable(Path(args.proof)) as path:
+    with readable(Path(args.proof)) as path:
         found = _answer(path)
     if args.json:
         print_json(found)
@@ -52,7 +52,7 @@ def verify(args: Namespace) -> int:
 
 
 @contextmanager
-def _readable(path: Path) -> Iterator[Path]:
+def readable(path: Path) -> Iterator[Path]:
     """Yields a path at which a child process finds the proof: the file itself, or a copy of what comes from a pipe.
 
     Raises:

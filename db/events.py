@@ -18,7 +18,7 @@ def emit(session: Session, job: JobRow, kind: str, data: dict[str, Any]) -> None
 
     - ``job``: state, outcome, reason;
     - ``iteration``: index, label, state, pairs, parts;
-    - ``pairs``: iteration, and pairs (each with index, part, state, stage, margin, seconds);
+    - ``pairs``: iteration, and pairs (each with index, part, state, stage, proved_distance, margin (the same), seconds);
     - ``step``: kind, state, seconds;
     - ``region``: region_id, iteration, guarantee, ellipsoid_volume, q_volume and share (as in the manifest);
     - ``cover``: of a cover, what a look at the scene has found, as :func:`planner.cover.result.said` says it;

@@ -164,7 +164,8 @@ class JobRow(Owned, Base):
     """What CirisError.to_document() returned, when the job failed."""
     options: Mapped[Document]
     """What certifier.growth.options.GrowthOptions.to_document() returned; for a cover, planner.cover.options.CoverOptions.to_document();
-    for a motion, what certifier.motion.given.motion_of() takes, with ``space`` where it was given, and ``tube``."""
+    for a motion, what certifier.motion.given.motion_of() takes, with ``space`` where it was given, ``tube``,
+    ``padding`` and ``clearance``."""
     action: Mapped[Document | None] = mapped_column(deferred=True)
     """The action that the job waits for: its kind, the iteration of a certification, the outcome and reason of an end.
 

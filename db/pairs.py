@@ -499,6 +499,7 @@ def _public(index: int, part: int, result: PairResult) -> dict[str, Any]:
         "part": part,
         "state": state_of(result),
         "stage": result.stage,
+        "proved_distance": result.margin,
         "margin": result.margin,
         "seconds": result.seconds,
     }

@@ -37,7 +37,8 @@ class Verdict:
         outcome, stop = Outcome(found["outcome"]), found["stop"]
         if stop is None:
             return cls(outcome, "every pair is certified all along the motion")
-        how = {Outcome.REFUTED: "touch", Outcome.TOO_CLOSE: "are too close to tell"}.get(outcome, "are where the search ended")
+        touch = "come nearer than the padding of the request allows" if found.get("padding") else "touch"
+        how = {Outcome.REFUTED: touch, Outcome.TOO_CLOSE: "are too close to tell"}.get(outcome, "are where the search ended")
         return cls(outcome, f"{stop['a']} and {stop['b']} {how}, on piece {stop['piece']}; pieces count from 0")
 
 

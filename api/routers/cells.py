@@ -27,7 +27,7 @@ Outlines = Annotated[OutlinesKept, Depends(_outlines)]
 
 @router.get("/regions/{region_id}/pairs", tags=["regions"])
 def get_region_pairs(region_id: RegionGiven, db: Db, outlines: Outlines) -> RegionPairs:
-    """Returns how each pair of a region is proved: by one plane or over how many cells, with what margin, and together with which pairs."""
+    """Returns how each pair of a region is proved: by one plane or over how many cells, how far apart at least, and with which pairs."""
     with db.read() as session:
         region = regions.get(session, region_id)
     scene = scenes.load(db, region.scene_id)

@@ -435,16 +435,18 @@ def _cell(scene: Scene, parts: Sequence[PairRow]) -> PairCell:
     """Describes a pair from its parts in their order: by its state from the first part of this state, and by sums of cells and seconds."""
     state = pairs.state_of_parts([PairState(row.state) for row in parts])
     row = next((row for row in parts if row.state == state), parts[0])
-    margins, seconds, cells = (
+    distances, seconds, cells = (
         [value for part in parts if (value := getattr(part, name)) is not None] for name in ("margin", "seconds", "open_cells")
     )
+    proved = min(distances) if distances and state is PairState.CERTIFIED else None
     return PairCell(
         iteration=row.iteration,
         pair=row.pair_index,
         state=state,
         parts=len(parts),
         stage=None if row.stage is None else Stage(row.stage),
-        margin=min(margins) if margins and state is PairState.CERTIFIED else None,
+        proved_distance=proved,
+        margin=proved,
         seconds=sum(seconds) if seconds else None,
         detail=row.detail,
         worker=row.worker,

@@ -24,9 +24,11 @@ class RegionPair(PairInfo):
 
     kind: ProofKind = Field(description="The form of the proof.")
     cells: int = Field(description="Number of cells of the proof, the leaves of its tree; 1 for one plane on all of the polytope.")
-    margin: float | None = Field(
-        description="Certified lower bound, in metres, of the distance between the padded bodies; null where the proof bounds none."
+    proved_distance: float | None = Field(
+        description="The distance of the padded bodies that the proof happens to show, in metres. They may be many times as far "
+        "apart. Null where the proof bounds none."
     )
+    margin: float | None = Field(description="The same as `proved_distance`.", deprecated=True)
     shares_with: list[int] = Field(description="Indices of the other pairs that the same proof covers.")
 
 
@@ -44,6 +46,7 @@ class RegionPairs(BaseModel):
                             "b": "world/post",
                             "kind": "partition",
                             "cells": 14,
+                            "proved_distance": 0.0012,
                             "margin": 0.0012,
                             "shares_with": [1],
                         }

@@ -220,7 +220,9 @@ class CertifyPathRequest(JobRequest, GivenMotion):
     """Asks for a proof of a motion, or for its first contact, where that takes longer than a request may."""
 
     model_config = ConfigDict(
-        json_schema_extra={"examples": [{"kind": "certify-path", "scene": "planar-2dof", "q": [[0.2, -0.4], [-0.4, 0.3]], "tube": True}]}
+        json_schema_extra={
+            "examples": [{"kind": "certify-path", "scene": "planar-2dof", "q": [[0.2, -0.4], [-0.4, 0.3]], "clearance": True}]
+        }
     )
 
     kind: Literal["certify-path"] = Field(description="The kind of the job.")
@@ -403,7 +405,11 @@ class PairCell(BaseModel):
         description="Number of parts that the pair's open cells, or the cells to verify, were dealt to; 1 for an undivided pair."
     )
     stage: Stage | None = Field(description="Which method settled it; null before.")
-    margin: float | None = Field(description="Certified lower bound, in metres, of the distance between the padded bodies.")
+    proved_distance: float | None = Field(
+        description="The distance of the padded bodies that the proof happens to show, in metres. They may be many times as far "
+        "apart. Null where nothing is proved, and where the proof bounds none."
+    )
+    margin: float | None = Field(description="The same as `proved_distance`.", deprecated=True)
     seconds: float | None = Field(description="Processor time that it took; null before it is settled.")
     detail: str | None = Field(description="More about the outcome, in words.")
     worker: str | None = Field(description="The process that holds it, or held it last: host, process number and start.")

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from certifier.errors import ProofError
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
-from certifier.motion.given import motion_of
-from certifier.motion.search import Stop, search
+from certifier.motion.given import motion_of, padding_of
+from certifier.motion.search import Approach, Stop, search
 from certifier.outcome import Guarantee, Outcome
 from certifier.proof.container import with_scene
 from certifier.proof.motion import Motion, MotionProof, Space
@@ -26,6 +27,9 @@ class MotionVerdict:
         statement: what is proved of the motion, or of its beginning; None where nothing is.
         proof: the file that proves it, with the scene; None where there is none.
         stop: where the motion first touches or comes too close; None where all of it is certified.
+        nearest: where the padded bodies come closest, where the statement's gap is a tight bound of this; None where nobody asked, where
+            there is a stop, and where it takes too many intervals.
+        padding: metres that were added around every body, beyond the scene's padding.
         intervals: how many planes the proof holds.
         seconds: how long the search and the verification took together.
         verify_seconds: how long the verification took.
@@ -36,6 +40,8 @@ class MotionVerdict:
     statement: MotionStatement | None
     proof: bytes | None
     stop: Stop | None
+    nearest: Approach | None
+    padding: float
     intervals: int
     seconds: float
     verify_seconds: float
@@ -52,17 +58,25 @@ class MotionVerdict:
             "space": self.motion.space.value,
             "degree": self.motion.degree,
             "waypoints": len(self.motion.waypoints),
+            "padding": self.padding,
             "outcome": self.outcome.value,
             "guarantee": (Guarantee.EXACT if stop is None else Guarantee.NONE).value,
             "certified_to": statement and self._place(statement.motion.pieces - 1, statement.end),
+            "proved_distance": statement and statement.gap,
             "margin": statement and statement.gap,
+            "clearance": statement.gap if statement and self.nearest else None,
+            "nearest": self.nearest and self._approach(self.nearest),
             "tube": statement.rho if statement and statement.rho else None,
-            "stop": stop
-            and {"a": stop.pair.a, "b": stop.pair.b, **self._place(stop.piece, stop.time), "distance": max(0.0, stop.distance)},
+            "stop": stop and self._approach(stop),
             "intervals": self.intervals,
             "seconds": self.seconds,
             "verify_seconds": self.verify_seconds,
         }
+
+    def _approach(self, found: Approach) -> dict[str, Any]:
+        """Returns a place on the motion with the pair and its distance there."""
+        pair, place = found.pair, self._place(found.piece, found.time)
+        return {"a": pair.a, "b": pair.b, **place, "distance": max(0.0, found.distance)}
 
     def _place(self, piece: int, time: float) -> dict[str, Any]:
         """Returns a place on the motion, with the joint positions there."""
@@ -71,41 +85,48 @@ class MotionVerdict:
         return {"piece": piece, "time": time, "q": q.tolist()}
 
 
-def certify(scene: Scene, motion: Motion, tube: bool = False) -> MotionVerdict:
+def certify(scene: Scene, motion: Motion, tube: bool = False, padding: float = 0.0, clearance: bool = False) -> MotionVerdict:
     """Certifies a motion.
 
     Args:
         motion: that certifier.motion.given has accepted.
         tube: whether to look for the largest tube about it.
+        padding: metres that are added around every body, beyond the scene's padding, so that the bodies of a pair have to be twice as far
+            apart. certifier.motion.given.padding_of has accepted it.
+        clearance: whether to look for a proof that shows nearly the least distance.
 
     Raises:
         ProofError: the proof that was found does not hold; nothing is said then.
     """
     start = time.perf_counter()
-    found = search(scene, motion, tube)
+    found = search(scene, motion, tube, padding, clearance)
     searched = time.perf_counter()
     if found.proof is None:
-        return MotionVerdict(scene, motion, None, None, found.stop, 0, searched - start, 0.0)
+        return MotionVerdict(scene, motion, None, None, found.stop, None, padding, 0, searched - start, 0.0)
     data = found.proof.to_bytes()
     statement = verify_motion(MotionProof.from_bytes(data, scene))
+    if statement.gap < 2 * padding:
+        problem = f"the proof shows that the bodies are {statement.gap} m apart, and the padding of the request asks for {2 * padding} m"
+        raise ProofError("proof_motion", problem, field="padding", hint="ask for a little less")
     verified = time.perf_counter()
-    proof, intervals = with_scene(data, scene), len(found.proof.ends)
-    return MotionVerdict(scene, motion, statement, proof, found.stop, intervals, verified - start, verified - searched)
+    proof, intervals, seconds = with_scene(data, scene), len(found.proof.ends), (verified - start, verified - searched)
+    return MotionVerdict(scene, motion, statement, proof, found.stop, found.nearest, padding, intervals, *seconds)
 
 
 def certify_in_child(payload: dict[str, Any]) -> dict[str, Any]:
     """Returns the document of a verdict, with the ``proof`` in base 64 or None. A child process runs this function.
 
     Args:
-        payload: the ``scene``'s document; the motion, as certifier.motion.given.motion_of takes it; ``space`` or None; ``tube``; and
-            ``prove``, whether to give the proof.
+        payload: the ``scene``'s document; the motion, as certifier.motion.given.motion_of takes it; ``space`` or None; ``tube``;
+            ``padding`` and ``clearance``, or neither; and ``prove``, whether to give the proof.
 
     Raises:
         RegionError: as certifier.motion.given; the field names the place in the payload.
     """
     scene = Scene.from_document(payload["scene"])
     motion = motion_of(scene, payload, Space(payload["space"]) if payload["space"] else None)
-    verdict = certify(scene, motion, payload["tube"])
+    padding = padding_of(payload.get("padding", 0.0))
+    verdict = certify(scene, motion, payload["tube"], padding, payload.get("clearance", False))
     proof = base64.b64encode(verdict.proof).decode() if verdict.proof and payload["prove"] else None
     return {**verdict.document(), "proof": proof}
 
@@ -116,4 +137,4 @@ def warm_up() -> None:
     balls = [Geometry(f"{body}/ball", body, np.array([[x, 0.0, 0.0]]), 0.1, {}) for body, x in (("arm/link", 1.0), (WORLD, 0.0))]
     pair = Pair(balls[0].name, balls[1].name)
     scene = Scene("swing", (joint,), (WORLD, "arm/link"), tuple(balls), (pair,), (), np.zeros(1))
-    certify(scene, Motion(Space.Q, np.array([[0.0], [0.5]])), tube=True)
+    certify(scene, Motion(Space.Q, np.array([[0.0], [0.5]])), tube=True, clearance=True)

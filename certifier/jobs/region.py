@@ -96,7 +96,14 @@ def certified_region(
         "share": None if proposal is None else proposal.share(polytope),
         "seed": None if candidate.seed is None else scene.to_q(candidate.seed).tolist(),
         "pairs": [
-            {"a": p.a, "b": p.b, "outcome": "certified", "margin": statement.gaps[p], "proof_digest": digest(proofs[index])}
+            {
+                "a": p.a,
+                "b": p.b,
+                "outcome": "certified",
+                "proved_distance": statement.gaps[p],
+                "margin": statement.gaps[p],
+                "proof_digest": digest(proofs[index]),
+            }
             for index, p in enumerate(scene.pairs)
         ],
         "ignored": [{"a": i.a, "b": i.b, "reason": i.reason} for i in scene.ignored],

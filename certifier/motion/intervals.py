@@ -68,7 +68,7 @@ def acceleration(side: Side, levers: Array, rates: Array, changes: Array) -> flo
 
 
 @njit(cache=True)
-def _moved(side: Side, levers: Array, rates: Array) -> float:
+def moved(side: Side, levers: Array, rates: Array) -> float:
     """Returns how far joints that move by this much, (n,), move a vertex at most."""
     total = 0.0
     for k in range(len(side.chain.joints)):
@@ -89,7 +89,7 @@ def positions(coordinates: Array, turns: Array, q_star: Array, q: Array) -> None
 
 
 @njit(cache=True)
-def _evaluate(controls: Array, time: float, at: Array) -> None:
+def evaluate(controls: Array, time: float, at: Array) -> None:
     """Fills in the coordinates, their rates and the rates' changes, (3, n), at a time of a piece, (m + 1, n). Source: de Casteljau."""
     m, steps = len(controls) - 1, np.empty(len(controls))
     for i in range(controls.shape[1]):
@@ -107,13 +107,13 @@ def _evaluate(controls: Array, time: float, at: Array) -> None:
 
 
 @njit(cache=True)
-def _bound_rates(
+def bound_rates(
     here: Array, there: Array, hull: Array, width: float, inexact: tuple[float, float], turns: Array, rates: Array, changes: Array
 ) -> None:
     """Fills in bounds of |dq/dt| and |d2q/dt2| in an interval of a piece; for tangents of half angles, q = q* + 2 atan(x).
 
     Args:
-        here, there: (3, n) as :func:`_evaluate` fills them in, at both ends of the interval.
+        here, there: (3, n) as :func:`evaluate` fills them in, at both ends of the interval.
         hull: (4, n) bounds of the first four derivatives on the whole piece.
         inexact: what the verifier adds to rates and to changes for what they may be wrong by.
     """
@@ -131,7 +131,8 @@ def _bound_rates(
 
 
 @njit(cache=True)
-def _gap(normal: Array, A: Array, B: Array) -> float:
+def gap_along(normal: Array, A: Array, B: Array) -> float:
+    """Returns how far a plane's normal, (3,), keeps points A, (V, 3), on its side of points B, (W, 3), times the normal's length."""
     low, high = np.inf, -np.inf
     for v in range(len(A)):
         low = min(low, normal[0] * A[v, 0] + normal[1] * A[v, 1] + normal[2] * A[v, 2])
@@ -161,6 +162,7 @@ def divide(
     reach: float,
     slack: float,
     rho: float,
+    shrinks: bool,
     until: tuple[int, float],
     ends: Array,
     normals: Array,
@@ -171,18 +173,19 @@ def divide(
     Args:
         controls: (P, m + 1, n) control points of the pieces.
         hulls: (P, 4, n) bounds of the first four derivatives of the coordinates on every piece.
-        inexact: as for :func:`_bound_rates`.
+        inexact: as for :func:`bound_rates`.
         turns, q_star: as for :func:`positions`.
-        reach: the radii and paddings of both bodies, metres.
+        reach: the radii and paddings of both bodies, and the distance that they have to keep beyond these, metres.
         slack: metres that the planes have to leave for what the verifier rounds.
-        rho: the tube, radians or metres; it becomes smaller where it has to, if it is above 0.
+        rho: the tube, radians or metres.
+        shrinks: whether the tube becomes smaller where it has to.
         until: the number of the piece and the time in it at which the search ends.
         ends, normals: (I,), (I, 3); they are filled in.
         counts: (P,) is filled in.
 
     Returns:
-        how it ends; the piece where it does; the beginning and the end of the interval there; how far the padded bodies are apart at its
-        beginning or, for a contact, where they touch; and what is left of rho.
+        how it ends; the piece where it does; the beginning and the end of the interval there; how far the bodies are apart beyond
+        ``reach`` at its beginning or, for a contact, where they touch; and what is left of rho.
     """
     n, V, W = controls.shape[2], len(a.vertices), len(b.vertices)
     # The vertices of the interval's beginning come first, then those of its end.
@@ -198,23 +201,23 @@ def divide(
             widening += a.levers[piece, k]
         for k in range(len(b.chain.joints)):
             widening += b.levers[piece, k]
-        _evaluate(controls[piece], 0.0, here)
+        evaluate(controls[piece], 0.0, here)
         positions(here[0], turns, q_star, q)
         place(a, q, X, Y, A[:V])
         place(b, q, X, Y, B[:W])
         while top:
             t1 = stack[top - 1]
-            _evaluate(controls[piece], t1, there)
+            evaluate(controls[piece], t1, there)
             positions(there[0], turns, q_star, q)
             place(a, q, X, Y, A[V:])
             place(b, q, X, Y, B[W:])
-            _bound_rates(here, there, hulls[piece], t1 - t0, inexact, turns, rates, changes)
+            bound_rates(here, there, hulls[piece], t1 - t0, inexact, turns, rates, changes)
             bent = acceleration(a, a.levers[piece], rates, changes) + acceleration(b, b.levers[piece], rates, changes)
             need = reach + slack + (t1 - t0) ** 2 / 8.0 * bent
-            apart = _gap(normal, A, B) > need + rho * widening
+            apart = gap_along(normal, A, B) > need + rho * widening
             if not apart:
                 gap = separation(A, B, normal)
-                if gap <= need + rho * widening and rho > 0.0:
+                if gap <= need + rho * widening and shrinks:
                     for known in (separation(A[:V], B[:W], other) - reach, separation(A[V:], B[W:], other) - reach):
                         if known > RESOLUTION and widening > 0.0:
                             rho = min(rho, SHRINK * known / widening)
@@ -232,9 +235,9 @@ def divide(
                 here[:] = there
                 t0, top = t1, top - 1
                 continue
-            moved = _moved(a, a.levers[piece], rates) + _moved(b, b.levers[piece], rates)
+            reached = moved(a, a.levers[piece], rates) + moved(b, b.levers[piece], rates)
             narrow = t1 - t0 <= NARROWEST
-            if narrow or (t1 - t0) * moved <= RESOLUTION:
+            if narrow or (t1 - t0) * reached <= RESOLUTION:
                 now, then = separation(A[:V], B[:W], other) - reach, separation(A[V:], B[W:], other) - reach
                 if now <= RESOLUTION:
                     return CONTACT, piece, t0, t0, now, rho

@@ -42,6 +42,7 @@ class Area:
         ground: the polytope as proofs hold it, with the root cell as its box.
         norms: (m,) the lengths of the faces' normals.
         unit: the polytope with normals of length 1.
+        finer: cells are cut until they are narrower by this factor, and bodies count as touching when they are nearer by it.
     """
 
     scene: Scene
@@ -54,9 +55,10 @@ class Area:
     ground: Ground
     norms: Array
     unit: Polytope
+    finer: float = 1.0
 
     @classmethod
-    def of(cls, scene: Scene, polytope: Polytope, seed: int, box: ProvedBox | None = None) -> Area:
+    def of(cls, scene: Scene, polytope: Polytope, seed: int, box: ProvedBox | None = None, finer: float = 1.0) -> Area:
         """Looks at a polytope.
 
         Args:
@@ -71,7 +73,7 @@ class Area:
         samples = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, seed).reshape(-1, scene.n)
         norms = np.linalg.norm(polytope.C, axis=1)
         unit = Polytope(polytope.C / norms[:, None], polytope.d / norms)
-        return cls(scene, Kinematics.of(scene), polytope, box.lower, box.upper, center, samples, ground, norms, unit)
+        return cls(scene, Kinematics.of(scene), polytope, box.lower, box.upper, center, samples, ground, norms, unit, finer)
 
     def inside(self, lower: Array, upper: Array) -> Inside:
         """Returns the part of the polytope in a cell."""

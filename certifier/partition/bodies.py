@@ -168,7 +168,7 @@ class Bodies:
         J = np.array(self.joints)
         chart = planes.Chart(J, cell.mid[J], CALM / cell.half[J], CALM)
         found: tuple[int, Array, Array, Array, int] = planes.look(
-            *self.hulls, chart, cell.inside.C, cell.inside.d, X, N, LOOKS, DESCENT, LEAST, ENOUGH
+            *self.hulls, chart, cell.inside.C, cell.inside.d, X, N, LOOKS, DESCENT, LEAST / self._area.finer, ENOUGH
         )
         return found
 

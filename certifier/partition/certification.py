@@ -86,6 +86,7 @@ class CellCertification:
             must have had the same one.
         together: pairs that are certified as one with others; None for none. What was begun must have had the same ones.
         faces: faces will be added to the polytope where pairs are hard, and so their cells are cut in other ways.
+        finer: as :class:`certifier.partition.area.Area` has it.
 
     Raises:
         RegionError: the polytope is empty or unbounded.
@@ -99,9 +100,10 @@ class CellCertification:
         box: ProvedBox | None = None,
         together: Together | None = None,
         faces: bool = False,
+        finer: float = 1.0,
     ) -> None:
         self._scene, self._together, self._faces = scene, together or {}, faces
-        self._area = Area.of(scene, polytope, seed, box)
+        self._area = Area.of(scene, polytope, seed, box, finer)
         check_ground(scene, self._area.ground)
         check_interior(scene, self._area.ground, self._area.center)
         self._covariance = np.cov(self._area.samples.T).reshape(scene.n, scene.n)

@@ -130,7 +130,7 @@ class Search:
             if cut is None:
                 continue
             joint, points = cut
-            narrow = self._turn(cell, self.bodies)[self.joints].max() < NARROW
+            narrow = self._turn(cell, self.bodies)[self.joints].max() * area.finer < NARROW
             value = None if narrow else self._middle_of(cell, joint)
             if value is None:
                 report.narrow.append(points[:FEW])
@@ -222,7 +222,7 @@ class Search:
             if nearest is not None and nearest[1] <= 0:
                 report.contacts.append(nearest[0])
                 return None
-            if nearest is not None and nearest[1] < TOUCH * self.bodies.extent:
+            if nearest is not None and nearest[1] * self._area.finer < TOUCH * self.bodies.extent:
                 report.narrow.append(nearest[0][None])
                 return None
         return self._cut(cell, self.bodies, found), found.points
@@ -262,7 +262,7 @@ class Search:
         A bad cut there takes several times as many cells.
         """
         turn = self._turn(cell, bodies)
-        wide = turn > NARROW / 2
+        wide = turn * self._area.finer > NARROW / 2
         if found.support is None:
             return found.joint if found.joint in bodies.joints and wide[found.joint] else max(bodies.joints, key=lambda j: float(turn[j]))
         q = np.where(self._area.scene.revolute, 2 * np.arctan(found.support), found.support / bodies.extent)

@@ -327,6 +327,8 @@ class Service:
         s: ArrayLike | None = None,
         space: Straight | None = None,
         tube: bool = False,
+        padding: float = 0.0,
+        clearance: bool = False,
         prove: bool = False,
     ) -> Motion:
         """Certifies a motion itself, without any region, or finds its first contact.
@@ -335,10 +337,13 @@ class Service:
             q: (k, n), the waypoints, or else ``s``.
             space: in which the motion is straight between them; default: in which they are given.
             tube: whether to look for the largest certified tube about the motion.
+            padding: metres that are added around every body, beyond the scene's padding: the motion is certified with the bodies of each
+                pair twice this apart.
+            clearance: whether to prove nearly the least distance of the bodies.
             prove: whether to return the proof file as well.
         """
-        asked = {"scene": scene_name(scene), **points(2, q=q, s=s), **given(space=space), "tube": tube, "prove": prove}
-        document = self.client.certify_path(asked)
+        options = {"tube": tube, "padding": float(padding), "clearance": clearance, "prove": prove}
+        document = self.client.certify_path({"scene": scene_name(scene), **points(2, q=q, s=s), **given(space=space), **options})
         proof = document["proof"] and base64.b64decode(document["proof"])
         return read(Motion, {**document, "proof": proof})
 
@@ -350,6 +355,8 @@ class Service:
         s: ArrayLike | None = None,
         space: Straight | None = None,
         tube: bool = False,
+        padding: float = 0.0,
+        clearance: bool = False,
         deadline: float | None = None,
     ) -> Job:
         """Creates a job that certifies a motion which may take minutes, and returns it at once; its :meth:`Job.motion` waits.
@@ -357,8 +364,10 @@ class Service:
         Args:
             deadline: seconds after which the job ends, without a verdict then. The others are as of :meth:`certify_path`.
         """
-        motion = {**points(2, q=q, s=s), **given(space=space, deadline_seconds=deadline), "tube": tube}
-        return self._job((self.client.create_job({"kind": "certify-path", "scene": scene_name(scene), **motion}))[0])
+        motion = {**points(2, q=q, s=s), **given(space=space, deadline_seconds=deadline)}
+        options = {"tube": tube, "padding": float(padding), "clearance": clearance}
+        job, _ = self.client.create_job({"kind": "certify-path", "scene": scene_name(scene), **motion, **options})
+        return self._job(job)
 
     def graph(self, scene: str | Scene) -> Graph:
         """Returns which regions of a scene overlap, once the service has compared them all."""

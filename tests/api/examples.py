@@ -29,6 +29,12 @@ from tests.workers.service import environment
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FILE = Path(__file__).parents[2] / "api" / "examples.json"
 PAIR = {"a": "arm/upper/bar", "b": "arm/lower/bar"}
+CERTAIN = {
+    "tube": 0.012,
+    "clearance": 0.0141,
+    "nearest": {"a": "arm/upper/bar", "b": "world/post", "piece": 0, "time": 0.25, "q": [0.4, 0.3], "distance": 0.0142},
+}
+"""A motion that is certified has these."""
 SELDOM: dict[str, dict[str, Any]] = {
     "IgnoredPair": {**PAIR, "reason": "neighbours: the joint between them always overlaps"},
     "Substitution": {"geometry": "arm/flange/disc", "substitution": "a capsule around a cylinder", "inflation": 0.003},
@@ -41,10 +47,10 @@ SELDOM: dict[str, dict[str, Any]] = {
         "trace": "0af7651916cd43dd8448eb211c80319c",
     },
     "HeldWork": {"job": "1f9b2a7c-5b0e-4b58-9c39-2f1d6a3c8e10"},
-    "JobMotion": {"tube": 0.012},
+    "JobMotion": CERTAIN,
     "KeyPage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
     "KeySummary": {"revoked_at": "2026-05-01T08:00:00Z"},
-    "MotionResponse": {"tube": 0.012},
+    "MotionResponse": CERTAIN,
     "Obstacle": {"faces": 4, "lost": 0.013},
     "PairCell": {"witness_q": [0.4, 0.3], "open_cells": 12},
     "PairMatrix": {"next": "3.41"},
@@ -188,7 +194,9 @@ def record(client: TestClient, database: Database) -> dict[str, Any]:
     service.ended(ask("POST", "/v1/jobs", certify))
     wide = {**certify, "polytope": {"C": [[1, 0]], "d": [2.0]}, "cells": 20}
     service.ended(ask("POST", "/v1/jobs", wide))
-    motion = service.ended(ask("POST", "/v1/jobs", {"kind": "certify-path", "scene": name, "q": [home, away], "tube": True}))
+    motion = service.ended(
+        ask("POST", "/v1/jobs", {"kind": "certify-path", "scene": name, "q": [home, away], "tube": True, "clearance": True})
+    )
     ask("GET", "/v1/jobs/{job_id}/motion", job_id=motion["id"])
     other = ask("POST", "/v1/jobs", {"kind": "cover", "scene": name, "options": {"coverage": 0.6, "regions": 3}, "deadline_seconds": 40})
     service.ended(other)
@@ -287,7 +295,15 @@ def offered(scene: str, home: list[float], away: list[float], region: str) -> di
             {**more, "kind": "grow", "seed": {"method": "polytope", "q": home, **faces, "half_width": 0.1}},
             {**more, "kind": "certify", "polytope": faces, "cells": 100, "random_seed": 1},
             {**more, "kind": "recertify", "region": region, "random_seed": 1},
-            {**more, "kind": "certify-path", "s": [[0.2, 0.15], [0.3, 0.25]], "space": "s", "tube": True},
+            {
+                **more,
+                "kind": "certify-path",
+                "s": [[0.2, 0.15], [0.3, 0.25]],
+                "space": "s",
+                "tube": True,
+                "padding": 0.002,
+                "clearance": True,
+            },
             {**more, "kind": "certify-path", "bezier": [curve]},
             {**more, "kind": "certify-path", "knots": knots, "control_points": curve},
             {**more, "kind": "cover", "options": {**covering, "cells": 1000, "stages": 1, "random_seed": 1}},
@@ -306,7 +322,7 @@ def offered(scene: str, home: list[float], away: list[float], region: str) -> di
             {"scene": scene, "q": home, "x": "a", "y": "b", "regions": [region], "x_range": [-1, 1], "y_range": [-1, 1]}
         ],
         "/v1/planning/certify-path": [
-            {"scene": scene, "s": [[0.2, 0.15], [0.3, 0.25]], "space": "s", "tube": True},
+            {"scene": scene, "s": [[0.2, 0.15], [0.3, 0.25]], "space": "s", "tube": True, "padding": 0.002, "clearance": True},
             {"scene": scene, "bezier": [curve]},
             {"scene": scene, "knots": knots, "control_points": curve},
         ],

@@ -111,7 +111,11 @@ def test_a_grown_region_shows_its_pairs_and_their_cells(client: TestClient, work
     region = ask(f"regions/{job['region']}")
     listed = ask(f"regions/{job['region']}/pairs")["pairs"]
     assert [(pair["index"], pair["a"], pair["b"]) for pair in listed] == [(i, p.a, p.b) for i, p in enumerate(scene.pairs)]
-    assert [pair["margin"] for pair in listed] == [pair["margin"] for pair in region["manifest"]["pairs"]]
+    assert (
+        [pair["proved_distance"] for pair in listed]
+        == [pair["margin"] for pair in listed]
+        == [pair["margin"] for pair in region["manifest"]["pairs"]]
+    )
     for pair in listed:
         partition = ask(f"regions/{job['region']}/pairs/{pair['index']}/cells")
         check(partition, scene)

@@ -236,7 +236,9 @@ def test_the_parts_of_a_pair_are_shown_as_one(client: TestClient, database: Data
 
     def shown() -> list[tuple[Any, ...]]:
         cells = client.get(f"/v1/jobs/{job_id}/pairs").json()["cells"]
-        return [(cell["pair"], cell["parts"], cell["state"], cell["margin"], cell["seconds"], cell["proof"] is None) for cell in cells]
+        return [
+            (cell["pair"], cell["parts"], cell["state"], cell["proved_distance"], cell["seconds"], cell["proof"] is None) for cell in cells
+        ]
 
     def proof() -> int:
         return client.get(f"/v1/jobs/{job_id}/pairs/0/proof", params={"iteration": 0}).status_code

@@ -121,7 +121,8 @@ def test_motions_are_covered_or_it_is_said_where_they_are_not(service: Any, regi
 def test_a_motion_is_certified_by_itself_or_its_contact_is_named(service: Any, scene: Scene) -> None:
     motion = service.certify_path("slider", [[0.0], [0.1]], tube=True, prove=True)
     assert motion
-    assert motion.margin > 0
+    assert motion.proved_distance == motion.margin > 0
+    assert (motion.clearance, motion.nearest, motion.padding) == (None, None, 0.0)
     assert motion.tube > 0
     assert verify_file(motion.proof)
     assert service.certify_path("slider", s=[[0.0], [0.1]]).proof is None
@@ -131,6 +132,11 @@ def test_the_first_contact_of_a_motion_is_named(service: Any, database: Database
     arm = swing(-0.01)
     with database.write() as session:
         scenes.add(session, arm)
+    passing = service.certify_path(arm.name, [[-0.5], [-0.3]], clearance=True, padding=1)
+    assert not passing
+    passing = service.certify_path(arm.name, [[-0.5], [-0.3]], clearance=True, padding=0.001)
+    assert passing.nearest.distance - 1e-4 <= passing.clearance <= passing.nearest.distance
+    assert passing.nearest.q == pytest.approx([-0.3])
     stopped = service.certify_path(arm.name, s=[[-0.5], [0.6]], space="q")
     assert not stopped
     assert stopped.outcome is ciris.Outcome.REFUTED

@@ -155,7 +155,7 @@ def test_certifying_here_prints_the_stable_document(spawn: Ciris, files: Path) -
     assert (document["scene"]["name"], document["outcome"], document["guarantee"]) == ("planar-2dof", "certified", "exact")
     assert len(document["pairs"]) == 6
     for pair in document["pairs"]:
-        assert {"a", "b", "outcome", "margin", "seconds", "stage", "witness_q"} <= set(pair)
+        assert {"a", "b", "outcome", "proved_distance", "seconds", "stage", "witness_q"} <= set(pair)
         assert (pair["outcome"], pair["witness_q"]) == ("certified", None)
 
 

@@ -88,6 +88,31 @@ def test_a_curve_is_certified_here_and_by_the_service(ciris: Ciris, url: str, sc
     assert ciris("certify-path", PLANAR, "--path", path, "--local").error.startswith("--path bezier[1][0]: piece 1 does not begin")
 
 
+def test_clearance_and_padding_are_printed_here_and_by_the_service(ciris: Ciris, url: str, scene: Scene, tmp_path: Path) -> None:
+    motion = ("--q", FREE[0], "--q", FREE[1], "--local")
+    assert "proved distance  at least" in ciris("certify-path", PLANAR, *motion).stdout
+    done = ciris("certify-path", PLANAR, *motion, "--clearance")
+    for word in ("clearance  at least", "closest", "mm apart", "of the way from waypoint 0 to 1", "q = "):
+        assert word in done.stdout
+    found = ciris("certify-path", PLANAR, *motion, "--clearance", "--json").json
+    assert (
+        max(0.9 * found["nearest"]["distance"], found["nearest"]["distance"] - 1e-4) <= found["clearance"] <= found["nearest"]["distance"]
+    )
+    half = found["clearance"] / 2
+    kept = ciris("certify-path", PLANAR, *motion, "--padding", f"{half - 1e-6}", "--out", tmp_path / "kept.proof")
+    assert kept.status == 0, kept.stderr
+    assert "m around every body, beyond the scene's" in kept.stdout
+    assert "m apart" in ciris("verify", tmp_path / "kept.proof").stdout
+    broken = ciris("certify-path", PLANAR, *motion, "--padding", f"{half + 1e-4}")
+    assert (broken.status, "less than the padding asks for" in broken.stdout) == (1, True)
+    refused = ciris("certify-path", PLANAR, *motion, "--padding", "-1")
+    assert refused.error.startswith("--padding: must be from 0 to 1e+06 metres, not -1")
+    asked = ("certify-path", "slider", "--q", "0.1", "--q", "-0.3", "--clearance", "--padding", "0.001", "--url", url)
+    answer = ciris(*asked, "--json").json
+    assert (answer["outcome"], answer["padding"]) == ("certified", 0.001)
+    assert 0.002 <= answer["clearance"] == answer["proved_distance"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -218,7 +218,7 @@ def test_a_pair_is_followed_through_the_iterations(browser: Any, url: str, datab
         "10 \N{ALMOST EQUAL TO}iteration 10: too close",
         "9 \N{CHECK MARK}iteration 9: certified",
     ]
-    page.get_by_text("Certified in iteration 9; by sos; 0.1 s; margin at least 1 mm.").wait_for()
+    page.get_by_text("Certified in iteration 9; by sos; 0.1 s; at least 1 mm apart.").wait_for()
     page.close()
 
 

@@ -120,7 +120,7 @@ def iteration(index: int, reused: dict[int, int]) -> Iteration:
 
 
 def cell(pair: int, index: int, state: PairState, **values: object) -> PairCell:
-    known = dict.fromkeys(("stage", "margin", "seconds", "detail", "worker", "witness_q", "open_cells", "proof")) | values
+    known = dict.fromkeys(("stage", "proved_distance", "seconds", "detail", "worker", "witness_q", "open_cells", "proof")) | values
     return PairCell(iteration=index, pair=pair, parts=1, state=state, **known)  # type: ignore[arg-type]
 
 
@@ -130,7 +130,7 @@ def matrix() -> PairMatrix:
         pairs=[PairInfo(index=i, a=f"a{i}", b=f"b{i}") for i in range(3)],
         iterations=[iteration(0, {}), iteration(1, {0: 0})],
         cells=[
-            cell(0, 0, PairState.CERTIFIED, seconds=0.5, margin=0.0123, stage="sos"),
+            cell(0, 0, PairState.CERTIFIED, seconds=0.5, proved_distance=0.0123, stage="sos"),
             cell(1, 0, PairState.REFUTED, witness_q=[0.5, 1.0]),
             cell(1, 1, PairState.RUNNING),
             cell(2, 1, PairState.OPEN),

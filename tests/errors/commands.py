@@ -338,6 +338,10 @@ COMMANDS: list[Row] = [
         ),
     ),
     *rows(
+        "certifier/jobs/clearance.py",
+        ("no_file", "", "{...}", "", "a file that goes away before the child process reads it"),
+    ),
+    *rows(
         "client/verify.py",
         ("no_file", "nothing.proof", "{...}", "name a proof file", lambda t: t.ciris("verify", "nothing.proof")),
         ("no_file", "", "{...}", "name a proof file", "a file that goes away while it is checked"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from certifier.motion.given import given, motion_of
+from certifier.motion.given import given, motion_of, padding_of
 from certifier.motion.splines import curve
 from certifier.proof.motion import Space
 from db import scenes
@@ -79,6 +79,7 @@ MOTIONS: list[Row] = [
             "move it between them; waypoints count from 0",
             lambda t: given(slider(), [[0.0], [99.0]], Space.Q),
         ),
+        ("padding", "padding", "must be from 0 to {MAGNITUDE} metres, not {value}", "", lambda t: padding_of(-1.0)),
         (
             "motion_shape",
             "bezier",
@@ -92,6 +93,16 @@ MOTIONS: list[Row] = [
             "joint {name} is at {...} in {place}, not between {...} and {...}",
             "all control points must be within the limits, as then all of the motion is; divide a piece whose own are far out",
             lambda t: motion_of(slider(), {"bezier": [[[0.0], [99.0], [0.0]]]}),
+        ),
+    ),
+    *rows(
+        "certifier/jobs/motion.py",
+        (
+            "proof_motion",
+            "padding",
+            "the proof shows that the bodies are {gap} m apart, and the padding of the request asks for {...} m",
+            "ask for a little less",
+            "a search whose planes leave too little for what the verifier rounds (tests/certifier/motion/test_clearance.py)",
         ),
     ),
     *rows(

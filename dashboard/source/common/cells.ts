@@ -38,7 +38,7 @@ export interface PairProof {
   b: string;
   kind: "partition" | "program";
   cells: number;
-  margin: number | null;
+  proved_distance: number | null;
   shares_with: number[];
 }
 

@@ -12,7 +12,7 @@ const SPARE = 6;
 const NARROW = 560;
 const ROW = { narrow: 44, wide: 30 };
 const COLUMN = { least: 36, most: 72 };
-/** Where names have so much room, the newest iteration's time and margin stand beside them. */
+/** Where names have so much room, the newest iteration's time and proved distance stand beside them. */
 const ROOMY = 620;
 const NAME = { narrow: 190, least: 260, most: 470 };
 
@@ -252,7 +252,7 @@ function Grid({ store, version, rows, memory }: { store: JobStore; version: numb
         <div role="row" class="head" aria-rowindex={1} style={{ width: `${width}px`, height: `${HEAD}px` }}>
           <div role="columnheader" class="name" style={{ width: `${named}px` }}>
             <span>Pair</span>
-            <span aria-hidden="true">{named >= ROOMY ? "time and margin, " : ""}iteration</span>
+            <span aria-hidden="true">{named >= ROOMY ? "time and proved distance, " : ""}iteration</span>
           </div>
           {columns.slice(from, to).map((one, i) => (
             <div
@@ -348,7 +348,7 @@ class Row extends Component<RowProps> {
           {newest && (
             <span class="newest">
               {newest.seconds !== null && duration(newest.seconds)}
-              <span>{newest.margin !== null && `≥ ${atLeast(newest.margin)}`}</span>
+              <span>{newest.proved_distance !== null && `≥ ${atLeast(newest.proved_distance)}`}</span>
             </span>
           )}
         </div>

@@ -52,13 +52,13 @@ export function atLeast(metres: number): string {
   return `${Number(mm.slice(0, Math.max(point, first + (first < point ? 4 : 3))))} mm`;
 }
 
-/** Says of a cell of the matrix all that is known: outcome, how, how long, with what margin, and where it fails. */
+/** Says of a cell of the matrix all that is known: outcome, how, how long, what distance is proved, and where it fails. */
 export function facts(letter: string, iteration: Iteration, cell: PairCell | undefined): string[] {
   const found = [`${OUTCOMES[letter]!.words} in iteration ${iteration.index}`];
   if (!cell) return found;
   if (cell.stage) found.push(`by ${cell.stage.replaceAll("_", " ")}`);
   if (cell.seconds !== null) found.push(duration(cell.seconds));
-  if (cell.margin !== null) found.push(`margin at least ${atLeast(cell.margin)}`);
+  if (cell.proved_distance !== null) found.push(`at least ${atLeast(cell.proved_distance)} apart`);
   if (cell.parts > 1) found.push(`in ${cell.parts} parts`);
   if (cell.open_cells) found.push(plural(cell.open_cells, "open cell"));
   if (cell.worker && letter === "w") found.push(`on ${cell.worker}`);

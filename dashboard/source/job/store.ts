@@ -24,7 +24,7 @@ export interface PairCell {
   state: string;
   parts: number;
   stage: string | null;
-  margin: number | null;
+  proved_distance: number | null;
   seconds: number | null;
   detail: string | null;
   worker: string | null;

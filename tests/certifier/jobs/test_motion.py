@@ -40,7 +40,7 @@ def test_a_contact_comes_with_its_place_and_a_proof_up_to_there(space):
 def test_what_begins_in_contact_has_no_proof():
     scene = swing(-0.01)
     verdict = certify(scene, given(scene, [[0.0], [1.0]], Space.Q))
-    assert (verdict.proof, verdict.document()["certified_to"], verdict.document()["margin"]) == (None, None, None)
+    assert (verdict.proof, verdict.document()["certified_to"], verdict.document()["proved_distance"]) == (None, None, None)
 
 
 def test_waypoints_are_taken_from_one_space_to_the_other():

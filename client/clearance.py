@@ -1,0 +1,71 @@
+"""``ciris clearance`` proves how far apart the bodies are in all of a region, in a child process of this machine."""
+
+from __future__ import annotations
+
+import base64
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+from certifier.errors import CirisError
+from certifier.isolation.child import run_in_child
+from certifier.model import escaped
+from certifier.verify.decimals import at_least_mm
+from client import output
+from client.cores import cores
+from client.files import ProofFile, check_writable
+from client.verify import MEMORY_BYTES, readable
+
+TIGHT, NOT_TIGHT = 0, 1
+TIMEOUT_S = 3600.0
+
+
+def clearance(args: Namespace) -> int:
+    """Prints the clearance of a region whose proof file is given, and returns the command's exit status: 0 where it is tight.
+
+    Raises:
+        CirisError: the file cannot be read, or is no region's proof that holds.
+    """
+    kept = None
+    if args.out is not None:
+        check_writable(args.out)
+        kept = ProofFile(args.out)
+    with readable(Path(args.proof)) as path:
+        found = _found(path, args.proof)
+    proof = found.pop("proof")
+    written = None if kept is None or proof is None else str(kept.write(found["scene"]["name"], base64.b64decode(proof)))
+    if args.json:
+        output.print_json({**found, "proof": written})
+    else:
+        _print(found, written, proved_by_region=proof is None)
+    return TIGHT if found["tight"] else NOT_TIGHT
+
+
+def _found(path: Path, name: str) -> dict[str, Any]:
+    """Returns what certifier.jobs.clearance says of the file at a path, of which users know the name."""
+    payload = {"path": str(path.absolute()), "processes": cores()}
+    try:
+        found: dict[str, Any] = run_in_child(
+            "certifier.jobs.clearance:clearance_in_child", payload, timeout_s=TIMEOUT_S, memory_bytes=MEMORY_BYTES
+        )
+    except CirisError as error:
+        error.field = escaped(name)
+        raise
+    return found
+
+
+def _print(found: dict[str, Any], written: str | None, proved_by_region: bool) -> None:
+    nearest = found["nearest"]
+    facts = [
+        ("region", f"of {found['scene']['name']} ({found['scene']['hash'][:16]})"),
+        ("clearance", f"at least {at_least_mm(found['clearance'])}, padded, proved at every configuration of the region"),
+        ("closest", f"{nearest['a']} - {nearest['b']}, {1000 * nearest['distance']:.6g} mm apart"),
+        ("", f"q = {', '.join(f'{value:.6g}' for value in nearest['q'])}"),
+    ]
+    if not found["tight"]:
+        facts.append(("note", "the two numbers are farther apart than 10 % and 0.1 mm; nothing larger could be proved"))
+    if written:
+        facts.append(("proof", f"{written}, of the region with more padding (check it: ciris verify {written})"))
+    else:
+        facts.append(("proof", "that of the region" if proved_by_region else "verified and not kept; --out FILE keeps it"))
+    output.print_facts([(name, escaped(text)) for name, text in facts])
