@@ -64,6 +64,20 @@ def test_a_region_is_arrays_a_proof_and_a_verdict(service: Any, region: str, sce
     assert service.region(region[:8]).id == region
 
 
+@pytest.mark.parametrize("number", [9185166224891948.0, 1e300])
+def test_a_number_that_no_double_tells_from_others_is_refused(service: Any, region: str, number: float) -> None:
+    for ask in (
+        lambda: service.contains("slider", [[number]]),
+        lambda: service.nearest("slider", [number]),
+        lambda: service.path("slider", [[0.1], [number]]),
+        lambda: service.plan("slider", [0.1], [number]),
+        lambda: service.certify_path("slider", [[0.1], [number]]),
+    ):
+        with pytest.raises(ciris.CirisError, match="is no number of at most 1e\\+06"):
+            ask()
+    assert not service.region(region).contains([number]), "it is taken literally, and is outside of the limits"
+
+
 def test_regions_are_fetched_once(service: Any, region: str, database: Database) -> None:
     first = service.regions("slider")
     more = store_region(database, a_part(0.1, 0.4))
