@@ -14,8 +14,9 @@ from api.schemas.jobs import PolytopeBody, Seed, WebhookRequest
 from api.schemas.motions import GivenMotion
 from certifier.carry.robot import same_bodies
 from certifier.errors import CirisError, RegionError
-from certifier.model import Array, Scene
+from certifier.model import Array, Polytope, Scene
 from certifier.motion.given import motion_of, padding_of
+from certifier.positions import check_magnitude
 from certifier.proof.motion import Space
 from certifier.seeding.limits import check_limits
 from certifier.seeding.options import SeedOptions
@@ -31,8 +32,8 @@ def seed(scene: Scene, body: Seed) -> SeedOptions:
     It refuses options that contradict each other, a configuration of the wrong length, and one outside the joint limits.
 
     Raises:
-        RegionError: seed_wrong_length, seed_outside_limits, seed_outside_window, polytope_shape, or as SeedOptions.from_document; the field
-            names the place.
+        RegionError: seed_wrong_length, seed_outside_limits, seed_outside_window, polytope_shape, number_too_large, or as
+            SeedOptions.from_document; the field names the place.
     """
     options = SeedOptions.from_document(body.model_dump(exclude_none=True))
     for i, row in enumerate(options.C or ()):
@@ -47,7 +48,8 @@ def cover(scene: Scene, body: CoverRequestOptions) -> CoverOptions:
     """Returns the options of a cover. It refuses configurations of the wrong length, or outside the joint limits.
 
     Raises:
-        RegionError: seed_wrong_length, seed_outside_limits, seed_outside_window, or as CoverOptions.from_document; the field says where.
+        RegionError: seed_wrong_length, number_too_large, seed_outside_limits, seed_outside_window, or as CoverOptions.from_document; the
+            field says where.
     """
     given = {f"options.{name}[{i}]": q for name in ("seeds", "connect") for i, q in enumerate(getattr(body, name))}
     given |= {f"options.paths[{i}][{j}]": q for i, path in enumerate(body.paths) for j, q in enumerate(path)}
@@ -62,7 +64,7 @@ def polytope(scene: Scene, body: PolytopeBody) -> None:
     """Refuses a polytope whose shapes do not fit the scene or each other, or whose centre is outside of it.
 
     Raises:
-        RegionError: polytope_shape, center_outside.
+        RegionError: polytope_shape, polytope_not_finite, number_too_large, center_outside.
     """
     for i, row in enumerate(body.C):
         _length(scene, row, f"polytope.C[{i}]", "polytope_shape")
@@ -70,8 +72,9 @@ def polytope(scene: Scene, body: PolytopeBody) -> None:
         raise RegionError(
             "polytope_shape", f"C has {len(body.C)} rows and d has {len(body.d)} numbers", field="polytope.d", hint="give one number a row"
         )
+    Polytope.given(body.C, body.d, scene.n)
     if body.center is not None:
-        _length(scene, body.center, "polytope.center", "polytope_shape")
+        _configuration(scene, body.center, "polytope.center", "polytope_shape")
         if not scene.polytope(body.C, body.d).contains(body.center):
             raise RegionError(
                 "center_outside",
@@ -140,20 +143,22 @@ def points(scene: Scene, rows: Sequence[Sequence[float]], field: str) -> Array:
     """Returns the points of a request as an array (k, n).
 
     Raises:
-        RegionError: wrong_length.
+        RegionError: wrong_length, number_too_large.
     """
     for i, row in enumerate(rows):
         _length(scene, row, f"{field}[{i}]", "wrong_length")
-    return np.array(rows, dtype=float)
+    found = np.array(rows, dtype=float)
+    check_magnitude(found, field)
+    return found
 
 
 def point(scene: Scene, row: Sequence[float], field: str) -> Array:
     """Returns a configuration of a request as an array (n,).
 
     Raises:
-        RegionError: wrong_length.
+        RegionError: wrong_length, number_too_large.
     """
-    _length(scene, row, field, "wrong_length")
+    _configuration(scene, row, field, "wrong_length")
     return np.array(row, dtype=float)
 
 
@@ -177,6 +182,11 @@ def in_s(scene: Scene, q: Array, field: str) -> Array:
         message = "a joint of this waypoint is outside of its limits, or of the window that the scene covers, and has no s"
         raise RegionError("waypoint_outside_limits", message, field=f"{field}[{i}]", hint="`ciris scene show` lists the limits")
     return s
+
+
+def _configuration(scene: Scene, values: Sequence[float], field: str, code: str) -> None:
+    _length(scene, values, field, code)
+    check_magnitude(values, field)
 
 
 def _length(scene: Scene, values: Sequence[float], field: str, code: str) -> None:

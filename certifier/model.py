@@ -21,8 +21,9 @@ import numpy as np
 from flint import arb, ctx, fmpq
 from numpy.typing import ArrayLike, NDArray
 
-from certifier.document import Node
+from certifier.document import LARGEST, Node
 from certifier.errors import CirisError, RegionError, SceneError
+from certifier.positions import check_magnitude, without_turns
 
 Array = NDArray[Any]
 
@@ -193,15 +194,23 @@ class Scene:
         lower = [-np.inf if limits[0] is None else limits[0] for limits in own]
         return np.array(lower), np.array([np.inf if limits[1] is None else limits[1] for limits in own])
 
-    def in_windows(self, q: ArrayLike) -> Array:
+    def in_windows(self, q: ArrayLike, field: str = "q") -> Array:
         """Returns positions q, (..., n), shifted by whole turns to half a turn about q* for every joint that has a window.
 
-        The robot is in the same pose there. Positions beyond a joint's own limits are shifted as well.
+        The robot is in the same pose there, but for the rounding of the last digit. Positions beyond a joint's own limits are shifted as
+        well.
+
+        Args:
+            field: where the user gave the positions, for errors.
+
+        Raises:
+            RegionError: number_too_large, for a position above certifier.positions.MAGNITUDE.
         """
         given = np.asarray(q, dtype=float)
+        check_magnitude(given, field)
         windowed = np.array([j.own_limits is not None for j in self.moving])
         turns = np.where(windowed, np.round((given - self.q_star) / (2 * np.pi)), 0.0)
-        return given - 2 * np.pi * turns
+        return without_turns(given, turns)
 
     @cached_property
     def s_lower(self) -> Array:
@@ -481,8 +490,8 @@ class Polytope:
             hint = f"C must be m x {n or 'n'}, one column a joint in the scene's order, and d must have m numbers"
             message = f"C is {_size(rows)} and d is {_size(offsets)}"
             raise RegionError("polytope_shape", message, field=field, hint=hint)
-        if not (np.isfinite(rows).all() and np.isfinite(offsets).all()):
-            raise RegionError("polytope_not_finite", "C and d must be finite numbers", field=field)
+        if not (np.abs(rows).max(initial=0.0) <= LARGEST and np.abs(offsets).max(initial=0.0) <= LARGEST):
+            raise RegionError("polytope_not_finite", f"C and d must be finite numbers of at most {LARGEST:g}", field=field)
         return cls(rows, offsets)
 
     def contains(self, s: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:

@@ -53,6 +53,35 @@ class Answers(Sequence[T]):
 
 
 @dataclass(frozen=True)
+class UncoveredBodies:
+    """Two bodies with pairs of geometries that no proof is about."""
+
+    a: str
+    b: str
+    pairs: int
+    """How many pairs of their geometries."""
+    why: str
+    """``neighbours`` where a joint joins them, ``filtered`` by the model, or ``ignored`` by the scene file."""
+    reason: str | None
+    """The reason in the scene file; None for pairs that it does not ignore."""
+
+
+@dataclass(frozen=True)
+class NotCovered:
+    """The pairs of geometries that can move against each other and are in no proof about the scene."""
+
+    pairs: int
+    """How many there are."""
+    bodies: tuple[UncoveredBodies, ...]
+    """They by their bodies; the first thousand."""
+    summary: str
+    """A sentence for people."""
+
+    def __str__(self) -> str:
+        return self.summary
+
+
+@dataclass(frozen=True)
 class Hit:
     """A region that contains a point."""
 

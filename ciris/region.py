@@ -10,14 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from certifier.outcome import Guarantee
-from ciris.answers import SHORT, Document, QVolume, Share
+from ciris.answers import SHORT, Document, NotCovered, QVolume, Share
 from ciris.reading import read
 from ciris.space import Array, InSpace, Space, frozen
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RegionData(InSpace):
-    """A polytope {s : C s <= d} in which the robot collides nowhere, which is proved. It has n joints and m faces."""
+    """A polytope {s : C s <= d} in which the robot collides nowhere, which is proved, but for the pairs that are ``not_covered``.
+
+    It has n joints and m faces.
+    """
 
     id: str
     scene: str
@@ -38,6 +41,8 @@ class RegionData(InSpace):
     """How large the region is in joint positions."""
     share: Share | None
     """How much of the proposal it keeps; None for a region that was not grown."""
+    not_covered: NotCovered
+    """The pairs of geometries that the proof is not about."""
     created_at: datetime
     manifest: Document
     """Everything else that is known of it: docs/architecture.md, "Manifest"."""
@@ -84,6 +89,7 @@ def region_fields(document: Document) -> dict[str, Any]:
         "space": Space(tuple(given["joints"]), q_star, lower, upper, frozen(given["revolute"], bool)),
         "q_volume": document["q_volume"] and read(QVolume, document["q_volume"]),
         "share": document["share"] and read(Share, document["share"]),
+        "not_covered": read(NotCovered, document["not_covered"]),
         "created_at": datetime.fromisoformat(document["created_at"]),
         "manifest": manifest,
     }

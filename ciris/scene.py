@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ciris.answers import Document
+from ciris.answers import Document, NotCovered
+from ciris.reading import read
 from ciris.requests import named
 from ciris.space import InSpace, Space, frozen
 
@@ -24,6 +25,8 @@ class Scene(InSpace):
     """Number of the pairs of bodies that must not touch."""
     warnings: int
     """Number of the warnings; ``service.warnings(scene)`` returns them."""
+    not_covered: NotCovered
+    """The pairs of geometries that no proof about the scene is about."""
     padding: float
     """Metres added around every geometry of every pair."""
 
@@ -45,7 +48,7 @@ class Scene(InSpace):
         revolute = frozen([joint["kind"] == "revolute" for joint in joints], bool)
         space = Space(tuple(joint["name"] for joint in joints), q_star, lower, upper, revolute)
         names = ("id", "name", "hash", "geometries", "pairs", "warnings", "padding")
-        return cls(space=space, **{name: document[name] for name in names})
+        return cls(space=space, not_covered=read(NotCovered, document["not_covered"]), **{name: document[name] for name in names})
 
 
 def scene_name(scene: str | Scene) -> str:

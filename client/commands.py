@@ -12,6 +12,7 @@ from typing import Any
 from certifier.errors import CirisError
 from certifier.outcome import Outcome
 from certifier.verify.decimals import at_most_mm, exactly
+from certifier.verify.uncovered import named
 from client import output, service
 from client.files import ProofFile, check_writable
 from client.inputs import configuration, labels, polytope_file, seed_of
@@ -78,6 +79,7 @@ def scene_show(args: Namespace) -> int:
         print(f"{item['geometry']}: {item['substitution']} (reaches outside by at most {at_most_mm(item['inflation'])})")
     for item in lint["ignored"]:
         print(f"ignored: {item['a']} - {item['b']} ({item['reason']})")
+    _print_not_covered(scene["not_covered"])
     for warning in lint["warnings"]:
         print("warning:", warning)
     return OK
@@ -258,7 +260,15 @@ def region_show(args: Namespace) -> int:
     output.print_region(region["manifest"], [("job", region["job"]), ("created", region["created_at"])])
     print()
     output.print_pairs(region["manifest"]["pairs"])
+    _print_not_covered(region["not_covered"])
     return OK
+
+
+def _print_not_covered(found: dict[str, Any]) -> None:
+    """Prints which pairs no proof is about."""
+    print(found["summary"])
+    for line in named(found):
+        print(f"  {line}")
 
 
 def region_export(args: Namespace) -> int:

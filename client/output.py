@@ -158,7 +158,7 @@ def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()
     limits = 2 * len(space["joints"])
     faces = len(manifest["halfspace_offsets"])
     least = min((p for p in pairs if p["margin"] is not None), key=lambda p: p["margin"], default=None)
-    # Regions that an earlier checkout stored have neither.
+    # Regions that an earlier checkout stored have none of these.
     ranges, kept = manifest.get("joint_ranges", {}), manifest.get("share")
     moves = [f"{name}: {_range(r)}" for name, r in ranges.items()] or space["joints"]
     print_facts(
@@ -169,6 +169,7 @@ def print_region(manifest: dict[str, Any], extra: Iterable[tuple[str, str]] = ()
             ("volume", q_volume(manifest.get("q_volume"))),
             *([("share", f"{share(kept)} of the proposal's collision-free part")] if kept else []),
             ("pairs", f"{sum(p['outcome'] == 'certified' for p in pairs)} of {len(pairs)} certified, {len(manifest['ignored'])} ignored"),
+            *([("", manifest["not_covered"]["summary"])] if "not_covered" in manifest else []),
             *([("proved distance", f"at least {distance(least['margin'])}: {least['a']} - {least['b']}")] if least else []),
             ("guarantee", manifest["guarantee"]),
             *extra,

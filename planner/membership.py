@@ -83,6 +83,9 @@ def to_s(scene: Scene, q: Array) -> Array:
 
     A joint that can turn a whole turn and more is in the same pose a turn later, so its position is taken to the window that the scene
     covers. s itself has period 2 pi in every revolute joint, so without the check of the limits any configuration a turn away would count.
+
+    Raises:
+        RegionError: number_too_large, for a position whose whole turns a double cannot hold (:meth:`Scene.in_windows`).
     """
     lower, upper = scene.own_limits
     shifted = scene.in_windows(q)

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from certifier.model import Array
+from certifier.positions import check_magnitude
 from planner.library import Library
 
 INWARDS = 1e-9
@@ -40,9 +41,13 @@ class Nearest:
 def nearest(library: Library, s: Array, without: Collection[int] = ()) -> Nearest | None:
     """Returns the region that is nearest to the point s, (n,), of all but those ``without``; None where there is none.
 
+    Raises:
+        RegionError: number_too_large.
+
     The regions are looked at by the distance of their boxes, until a box is farther away than the best region. The distance to the
     farthest face that the point is beyond spares most of the others their projection.
     """
+    check_magnitude(s, "s")
     outside = np.maximum(np.maximum(library.lower - s, s - library.upper), 0.0)
     far = np.linalg.norm(outside, axis=1)
     far[list(without)] = np.inf

@@ -12,6 +12,7 @@ from fastapi import APIRouter, Query, Response, status
 from api import drawing, exports
 from api.access import READ, Admin, Db
 from api.children import Children
+from api.manifests import manifest
 from api.reading import ReadingRoute
 from api.schemas.common import MAX_INT, Cursor, Listed, OfScene, RegionGiven
 from api.schemas.drawing import MAX_SAMPLES, Extreme, RegionConfigurations
@@ -66,7 +67,8 @@ def list_regions(
 def get_region(region_id: RegionGiven, db: Db) -> RegionDetail:
     """Returns one region with its manifest."""
     with db.read() as session:
-        return RegionDetail.of(regions.get(session, region_id))
+        row = regions.get(session, region_id)
+    return RegionDetail.whole(row, manifest(db, row))
 
 
 @router.get("/{region_id}/configurations")
@@ -148,7 +150,7 @@ def export_region(region_id: RegionGiven, db: Db, format: Format = ExportFormat.
         raise CirisError("bad_name", f"{escaped(name)!r} cannot be a region's name", field="name", hint=f"give {ALPHABET}")
     with db.read() as session:
         row = regions.get(session, region_id)
-    data, suffix = exports.WRITERS[format](row, name or row.id)
+    data, suffix = exports.WRITERS[format](manifest(db, row), row.arrays, name or row.id)
     return _download(data, f"{region_id}.{suffix}", exports.MEDIA_TYPES[format])
 
 

@@ -19,6 +19,7 @@ from api.schemas.service import Dependents
 from api.writing import writing
 from certifier.pair.forecast import forecast
 from certifier.scene.bundle import load_bundle
+from certifier.verify import uncovered
 from db import audit, retention, scenes
 from db.audit import Action
 from db.session import Database
@@ -56,9 +57,10 @@ async def create_scene(
 def _add_scene(db: Database, room: Room, project: str, file: BinaryIO) -> SceneDetail:
     room.check(db, project)
     scene = load_bundle(file.read())
+    besides = uncovered.document(scene)
     with db.write() as session:
         row = scenes.add(session, scene)
-        return SceneDetail.of(row, scenes.names(session, [row.id])[row.id])
+        return SceneDetail.whole(row, scenes.names(session, [row.id])[row.id], besides)
 
 
 @router.get("")
@@ -75,7 +77,8 @@ def get_scene(scene_id: SceneGiven, db: Db) -> SceneDetail:
     """Returns one scene, by its id or by its name. A name means the scene that was last added under it."""
     with db.read() as session:
         row = scenes.get(session, scene_id)
-        return SceneDetail.of(row, scenes.names(session, [row.id])[row.id])
+        names = scenes.names(session, [row.id])[row.id]
+    return SceneDetail.whole(row, names, uncovered.document(scenes.load(db, row.id)))
 
 
 @router.get("/{scene_id}/model")

@@ -19,6 +19,8 @@ SCENE, REGION = "planar-2dof", "1f0c6d4e-6d0e-4f0e-9a51-0c1f5d0a7b11"
 
 POINTS_IN_Q = "(k, n), joint positions in radians or metres, one row a point."
 POINTS_IN_S = "(k, n), tangent-space coordinates s, one row a point."
+Moment = Annotated[Real, Field(ge=-1e100, le=1e100)]
+"""Differences of times do not overflow."""
 Ends = Annotated[list[Vector], Field(min_length=2, max_length=2)]
 Q = Annotated[list[float], Field(description="(n,), joint positions in radians or metres.", examples=[[0.4, 0.3]])]
 S = Annotated[list[float], Field(description="(n,), tangent-space coordinates.", examples=[[0.2027, 0.1511]])]
@@ -127,7 +129,7 @@ class PathRequest(_Motion):
     bezier: Bezier | None = Field(None, max_length=MAX_SEGMENTS, description=BEZIER)
     knots: Knots | None = Field(None, description=KNOTS)
     control_points: ControlPoints | None = Field(None, max_length=MAX_SEGMENTS, description=CONTROL_POINTS)
-    times: list[Real] | None = Field(
+    times: list[Moment] | None = Field(
         None,
         min_length=2,
         max_length=MAX_WAYPOINTS + 1,

@@ -8,6 +8,7 @@ from typing import Self
 from pydantic import BaseModel, Field
 
 from api.schemas.common import Document, Page
+from api.schemas.scenes import NotCovered
 from certifier.outcome import Guarantee
 from db.models import RegionRow
 
@@ -74,10 +75,11 @@ class RegionDetail(RegionSummary):
     """Describes a certified region, with its manifest."""
 
     manifest: Document = Field(description="Everything that is known about the region; docs/architecture.md lists the keys.")
+    not_covered: NotCovered = Field(description="The pairs of geometries that the region's proof is not about, as the manifest has them.")
 
     @classmethod
-    def of(cls, row: RegionRow) -> Self:
-        return cls(**RegionSummary.of(row).model_dump(), manifest=row.manifest)
+    def whole(cls, row: RegionRow, manifest: Document) -> Self:
+        return cls(**RegionSummary.of(row).model_dump(), manifest=manifest, not_covered=NotCovered.model_validate(manifest["not_covered"]))
 
 
 class Verification(BaseModel):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import BaseModel, Field
 
 from api.schemas.common import Document, Page
 from certifier.model import JointKind
+from certifier.verify.uncovered import LISTED
 from db.models import SceneRow
 
 
@@ -60,16 +61,40 @@ class JointInfo(BaseModel):
     q_star: float = Field(description="Centre of the parametrisation: s = tan((q - q_star) / 2), or q - q_star for a prismatic joint.")
 
 
+class UncoveredBodies(BaseModel):
+    """Says how many pairs of geometries of two bodies no proof is about, and why."""
+
+    a: str = Field(description="Name of the first body.")
+    b: str = Field(description="Name of the second body.")
+    pairs: int = Field(description="Number of pairs of their geometries.")
+    why: Literal["neighbours", "filtered", "ignored"] = Field(
+        description="A joint joins the bodies, a collision filter of the model leaves the pairs out, or the scene file ignores them."
+    )
+    reason: str | None = Field(description="The reason in the scene file; null for pairs that it does not ignore.")
+
+
+class NotCovered(BaseModel):
+    """Says which pairs of geometries can move against each other and are in no proof about the scene."""
+
+    pairs: int = Field(description="Number of such pairs.")
+    neighbours: int = Field(description="Number of those of bodies that a joint joins.")
+    filtered: int = Field(description="Number of those that a collision filter of the model leaves out.")
+    ignored: int = Field(description="Number of those that the scene file ignores.")
+    bodies: list[UncoveredBodies] = Field(description=f"The pairs by their bodies, {LISTED} entries at most.")
+    summary: str = Field(description="A sentence for people.", examples=["6 pairs of neighbouring links are not covered"])
+
+
 class SceneDetail(SceneSummary):
     """Describes a scene with its joints, in position order."""
 
     positions: list[JointInfo] = Field(description="The joints that have a position.")
     bodies: list[str] = Field(description="Names of the bodies.")
     padding: float = Field(description="Metres added around every geometry of every pair.")
+    not_covered: NotCovered = Field(description="The pairs of geometries that no proof about the scene is about.")
     provenance: Document = Field(description="What the scene was read from, and by which versions.")
 
     @classmethod
-    def of(cls, row: SceneRow, names: list[str]) -> Self:
+    def whole(cls, row: SceneRow, names: list[str], not_covered: Document) -> Self:
         document = row.document
         moving = sorted((j for j in document["joints"] if j["index"] is not None), key=lambda j: j["index"])
         positions = [
@@ -81,6 +106,7 @@ class SceneDetail(SceneSummary):
             positions=positions,
             bodies=document["bodies"],
             padding=document["padding"],
+            not_covered=NotCovered.model_validate(not_covered),
             provenance=document["provenance"],
         )
 
@@ -141,4 +167,4 @@ class LintReport(BaseModel):
 
     warnings: list[str] = Field(description="Sentences about what was read in another way than one might expect.")
     substitutions: list[Substitution] = Field(description="Shapes that were replaced by larger ones.")
-    ignored: list[IgnoredPair] = Field(description="Pairs that no proof is about.")
+    ignored: list[IgnoredPair] = Field(description="Pairs that the scene file ignores; `not_covered` of the scene has all.")

@@ -38,7 +38,7 @@ def begin_again(scene: Scene, state: GrowthState) -> Transition:
         raise RegionError(
             "seed_wrong_length", f"a configuration to keep has not {scene.n} numbers", field="seed.q", hint="one for each joint"
         )
-    keep = scene.to_s(scene.in_windows(np.array(asked["q"], dtype=float).reshape(-1, scene.n)))
+    keep = scene.to_s(scene.in_windows(np.array(asked["q"], dtype=float).reshape(-1, scene.n), "seed.q"))
     limits = scene.polytope([], [])
     rows = {(*c, d) for c, d in zip(limits.C.tolist(), limits.d.tolist(), strict=True)}
     others = [(*c, d) not in rows for c, d in zip(given.C.tolist(), given.d.tolist(), strict=True)]

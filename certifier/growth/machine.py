@@ -28,6 +28,7 @@ from certifier.model import Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.polytopes.polytope import chebyshev_center
+from certifier.positions import check_magnitude
 from certifier.seeding.options import IRIS, IRIS_SEEDS, Method
 from certifier.seeding.proposal import Proposal
 from certifier.step.stepped import Stepped
@@ -37,7 +38,7 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
     """Returns the first action of a job.
 
     Raises:
-        RegionError: a ``certify`` job without C and d, or with the wrong number of columns.
+        RegionError: a ``certify`` job without C and d, with the wrong number of columns, or with a number that is too large.
     """
     state = GrowthState(options)
     if options.kind == "grow":
@@ -49,7 +50,9 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
         raise RegionError("polytope_missing", "a polytope needs C and d", field="polytope", hint="give both")
     given, center = Polytope.given(options.seed["C"], options.seed["d"], scene.n), options.seed.get("center")
     limited = scene.polytope(given.C, given.d)
-    center = None if center is None else np.array(center)
+    if center is not None:
+        check_magnitude(center, "polytope.center")
+        center = np.array(center)
     return certify(scene, state, "given", limited, center, failures=None, cells=options.cells or 1)
 
 

@@ -18,6 +18,7 @@ from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume, volume_in
 from certifier.polytopes.polytope import bounds, chebyshev_center, drop_redundant, support
 from certifier.proof.region import Implied, RegionProof, read_part
 from certifier.proof.separation import Separation, digest
+from certifier.verify import uncovered
 from certifier.verify.region import RegionStatement, verify_region
 from certifier.verify.separations import Progress
 
@@ -107,6 +108,7 @@ def certified_region(
             for index, p in enumerate(scene.pairs)
         ],
         "ignored": [{"a": i.a, "b": i.b, "reason": i.reason} for i in scene.ignored],
+        "not_covered": uncovered.document(scene),
         "padding": scene.padding,
         "archimedean": {"N": bound.N},
         "guarantee": Guarantee.EXACT.value,

@@ -10,6 +10,7 @@ import numpy as np
 from certifier.errors import RegionError
 from certifier.model import Array, Scene
 from certifier.motion.splines import Curve, curve
+from certifier.positions import check_magnitude
 from certifier.proof import limits
 from certifier.proof.motion import Motion, Space
 
@@ -101,10 +102,7 @@ def _numbers(scene: Scene, waypoints: Any, field: str) -> Array:
         shape = "no lists of numbers of one length" if points is None else f"of shape {points.shape}"
         raise RegionError("motion_shape", f"the waypoints are {shape}", field=field, hint=hint)
     _check_scene(scene, len(points), field)
-    wrong = np.argwhere(~(np.abs(points) <= limits.MAGNITUDE))
-    if len(wrong):
-        i, j = wrong[0]
-        raise RegionError("motion_not_finite", f"{points[i, j]} is no number of at most {limits.MAGNITUDE:g}", field=f"{field}[{i}][{j}]")
+    check_magnitude(points, field, code="motion_not_finite")
     return points
 
 

@@ -15,7 +15,8 @@ import numpy as np
 from certifier.document import LARGEST
 from certifier.errors import RegionError
 from certifier.model import Array
-from certifier.proof.limits import DEGREE, MAGNITUDE
+from certifier.positions import MAGNITUDE, check_magnitude
+from certifier.proof.limits import DEGREE
 
 
 @dataclass(frozen=True)
@@ -130,8 +131,5 @@ def _numbers(given: Any, dimensions: int, most: float, field: str, hint: str) ->
     if numbers is None or numbers.ndim != dimensions or not numbers.size:
         shape = "no lists of numbers of one length" if numbers is None else f"of shape {numbers.shape}"
         raise RegionError("curve_shape", f"the numbers are {shape}", field=field, hint=hint)
-    wrong = np.argwhere(~(np.abs(numbers) <= most))
-    if len(wrong):
-        place = "".join(f"[{i}]" for i in wrong[0])
-        raise RegionError("motion_not_finite", f"{numbers[tuple(wrong[0])]} is no number of at most {most:g}", field=f"{field}{place}")
+    check_magnitude(numbers, field, most, "motion_not_finite")
     return numbers

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from certifier import positions
+
 FILE_BYTES = 256 << 20
 UNPACKED_BYTES = 256 << 20
 RATIO = 100
@@ -20,7 +22,7 @@ PATH = 64
 GEOMETRIES = 20_000
 VERTICES = 4_096
 """A geometry has at most this many vertices."""
-MAGNITUDE = 1e6
+MAGNITUDE = positions.MAGNITUDE
 """No length, in metres, and no joint position, limit or q*, in metres or radians, is larger than this."""
 PAIRS = 20_000
 """This limit holds for the pairs to prove, and again for those that are ignored."""

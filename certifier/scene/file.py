@@ -18,6 +18,7 @@ import yaml
 
 from certifier.errors import SceneError, close_matches
 from certifier.model import ALPHABET, MAX_SENTENCE, is_name, is_sentence
+from certifier.positions import MAGNITUDE
 
 KEYS = ("name", "packages", "directives", "q_star", "limits", "fix", "padding", "ignore", "hulls", "mesh", "cylinder_sides")
 """The keys of a scene file."""
@@ -262,8 +263,8 @@ def _sentence(value: Any, where: str) -> str:
 
 
 def _number(value: Any, where: str, minimum: float = -math.inf) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise _wrong(where, f"must be a finite number, not {value!r}")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= MAGNITUDE:
+        raise _wrong(where, f"must be a number of at most {MAGNITUDE:g}, not {value!r}")
     if value < minimum:
         raise _wrong(where, f"must be at least {minimum:g}, not {value!r}")
     return float(value)

@@ -18,9 +18,10 @@ def check_limits(scene: Scene, q: ArrayLike, field: str = "seed") -> None:
     """Refuses a configuration with a joint outside of its limits, or of the window that the scene covers of its turn.
 
     Raises:
-        RegionError: ``seed_outside_limits`` (limits themselves are not outside) or ``seed_outside_window``; the error names the joint.
+        RegionError: ``number_too_large``; ``seed_outside_limits`` (limits themselves are not outside) or ``seed_outside_window``; the error
+            names the joint.
     """
-    values, shifted = np.asarray(q, dtype=float), scene.in_windows(q)
+    values, shifted = np.asarray(q, dtype=float), scene.in_windows(q, field)
     for i, (joint, value, own_lower, own_upper) in enumerate(zip(scene.moving, values, *scene.own_limits, strict=True)):
         if not own_lower - ON <= value <= own_upper + ON:
             message = f"joint {joint.name} is at {value:.9g}, not between its limits {own_lower:.9g} and {own_upper:.9g}"

@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import Any
 
 from certifier.errors import RegionError
+from certifier.positions import check_magnitude
 
 
 class Method(StrEnum):
@@ -105,6 +106,10 @@ class SeedOptions:
                 given[name] = tuple(
                     _numbers(f"{name}[{i}]", row) for i, row in enumerate(rows if isinstance(rows, list | tuple) else [rows])
                 )
+        for name in ("q", "center"):
+            check_magnitude(given.get(name, ()), f"seed.{name}")
+        for i, row in enumerate(given.get("contain", ())):
+            check_magnitude(row, f"seed.contain[{i}]")
         for name, most in (("half_width", math.inf), ("epsilon", 1), ("delta", 1), ("tolerance", math.inf), ("margin", math.inf)):
             if name in given and not (_is_number(given[name]) and 0 < given[name] < most):
                 raise _refuse(name, f"{name} must be a positive number" + (f" below {most}" if most < math.inf else ""))

@@ -25,7 +25,7 @@ def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> Nearest:
     """Refuses joint positions around which no region can be certified, and returns the pair that is nearest at others.
 
     Raises:
-        RegionError: ``seed_wrong_length``, ``seed_not_finite``, ``seed_in_collision``, or as
+        RegionError: ``seed_wrong_length``, ``seed_in_collision``, or as
             :func:`certifier.seeding.limits.check_limits`; the error names the joint or the pair.
     """
     q = np.asarray(q, dtype=float)
@@ -34,10 +34,6 @@ def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> Nearest:
         raise RegionError(
             "seed_wrong_length", f"the seed has {q.size} numbers, the scene {scene.n} joints", field=field, hint=f"in order: {names}"
         )
-    for joint, value in zip(scene.moving, q, strict=True):
-        if not np.isfinite(value):
-            message = f"joint {joint.name} is at {value}"
-            raise RegionError("seed_not_finite", message, field=f"{field}[{joint.index}]", hint="give a finite number")
     check_limits(scene, q, field)
     return check_free(scene, q, field)
 

@@ -171,7 +171,7 @@ class AsyncClient:
                 if error.code not in ("unreachable", "timeout"):
                     raise
                 if time.monotonic() > until:
-                    hint = f"wait for it again with job({job_id!r}) of the service, or with `ciris job watch {job_id[:8]}`"
+                    hint = f"wait for it again with job({job_id!r}) of the service, or with `ciris job follow {job_id[:8]}`"
                     raise CirisError(error.code, f"{error.message}; the job {job_id} goes on", hint=hint) from None
             await asyncio.sleep(PAUSE_S)
 

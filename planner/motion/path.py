@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from certifier.model import Array, Scene
+from certifier.positions import check_magnitude
 from planner.library import Library
 from planner.membership import locate, to_s
 from planner.motion.cover import Line, cover
@@ -61,7 +62,11 @@ def follow(library: Library, scene: Scene, space: Space, controls: Array, times:
             from number i m to (i + 1) m. Of degree 1 they are waypoints, between which the path is straight. The doubles are taken
             literally.
         times: k + 1 ascending numbers, when the path is where segments begin and end. They only name the points of the path.
+
+    Raises:
+        RegionError: number_too_large, for a control point.
     """
+    check_magnitude(controls, "controls")
     stretches: list[Stretch] = []
     for i in range((len(controls) - 1) // degree):
         segment = controls[i * degree : (i + 1) * degree + 1]

@@ -20,6 +20,7 @@ from planner.motion.space import Space
 from planner.nearest import project
 from planner.overlap import Gap, components, gap
 from planner.trajectory.routes import Links, Route, Terminal, routes
+from planner.trajectory.stretch import stretch
 
 ROUTES = 5
 """So many routes are made curves of; the shortest curve counts."""
@@ -121,8 +122,14 @@ def plan(library: Library, scene: Scene, links: Links, start: Array | int, goal:
         for place, end in ((0, first), (-1, last)):
             if end.q is not None:
                 q[slice(None) if t[-1] == 0 else place] = end.q
-        covering = follow(library, scene, Space.Q, q + turns, t.tolist())
-        return Trajectory(q + turns, t, covering.stretches) if covering.uncovered is None else Unproved(covering.uncovered)
+        q = q + turns
+        if not isinstance(start, int):
+            q[slice(None) if t[-1] == 0 else 0] = start
+        if t[-1] > 0:
+            # Far from q* the turns have rounded the differences.
+            t = t * stretch(q, t, limits.speed, limits.acceleration)
+        covering = follow(library, scene, Space.Q, q, t.tolist())
+        return Trajectory(q, t, covering.stretches) if covering.uncovered is None else Unproved(covering.uncovered)
 
     line = _straight(library, scene, first, last)
     if line is not None:

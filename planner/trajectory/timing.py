@@ -13,6 +13,7 @@ from pydrake.multibody.tree import PrismaticJoint, SpatialInertia
 from pydrake.trajectories import PiecewisePolynomial
 
 from certifier.model import Array
+from planner.trajectory.stretch import UP, stretch
 
 STILL = 1e-6
 """A curve that is no longer than this is as good as a point, because solvers are not more exact; and so is a part of a curve that is so
@@ -20,7 +21,6 @@ much shorter than all of it.
 """
 FEWEST, MOST = 17, 4000
 """A trajectory has so many configurations at least and at most."""
-_UP = 1 + 1e-6
 _FAST = 1e6
 """No joint need be faster: Toppra has its numbers in units in which the whole motion lasts about 1."""
 
@@ -44,7 +44,7 @@ def timed(curve: Array, through: list[int], speed: Array, acceleration: Array, s
         spacing: no joint moves much farther between two configurations, unless there would be more than MOST of them.
     """
     if length(curve) <= STILL:
-        return curve[[0, -1]], np.array([0.0, _UP * _least(np.abs(curve[-1] - curve[0]), speed, acceleration)])
+        return curve[[0, -1]], np.array([0.0, UP * _least(np.abs(curve[-1] - curve[0]), speed, acceleration)])
     along = _along(curve)
     moves = np.concatenate([[True], np.diff(along) > 0])
     path = PiecewisePolynomial.CubicWithContinuousSecondDerivatives(along[moves], curve[moves].T)
@@ -67,7 +67,7 @@ def timed(curve: Array, through: list[int], speed: Array, acceleration: Array, s
     q = path.vector_values(np.clip(course.vector_values(t)[0], 0.0, along[-1])).T
     q[places], q[0], q[-1], t[0], t[-1] = curve[through][apart], curve[0], curve[-1], fine[0], fine[-1]
     t *= unit
-    return q, t * _stretch(q, t, speed, acceleration)
+    return q, t * stretch(q, t, speed, acceleration)
 
 
 def _least(way: Array, speed: Array, acceleration: Array) -> float:
@@ -79,17 +79,6 @@ def _along(curve: Array) -> Array:
     """Returns how far along the curve its points are, (m,); those where it stays are no farther than the one before."""
     far = np.linalg.norm(np.diff(curve, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(np.where(far > STILL * far.sum(), far, 0.0))])
-
-
-def _stretch(q: Array, t: Array, speed: Array, acceleration: Array) -> float:
-    """Returns by what factor, 1 or more, the times have to be multiplied for the differences to be within the limits."""
-    step = np.diff(t)[:, None]
-    at_rest = np.zeros((1, q.shape[1]))
-    velocity = np.concatenate([at_rest, np.diff(q, axis=0) / step, at_rest])
-    between = np.concatenate([step[:1], (step[:-1] + step[1:]) / 2, step[-1:]])
-    change = np.diff(velocity, axis=0) / between
-    over = max(float((np.abs(velocity) / speed).max()), float(np.sqrt(np.abs(change) / acceleration).max()))
-    return max(1.0, over * _UP)
 
 
 def _sliders(n: int) -> MultibodyPlant:

@@ -37,6 +37,7 @@ CERTAIN = {
 """A motion that is certified has these."""
 SELDOM: dict[str, dict[str, Any]] = {
     "IgnoredPair": {**PAIR, "reason": "neighbours: the joint between them always overlaps"},
+    "UncoveredBodies": {"why": "ignored", "reason": "they are bolted together"},
     "Substitution": {"geometry": "arm/flange/disc", "substitution": "a capsule around a cylinder", "inflation": 0.003},
     "AuditPage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
     "DrawnGeometry": {"substitution": "a capsule around a cylinder"},

@@ -90,13 +90,47 @@ def small_region() -> bytes:
     return certified_region(scene, accepted(polytope, np.zeros(1)), proofs, {"seconds": 1.0}).proof
 
 
+UNCOVERED = {"not_covered", "not_covered_pairs", "not_covered_why", "not_covered_summary"}
+SUMMARY = "1 pair of neighbouring links is not covered"
+
+
+@pytest.mark.parametrize("stored", ["now", "by an earlier version"])
+def test_what_a_region_does_not_cover_is_said_wherever_it_is_told_of(
+    client: TestClient, planar_region: str, database: Database, stored: str
+) -> None:
+    links = {"a": "arm/link1", "b": "arm/link2", "pairs": 1, "why": "neighbours", "reason": None}
+    if stored != "now":
+        with database.write() as session:
+            row = regions.get(session, planar_region)
+            row.manifest = {name: value for name, value in row.manifest.items() if name != "not_covered"}
+    answer = client.get(f"/v1/regions/{planar_region}").json()
+    expected = {"pairs": 1, "neighbours": 1, "filtered": 0, "ignored": 0, "bodies": [links], "summary": SUMMARY}
+    assert answer["not_covered"] == answer["manifest"]["not_covered"] == expected
+    assert client.get(f"/v1/scenes/{answer['scene']}").json()["not_covered"] == expected
+    files = {name: client.get(f"/v1/regions/{planar_region}/export?format={name}").content for name in ("json", "npz", "drake-yaml")}
+    assert json.loads(files["json"])["not_covered"] == expected
+    with np.load(io.BytesIO(files["npz"])) as arrays:
+        said = {name: arrays[name].tolist() for name in UNCOVERED}
+    assert said == {
+        "not_covered": [["arm/link1", "arm/link2"]],
+        "not_covered_pairs": [1],
+        "not_covered_why": ["neighbours"],
+        "not_covered_summary": SUMMARY,
+    }
+    assert f"# {SUMMARY}\n#   1 of arm/link1 and arm/link2: neighbours\n" in files["drake-yaml"].decode()
+    statement = client.post(f"/v1/regions/{planar_region}/verify").json()["statement"]
+    assert "not covered, as the scene has no such pairs: 1 of 'arm/link1' and 'arm/link2'" in statement
+    for page in (f"/regions/{planar_region}", f"/scenes/{answer['scene']}", f"/jobs/{answer['job']}", f"/jobs/{answer['job']}/live"):
+        assert SUMMARY in client.get(page, headers={"accept": "text/html"}).text
+
+
 def test_the_manifest_and_the_arrays_are_exported(client: TestClient, region: str, certified: Region) -> None:
     assert client.get(f"/v1/regions/{region}/export").json() == {"name": region, **certified.manifest}
     with np.load(io.BytesIO(client.get(f"/v1/regions/{region}/export?format=npz").content)) as arrays:
         assert arrays["C"].tolist() == certified.manifest["halfspace_normals"]
         assert arrays["d"].tolist() == certified.manifest["halfspace_offsets"]
         meaning = {"joints", "q_star", "q_lower", "q_upper", "revolute"}
-        assert set(arrays.files) == {"name", "C", "d", "center", "ellipsoid_center", "ellipsoid_shape", *meaning}
+        assert set(arrays.files) == {"name", "C", "d", "center", "ellipsoid_center", "ellipsoid_shape", *meaning, *UNCOVERED}
         assert {name: arrays[name].tolist() for name in meaning} == {name: certified.manifest["space"][name] for name in meaning}
 
 

@@ -59,9 +59,30 @@ def test_a_region_is_arrays_a_proof_and_a_verdict(service: Any, region: str, sce
     verdict = found.verify()
     assert verdict
     assert any("separated" in line for line in verdict.statement)
+    assert (found.not_covered.pairs, str(found.not_covered), found.not_covered.bodies) == (0, str(service.scene("slider").not_covered), ())
     assert repr(found).startswith(f"Region({region[:8]} of slider: 1 joints, {len(found.d)} faces, ")
     assert b"slider" in found.export("json")
     assert service.region(region[:8]).id == region
+
+
+@pytest.mark.parametrize("number", [9185166224891948.0, 1e300])
+def test_a_number_that_no_double_tells_from_others_is_refused(service: Any, region: str, number: float) -> None:
+    for ask in (
+        lambda: service.contains("slider", [[number]]),
+        lambda: service.nearest("slider", [number]),
+        lambda: service.path("slider", [[0.1], [number]]),
+        lambda: service.plan("slider", [0.1], [number]),
+        lambda: service.certify_path("slider", [[0.1], [number]]),
+    ):
+        with pytest.raises(ciris.CirisError, match="is no number of at most 1e\\+06"):
+            ask()
+    assert not service.region(region).contains([number]), "it is taken literally, and is outside of the limits"
+
+
+def test_a_region_names_the_pairs_that_are_not_covered(service: Any, planar_region: str) -> None:
+    found = service.region(planar_region).not_covered
+    assert (found.pairs, str(found)) == (1, "1 pair of neighbouring links is not covered")
+    assert [(one.a, one.b, one.why, one.reason) for one in found.bodies] == [("arm/link1", "arm/link2", "neighbours", None)]
 
 
 def test_regions_are_fetched_once(service: Any, region: str, database: Database) -> None:

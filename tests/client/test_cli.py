@@ -22,11 +22,15 @@ from certifier.model import Scene
 from certifier.outcome import Guarantee, Outcome, Stage
 from certifier.pair.result import PairResult
 from certifier.verify.region import verify_region
+from certifier.verify.uncovered import document
 from ciris.find import data_dir
 from client import output
 from client.cli import INTERRUPTED, _joined
 from client.files import ProofFile
+from db import regions
+from db.session import Database
 from db.settings import Settings
+from tests.certifier.scenes import planar_arm
 from tests.client.conftest import PLANAR, ROOT, Ciris, command, surroundings
 
 
@@ -324,6 +328,19 @@ def test_regions_are_listed_shown_and_exported(ciris: Ciris, url: str, region: s
     assert verify_region(ciris("region", "export", region, "--format", "proof", CIRIS_URL=url).raw).faces == 4
 
 
+def test_what_a_region_does_not_cover_is_said_where_it_is_shown(ciris: Ciris, url: str, region: str, database: Database) -> None:
+    with database.write() as session:
+        row = regions.get(session, region)
+        row.manifest = {**row.manifest, "not_covered": document(planar_arm(2))}
+    said = ["1 pair of neighbouring links is not covered", "  1 of arm/link1 and arm/link2: neighbours"]
+    shown = ciris("region", "show", region, CIRIS_URL=url).stdout.splitlines()
+    assert shown[-2:] == said
+    (pairs,) = (i for i, line in enumerate(shown) if line.startswith("  pairs "))
+    assert shown[pairs + 1].strip() == said[0]
+    scene = ciris("scene", "show", "slider", CIRIS_URL=url).stdout.splitlines()
+    assert "every pair of bodies that can move against each other is covered" in scene
+
+
 def test_an_export_overwrites_nothing(ciris: Ciris, url: str, region: str, tmp_path: Path) -> None:
     assert ciris("region", "export", region, "--out", "a.json", CIRIS_URL=url).status == 0
     written = (tmp_path / "a.json").read_bytes()
@@ -350,7 +367,7 @@ def test_the_region_of_another_robot_is_not_certified_here(ciris: Ciris, url: st
 
 
 def test_a_region_that_was_stored_before_there_were_shares_is_shown(certified: Region, capsys: pytest.CaptureFixture[str]) -> None:
-    older = {name: value for name, value in certified.manifest.items() if name not in ("share", "joint_ranges")}
+    older = {name: value for name, value in certified.manifest.items() if name not in ("share", "joint_ranges", "not_covered")}
     output.print_region(older)
     lines = capsys.readouterr().out.splitlines()
     assert "  joints     model/slide" in lines

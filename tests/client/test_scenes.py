@@ -206,3 +206,20 @@ def test_a_check_says_what_touches(ciris: Ciris, tmp_path: Path) -> None:
         done = ciris("scene", "check", tmp_path / "scene.yaml", "--q", q)
         assert done.status == 2
         assert words in done.error
+
+
+def test_an_angle_that_no_double_tells_from_others_is_refused_without_a_service(ciris: Ciris, tmp_path: Path) -> None:
+    scene, huge = EXAMPLES / "planar_2dof" / "scene.yaml", "9185166224891948,0"
+    polytope = tmp_path / "polytope.json"
+    polytope.write_text('{"C": [[1, 0]], "d": [0.1], "center": [0, 1e300]}')
+    for arguments, field in (
+        (("scene", "check", scene, "--q", huge), "q[0]"),
+        (("grow", scene, "--local", "--method", "box", "--q", huge), "seed.q[0]"),
+        (("grow", scene, "--local", "--method", "box", "--q", "0,0", "--contain", huge), "seed.contain[0][0]"),
+        (("certify-path", scene, "--local", "--q", "0,0", "--q", huge), "--q[1][0]"),
+        (("certify", scene, "--local", "--polytope", polytope), "polytope.center[1]"),
+    ):
+        done = ciris(*arguments)
+        assert (done.status, done.stdout) == (2, "")
+        number = "1e+300" if polytope in arguments else "9185166224891948.0"
+        assert done.stderr.splitlines()[-1] == f"error: {field}: {number} is no number of at most 1e+06"

@@ -17,7 +17,7 @@ def submit(page: Any, url: str) -> str:
     """Starts a job in the form, from a box around the configuration (-20, -12) degrees, and returns its id."""
     page.goto(url)
     page.get_by_role("link", name="Start a job").first.click()
-    page.locator(".said", has_text=re.compile("Free here|No collision, as proved")).wait_for()
+    page.locator(".said", has_text=re.compile("Free here|as proved")).wait_for()
     set_joint(page, "arm/joint1", -20)
     set_joint(page, "arm/joint2", -12)
     page.get_by_label("First polytope").select_option("box")
@@ -69,7 +69,7 @@ def test_a_visit_from_a_job_to_a_plan(page: Any, url: str, planar: Scene, client
     page.get_by_role("button", name="Play", exact=True).wait_for(timeout=20_000)
     shown = [float(field.input_value()) for field in page.locator(".library .sliders input[type=number]").all()]
     assert shown == pytest.approx([-25, -17], abs=0.06)
-    page.get_by_text("No collision, as proved.").wait_for()
+    page.get_by_text("No collision of the scene's pairs, as proved.").wait_for()
 
     # Another job, which is cancelled.
     other = submit(page, url)

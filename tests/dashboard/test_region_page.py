@@ -48,6 +48,25 @@ def test_sliders_stay_inside_the_region(opened: Any, planar: Scene, faces: tuple
     assert (d - C @ planar.to_s(shown(opened))).min() > -2e-3
 
 
+def test_what_is_not_covered_stands_beside_the_claim(opened: Any, client: TestClient, url: str, planar_region: str) -> None:
+    """One pair of links has no proof: the page says so where it says what is proved, and names the pair."""
+    summary = "1 pair of neighbouring links is not covered"
+    status = opened.locator(".explore [role=status]").text_content()
+    assert status == f"The robot is inside the region: no collision of the 2 pairs below, as proved. {summary}."
+    claim, besides = opened.locator("p.lead").bounding_box(), opened.locator("#not-covered").bounding_box()
+    assert 0 <= besides["y"] - (claim["y"] + claim["height"]) < 40
+    region = client.get(f"/v1/regions/{planar_region}").json()
+    for path in (f"regions/{planar_region}", f"scenes/{region['scene']}", f"jobs/{region['job']}"):
+        opened.goto(f"{url}/{path}")
+        folded = opened.locator("#not-covered")
+        assert folded.locator("summary").text_content() == summary
+        row = folded.get_by_role("row", name="arm/link1")
+        assert not row.is_visible()
+        folded.locator("summary").click()
+        row.wait_for()
+        assert row.inner_text().split("\t") == ["arm/link1 \N{EN DASH} arm/link2", "1", "neighbours"]
+
+
 def test_buttons_lead_to_the_ends_of_a_joint(opened: Any, client: TestClient, planar_region: str) -> None:
     ends = client.get(f"/v1/regions/{planar_region}/configurations?samples=0").json()["extremes"]
     for extreme in ends:

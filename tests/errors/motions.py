@@ -66,13 +66,6 @@ MOTIONS: list[Row] = [
             lambda t: given(slider(), [[0.0]] * (1 << 21), Space.Q),
         ),
         (
-            "motion_not_finite",
-            "{field}[{i}][{j}]",
-            "{...} is no number of at most {MAGNITUDE}",
-            "",
-            lambda t: given(slider(), [[0.0], [float("nan")]], Space.Q),
-        ),
-        (
             "outside_limits",
             "{field}[{i}][{j}]",
             "joint {name} is at {...} in waypoint {i}, not between {...} and {...}",
@@ -162,13 +155,6 @@ MOTIONS: list[Row] = [
             "the numbers are {shape}",
             "give (P, m + 1, n) numbers: the control points of each piece",
             lambda t: curve({"bezier": [[0.0]]}),
-        ),
-        (
-            "motion_not_finite",
-            "{field}{place}",
-            "{...} is no number of at most {most}",
-            "",
-            lambda t: curve({"bezier": [[[0.0], [float("inf")]]]}),
         ),
     ),
     *rows(

@@ -74,7 +74,7 @@ CLIENT: list[tuple[str, str, str, str, Provoke | str]] = [
         "unreachable",
         "",
         "{message}; the job {job_id} goes on",
-        "wait for it again with job({job_id}) of the service, or with `ciris job watch {...}`",
+        "wait for it again with job({job_id}) of the service, or with `ciris job follow {...}`",
         lambda t: waited(),
     ),
     (

@@ -15,8 +15,11 @@ from certifier.isolation.child import run_in_child
 from certifier.jobs import local
 from certifier.jobs.reference import Reference
 from certifier.model import Polytope, Scene
+from certifier.motion.given import given as moved
+from certifier.motion.splines import curve
 from certifier.polytopes.polytope import bound_multipliers, chebyshev_center
 from certifier.polytopes.sampling import hit_and_run
+from certifier.proof.motion import Space
 from certifier.seeding.options import SeedOptions
 from certifier.seeding.propose import propose
 from certifier.step.step import step
@@ -115,6 +118,19 @@ GROWTH = [
             "{what} of joint {name} is not what it was",
             ROBOT,
             lambda t: same_bodies(slider(), replace(slider(), q_star=np.array([0.1]))),
+        ),
+    ),
+    *rows(
+        "certifier/positions.py",
+        *(
+            (code, "{field}{place}", "{...} is no number of at most {most}", "", provoke)
+            for code, provoke in (
+                ("number_too_large", lambda t: seeded(q=[0, 1e16])),
+                ("number_too_large", lambda t: seeded(q=[0, 0], contain=[[0, float("inf")]])),
+                ("number_too_large", lambda t: slider().in_windows([1e7])),
+                ("motion_not_finite", lambda t: moved(slider(), [[0.0], [float("nan")]], Space.Q)),
+                ("motion_not_finite", lambda t: curve({"bezier": [[[0.0], [float("inf")]]]})),
+            )
         ),
     ),
     *rows(
@@ -228,7 +244,13 @@ GROWTH = [
             "C must be m x {...}, one column a joint in the scene's order, and d must have m numbers",
             lambda t: given([[1.0, 0.0, 0.0]], [1.0]),
         ),
-        ("polytope_not_finite", "seed.C", "C and d must be finite numbers", "", lambda t: given([[1.0, float("nan")]], [1.0])),
+        (
+            "polytope_not_finite",
+            "seed.C",
+            "C and d must be finite numbers of at most {LARGEST}",
+            "",
+            lambda t: given([[1.0, float("nan")]], [1.0]),
+        ),
     ),
 ]
 
@@ -391,13 +413,6 @@ SEEDS = [
     *rows(
         "certifier/seeding/propose.py",
         ("seed_wrong_length", "seed.q", "the seed has {size} numbers, the scene {n} joints", "in order: {names}", lambda t: seeded(q=[0])),
-        (
-            "seed_not_finite",
-            "{field}[{index}]",
-            "joint {name} is at {value}",
-            "give a finite number",
-            lambda t: seeded(q=[0, float("inf")]),
-        ),
         (
             "seed_cut_off",
             "seed",

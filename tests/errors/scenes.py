@@ -136,7 +136,7 @@ FILES = rows(
         "",
         lambda t: t.load(D + "ignore: [{pair: [a, b], reason: 3}]\n"),
     ),
-    ("scene_field", "padding", "must be a finite number, not {value}", "", lambda t: t.load(D + "padding: .nan\n")),
+    ("scene_field", "padding", "must be a number of at most {MAGNITUDE}, not {value}", "", lambda t: t.load(D + "padding: .nan\n")),
     ("scene_field", "padding", "must be at least {minimum}, not {value}", "", lambda t: t.load(D + "padding: -1\n")),
     ("scene_field", "cylinder_sides", "must be a whole number, not {value}", "", lambda t: t.load(D + "cylinder_sides: 3.5\n")),
     ("scene_field", "packages", "must map names of packages to directories", "", lambda t: t.load(D + "packages: [m]\n")),

@@ -2,13 +2,19 @@
 
 import numpy as np
 import pytest
+from flint import arb, ctx
 from hypothesis import given
 from hypothesis import strategies as st
 
+from certifier.errors import RegionError
 from certifier.model import Joint, JointKind, Scene, StoredRegion
 from planner.library import Library
 from planner.membership import locate, to_s
+from planner.motion.path import follow
+from planner.motion.space import Space
+from planner.nearest import nearest
 from tests.planner.regions import box, cut_box, cut_boxes, library
+from tests.planner.test_motion import arm
 
 
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(1, 5), regions=st.integers(1, 5), faces=st.integers(0, 20))
@@ -100,3 +106,39 @@ def test_a_full_turn_away_is_outside_although_s_is_the_same() -> None:
     s = to_s(scene, np.array([[0.7], [0.7 + 2 * np.pi], [2.0], [2.1]]))
     assert s[0] == pytest.approx(np.tan(0.1))
     assert np.isfinite(s).ravel().tolist() == [True, False, True, False]
+
+
+HUGE = 9185166224891948.0
+"""An angle of 0.6247 rad and whole turns, which plain doubles take for one of 0.02 rad: the next double is 2 rad away."""
+
+
+@pytest.mark.parametrize("angle", [HUGE, -HUGE, 1e300, 1e7])
+def test_an_angle_whose_turns_a_double_cannot_hold_is_in_no_region_and_outside_of_none(angle: float) -> None:
+    scene = arm(1, -2.9, 2.9, own=(None, None))
+    stored = library(box("a", [-0.3], [0.3]))
+    q = np.array([[angle]])
+    for ask in (
+        lambda: to_s(scene, q),
+        lambda: nearest(stored, q[0]),
+        lambda: follow(stored, scene, Space.Q, np.concatenate([q, q]), [0.0, 1.0]),
+        lambda: follow(stored, scene, Space.S, np.concatenate([q, q]), [0.0, 1.0]),
+    ):
+        with pytest.raises(RegionError) as refusal:
+            ask()
+        assert refusal.value.code == "number_too_large"
+
+
+@given(turns=st.integers(-159_000, 159_000), place=st.floats(-2.89, 2.89))
+def test_a_turn_away_a_point_is_in_the_regions_that_exact_numbers_say(turns: int, place: float) -> None:
+    """The edge of the region is where the double beside it is: what doubles take off must not lead over it."""
+    scene, q = arm(1, -2.9, 2.9, own=(None, None)), 2 * np.pi * turns + place
+    precision, ctx.prec = ctx.prec, 200
+    try:
+        exactly = ((arb(q) - 2 * arb.pi() * turns) / 2).tan()
+        edge = float(exactly.mid())
+    finally:
+        ctx.prec = precision
+    hair = 4e-15 * (1 + edge**2)
+    s = to_s(scene, np.array([[q]]))
+    assert locate(library(box("a", [-20.0], [edge + hair])), s).point.size == 1
+    assert locate(library(box("a", [-20.0], [edge - hair])), s).point.size == 0

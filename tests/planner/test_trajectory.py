@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from certifier.errors import RegionError
 from certifier.model import Array, Scene
 from planner.library import Library
 from planner.overlap import beside, overlap
@@ -191,6 +192,29 @@ def test_a_joint_that_starts_a_turn_away_stays_in_that_turn() -> None:
     assert isinstance(found, Trajectory)
     assert (found.q[0] == here[0] + turn).all()
     assert found.q[-1] == pytest.approx(here[1] + turn)
+
+
+def test_limits_hold_for_the_numbers_of_the_answer_many_turns_away() -> None:
+    """At a million radians doubles are 1e-10 apart, which is much of a small step."""
+    scene, turns = arm(2, -3.0, 3.0, own=(None, None)), np.array([2 * np.pi * 159_000, 0.0])
+    begin, end = np.array([0.1, 0.1]), np.array([0.101, 0.1])
+
+    def at_the_limit(_: dict[str, object]) -> dict[str, object]:
+        return {"q": np.linspace(begin, end, 101), "t": np.linspace(0.0, 1.000001e-3, 101)}
+
+    given = limits(2, 1.0, 2e5)
+    found = plan(CORNER, scene, links_of(CORNER, scene), begin + turns, end, given, at_the_limit)
+    assert isinstance(found, Trajectory)
+    assert (found.q[0] == begin + turns).all()
+    assert (np.abs(np.diff(found.q, axis=0)) <= np.diff(found.t)[:, None] * given.speed).all()
+    assert found.t[-1] == pytest.approx(1e-3, rel=1e-5)
+
+
+def test_an_end_beyond_what_doubles_tell_is_refused() -> None:
+    scene = arm(2, -3.0, 3.0, own=(None, None))
+    for start, goal in (([9185166224891948.0, 0.1], [0.1, 0.1]), ([0.1, 0.1], [0.1, -1e300])):
+        with pytest.raises(RegionError, match=r"q\[0\]\[[01]\]: .* no number of at most 1e\+06"):
+            planned(CORNER, scene, np.array(start), np.array(goal))
 
 
 @given(seed=SEEDS, count=st.integers(2, 12))

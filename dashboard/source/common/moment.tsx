@@ -90,7 +90,7 @@ export function MomentText({ model, moment }: { model: SceneModel; moment: Momen
       ) : names.length ? (
         <span class="bad">In collision: {names.slice(0, 3).join("; ")}{names.length > 3 && `; and ${names.length - 3} more pairs`}.</span>
       ) : regions.length ? (
-        <span class="good">In {regions.length === 1 ? "a certified region" : `${regions.length} certified regions`}: {regions.slice(0, 4).map((region, i) => <>{i > 0 && ", "}<a href={`/regions/${region}`} key={region}>{region.slice(0, 8)}</a></>)}. No collision, as proved.</span>
+        <span class="good">In {regions.length === 1 ? "a certified region" : `${regions.length} certified regions`}: {regions.slice(0, 4).map((region, i) => <>{i > 0 && ", "}<a href={`/regions/${region}`} key={region}>{region.slice(0, 8)}</a></>)}. No collision of the scene's pairs, as proved.</span>
       ) : (
         <span>Free here, by floating point, and in no certified region{nearest && <>; the nearest is <a href={`/regions/${nearest.region}`}>{nearest.region.slice(0, 8)}</a>, {nearest.distance.toPrecision(3)} away in s</>}.</span>
       )}

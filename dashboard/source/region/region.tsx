@@ -11,6 +11,7 @@ import { Sliders } from "../common/sliders";
 interface RegionDetail {
   scene: string;
   guarantee: string;
+  not_covered: { pairs: number; summary: string };
   manifest: { scene: { name: string }; space: Space; halfspace_normals: number[][]; halfspace_offsets: number[] };
 }
 
@@ -65,6 +66,7 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
   const ghosts = useMemo(() => (swept ? configurations.samples.slice(0, GHOSTS) : []), [swept, configurations]);
   const names = shortNames(space.joints);
   const inside = contains(space, faces, q);
+  const besides = region.not_covered.pairs ? ` ${region.not_covered.summary}.` : "";
 
   useEffect(() => {
     setCells(null);
@@ -90,7 +92,7 @@ function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: s
         <button type="button" onClick={() => go(configurations.center)}>Centre</button>
         {configurations.seed && <button type="button" onClick={() => go(configurations.seed!)}>Seed</button>}
         <label><input type="checkbox" checked={swept} onChange={(event) => setSwept(event.currentTarget.checked)} /> show {GHOSTS} samples</label>
-        <span role="status" class={inside ? "inside" : "inside not"}>{inside ? "The robot is inside the region: no collision, as proved." : "The robot is outside the region: nothing is proved here."}</span>
+        <span role="status" class={inside ? "inside" : "inside not"}>{inside ? `The robot is inside the region: no collision of the ${pairs.length} pairs below, as proved.${besides}` : "The robot is outside the region: nothing is proved here."}</span>
       </div>
       <div class="views">
         <Robot model={model} q={q} ghosts={ghosts} label={`The robot of ${model.name} inside the region${swept ? `, with ${GHOSTS} samples of it` : ""}`} />

@@ -73,15 +73,17 @@ def test_a_scene_without_windows_has_the_hash_that_it_always_had(tmp_path):
 
 def test_configurations_a_turn_away_are_taken_to_the_window_where_the_joint_goes_there(tmp_path):
     scene = parsed(write(tmp_path, limit=WIDE))
-    q = np.array([[1.0], [1.0 - 2 * np.pi], [1.0 + 2 * np.pi], [3.1], [-4.0], [np.nan]])
+    q = np.array([[1.0], [1.0 - 2 * np.pi], [1.0 + 2 * np.pi], [3.1], [-4.0]])
     s = to_s(scene, q)
     np.testing.assert_allclose(s[:2], np.tan(0.5), rtol=1e-12)
-    assert np.isnan(s[[2, 3, 5]]).all()  # beyond 2 pi, in the gap between windows, and nowhere
+    assert np.isnan(s[[2, 3]]).all()  # beyond 2 pi, and in the gap between windows
     np.testing.assert_allclose(s[4], np.tan((2 * np.pi - 4.0) / 2), rtol=1e-12)
     narrow = parsed(write(tmp_path))
     assert np.isnan(to_s(narrow, np.array([[1.0 - 2 * np.pi]]))).all()
     check_limits(scene, [1.0 - 2 * np.pi])
     check_limits(scene, [2 * np.pi])
+    with pytest.raises(RegionError, match="nan is no number"):
+        to_s(scene, np.array([[np.nan]]))
     for value, code in ((7.0, "seed_outside_limits"), (3.1, "seed_outside_window"), (2 * np.pi + 1e-6, "seed_outside_limits")):
         with pytest.raises(RegionError) as caught:
             check_limits(scene, [value])
@@ -129,7 +131,10 @@ def test_limits_of_ones_own(tmp_path):
     [
         ({"extra": "fix: {trun: 0}\n"}, "unknown_name", "fix.trun", "did you mean arm/turn"),
         ({"extra": "fix: {turn: 3}\n"}, "scene_field", "fix.arm/turn", "3 is not within the joint's limits, -1 to 2"),
-        ({"extra": "fix: {turn: x}\n"}, "scene_field", "fix.turn", "must be a finite number"),
+        ({"extra": "fix: {turn: x}\n"}, "scene_field", "fix.turn", "must be a number of at most 1e+06"),
+        ({"extra": "fix: {turn: 9185166224891948.0}\n"}, "scene_field", "fix.turn", "must be a number of at most 1e+06"),
+        ({"extra": "q_star: [1e16]\n"}, "scene_field", "q_star[0]", "must be a number of at most 1e+06"),
+        ({"extra": "limits: {turn: [-1e16, 1e16]}\n"}, "scene_field", "limits.turn[0]", "must be a number of at most 1e+06"),
         ({"extra": "fix: [turn]\n"}, "scene_field", "fix", "must map names of joints"),
         ({"extra": "fix: {turn: 0}\n"}, "no_joints", "directives", "no joint"),
         ({"extra": "limits: {turn: [0, 3]}\n"}, "scene_field", "limits.arm/turn", "0 to 3 is not within the joint's own limits, -1 to 2"),
