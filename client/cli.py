@@ -84,7 +84,7 @@ def _terminated(number: int, _frame: FrameType | None) -> NoReturn:
 
 
 def _prepare_streams() -> None:
-    """Sees to it that whatever is printed can be printed.
+    """Ensures that every text can be printed.
 
     A stream that the caller has closed leads nowhere, so that no file takes its place. A character that the terminal's encoding lacks is
     written as an escape.
