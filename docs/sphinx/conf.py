@@ -1,5 +1,6 @@
 """How Sphinx builds the pages as a site (``docs/site``). Its sources are the pages of the repository as they stand."""
 
+import logging
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 from sphinx.application import Sphinx
 
 ROOT = Path(__file__).parents[2]
+logging.getLogger("alembic").setLevel(logging.WARNING)
 sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
 
 project = "ciris"
