@@ -31,7 +31,7 @@ _thread = ThreadPoolExecutor(1, "keys")
 
 @dataclass(frozen=True)
 class Caller:
-    """A caller is whoever sent a request. The caller has no key where the service asks for none."""
+    """A caller is the sender of a request. The caller has no key where the service asks for none."""
 
     scope: Scope
     project: str = DEFAULT_PROJECT

@@ -22,11 +22,11 @@ from db.session import Database
 from db.states import PairState
 
 MOST_NODES = 200_000
-"""An answer has at most so many nodes."""
+"""Largest number of nodes in an answer."""
 KEPT_NODES = 5_000_000
-"""Each process keeps the outlines of the regions that were asked about last, as long as these have at most so many nodes together."""
+"""Each process keeps the outlines of the regions that were asked about last, up to this many nodes together."""
 NAMED = 3
-"""A volume that stands for more geometries is named by so many of them."""
+"""A volume that stands for more geometries is named by this many of them."""
 
 
 class OutlinesKept:
@@ -136,7 +136,7 @@ def of_job_pair(database: Database, kept: OutlinesKept, scene: Scene, job_id: st
 
 
 def _without_cells(index: int, why: str) -> CirisError:
-    hint = "/v1/jobs/{id}/pairs says what became of it"
+    hint = "/v1/jobs/{id}/pairs has its outcome"
     return CirisError("cells_not_found", f"pair {index} has no cells: {why}", field="pair", hint=hint)
 
 

@@ -2,7 +2,7 @@
 
 A request has to arrive in time, and an answer has to be taken in time. Only the client's time counts: while this process does not read,
 nobody is late. When there are more connections than one process holds, those that wait longest for a request make room for new ones. So
-whoever opens many connections and says nothing on them loses those, and not the places of others.
+a client that opens many connections and says nothing on them loses those, and not the places of others.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from api.problems import as_json, problem_of
 from certifier.errors import CirisError
 
 HEAD_SECONDS = 30.0
-"""The first line and the headers of a request must arrive within so many seconds from its first byte, or from the connection's start."""
+"""The first line and the headers of a request must arrive within this many seconds from its first byte, or from the connection's start."""
 BODY_SECONDS, BODY_RATE = 30.0, 4096
-"""A body may take so many seconds, and one more for each so many of its bytes."""
+"""A body may take BODY_SECONDS, and one second more for each BODY_RATE of its bytes."""
 ANSWER_SECONDS, ANSWER_RATE = 60.0, 1024
-"""Who takes fewer bytes a second of an answer for so many seconds is believed gone."""
+"""A client that takes less than ANSWER_RATE bytes a second of an answer for ANSWER_SECONDS counts as gone."""
 LOOK_SECONDS = 5.0
 """Every connection is looked at this often."""
 CONNECTIONS = 1000
 """One process holds at most this many connections."""
 FILES = 2 * CONNECTIONS
-"""So many files a process may need to hold open for them, and for everything else."""
+"""Number of files that a process may need to hold open, for connections and everything else."""
 
 _LATE = CirisError("too_slow", "the request did not arrive in time", field="body", hint="send it faster, or in smaller parts")
 _FULL = CirisError("busy", "the service has as many connections as it can hold", hint="try again in a while")

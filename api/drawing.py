@@ -35,7 +35,7 @@ from planner.slices import outline_in_q, slice_points, slice_polygon
 
 TIMEOUT_S = 60.0
 KEPT = 64
-"""An API process keeps so many collision maps, those that were asked for last."""
+"""Number of collision maps that an API process keeps, those that were asked for last."""
 
 
 def units(scene: Scene) -> list[Literal["rad", "m"]]:

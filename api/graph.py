@@ -1,4 +1,4 @@
-"""This module answers how the regions of a scene hang together, and compares those pairs of regions that nobody has compared yet."""
+"""This module answers which regions of a scene are connected, and compares those pairs of regions that nobody has compared yet."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from planner.overlap import compare, components, gap
 COMPARE_SECONDS = 5.0
 """One request compares regions for about so long."""
 MOST_GAPS = 20
-"""Gaps are looked for around so many components at most, the largest."""
+"""Gaps are looked for around at most this many components, the largest."""
 
 
 def describe(db: Database, scene_id: str, scene: Scene, library: Library) -> GraphResponse:

@@ -111,7 +111,7 @@ class Guard:
 def _network(scope: Scope) -> str:
     """Returns where a request comes from: its IPv4 address, or the /64 network of its IPv6 address.
 
-    Whoever has one IPv6 address has all addresses of its network.
+    A caller with one IPv6 address has all addresses of its network.
     """
     address = str(scope["client"][0]) if scope.get("client") else ""
     try:

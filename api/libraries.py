@@ -15,7 +15,7 @@ from db.session import Database
 from planner.library import Library, renewed
 
 MOST = 8
-"""The regions of so many scenes are kept, those that were asked about last."""
+"""Number of scenes whose regions are kept, those that were asked about last."""
 
 
 @dataclass

@@ -15,7 +15,7 @@ from planner.library import Library
 from planner.trajectory.routes import Links
 
 MOST = 8
-"""The overlaps of so many scenes are kept, those that were asked about last."""
+"""Number of scenes whose overlaps are kept, those that were asked about last."""
 
 
 class LinksKept:

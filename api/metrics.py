@@ -20,13 +20,13 @@ OTHER = "other"
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", OTHER)
 STATUSES = range(100, 600)
 BUCKETS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0)
-"""Latencies are counted up to so many seconds."""
+"""Upper bounds of the latencies that are counted, in seconds."""
 _LATENCIES = 2 * len(METHODS) * len(STATUSES)
 _LATENCY_CELLS = len(BUCKETS) + 2
 """For each method: a count for each bucket, one for what is beyond them, and the sum."""
 _BYTES = 8 * (_LATENCIES + len(METHODS) * _LATENCY_CELLS)
 AGES = (0, 1, 10, 60, 600, 3600)
-"""What waits is counted that is older than so many seconds."""
+"""Waiting work is counted by these least ages, in seconds."""
 MEDIA_TYPE = "text/plain; version=0.0.4"
 
 Samples = Mapping[tuple[tuple[str, str], ...], float]
@@ -102,7 +102,7 @@ def _cell(method: str, status: int) -> int:
 def _mapped(file: Path) -> mmap.mmap | None:
     """Returns the file in memory; None where it cannot be written, as on a full disk.
 
-    All of the file is written first. Whoever touches a mapped page that has no place on a full disk is ended by a signal.
+    All of the file is written first. A process that touches a mapped page without a place on a full disk is ended by a signal.
     """
     try:
         file.parent.mkdir(parents=True, exist_ok=True)

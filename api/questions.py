@@ -13,9 +13,9 @@ from pydantic import BaseModel
 from certifier.errors import CirisError
 
 SMALL, LARGE = 2, 1
-"""So many threads answer small questions, and large ones. Each takes a connection to the database while it reads."""
+"""Number of threads that answer small questions, and large ones. Each takes a connection to the database while it reads."""
 WAITING = 20
-"""So many large questions may wait in one process."""
+"""Number of large questions that may wait in one process."""
 
 Answer = TypeVar("Answer")
 _small, _large = ThreadPoolExecutor(SMALL, "small-questions"), ThreadPoolExecutor(LARGE, "large-questions")

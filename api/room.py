@@ -1,4 +1,4 @@
-"""A project may store so many bytes, and all of them as many as the disk has room for.
+"""A project has a limit of bytes to store, and all projects together the room on the disk.
 
 Each API process counts the bytes of projects now and then, and refuses more scenes and jobs when there is no room.
 """
@@ -15,7 +15,7 @@ from db import projects, retention
 from db.session import Database
 
 COUNT_SECONDS, COST = 10.0, 10.0
-"""A count is believed for so many seconds, and for so many times as long as it took."""
+"""A count is believed for COUNT_SECONDS, or for COST times as long as it took where that is longer."""
 
 
 class Room:

@@ -1,6 +1,6 @@
 """Routes that change something may wait long for their turn to write, so they wait in threads of their own.
 
-On SQLite one process writes at a time, and a writer waits for up to half a minute. Whoever only reads must not wait behind it.
+On SQLite one process writes at a time, and a writer waits for up to half a minute. A request that only reads must not wait behind it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from certifier.errors import CirisError
 WRITERS = 2
 """This many threads answer routes that write."""
 WAITING = 200
-"""So many requests may wait for them."""
+"""Number of requests that may wait for them."""
 
 Given = ParamSpec("Given")
 Answer = TypeVar("Answer")

@@ -19,7 +19,7 @@ from ciris.space import Array
 Document = dict[str, Any]
 T = TypeVar("T", covariant=True)
 SHORT = 8
-"""So many characters of an id are shown; the service knows a job or a region by them."""
+"""Number of characters of an id that are shown; the service knows a job or a region by them."""
 
 
 class Answers(Sequence[T]):
@@ -239,7 +239,7 @@ class Gap:
 
 @dataclass(frozen=True, eq=False)
 class Graph:
-    """How the regions of a scene hang together."""
+    """The connected regions of a scene."""
 
     version: int
     nodes: tuple[Node, ...]
@@ -253,10 +253,10 @@ class Graph:
 
 @dataclass(frozen=True, eq=False)
 class PlanGap:
-    """The place where the regions that hang together with the start of a plan come nearest to those of its goal."""
+    """The place where the regions connected with the start of a plan are nearest to those of its goal."""
 
     start: str
-    """Id of a region that hangs together with the start."""
+    """Id of a region that is connected with the start."""
     goal: str
     distance: float
     """Between the two, in s."""
@@ -408,7 +408,7 @@ class FreeCoverage:
 
 @dataclass(frozen=True)
 class Cover:
-    """What a cover has come to. It is true if it has reached all of its goals."""
+    """The results of a cover. It is true if it has reached all of its goals."""
 
     outcome: Outcome | None
     reason: str | None

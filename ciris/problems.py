@@ -51,7 +51,7 @@ def unreachable(url: str, error: Exception) -> CirisError:
 
 
 def problem(response: httpx2.Response) -> CirisError:
-    """Returns the error that the service, or whoever stands before it, has answered with."""
+    """Returns the error that the service, or a proxy before it, has answered with."""
     if response.headers.get("content-type", "").startswith("application/problem+json"):
         with suppress(ValueError, KeyError, TypeError):
             problem = response.json()
@@ -68,7 +68,7 @@ def problem(response: httpx2.Response) -> CirisError:
 
 
 class Answer(Document):
-    """An answer of the service. Whoever looks for an entry that it lacks at its top is told that something else has answered."""
+    """An answer of the service. Looking for a missing entry at its top raises an error that says that something else has answered."""
 
     def __missing__(self, name: str) -> Any:
         raise CirisError("not_ciris", f"the answer lacks {name}", hint="is it a ciris service of this version that answers?")

@@ -18,37 +18,37 @@ Straight = Literal["q", "s"]
 
 
 class GrowOptions(TypedDict, total=False):
-    """What may be said of how a region grows. What is left out has the service's default."""
+    """Options of growing a region. The service has a default for each."""
 
     contain: ArrayLike
     """(n,) or (k, n), more configurations that the region must contain, such as where it meets another region."""
     method: Literal["iris_np2", "iris_zo", "limits", "box"]
     """How the first polytope is found: by Drake's IRIS, from the joint limits, or as a box around q."""
     deadline: float
-    """Seconds after which the job ends, with the best region by then."""
+    """Seconds after which the job ends, with the best region so far."""
     contraction: Literal["whole", "targeted", "uniform"]
     """``whole`` keeps the first polytope and certifies it cell by cell; the others shrink it until every pair has one plane."""
     cells: int
-    """For ``whole``: what is open after so many cells of a pair, in a stage, is cut off."""
+    """For ``whole``: cells of a pair in each stage. Cells still undecided when this budget is spent are removed by new faces."""
     pushes: int
     """How often the faces are pushed out after the contractions."""
     max_rounds: int
     """Most rounds of the polytope step."""
     random_seed: int
-    """Seed of every random choice, those of Drake's IRIS too, so that another one comes to another region."""
+    """Seed of every random choice, those of Drake's IRIS too. Another seed gives another region."""
     priority: int
     """From -3 to 3; each step up doubles the job's share of the work."""
     labels: Mapping[str, str]
-    """What the job is to be found by: name -> value."""
+    """Labels to find the job by: name -> value."""
 
 
 class CoverOptions(TypedDict, total=False):
-    """What may be said of a cover. What is left out has the service's default."""
+    """Options of a cover. The service has a default for each."""
 
     coverage: float
     """Goal: this share of the collision-free configurations is in regions. Default: 0.95 where nothing else is asked for."""
     connected: bool
-    """Goal: all regions of the scene hang together."""
+    """Goal: all regions of the scene are connected."""
     connect: ArrayLike
     """(k, n), k >= 2: goal: these configurations are in one connected component."""
     paths: Sequence[ArrayLike]
@@ -56,23 +56,23 @@ class CoverOptions(TypedDict, total=False):
     seeds: ArrayLike
     """(k, n), configurations that get regions first."""
     regions: int
-    """At most so many regions are begun."""
+    """Grow at most this many regions."""
     at_once: int
-    """So many regions grow at the same time."""
+    """Number of regions that grow at the same time."""
     region_seconds: float
     """Each region ends after so long, with what there is of it."""
     cells: int
-    """What is open after so many cells of a pair, in a stage of a region, is cut off."""
+    """Cells of a pair in each stage of a region. New faces remove the cells that are undecided after that."""
     stages: int
-    """Each region ends after so many stages."""
+    """Number of stages after which the growth of each region ends."""
     random_seed: int
     """Seed of every random choice."""
     deadline: float
-    """Seconds after which the cover ends, with the regions by then."""
+    """Seconds after which the cover ends, with the regions grown so far."""
     priority: int
     """From -3 to 3; each step up doubles the job's share of the work."""
     labels: Mapping[str, str]
-    """What the job is to be found by: name -> value."""
+    """Labels to find the job by: name -> value."""
 
 
 _IN_JOB = (("deadline", "deadline_seconds"), ("priority", "priority"), ("labels", "labels"))
@@ -171,7 +171,7 @@ def straight(space: Straight | None, s: ArrayLike | None) -> str:
 
 
 def points(axes: int, **values: ArrayLike | None) -> Document:
-    """Returns points as nested lists of so many axes, by the name under which they were given; the first axis may be missing.
+    """Returns points as nested lists with this number of axes, by the name under which they were given; the first axis may be missing.
 
     Raises:
         RegionError: points.

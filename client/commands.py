@@ -246,9 +246,9 @@ def region_ls(args: Namespace) -> int:
 
 
 def _size(region: dict[str, Any]) -> str:
-    """Returns the size of a region in a list: the side of a box that is as large, or its q-volume where joints slide."""
+    """Returns the size of a region in a list: its average width in degrees, or its q-volume where joints slide."""
     size = region["q_volume"]
-    return "-" if size is None else f"box of {size['box_side']:.3g} deg" if size["box_side"] else f"{size['value']:.3g} {size['unit']}"
+    return "-" if size is None else f"width {size['box_side']:.3g} deg" if size["box_side"] else f"{size['value']:.3g} {size['unit']}"
 
 
 def region_show(args: Namespace) -> int:

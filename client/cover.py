@@ -17,7 +17,7 @@ OK, NO = 0, 1
 
 
 def cover(args: Namespace) -> int:
-    """Starts a cover, waits for its end, and prints what it has come to. Its exit status is 0 where all goals are reached."""
+    """Starts a cover, waits for its end, and prints its results. Its exit status is 0 where all goals are reached."""
     options: dict[str, Any] = {
         "seeds": [configuration(q, "--seed") for q in args.seed],
         "connect": [configuration(q, "--connect") for q in args.connect],

@@ -28,7 +28,7 @@ class ProofFile:
     def write(self, scene: str, proof: bytes) -> Path:
         """Puts the proof of a region of the scene with this name in the place of the one before, if any, and returns its path.
 
-        Whoever is interrupted meanwhile finds one of the two as a whole.
+        After an interruption, one of the two is there as a whole.
         """
         path = Path(self._out or f"{file_name(scene)}-{hashlib.sha256(proof).hexdigest()[:8]}.proof")
         if path.exists() and not path.is_file():

@@ -11,7 +11,7 @@ from client.output import Screen, number, plain, q_volume, seconds, share
 
 _STEPS = {"propose": "seeding", "step": "polytope step", "accept": "assembling and verifying the region", "motion": "certifying the motion"}
 _LOOK = "scout"
-"""The step of a cover whose findings are told instead of it."""
+"""The step of a cover whose findings are printed instead of it."""
 
 
 class Teller:

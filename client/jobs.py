@@ -15,9 +15,9 @@ from client.service import connect
 
 OK, NO = 0, 1
 SHORT = 8
-"""So many characters of an id are shown in lists; the service knows a job by them."""
+"""Number of characters of an id that lists show; the service knows a job by them."""
 WORST = 5
-"""So many obstacles of a job are shown."""
+"""Number of obstacles of a job that are shown."""
 
 
 def job_ls(args: Namespace) -> int:

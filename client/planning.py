@@ -1,5 +1,5 @@
 """These commands ask the service about its regions: for a trajectory through them, which is nearest, whether a path stays inside, and
-how they hang together.
+how they are connected.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def _why_not(answer: dict[str, Any]) -> str:
             end = "--from" if answer["reason"] == "start_uncovered" else "--to"
             return f"{end} is in no certified region; nearest: {_near(answer['nearest']) if answer['nearest'] else _no_region(answer)}"
         case "disconnected":
-            sides = f"{gap['start_regions']} of {answer['regions']} regions hang together with --from, {gap['goal_regions']} with --to"
+            sides = f"{gap['start_regions']} of {answer['regions']} regions are connected with --from, {gap['goal_regions']} with --to"
             between = f"between {gap['start']} and {gap['goal']}"
             return f"{sides}\ngap of {gap['distance']:.3g} in s {between}; try the seed {_place(gap['q'])}"
         case _:

@@ -62,7 +62,7 @@ def _all(args: Namespace, screen: Screen) -> int:
     """Has the service certify every region of a scene again, one job a region. The new regions stay on the service."""
     if args.local or args.out is not None or args.region is not None or args.q:
         hint = "leave out REGION, --q, --local and --out"
-        raise CirisError("option", "all regions of a scene need a service, which keeps what becomes of them", field="--from", hint=hint)
+        raise CirisError("option", "all regions of a scene need a service, which keeps the new regions", field="--from", hint=hint)
     with service.connect(args.url) as client:
         old = client.scene(args.old)
         scene = service.known_scene(client, args.scene)

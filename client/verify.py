@@ -24,7 +24,7 @@ from client.output import Screen, print_json
 
 HOLDS, DOES_NOT = 0, 1
 REFUSED = "get the file again from whom you have it, or grow the region again; believe nothing that this file says"
-UNCHECKED = "it may hold all the same; the verifier takes no files of this size, for they may come from strangers"
+UNCHECKED = "the proof may hold; the verifier takes no files of this size, because they may come from strangers"
 """These say what to do about every proof that does not hold, and about one that is too large."""
 MEMORY_BYTES = 4 << 30
 """This is the limit of each process, of which there is one for each core."""

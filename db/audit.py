@@ -16,7 +16,7 @@ from db.models import AuditRow
 from db.pages import Page
 
 COMMAND_LINE = "command line"
-"""Whoever can write to the database from a shell is not known by name."""
+"""The name of a person in a shell with access to the database is not known."""
 
 
 class Action(StrEnum):

@@ -14,7 +14,7 @@ from pathlib import Path
 RESERVE_BYTES = 32 * 2**20
 """With less room than this nothing new is begun. What is under way is saved in it, and deleting needs some of it too."""
 LOOK_SECONDS = 1.0
-"""A look at the disk is believed for so many seconds."""
+"""A look at the disk is believed for this many seconds."""
 _POSTGRESQL_FULL = "53100"
 
 

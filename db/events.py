@@ -43,7 +43,7 @@ def since(session: Session, job_id: str, seq: int = 0, limit: int = 500) -> Sequ
 def of_all(session: Session, after: int, limit: int, known: Collection[int] = ()) -> Sequence[EventRow]:
     """Returns the events of all jobs of the session's project whose ids are larger than a number, in the order of their ids.
 
-    Ids are not in the order of commits: one that is smaller may come to be seen later.
+    Ids are not in the order of commits: a smaller one may appear later.
 
     Args:
         known: ids that are left out.

@@ -8,7 +8,7 @@ from sqlalchemy.orm import InstrumentedAttribute, Session
 from certifier.errors import CirisError
 
 SHORTEST = 4
-"""So many characters of an id are needed at least."""
+"""Least number of characters of an id that is given in short."""
 
 
 def expanded(session: Session, column: InstrumentedAttribute[str], given: str) -> str:

@@ -22,7 +22,7 @@ from db.states import JOB, STEP, JobKind, JobState, StepKind, transition, unfini
 from db.types import utcnow
 
 ROW_BYTES = 1000
-"""A job counts as so many bytes besides its options and labels."""
+"""A job counts as this many bytes besides its options and labels."""
 
 
 def create(

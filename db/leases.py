@@ -220,7 +220,7 @@ def count_of_workers(session: Session) -> Counter[str]:
 
 
 def release(session: Session, model: type[Row], lost: Lost) -> list[Row]:
-    """Opens the rows of a lost lease and returns them. Whoever held them can save nothing any more."""
+    """Opens the rows of a lost lease and returns them. Their holder can save nothing any more."""
     ids = list(session.scalars(select(model.id).where(held(model, lost.token))))
     transition(session, model, OPEN, held(model, lost.token), deaths=model.deaths + int(lost.alone))
     return list(session.scalars(select(model).where(model.id.in_(ids), model.state == OPEN)))

@@ -43,9 +43,9 @@ class ProjectRow(Base):
 
     name: Mapped[str] = mapped_column(String(64), primary_key=True)
     max_bytes: Mapped[int | None] = mapped_column(BigInteger)
-    """What it stores may take so many bytes; None for any number."""
+    """Largest number of bytes that it may store; None for any number."""
     keep_days: Mapped[float | None]
-    """Jobs without a region are deleted so many days after their end; None where they stay."""
+    """Jobs without a region are deleted this many days after their end; None where they stay."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
 
 
@@ -103,7 +103,7 @@ class Leased:
     parent: Mapped[str | None]
     """The process that forked this worker, in the same form."""
     lease_token: Mapped[str | None] = mapped_column(String(36))
-    """Whoever knows the token is the holder. Every claim makes a new one."""
+    """The holder is the process that knows the token. Every claim makes a new one."""
     lease_until: Mapped[datetime | None]
 
 
@@ -188,7 +188,7 @@ class JobRow(Owned, Base):
     number: Mapped[int | None]
     """Its number among the regions that the cover has begun; None where somebody asked for the job."""
     open_pairs: Mapped[int] = mapped_column(default=0)
-    """How many of the job's pairs are open. Whoever moves a pair counts it here, so that nobody has to count the rows."""
+    """How many of the job's pairs are open. Every move of a pair changes this count, so that nobody has to count the rows."""
     running_pairs: Mapped[int] = mapped_column(default=0)
     """How many of the job's pairs are running."""
     pieces: Mapped[int | None]
@@ -271,15 +271,15 @@ class IterationRow(Base):
     failures: Mapped[int | None]
     """How many failures end the iteration; None when none does."""
     cells: Mapped[int] = mapped_column(default=1)
-    """So many cells of each pair are looked at; 1 for the program (11) on all of the polytope."""
+    """Number of cells that are tried for each pair; 1 for the program (11) on all of the polytope."""
     begun: Mapped[int | None]
     """The iteration in which the partitions of the pairs were begun; None where they begin in this one."""
     parts: Mapped[Document] = mapped_column(default=dict)
-    """Pair index (as a string) -> how many parts its open cells are dealt to, where there are several."""
+    """Pair index (as a string) -> into how many parts its open cells are divided, where there are several."""
     ending: Mapped[list[int]] = mapped_column(default=list)
     """Indices of the pairs whose open cells are going to be cut off."""
     together: Mapped[Document] = mapped_column(default=dict)
-    """Pair index (as a string) -> the indices of the other pairs that are certified with it as one, and have no rows of their own."""
+    """Pair index (as a string) -> the indices of the other pairs of its group, which have no rows of their own."""
     reuse: Mapped[Document]
     """Pair index (as a string) -> the iteration whose proof serves here too."""
     ellipsoid_volume: Mapped[float | None]
@@ -305,7 +305,7 @@ class PairRow(Leased, Base):
     pair_index: Mapped[int]
     """The pair's position in Scene.pairs."""
     part: Mapped[int] = mapped_column(default=0)
-    """The number of the part, from 0. A pair has several where its open cells are dealt to several pieces of work."""
+    """The number of the part, from 0. A pair has several where its open cells are divided among several pieces of work."""
     a: Mapped[str]
     b: Mapped[str]
     state: Mapped[str] = mapped_column(String(16), default=states.PairState.OPEN)
@@ -507,7 +507,7 @@ class WorkerRow(Base):
     version: Mapped[str]
     """Version of ciris."""
     processes: Mapped[int]
-    """So many pieces of work it does at the same time."""
+    """Number of pieces of work that it does at the same time."""
     cores: Mapped[int]
     memory_bytes: Mapped[int] = mapped_column(BigInteger)
     wanted: Mapped[str] = mapped_column(String(16), default=states.WorkerState.RUNNING)

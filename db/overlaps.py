@@ -1,6 +1,6 @@
 """Overlaps of a scene's regions are kept here, so that each pair of regions is compared once.
 
-A region is linked as far as its overlaps with the regions of lower numbers are known. Whoever finds more saves it; nobody has to.
+A region is linked as far as its overlaps with the regions of lower numbers are known. A process that finds more saves it; none has to.
 """
 
 from __future__ import annotations

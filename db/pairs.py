@@ -30,7 +30,7 @@ FAILED = frozenset(PairState) - UNFINISHED - {PairState.CERTIFIED, PairState.SKI
 MOST_TOGETHER = 100
 """At most this many pairs are claimed together, however short they are."""
 FEW, LONGER = 500, 10.0
-"""With more open pairs than this, batches are longer in proportion, up to so many times."""
+"""With more open pairs than this, batches are longer in proportion, up to LONGER times."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ def claim(session: Session, job: JobRow, *, lease_seconds: float, batch_seconds:
 
 
 def batch_length(open_pairs: int, batch_seconds: float) -> float:
-    """Returns the seconds of a batch of a job with so many open pairs."""
+    """Returns the seconds of a batch of a job with this many open pairs."""
     return batch_seconds * min(max(open_pairs / FEW, 1.0), LONGER)
 
 
@@ -327,7 +327,7 @@ def lately_failed(session: Session, job_id: str) -> dict[int, list[PairRow]]:
 
 
 def leader(iteration: IterationRow, pair: int) -> int:
-    """Returns the pair that has the rows of a pair that is certified with it as one; the pair itself where it has rows of its own."""
+    """Returns the pair that has the rows of this pair's group; the pair itself where it has rows of its own."""
     return next((int(first) for first, others in iteration.together.items() if pair in others), pair)
 
 
@@ -371,7 +371,7 @@ def page(
     Args:
         iteration, only: leave out other iterations, and pairs with other indices.
         after: the page begins after this pair in this iteration, (iteration, pair index).
-        limit: so many pairs at most.
+        limit: at most this many pairs.
 
     Returns:
         The rows, and what is ``after`` for the next page; None on the last page.

@@ -1,6 +1,6 @@
 """This module makes projects and sets their limits. ``ciris project`` runs it as ``python -m db.projects``.
 
-A project is a team's part of the service. Whoever has a key of it sees its scenes, jobs and regions, and nothing of other projects.
+A project is a team's part of the service. A key of it shows its scenes, jobs and regions, and nothing of other projects.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ NAME = re.compile(r"\w[\w.@-]{0,63}")
 """Projects and keys have such names."""
 MOST_BYTES = 2**62
 MOST_DAYS = 36_500
-"""A project keeps things for at most so many days. An earlier version took more: then nothing expires."""
+"""A project keeps things for at most this many days. An earlier version took more: then nothing expires."""
 
 
 def add(session: Session, name: str) -> ProjectRow:
@@ -79,9 +79,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     verbs.add_parser("ls", help="list the projects with their limits").add_argument("--json", action="store_true")
     setting = verbs.add_parser("set", help="set a project's limits; 0 for none")
     setting.add_argument("name")
-    setting.add_argument("--max-bytes", type=_bytes, help="what the project stores may take so many bytes")
+    setting.add_argument("--max-bytes", type=_bytes, help="the project may store this many bytes")
     setting.add_argument(
-        "--keep-days", type=partial(_limit, most=MOST_DAYS), help="jobs without a region are deleted so many days after their end"
+        "--keep-days", type=partial(_limit, most=MOST_DAYS), help="jobs without a region are deleted this many days after their end"
     )
     given = parser.parse_args(arguments)
     for line in command_line.on_database(given.data, partial(_run, given=given)):

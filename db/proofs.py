@@ -1,4 +1,4 @@
-"""Proof files are addressed by the SHA-256 of their content. The same proof is stored once, whoever found it."""
+"""Proof files are addressed by the SHA-256 of their content. The same proof is stored once, even if several workers found it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from db.models import PairRow, ProofRow, RegionRow, StepRow
 from db.session import insert_new
 
 TOGETHER = 500
-"""So many proofs are deleted by one statement."""
+"""Number of proofs that one statement deletes."""
 
 
 def put(session: Session, files: Collection[bytes]) -> dict[bytes, str]:
@@ -42,7 +42,7 @@ def get(session: Session, digest: str) -> bytes:
 
 
 def drop_unused(session: Session, digests: Collection[str]) -> None:
-    """Deletes those of these proofs that nothing has any more, of whatever project.
+    """Deletes those of these proofs that nothing refers to any more, in any project.
 
     Projects may share a proof. So the rows are looked for in the tables themselves, where a session's project does not count.
     """

@@ -1,6 +1,6 @@
 """Scenes and jobs are deleted here, with what depends on them, and what has ended long ago expires.
 
-Nothing is deleted that somebody has not been told of: who deletes a scene or a job says so of what depends on it, too. Regions and scenes
+Nothing is deleted without consent: deleting a scene or a job names everything that depends on it first. Regions and scenes
 never expire. The proofs of pairs, cells, steps and events of a job that has ended do, and so does all of a job without regions.
 """
 
@@ -31,7 +31,7 @@ from db.models import (
 from db.states import JOB, WebhookState, unfinished
 
 TOGETHER = 20
-"""So many jobs expire in one transaction."""
+"""Number of jobs that expire in one transaction."""
 
 
 @dataclass(frozen=True)
@@ -106,9 +106,9 @@ def delete_job(session: Session, job_id: str, *, dependents: bool) -> None:
 
 
 def expire(session: Session, now: datetime) -> int:
-    """Deletes some of what has expired in the projects that keep things for so many days. Returns how many jobs it was about.
+    """Deletes some of what has expired in the projects that keep things for a number of days. Returns how many jobs it was about.
 
-    A job without regions goes, once nobody is to be told of its end any more. Of one with regions, only these and its own row stay.
+    A job without regions goes, once its webhook does not wait any more. Of one with regions, only these and its own row stay.
     """
     done = 0
     for project in session.scalars(select(ProjectRow).where(projects.expires())):

@@ -19,7 +19,7 @@ from db.session import Database, insert_new, project_of
 
 ID_LENGTH = 16
 SUGGESTED_AMONG = 1000
-"""Names are suggested among those of so many scenes, the newest."""
+"""Names are suggested among those of this many scenes, the newest."""
 
 
 def add(session: Session, scene: Scene) -> SceneRow:
@@ -41,7 +41,7 @@ def add(session: Session, scene: Scene) -> SceneRow:
 
 
 def _name(session: Session, project: str, name: str, scene_id: str) -> None:
-    """Makes the name mean this scene. Whoever is overtaken by another addition under the name comes after it."""
+    """Makes the name mean this scene. An addition that is overtaken by another one under the name comes after it."""
     versions = select(SceneNameRow.version, SceneNameRow.scene_id).where(SceneNameRow.project == project, SceneNameRow.name == name)
     while True:
         last = session.execute(versions.order_by(SceneNameRow.version.desc()).limit(1)).first()

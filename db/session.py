@@ -46,11 +46,11 @@ BUSY_SECONDS = 30.0
 INCREMENTAL = 2
 """SQLite's number for giving room back when it is asked to."""
 SPARE_PAGES, PAGES_TOGETHER = 1000, 2000
-"""SQLite may keep so many pages, of 4 KiB, that it does not use; so many are given back at a time."""
+"""SQLite may keep SPARE_PAGES, of 4 KiB, that it does not use; PAGES_TOGETHER are given back at a time."""
 LOG_BYTES = 4 * 2**20
 """A longer log of SQLite is copied into the database. Its file is cut to this length when it begins again."""
 LONG_LOG_BYTES, LONG_LOG_PAGES = 4 * LOG_BYTES, 16_000
-"""Writers wait while a log longer than this is begun again, if that is quick. With so many pages a writer copies the log itself."""
+"""Writers wait while a log longer than this is begun again, if that is quick. With LONG_LOG_PAGES a writer copies the log itself."""
 QUICK_SECONDS = 0.5
 IDLE_SECONDS = 1.0
 """A connection to PostgreSQL that was idle for this many seconds is tested before it is used: the server may have been restarted."""

@@ -44,7 +44,7 @@ class JobKind(StrEnum):
     CERTIFY_PATH = "certify-path"
     """The job certifies a motion, or finds its first contact."""
     COVER = "cover"
-    """The job has regions grown, by grow jobs that are its children, until they cover the scene or connect configurations."""
+    """The job starts grow jobs, which are its children, until their regions cover the scene or connect configurations."""
 
 
 class PairState(StrEnum):
@@ -70,7 +70,7 @@ class PairState(StrEnum):
 
 class StepState(StrEnum):
     OPEN = "open"
-    """The step is to be done; no worker has claimed it."""
+    """The step waits; no worker has claimed it."""
     RUNNING = "running"
     """A worker has claimed the step, until ``lease_until``."""
     DONE = "done"

@@ -1,7 +1,7 @@
 """Subtrees are what searches leave of pairs that they have not certified, for later iterations to go on with.
 
 They stand apart from the proofs, because they prove nothing and must not be served as if they did. A job has those of its open pairs only.
-Each has an outline, which says what became of the cells. Outlines are left when the job has ended.
+Each has an outline, which has the state of each cell. Outlines stay when the job has ended.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def left_of(session: Session, job_id: str, pair: int, iteration: int) -> list[by
 
 
 def outlines(session: Session, job_id: str, pair: int, first: int, last: int) -> dict[int, dict[int, bytes | None]]:
-    """Returns iteration -> part -> the outline of what is left of the pair, for the iterations from ``first`` to ``last``, in order."""
+    """Returns iteration -> part -> the outline of the pair's subtrees, for the iterations from ``first`` to ``last``, in order."""
     mine = (SubtreesRow.job_id == job_id, SubtreesRow.pair_index == pair, SubtreesRow.iteration.between(first, last))
     columns = (SubtreesRow.iteration, SubtreesRow.part, SubtreesRow.outline)
     found: dict[int, dict[int, bytes | None]] = {}
@@ -46,7 +46,7 @@ def outlines(session: Session, job_id: str, pair: int, first: int, last: int) ->
 
 
 def drop(session: Session, job_id: str, but: Collection[int] = ()) -> None:
-    """Deletes what is left of all pairs but these. The caller holds the job's lock."""
+    """Deletes the subtrees of all pairs but these. The caller holds the job's lock."""
     session.execute(delete(SubtreesRow).where(SubtreesRow.job_id == job_id, SubtreesRow.pair_index.not_in(but)))
 
 

@@ -56,7 +56,7 @@ def configure(process: str) -> None:
 
 
 def end() -> None:
-    """Sends what is left before the process ends. A collector that is away delays the end by two seconds at most."""
+    """Sends the remaining traces before the process ends. A collector that is away delays the end by two seconds at most."""
     if (shutdown := getattr(trace.get_tracer_provider(), "shutdown", None)) is not None:
         rest = threading.Thread(target=shutdown, daemon=True)
         rest.start()

@@ -23,11 +23,11 @@ BACKOFF_SECONDS = (10, 60, 300, 1800, 7200, 21600)
 HELD_SECONDS = 60
 """A claim holds this long. An attempt takes less, so nobody else begins one meanwhile."""
 AT_ONCE, OF_PROJECT, OF_RECEIVER = 32, 8, 4
-"""A control worker has so many deliveries under way at most: in all, of one project, and to one receiver of a project."""
+"""A control worker has at most this many deliveries under way: in all, of one project, and to one receiver of a project."""
 KEPT = 20
-"""So many attempts are remembered of each webhook, the last ones."""
+"""Number of attempts that are kept of each webhook, the last ones."""
 ANSWER = 500
-"""So many characters of a receiver's answer are kept."""
+"""Number of characters of a receiver's answer that are kept."""
 
 
 Place = tuple[str, str]
@@ -58,7 +58,7 @@ class Answered:
 
 
 def add(session: Session, job_id: str, url: str, secret: str) -> None:
-    """Adds a webhook: the receiver at ``url`` is told when the job has ended.
+    """Adds a webhook: the service calls the receiver at ``url`` when the job has ended.
 
     Raises:
         CirisError: no_secret_key, secret_key.
@@ -176,7 +176,7 @@ def deliveries(session: Session, webhook_id: str) -> Sequence[DeliveryRow]:
 
 
 def send_again(session: Session, job: JobRow, now: datetime) -> WebhookRow:
-    """Has the receiver called again, at once and then as if for the first time, whatever became of it before.
+    """Lets the receiver be called again, at once and then as if for the first time, whether it had answered before or not.
 
     The caller holds the job's lock.
 

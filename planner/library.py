@@ -12,7 +12,7 @@ from planner.boxes import BoxGrid
 from planner.rows import Rows
 
 AT_ONCE = 200
-"""So many regions are read at once."""
+"""Number of regions that are read at once."""
 
 
 class Library:

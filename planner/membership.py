@@ -12,9 +12,9 @@ from certifier.model import Array, Scene
 from planner.library import Library
 
 _POINTS, _PAIRS = 500, 10_000
-"""So many points, and so many pairs of a point and a region, are looked at together, which bounds the memory that this takes."""
+"""Number of points, and of pairs of a point and a region, that are looked at together, which bounds the memory that this takes."""
 _FACES = 8
-"""So many faces of a region are tried first, and twice as many each time after."""
+"""Number of faces of a region that are tried first; each time after, twice as many."""
 
 _Found = tuple[NDArray[np.intp], NDArray[np.intp], Array]
 

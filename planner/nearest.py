@@ -20,7 +20,7 @@ INWARDS = 1e-9
 _INFEASIBLE = 1e-10
 """The residual of a least distance program without a solution is 0; rounding leaves it below this."""
 _ROUNDS, _SETTLED = 200, 1e-6
-"""Projecting to and fro ends after so many rounds, or when a round moves a point by less than this part of the distance."""
+"""Projecting to and fro ends after _ROUNDS, or when a round moves a point by less than this part of the distance."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def project(C: Array, d: Array, s: Array) -> Array | None:
 def between(library: Library, a: int, b: int) -> tuple[Array, Array]:
     """Returns a point (n,) of each of two regions, about as near to each other as the regions are.
 
-    Projecting to and fro between two polytopes comes to their nearest points (Cheney and Goldstein).
+    Projecting to and fro between two polytopes converges to their nearest points (Cheney and Goldstein).
     """
     first, second = _normalised(library, a), _normalised(library, b)
     x = _onto(first, (library.lower[b] + library.upper[b]) / 2)

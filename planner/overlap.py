@@ -1,4 +1,4 @@
-"""This module finds which regions overlap, and how the regions of a scene hang together."""
+"""This module finds which regions overlap, and which regions of a scene are connected."""
 
 from __future__ import annotations
 

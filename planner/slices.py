@@ -7,7 +7,7 @@ import numpy as np
 from certifier.model import Array, Polytope, Scene
 
 POINTS_PER_EDGE = 12
-"""An edge that is bent in q is drawn with so many points."""
+"""Number of points with which an edge that is bent in q is drawn."""
 
 
 def slice_polygon(polytope: Polytope, s: Array, axes: tuple[int, int], lower: Array, upper: Array) -> Array:
@@ -40,7 +40,7 @@ def slice_polygon(polytope: Polytope, s: Array, axes: tuple[int, int], lower: Ar
 
 
 def _cut(corners: Array, normal: Array, offset: float) -> Array:
-    """Returns the corners of what is left of a convex polygon (k, 2) on the inner side of a line."""
+    """Returns the corners of the part of a convex polygon (k, 2) on the inner side of a line."""
     slack = offset - corners @ normal
     kept: list[Array] = []
     for i, (here, there) in enumerate(zip(slack, np.roll(slack, -1), strict=True)):

@@ -3,7 +3,7 @@
 A message to the control worker names a job. A message to the solvers only says that there is work; a solver that takes it asks the
 database which work (db.work).
 
-A message is sent after the transaction that it announces. It may come twice, late or never: the database says what is to be done,
+A message is sent after the transaction that it announces. It may come twice, late or never: the database says what work there is,
 claims are conditional, and the sweeper sends again what was lost.
 """
 
@@ -30,7 +30,7 @@ SILENCE_SECONDS = 10
 GRACE_SECONDS = 30
 """A step ends itself with an error at its own limit. The worker kills its process this many seconds after that limit."""
 START_SECONDS = 120
-"""A worker kills a process that it has forked anew and that has not said within so many seconds that it is up.
+"""A worker kills a process that it has forked anew and that has not said within this many seconds that it is up.
 
 Celery's four seconds are too few on a machine at work, and the next process needs as long. The time also counts what the worker itself is
 late to listen. A process that really hangs leaves the others alone meanwhile.

@@ -50,7 +50,7 @@ def next_transition(options: dict[str, Any], state: dict[str, Any] | None, repor
 
 
 def report(session: Session, job: JobRow, state: dict[str, Any]) -> Report | Failed | None:
-    """Returns the report on the cover's present action; None while nothing has come of it."""
+    """Returns the report on the cover's present action; None while it has no result."""
     if state["closing"] is None and job.deadline_at is not None and job.deadline_at <= utcnow():
         return Late()
     action = job.action or {}

@@ -1,7 +1,7 @@
 """A worker says in the database that it lives and what it does, and does what people want of it: it runs, pauses or drains.
 
 A paused worker takes no message from its queue, and a draining one ends with status 0 when it has finished what it holds. Messages that
-it leaves are there for the other workers: the one who claims a piece and leaves more sends the next message, whoever that is.
+it leaves are there for the other workers: each worker that claims a piece and leaves more sends the next message.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 LOOK_SECONDS = 2.0
 """The worker looks each time this many seconds have passed what is wanted of it."""
 CHANGE_SECONDS = 0.1
-"""It looks again after so many seconds whether it does what it was asked to do a moment ago."""
+"""It looks again after this many seconds whether it does what it was asked to do a moment ago."""
 TELL_SECONDS = 10.0
 """It says this often that it lives."""
 

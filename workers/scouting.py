@@ -22,7 +22,7 @@ from workers.transaction import persistently
 
 _libraries: dict[str, Library] = {}
 MOST = 4
-"""The regions of so many scenes are kept, those that were looked at last."""
+"""Number of scenes whose regions are kept, those that were looked at last."""
 
 
 def scout(scene: Scene, scene_id: str, job_id: str) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 Its data directory is for its user alone (mode 0700) and holds:
 
 - ``ciris.sqlite3``, unless a database is given;
-- ``queue.sock``; the queue itself is in memory, since the database knows what is to be done;
+- ``queue.sock``; the queue itself is in memory, since the database has all open work;
 - ``logs/``;
 - ``secret.key``, with which secrets in the database are encrypted, unless a key is given;
 - ``stack.json``, which says where the API is while the stack runs;
@@ -132,7 +132,7 @@ class Child:
                 self.process.send_signal(self.stop_signal)
 
     def wait_or_kill(self) -> None:
-        """Waits for the child, and kills what is left of its group."""
+        """Waits for the child, and kills the rest of its group."""
         if self.process is None:
             return
         with suppress(subprocess.TimeoutExpired):
@@ -373,7 +373,7 @@ def _stop_signals() -> Iterator[Callable[[], bool]]:
 
 
 def main() -> None:
-    """Runs ``python -m workers.stack``: the stack with the settings of the environment, until it is told to stop."""
+    """Runs ``python -m workers.stack``: the stack with the settings of the environment, until it gets a signal to stop."""
     parser = argparse.ArgumentParser(prog="python -m workers.stack", description="Runs ciris on this machine until Ctrl-C.")
     parser.add_argument("--port", type=int, help="the API's port; default: CIRIS_PORT, or any free one when that is taken")
     parser.add_argument("--data", type=Path, help="data directory; default: CIRIS_DATA_DIR")

@@ -27,7 +27,7 @@ from workers.troubles import Troubles
 log = logging.getLogger(__name__)
 
 ASKED = 100
-"""While so many messages wait for the control worker, it is asked for nothing more: it may be paused, and what is due stays due."""
+"""While this many messages wait for the control worker, it is asked for nothing more: it may be paused, and what is due stays due."""
 
 
 def run(stop: threading.Event, troubles: Troubles) -> None:

@@ -85,7 +85,7 @@ def _decide(turn: Turn) -> Transition | cover.Transition | motions.Action:
         return covers.next_transition(turn.options, turn.growth, turn.report)
     if turn.kind == JobKind.CERTIFY_PATH:
         return motions.next_action(turn.report)
-    others = "only covers and motions are told these"
+    others = "only covers and motions get these reports"
     assert not isinstance(turn.report, cover.Scouted | cover.Ended | cover.Late | motions.Verdict), others
     if turn.growth is None:
         left = None if turn.deadline_at is None else (turn.deadline_at - utcnow()).total_seconds()
@@ -292,7 +292,7 @@ def _finish(session: Session, job: JobRow, afterwards: Afterwards) -> None:
     subtrees.end(session, job.id)
     if job.parent_id is not None:
         afterwards.append(partial(send_coordinate, job.parent_id))
-    assert job.action is not None, "whoever finishes a job has found its last action"
+    assert job.action is not None, "a job that ends has its last action"
     finish = Finish(Outcome(job.action["outcome"]), job.action["reason"])
     if job.state == JobState.CANCELLING:
         jobs.finish(session, job, JobState.CANCELLED, reason=finish.reason)

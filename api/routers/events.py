@@ -22,7 +22,7 @@ After = Annotated[int, Query(ge=0, le=MAX_INT, description="Return only events w
 POLL_SECONDS = 0.3
 PAGE = 500
 LATE = 200
-"""An event whose id is smaller by so many may still come: workers commit in another order than that of the ids."""
+"""An event whose id is smaller by up to this may still come: workers commit in another order than that of the ids."""
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[READ], route_class=ReadingRoute)
 project = APIRouter(prefix="/v1/events", tags=["project"], dependencies=[READ], route_class=ReadingRoute)
@@ -95,8 +95,8 @@ def list_project_events(
 ) -> ProjectEventList:
     """Returns what happened to all jobs of the project after an event.
 
-    Workers write at the same time, so an event may come to be seen after one with a larger `id`. Whoever must not miss any asks again from
-    some hundred before the last `id`, or reads the stream, and leaves out what it has seen by `job` and `seq`.
+    Workers write at the same time, so an event may appear after one with a larger `id`. To miss none, read the stream, or ask again from
+    some hundred before the last `id`; leave out the events that you have seen, by `job` and `seq`.
     """
     with db.read() as session:
         return ProjectEventList(events=[ProjectEvent.of(row) for row in events.of_all(session, after, limit)])

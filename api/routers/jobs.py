@@ -58,7 +58,7 @@ from planner.cover.result import said
 from planner.cover.state import CoverState
 
 MOST_PAIRS = 5000
-"""One page of a pair matrix has so many results at most."""
+"""One page of a pair matrix has at most this many results."""
 
 IdempotencyKey = Annotated[str | None, Header(min_length=1, max_length=200, description="The same key and body give the same job.")]
 Label = Annotated[
@@ -176,7 +176,7 @@ def list_jobs(
     label: Label = None,
     search: Search = None,
     after: Cursor = None,
-    limit: Annotated[int, Query(ge=1, le=200, description="Return so many at most.")] = 50,
+    limit: Annotated[int, Query(ge=1, le=200, description="Return at most this many.")] = 50,
 ) -> JobPage:
     """Lists the jobs that were asked for, newest first; or those that a cover has made for its regions."""
     with db.read() as session:
@@ -252,7 +252,7 @@ def retry_job(
 
 @router.get("/{job_id}/cover")
 def get_job_cover(job_id: JobGiven, db: Db) -> Cover:
-    """Returns what a cover has come to: how much is covered, how it hangs together, and which regions it has grown."""
+    """Returns the results of a cover: how much is covered, which regions are connected, and which it has grown."""
     with db.read() as session:
         job = jobs.get(session, job_id)
         if job.kind != JobKind.COVER:
@@ -323,7 +323,7 @@ def get_job_pairs(
         Query(max_length=200, description="Indices of the pairs wanted; all pairs if left out."),
     ] = None,
     after: Cursor = None,
-    limit: Annotated[int, Query(ge=1, le=MOST_PAIRS, description="Return so many results at most.")] = MOST_PAIRS,
+    limit: Annotated[int, Query(ge=1, le=MOST_PAIRS, description="Return at most this many results.")] = MOST_PAIRS,
 ) -> PairMatrix:
     """Returns the pair matrix: the result of every pair on the polytope of every iteration, or of the given ones."""
     begin = _place(after)
@@ -468,7 +468,9 @@ def get_job_workers(job_id: JobGiven, db: Db) -> JobWorkers:
 
 @router.get("/{job_id}/obstacles")
 def get_job_obstacles(
-    job_id: JobGiven, db: Db, limit: Annotated[int, Query(ge=1, le=1000, description="Return so many obstacles at most, the worst.")] = 100
+    job_id: JobGiven,
+    db: Db,
+    limit: Annotated[int, Query(ge=1, le=1000, description="Return at most this many, the worst.")] = 100,
 ) -> Obstacles:
     """Returns what holds the region of a job back, or has cut it, in words, worst first: each with the pair and a configuration.
 

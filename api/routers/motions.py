@@ -1,4 +1,4 @@
-"""A planner has its own motion certified here, while it waits."""
+"""These routes certify a planner's own motion while the planner waits."""
 
 from __future__ import annotations
 

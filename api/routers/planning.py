@@ -107,7 +107,7 @@ async def get_graph(
     children: Children,
     scene: Annotated[str, Query(min_length=1, max_length=255, description="The id or the name of a scene.", examples=["planar-2dof"])],
 ) -> GraphResponse:
-    """Returns which regions of a scene overlap, which sets of them hang together, and where to seed a region that may join two sets.
+    """Returns which regions of a scene overlap, which sets of them are connected, and where to seed a region that may join two sets.
 
     Pairs of regions that were not compared yet are compared now, for a few seconds. Ask again until `complete` is true.
     """

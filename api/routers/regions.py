@@ -76,7 +76,7 @@ async def get_region_configurations(
     region_id: RegionGiven,
     db: Db,
     children: Children,
-    samples: Annotated[int, Query(ge=0, le=MAX_SAMPLES, description="So many samples.")] = 100,
+    samples: Annotated[int, Query(ge=0, le=MAX_SAMPLES, description="Number of samples.")] = 100,
     seed: Annotated[int, Query(ge=0, le=MAX_INT, description="Seed of the random choices.")] = 0,
 ) -> RegionConfigurations:
     """Returns configurations of a region: its centre, its seed, where each joint is as far as it can be, and samples."""

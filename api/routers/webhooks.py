@@ -30,7 +30,7 @@ def list_webhooks(db: Db, state: InState = None, after: Cursor = None, limit: Li
 
 @router.get("/jobs/{job_id}/webhook")
 def get_job_webhook(job_id: JobGiven, db: Db) -> Webhook:
-    """Returns the job's webhook: whether its receiver has been told that the job has ended, and how the attempts went."""
+    """Returns the job's webhook: whether it was delivered after the end of the job, and the attempts."""
     with db.read() as session:
         row = webhooks.of_job(session, jobs.get(session, job_id).id)
         return Webhook.with_deliveries(row, webhooks.deliveries(session, row.id))
@@ -39,7 +39,7 @@ def get_job_webhook(job_id: JobGiven, db: Db) -> Webhook:
 @router.post("/jobs/{job_id}/webhook/resend", dependencies=[SUBMIT], status_code=status.HTTP_202_ACCEPTED)
 @writing
 def resend_job_webhook(job_id: JobGiven, db: Db) -> Webhook:
-    """Has the receiver called again within seconds, and again as often as at first, whatever became of it before.
+    """Calls the receiver again within seconds, and repeats that as often as at first, whether it had answered before or not.
 
     The message has the same `webhook-id`, so a receiver can tell that it knows it. The job must have ended.
     """

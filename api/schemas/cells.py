@@ -60,7 +60,7 @@ class RegionPairs(BaseModel):
 
 
 class CellCounts(BaseModel):
-    """Says what became of cells: how many have a plane, how many miss the polytope, and how many are open."""
+    """Counts cells by their state: how many have a plane, how many miss the polytope, and how many are undecided."""
 
     plane: int = Field(description="Cells with a plane that separates the pair.")
     empty: int = Field(description="Cells that miss the polytope.")
@@ -70,7 +70,7 @@ class CellCounts(BaseModel):
 class Partition(BaseModel):
     """Holds the cells of one pair: a binary tree of cuts that divides a box around the polytope.
 
-    The tree is a stream in preorder, the lower part of each cut first. Whoever draws it begins with the root cell, [`lower`, `upper`], and
+    The tree is a stream in preorder, the lower part of each cut first. To draw it, begin with the root cell, [`lower`, `upper`], and
     cuts it at the values of `cuts`, one after the other, in the joints that `nodes` names.
     """
 

@@ -26,7 +26,7 @@ Rows = Annotated[list[Vector], Field(max_length=2000)]
 Cursor = Annotated[
     str | None, Query(max_length=200, description="The value of `next` from the page before; leave it out for the first page.")
 ]
-Listed = Annotated[int, Query(ge=1, le=1000, description="Return so many at most.")]
+Listed = Annotated[int, Query(ge=1, le=1000, description="Return at most this many.")]
 SceneGiven = Annotated[str, Path(description="A scene: its id, its first characters, or a name of it.", examples=["planar-2dof"])]
 JobGiven = Annotated[str, Path(description="The id of a job, or its first characters, four at least.", examples=["1f9b2a7c"])]
 RegionGiven = Annotated[str, Path(description="The id of a region, or its first characters, four at least.", examples=["5d0c1e42"])]

@@ -1,4 +1,4 @@
-"""These models describe covers: jobs that have regions grown until a scene is covered, or configurations are connected."""
+"""These models describe covers: jobs that grow regions until a scene is covered, or configurations are connected."""
 
 from __future__ import annotations
 
@@ -41,20 +41,21 @@ class CoverRequestOptions(Request):
             f"regions. Default: {ENOUGH} where nothing else is asked for, else no goal.",
         ),
     ] = None
-    connected: Annotated[bool, Field(description="Goal: all regions of the scene hang together.")] = False
-    regions: Annotated[int, _whole("regions", "At most so many regions are begun.")] = DEFAULTS.regions
-    at_once: Annotated[int, _whole("at_once", "So many regions grow at the same time.")] = DEFAULTS.at_once
+    connected: Annotated[bool, Field(description="Goal: all regions of the scene are connected.")] = False
+    regions: Annotated[int, _whole("regions", "Grow at most this many regions.")] = DEFAULTS.regions
+    at_once: Annotated[int, _whole("at_once", "Number of regions that grow at the same time.")] = DEFAULTS.at_once
     region_seconds: Annotated[
         Real | None, Field(gt=0, le=30 * 86400, description="A region ends after so long, with what there is of it.")
     ] = None
-    cells: Annotated[int, _whole("cells", "What is open after so many cells of a pair, in a stage of a region, is cut off.")] = (
-        DEFAULTS.cells
-    )
+    cells: Annotated[
+        int,
+        _whole("cells", "Cells of a pair in each stage of a region. New faces remove the cells that are undecided after that."),
+    ] = DEFAULTS.cells
     stages: Annotated[
         int | None,
         _whole(
             "stages",
-            f"Each region ends after so many stages. Default: {STAGES} for robots with more than {MOST_JOINTS} joints; else a region ends "
+            f"Each region ends after this many stages. Default: {STAGES} for robots with more than {MOST_JOINTS} joints; else it ends "
             "when a stage gains little. One stage gives the first regions sooner, and less coverage in the end.",
         ),
     ] = None
@@ -82,7 +83,7 @@ class CoverRegion(BaseModel):
 
 
 class Cover(BaseModel):
-    """Describes what a cover has come to. All but ``regions`` is as of its last look at the scene, and null before the first."""
+    """Describes the results of a cover. All but ``regions`` are as of its last look at the scene, and null before the first."""
 
     state: JobState = Field(description="State of the job.")
     outcome: Outcome | None = Field(description="`certified` where all goals are reached; null before the job ends.")

@@ -105,7 +105,7 @@ class SliceRequest(Request):
     q: Vector = Field(description="(n,), where the other joints stay, in radians or metres.", examples=[[0.4, 0.3]])
     x: str = Field(max_length=200, description="Name of the joint of the horizontal axis.", examples=["arm/shoulder"])
     y: str = Field(max_length=200, description="Name of the joint of the vertical axis.", examples=["arm/elbow"])
-    size: int = Field(100, ge=8, le=MAX_SIZE, description="The slice has so many squares each way.")
+    size: int = Field(100, ge=8, le=MAX_SIZE, description="Number of squares of the slice in each direction.")
     regions: list[str] | None = Field(
         None,
         max_length=MAX_REGIONS,

@@ -44,11 +44,15 @@ class GrowOptions(Request):
     ] = DEFAULTS.contraction
     cells: Annotated[
         int | None,
-        _whole("cells", f"For `whole`: what is open after so many cells of a pair, in a stage, is cut off. Default: {MOST_CELLS}."),
+        _whole(
+            "cells",
+            "For `whole`: cells of a pair in each stage. Cells still undecided when this budget is spent are removed by new faces. "
+            f"Default: {MOST_CELLS}.",
+        ),
     ] = DEFAULTS.cells
     stages: Annotated[
         int | None,
-        _whole("stages", "For `whole`: growth ends after so many stages. Default: it ends when a stage gains little."),
+        _whole("stages", "For `whole`: number of stages after which growth ends. Default: it ends when a stage gains little."),
     ] = DEFAULTS.stages
     contractions: Annotated[
         int | None,
@@ -98,7 +102,7 @@ class Seed(Request):
     epsilon: Real | None = Field(None, description="Largest fraction of the volume that IRIS may leave in collision.")
     delta: Real | None = Field(None, description="Probability with which IRIS may be wrong about `epsilon`.")
     max_iterations: int | None = Field(
-        None, description="At most so many alternations of IRIS between faces and ellipsoid, and as many beside balls about a hand."
+        None, description="Largest number of alternations of IRIS between faces and ellipsoid, and again beside balls about a hand."
     )
     max_iterations_separating_planes: int | None = Field(
         None, description="Number of rounds in which IRIS adds faces, within each alternation."
@@ -106,10 +110,10 @@ class Seed(Request):
     tolerance: Real | None = Field(None, description="IRIS ends when the ellipsoid's volume grows by less than this fraction.")
     margin: Real | None = Field(None, description="Distance in s that IRIS' faces keep from the collisions found.")
     random_seed: int | None = Field(
-        None, description="Seed of IRIS' random choices. Default: `random_seed` of the options. Other seeds come to other proposals."
+        None, description="Seed of IRIS' random choices. Default: `random_seed` of the options. Another seed gives another proposal."
     )
     tries: int | None = Field(
-        None, description="IRIS makes so many proposals at most, each with a random seed of its own, and the best is taken. Default: 2."
+        None, description="IRIS makes at most this many proposals, each with its own random seed, and growth takes the best. Default: 2."
     )
 
 
@@ -153,7 +157,7 @@ class JobRequest(Request):
     deadline_seconds: Real | None = Field(
         None, gt=0, le=30 * 86400, description="The job ends this many seconds after its creation, with the regions it has by then."
     )
-    labels: Labels = Field(default_factory=dict, description="Whatever the job is to be found by, at most 20: name -> value.")
+    labels: Labels = Field(default_factory=dict, description="Labels to find the job by, at most 20: name -> value.")
     webhook: WebhookRequest | None = Field(None, description="Whom to tell when the job has ended; nobody by default.")
 
 
@@ -190,7 +194,7 @@ class CertifyRequest(JobRequest):
         int,
         _whole(
             "cells",
-            "So many cells of the polytope are looked at for each pair, each with a plane of its own. "
+            "Number of cells of the polytope that are tried for each pair, each with its own plane. "
             "With 1, each pair has one plane on all of the polytope.",
         ),
     ] = 1
@@ -198,7 +202,7 @@ class CertifyRequest(JobRequest):
 
 
 class RecertifyRequest(JobRequest):
-    """Asks for what is left of a region of another scene, such as this one before it changed.
+    """Asks which part of another scene's region still holds in this scene, for instance after this scene has changed.
 
     Proofs of pairs with the same numbers are taken over; the others are made again, cell by cell. What cannot be certified is cut off.
     """
@@ -263,9 +267,9 @@ class Job(BaseModel):
     finished_at: datetime | None = Field(description="When it ended; null before.")
     deadline_at: datetime | None = Field(description="When it ends at the latest; null without a deadline.")
     ended: bool = Field(description="True once it has ended, however it did.")
-    labels: dict[str, str] = Field(description="What it is to be found by: name -> value.")
+    labels: dict[str, str] = Field(description="Labels to find it by: name -> value.")
     trace: str | None = Field(description="Id of the OpenTelemetry trace that has all work on the job; null where nobody traces.")
-    progress: Progress = Field(description="How far the job is in its last iteration, and what its last region has come to.")
+    progress: Progress = Field(description="How far the job is in its last iteration, and how large its last region is.")
 
     @classmethod
     def of(cls, row: JobRow, share: float | None, labels: dict[str, str]) -> Self:
@@ -309,13 +313,13 @@ class JobPage(Page):
 
 
 MOST_TOGETHER = 100
-"""One request creates, or cancels, so many jobs at most."""
+"""One request creates, or cancels, at most this many jobs."""
 
 
 class NewJobs(Request):
     """Asks for several jobs: all of them are made, or none."""
 
-    jobs: list[NewJob] = Field(min_length=1, max_length=MOST_TOGETHER, description="The jobs, of whatever kinds.")
+    jobs: list[NewJob] = Field(min_length=1, max_length=MOST_TOGETHER, description="The jobs, of any kinds.")
 
 
 class JobList(BaseModel):
@@ -389,7 +393,7 @@ class Iteration(BaseModel):
     ellipsoid_volume: float | None = Field(description="Volume of the inscribed ellipsoid of its region, in s; null without a region.")
     reused: dict[int, int] = Field(description="Maps a pair's index to the earlier iteration whose proof serves here too.")
     together: dict[int, list[int]] = Field(
-        description="Maps a pair's index to the other pairs that are certified with it as one. These have no results of their own."
+        description="Maps a pair's index to the other pairs of its group. Grouped pairs share one row: the first pair's."
     )
     started_at: datetime = Field(description="When it began.")
     finished_at: datetime | None = Field(description="When its last pair was settled; null before.")
@@ -402,7 +406,7 @@ class PairCell(BaseModel):
     pair: int = Field(description="Index of the pair among the scene's.")
     state: PairState = Field(description="What has become of the pair.")
     parts: int = Field(
-        description="Number of parts that the pair's open cells, or the cells to verify, were dealt to; 1 for an undivided pair."
+        description="Number of parts among which the pair's undecided cells, or the cells to verify, are divided; 1 for an undivided pair."
     )
     stage: Stage | None = Field(description="Which method settled it; null before.")
     proved_distance: float | None = Field(

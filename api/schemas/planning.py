@@ -279,7 +279,7 @@ class Gap(BaseModel):
 
 
 class GraphResponse(Answer):
-    """Says how the regions of a scene hang together."""
+    """Describes the connected regions of a scene."""
 
     complete: bool = Field(
         description="Whether every pair of regions has been compared. Pairs are compared once, when this is asked, for a few seconds at a "

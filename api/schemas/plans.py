@@ -56,10 +56,10 @@ class Reason(StrEnum):
 
 
 class PlanGap(BaseModel):
-    """Names the place where the regions that hang together with the start come nearest to those that do so with the goal."""
+    """Names the place where the regions connected with the start are nearest to those connected with the goal."""
 
-    start_regions: int = Field(description="Number of the regions that hang together with the start.", examples=[4])
-    goal_regions: int = Field(description="Number of the regions that hang together with the goal.", examples=[2])
+    start_regions: int = Field(description="Number of the regions that are connected with the start.", examples=[4])
+    goal_regions: int = Field(description="Number of the regions that are connected with the goal.", examples=[2])
     start: RegionId
     goal: RegionId
     distance: Distance

@@ -13,7 +13,7 @@ class Progress(BaseModel):
 
     settled: int | None = Field(
         description="Number of pieces of the job's last iteration that are settled. A piece is a pair, or a part of a pair whose open "
-        "cells are dealt to several. Null before the first iteration."
+        "cells are divided among several. Null before the first iteration."
     )
     total: int | None = Field(description="Number of pieces of that iteration, without the pairs whose proofs of earlier ones serve.")
     share: float | None = Field(

@@ -97,5 +97,5 @@ class Project(BaseModel):
     name: str = Field(description="The project's name.")
     scope: Scope = Field(description="What the caller's key allows.")
     bytes: int = Field(description="Bytes of scenes, jobs, proofs and cells that the project stores, as of some seconds ago.")
-    max_bytes: int | None = Field(description="From so many bytes on, the service takes no more scenes and jobs; null for no limit.")
-    keep_days: float | None = Field(description="So many days after their end jobs lose what they have besides regions; null for never.")
+    max_bytes: int | None = Field(description="The service refuses new scenes and jobs once this many bytes are stored; null for no limit.")
+    keep_days: float | None = Field(description="Days after a job's end when its data is deleted, except its regions; null for never.")

@@ -29,11 +29,11 @@ class Delivery(BaseModel):
 
 
 class WebhookSummary(BaseModel):
-    """Says whether the receiver has been told that the job has ended."""
+    """Says whether the webhook was delivered, which reports the end of the job."""
 
     job: str = Field(description="Id of the job.")
     url: str = Field(description="The address that is called.")
-    state: WebhookState = Field(description="Whether the receiver has been told.")
+    state: WebhookState = Field(description="Whether the webhook was delivered.")
     attempts: int = Field(description="How often it was called, since it was last asked for.")
     next_at: datetime = Field(description="The service does not try before this time.")
     error: str | None = Field(description="Why the last attempt failed.")
@@ -44,7 +44,7 @@ class WebhookSummary(BaseModel):
 
 
 class Webhook(WebhookSummary):
-    """Says whether the receiver has been told that the job has ended, and how the last attempts went."""
+    """Says whether the webhook was delivered, which reports the end of the job, and lists the last attempts."""
 
     deliveries: list[Delivery] = Field(description=f"The last attempts, the newest first, at most {KEPT}.")
 

@@ -184,10 +184,10 @@ class AsyncService:
         return self._job((await self.client.create_job(grow_request(scene_name(scene), q, options)))[0])
 
     async def cover(self, scene: str | Scene, **options: Unpack[CoverOptions]) -> Cover:
-        """Has regions grown until they cover a scene or connect configurations, and waits for that. The job goes on if it is interrupted.
+        """Grows regions until they cover a scene or connect configurations, and waits for it. The job goes on if the wait is interrupted.
 
         Raises:
-            CirisError: what was refused, or ``not_covered`` where no region came of it.
+            CirisError: what was refused, or ``not_covered`` if there is no region in the end.
         """
         job = await (await self.submit_cover(scene, **options)).wait()
         found = read(Cover, await self.client.cover(job.id))
@@ -218,7 +218,7 @@ class AsyncService:
         """Creates a job that certifies the polytope {s : C s <= d} within the joint limits, C (m, n), d (m,), and returns it at once.
 
         Args:
-            cells: so many cells of the polytope are looked at for each pair, each with a plane of its own.
+            cells: number of cells of the polytope that are tried for each pair, each with its own plane.
         """
         polytope = {"C": numbers(C, "C").tolist(), "d": numbers(d, "d").tolist()}
         request = {"kind": "certify", "scene": scene_name(scene), "polytope": polytope, "cells": cells}
@@ -237,7 +237,7 @@ class AsyncService:
         search: str | None = None,
         most: int = 50,
     ) -> list[AsyncJob]:
-        """Returns the newest jobs, at most so many: of one scene, in one state, with labels, or that mention a text."""
+        """Returns the newest jobs, at most ``most``: of one scene, in one state, with labels, or that mention a text."""
         named = None if scene is None else scene_name(scene)
         found = await self.client.jobs(scene=named, state=state, labels=labels, search=search, most=most)
         return [self._job(document) for document in found]

@@ -29,9 +29,9 @@ QUIET_S = 60.0
 """When a stream says nothing for this many seconds, not even a ping, the client opens it again."""
 
 PATIENCE, LONGEST_WAIT_S = 5, 60
-"""The client repeats a request at most this often, each time after at most so many seconds, when the service was asked too often."""
+"""Repeats of a request when the service was asked too often, and the longest wait in seconds before each."""
 ABSENCE_S, PAUSE_S = 30.0, 0.5
-"""Whoever waits for a job bears with a service that does not answer for so long, as while it starts again, and asks with such pauses."""
+"""While a job is awaited, the service may be silent for this long, as when it starts again; the client asks with these pauses."""
 
 
 class _Patient(httpx2.HTTPTransport):
@@ -138,7 +138,7 @@ class Client:
         search: str | None = None,
         most: int = 50,
     ) -> list[Document]:
-        """Returns the newest jobs, at most so many: in one state, of one scene, of one cover, with labels, or that mention a text."""
+        """Returns the newest jobs, at most ``most``: in one state, of one scene, of one cover, with labels, or that mention a text."""
         label = [f"{name}={value}" for name, value in labels.items()] if labels else None
         wanted = given(state=state, scene=scene, parent=parent, label=label, search=search)
         found: list[Document] = []
@@ -255,7 +255,7 @@ class Client:
         return self._json("POST", f"/v1/workers/{segment(worker_id)}/drain")
 
     def cover(self, job_id: str) -> Document:
-        """Returns what a cover has come to."""
+        """Returns the results of a cover."""
         return self._json("GET", f"/v1/jobs/{segment(job_id)}/cover")
 
     def motion(self, job_id: str) -> Document:
@@ -349,7 +349,7 @@ class Client:
         return self._json("POST", "/v1/planning/contains", json={"scene": scene, **given(q=q, s=s)})
 
     def certify_path(self, request: Document) -> Document:
-        """Returns what becomes of a motion, and the proof in base 64 if the request asks for it."""
+        """Returns the verdict about a motion, and the proof in base 64 if the request asks for it."""
         return self._json("POST", "/v1/planning/certify-path", json=request)
 
     def nearest(self, scene: str, q: Rows | None = None, s: Rows | None = None) -> Document:

@@ -17,9 +17,9 @@ Collides = Callable[[Array], NDArray[np.bool_]]
 """Tells at which of the points s, (k, n), bodies touch; (k,)."""
 
 BATCH, BATCHES = 2000, 500
-"""So many configurations are drawn together, and so often at most."""
+"""Number of configurations that are drawn together, and the largest number of draws."""
 LEVELS = 4
-"""A line is tried at its middle, then at the middles of its halves, and so on, so many times."""
+"""A line is tried at its middle, then at the middles of its halves, and so on, for this many levels."""
 
 
 def free_samples(scene: Scene, collides: Collides, count: int, rng: np.random.Generator) -> Array:

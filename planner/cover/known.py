@@ -1,4 +1,4 @@
-"""What is known of the regions that a scene has: which there are, and how they hang together."""
+"""What is known of the regions that a scene has: which there are, and which are connected."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One look at a scene: how much of it its regions cover, and how they hang together.
+"""One look at a scene: how much of it its regions cover, and which are connected.
 
 What is covered is estimated from samples that have nothing to do with the choice of seeds. So a seed counts for nothing by itself.
 """
@@ -23,7 +23,7 @@ from planner.motion.path import follow
 from planner.motion.space import Space
 
 SAMPLES = 4000
-"""The coverage is estimated from so many collision-free configurations."""
+"""The coverage is estimated from this many collision-free configurations."""
 SPACING = 0.005
 """A path is tested in points that are this part of the joint limits' diagonal apart, in s."""
 
@@ -62,7 +62,7 @@ class Look:
         return to_s(self._scene, np.array(q, dtype=float).reshape(-1, self._scene.n))
 
     def __call__(self, known: Known, state: CoverState) -> Scouted:
-        """Returns what is covered and how it hangs together; unless the cover is ending, also what is best grown next."""
+        """Returns what is covered and which regions are connected; unless the cover is ending, also what is best grown next."""
         hits = locate(known.library, self._samples)
         pairs = np.unique(np.column_stack([hits.point, known.part_of[hits.region]]), axis=0)
         held = np.bincount(pairs[:, 1], minlength=len(known.parts))

@@ -1,4 +1,4 @@
-"""This pure state machine decides what happens next in a cover. It is told what was seen, and says what is to be grown.
+"""This pure state machine decides what happens next in a cover. It takes reports of what was seen, and returns which regions to grow.
 
 A cover looks at the scene, grows a few regions at a time, and looks again whenever one of them has ended. It ends when its goals are
 reached, when its number of regions is, when it is late, or when it cannot go on: then the last look says why. The goals that were
@@ -16,9 +16,9 @@ LATE = "the deadline was reached"
 TRIES = 4
 """Nothing is tried more often in a row about the same thing without a region."""
 IDLE = 20
-"""A cover ends when so many regions in a row changed nothing."""
+"""A cover ends when this many regions in a row changed nothing."""
 LOOKS = 3
-"""A cover ends when so many looks in a row, each with other samples, found nothing to grow."""
+"""A cover ends when this many looks in a row, each with other samples, found nothing to grow."""
 
 
 def begin(options: CoverOptions) -> Transition:
@@ -85,7 +85,7 @@ def _after_look(state: CoverState, seen: Scouted) -> Transition:
 
 
 def _after_regions(state: CoverState, report: Ended) -> Transition:
-    """Notes what came of the regions, and looks again."""
+    """Notes the results of the regions, and looks again."""
     failed, why = dict(state.failed), dict(state.why)
     ended = {number: state.growing[number] for number in report.regions if number in state.growing}
     for number, task in ended.items():

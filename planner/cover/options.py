@@ -13,10 +13,10 @@ Q = tuple[float, ...]
 WHOLE_NUMBERS = {"regions": (1, 100_000), "at_once": (1, 64), "cells": (1, 10_000_000), "stages": (1, 100), "random_seed": (0, 2**31 - 1)}
 """Maps an option to its least and its greatest value."""
 MOST_GIVEN = 1000
-"""So many configurations may be given in each of the lists."""
+"""Number of configurations that may be given in each of the lists."""
 MOST_JOINTS = 4
 STAGES = 2
-"""For robots with more joints than that a region is left after so many stages, unless somebody asks for more."""
+"""For robots with more joints than that a region ends after this many stages, unless somebody asks for more."""
 ENOUGH = 0.95
 """The coverage that is asked for where nothing else is."""
 
@@ -31,12 +31,12 @@ class CoverOptions:
         paths: waypoints, (n,) each; the motions that are straight in q between them shall be covered.
         coverage: ends when this share of the collision-free configurations, uniform in q within the joint limits, is in regions. None is
             ENOUGH where neither ``connect`` nor ``paths`` nor ``connected`` asks for anything, and no goal elsewhere.
-        connected: ends when all regions of the scene hang together.
-        regions: so many regions are begun at most.
-        at_once: so many regions grow at the same time.
+        connected: ends when all regions of the scene are connected.
+        regions: largest number of regions that are begun.
+        at_once: number of regions that grow at the same time.
         region_seconds: each region is given up, or ends with what there is of it, after so long; None sets no limit.
-        cells: so many cells of each pair are looked at in every stage of a region (certifier.growth.options).
-        stages: each region ends after so many stages (certifier.growth.options); None sets no limit.
+        cells: number of cells of each pair in every stage of a region (certifier.growth.options).
+        stages: each region ends after this many stages (certifier.growth.options); None sets no limit.
         random_seed: seeds every random choice.
     """
 

@@ -9,7 +9,7 @@ from planner.cover.state import CoverState
 
 
 def said(state: CoverState) -> dict[str, Any] | None:
-    """Returns what a cover has come to, as JSON-able data; None before the first look.
+    """Returns the results of a cover, as JSON-able data; None before the first look.
 
     Keys: ``coverage`` (``value``, ``stderr``, ``samples``: of the collision-free configurations that were drawn, which part is in regions),
     ``regions`` (how many the scene has), ``components`` (how many regions each has), ``largest`` (which part of what is covered is in the

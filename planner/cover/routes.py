@@ -14,9 +14,9 @@ from certifier.model import Array, Scene
 from planner.cover.ground import Collides, sees
 
 NEAREST = 20
-"""So many pairs of a start and an end are tried by straight lines, the nearest ones."""
+"""Number of pairs of a start and an end that are tried by straight lines, the nearest ones."""
 ROUNDS, BRANCHES = 80, 24
-"""The trees grow in so many rounds, by so many branches each."""
+"""The trees grow in ROUNDS, by BRANCHES each."""
 STEP = 0.15
 """A branch is no longer than this part of the joint limits' diagonal, in s."""
 FINE = 6

@@ -24,20 +24,20 @@ from planner.motion.space import Space
 from planner.overlap import gap
 
 TARGETS, DRAWN = 64, 2000
-"""A seed is chosen among so many uncovered configurations, of so many that are free; or of more, while fewer are found."""
+"""A seed is chosen among TARGETS uncovered configurations, of DRAWN that are free; or of more, while fewer are found."""
 DRAWS = 10
 BUSY = 0.1
 """What is seen from the seed of a region that grows counts so much for the next seed."""
 MOST = 3
-"""So many seeds are chosen for what is uncovered."""
+"""Number of seeds that are chosen for uncovered configurations."""
 SPACING = 0.005
 """Routes are looked at in points that are this part of the joint limits' diagonal apart, in s."""
 ROOTS = 60
-"""A route begins and ends at so many points of a component at most."""
+"""A route begins and ends at one of at most this many points of a component."""
 JOINS = 2
-"""So many routes are looked for in one look."""
+"""Number of routes that one look searches for."""
 BACK = 4
-"""A region that goes on with a path begins so many points before the path's uncovered part."""
+"""A region that goes on with a path begins this many points before the path's uncovered part."""
 
 
 def proposals(scene: Scene, collides: Collides, known: Known, state: CoverState, seen: Scouted) -> Scouted:

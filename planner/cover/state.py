@@ -1,4 +1,4 @@
-"""What a cover remembers, asks for and is told: plain data, which goes into the database as JSON."""
+"""The state of a cover, its actions and their reports: plain data, which goes into the database as JSON."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Scouted:
-    """A report: how much of the scene is covered, how its regions hang together, and where it is best to go on.
+    """A report: how much of the scene is covered, which of its regions are connected, and where it is best to go on.
 
     Attributes:
         version: version of the library that it is about.
@@ -177,8 +177,8 @@ class CoverState:
         begun: how many regions were begun.
         growing: number of a region that grows -> what it is.
         last: the last look at the scene; None before the first.
-        failed: key of a task -> how often no region came of it in a row.
-        why: key of a task -> why no region came of it the last time.
+        failed: key of a task -> how often in a row it gave no region.
+        why: key of a task -> why it gave no region the last time.
         idle: how many regions in a row changed nothing that the scouts count.
         looks: how many scouts were sent.
         fruitless: how many looks in a row found nothing to grow while nothing grew.
@@ -212,7 +212,7 @@ class CoverState:
 
 @dataclass(frozen=True)
 class Transition:
-    """What a cover remembers from now on, and what is to be done."""
+    """The next state of a cover, and the next action."""
 
     state: CoverState
     action: Action

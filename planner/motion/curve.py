@@ -138,7 +138,7 @@ class Curve:
 
 
 def _rounded(balls: list[arb], roundings: int) -> tuple[Array, Array]:
-    """Returns the midpoints of balls, (n,), and bounds on how far these are off, with room for so many roundings more."""
+    """Returns the midpoints of balls, (n,), and bounds on how far these are off, with room for ``roundings`` more roundings."""
     mid = np.array([float(ball.mid()) for ball in balls])
     return mid, (np.array([float(ball.rad()) for ball in balls]) + roundings * _EPS * np.abs(mid)) * _UP
 

@@ -30,11 +30,11 @@ ORDER = 3
 EVEN = 1.0
 """Weight of the squares of the control polygon's edges, beside their lengths."""
 NEAREST = 2
-"""So many faces for each joint that are nearest to a place of the route are in the first program."""
+"""Number of faces for each joint, the nearest to a place of the route, that are in the first program."""
 BEYOND = 1e-7
 """A control point that is so far beyond a face, in s, is beyond it; the solver is that exact."""
 STRAIGHT = 65
-"""A straight line is looked at in so many points."""
+"""Number of points at which a straight line is looked at."""
 
 logging.getLogger("drake").setLevel(logging.WARNING)
 

@@ -23,12 +23,12 @@ from planner.trajectory.routes import Links, Route, Terminal, routes
 from planner.trajectory.stretch import stretch
 
 ROUTES = 5
-"""So many routes are made curves of; the shortest curve counts."""
+"""Number of routes for which curves are made; the shortest curve counts."""
 MARGIN = 1e-3
 """A curve keeps this far, in s, from the faces of its regions, or a quarter of the depth of its overlaps where that is less."""
 FINENESS = ({"steps": 24, "spacing": 0.05}, {"steps": 96, "spacing": 0.0125})
 """In how many steps a curve is looked at in each region, and how far a joint moves between two configurations of an answer, in radians or
-metres. The second is tried when what came of the first was not covered.
+metres. The second is tried when the result of the first was not covered.
 """
 
 Optimise = Callable[[dict[str, Any]], dict[str, Any] | None]

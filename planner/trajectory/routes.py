@@ -17,7 +17,7 @@ from scipy.spatial.distance import cdist
 from certifier.model import Array
 
 LONGEST = 1.2
-"""No route is taken that is so many times as long as the shortest."""
+"""No route is taken that is this many times as long as the shortest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Terminal:
 
 
 def routes(links: Links, start: Terminal, goal: Terminal, most: int) -> list[Route]:
-    """Returns the shortest routes through each overlap, the shortest first, without repeats, so many at most.
+    """Returns the shortest routes through each overlap, the shortest first, without repeats, at most ``most``.
 
     None is longer than LONGEST times the shortest. Where one region has both ends, the routes are of one region each.
     """

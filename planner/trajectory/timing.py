@@ -20,7 +20,7 @@ STILL = 1e-6
 much shorter than all of it.
 """
 FEWEST, MOST = 17, 4000
-"""A trajectory has so many configurations at least and at most."""
+"""Least and largest number of configurations of a trajectory."""
 _FAST = 1e6
 """No joint need be faster: Toppra has its numbers in units in which the whole motion lasts about 1."""
 

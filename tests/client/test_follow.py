@@ -58,7 +58,7 @@ def test_the_course_of_a_job_in_a_few_lines() -> None:
         "seeding: done after 4.80 s",
         "iteration 0 (contract): failed, 2 of 2 pairs settled; a - c: not certifiable",
         "iteration 1 (contract): certified, 1 of 1 pairs settled",
-        "certified region r of iteration 1: 63.4 +- 0.5 % of the proposal, 0.25 +- 0.003 rad^2, that of a box of 28.6 deg in each joint",
+        "certified region r of iteration 1: 63.4 +- 0.5 % of the proposal, 0.25 +- 0.003 rad^2, average width 28.6 deg",
     ]
 
 

@@ -100,7 +100,7 @@ def test_a_plan_that_is_not_found_says_why(ciris: Ciris, url: str, region: str, 
     apart = ciris("plan", "slider", "--from", "0.1", "--to", "0.7", CIRIS_URL=url)
     assert (apart.status, apart.stdout) == (
         1,
-        f"1 of 2 regions hang together with --from, 1 with --to\ngap of 0.4 in s between {region} and {far}; try the seed 0.4\n",
+        f"1 of 2 regions are connected with --from, 1 with --to\ngap of 0.4 in s between {region} and {far}; try the seed 0.4\n",
     )
     outside = ciris("plan", "slider", "--from", "0.1", "--to", "-0.8", CIRIS_URL=url)
     assert (outside.status, outside.stdout) == (

@@ -1,4 +1,4 @@
-"""The page of a scene in a real browser: its robot, its regions and how they hang together, coverage, plans."""
+"""The page of a scene in a real browser: its robot, its regions and how they are connected, coverage, plans."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_scenes_are_listed_with_their_regions(page: Any, url: str, regions: list
     page.get_by_role("link", name="Scenes", exact=True).click()
     assert page.locator("tbody tr").first.locator("td").nth(3).text_content() == "3"
     page.get_by_role("link", name="planar", exact=True).click()
-    page.get_by_text("How the regions hang together").wait_for()
+    page.get_by_text("Connected regions").wait_for()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

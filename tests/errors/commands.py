@@ -325,7 +325,7 @@ COMMANDS: list[Row] = [
         (
             "option",
             "--from",
-            "all regions of a scene need a service, which keeps what becomes of them",
+            "all regions of a scene need a service, which keeps the new regions",
             "leave out REGION, --q, --local and --out",
             lambda t: again(t, "x", "--from", "planar-2dof"),
         ),

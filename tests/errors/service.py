@@ -416,7 +416,7 @@ REQUESTS = [
             "cells_not_found",
             "pair",
             "pair {index} has no cells: {why}",
-            "/v1/jobs/{id}/pairs says what became of it",
+            "/v1/jobs/{id}/pairs has its outcome",
             lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/0/cells"),
         ),
     ),

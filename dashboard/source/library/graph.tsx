@@ -1,4 +1,4 @@
-// How the regions of a scene hang together: a node for each region, a line where two overlap.
+// How the regions of a scene are connected: a node for each region, a line where two overlap.
 import { useMemo } from "preact/hooks";
 import { LINKS } from "../common/colours";
 import { layout } from "./layout";

@@ -1,4 +1,4 @@
-// A scene and its library of regions: the robot, which regions hold it, how they hang together, slices, and plans.
+// A scene and its library of regions: the robot, which regions hold it, how they are connected, slices, and plans.
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { get, said } from "../common/api";
 import { positions, type SceneModel } from "../common/kinematics";
@@ -76,7 +76,7 @@ function Library({ model }: { model: SceneModel }) {
       </div>
       <div class="views">
         <section aria-labelledby="h-graph">
-          <h2 id="h-graph">How the regions hang together</h2>
+          <h2 id="h-graph">Connected regions</h2>
           {graphProblem && <p class="notice bad">{graphProblem}</p>}
           {!graph ? !graphProblem && <p class="empty">Comparing the regions …</p> : !some ? (
             <p class="empty">This scene has no region yet. <a href={`/new?scene=${model.scene}`}>Start a job</a> that grows one.</p>

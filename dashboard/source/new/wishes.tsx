@@ -80,7 +80,7 @@ export function Wishes({ wish, onWish, marks, onMark, onGo }: Props) {
       </div>
       <details>
         <summary>Effort, deadline and priority</summary>
-        {number("minutes", "Deadline", "minutes; the regions by then are kept", { min: 0.01, max: 43200, step: "any", placeholder: "none" })}
+        {number("minutes", "Deadline", "minutes; the regions so far are kept", { min: 0.01, max: 43200, step: "any", placeholder: "none" })}
         {number("cells", "Cells of a pair in a stage", "", { ...whole, max: 10_000_000 })}
         {number("stages", "Stages of a region", "", { ...whole, max: 100 })}
         <p class="field">
