@@ -24,7 +24,7 @@ import numpy as np
 
 from certifier.model import Array
 from certifier.proof.region import RegionProof
-from certifier.verify.region import RegionStatement, verify_region
+from certifier.verify.region import verify_region
 from client.cores import cores
 from tests.oracles.distances import Distances
 from tests.oracles.written_scenes import write_scene
@@ -33,6 +33,8 @@ ROOT = Path(__file__).parents[2]
 SAMPLES, ON_FACES = 100_000, 0.2
 STARTS = 20
 """From so many of the nearest samples the distance is followed downwards."""
+STEPS = 40
+"""It is followed so many steps, or until bodies touch."""
 ROOM = 0.03
 """At a seed all padded bodies are farther apart than this, in metres."""
 PRECISION = 1e-6
@@ -67,7 +69,7 @@ class Result:
 def look(number: int, directory: Path, deadline: float, samples: int) -> Result:
     """Carries out everything for one scene, which its number determines."""
     start, rng = time.perf_counter(), np.random.default_rng(number)
-    path, distances, seed = _scene(directory, rng)
+    path, distances, seed = random_scene(directory, rng)
     proof = directory / "region.proof"
     proof.unlink(missing_ok=True)
     q = ",".join(f"{x:.9f}" for x in seed)
@@ -81,12 +83,12 @@ def look(number: int, directory: Path, deadline: float, samples: int) -> Result:
         statement = verify_region(proof.read_bytes())
         result.pairs, result.margin = len(statement.gaps), statement.gap
         result.problem = "" if verified.returncode == 0 else f"ciris verify: {verified.stdout}{verified.stderr}"
-        _search(result, statement, proof, distances, rng, samples)
+        search(result, ProvedRegion(proof.read_bytes(), distances), distances, rng, samples)
     result.seconds = time.perf_counter() - start
     return result
 
 
-def _scene(directory: Path, rng: np.random.Generator) -> tuple[Path, Distances, Array]:
+def random_scene(directory: Path, rng: np.random.Generator) -> tuple[Path, Distances, Array]:
     """Writes a scene that has a free configuration, and returns its path, its distances, and that configuration as a seed."""
     while True:
         path = write_scene(directory, rng, int(rng.integers(5, 8)))
@@ -105,9 +107,8 @@ def _ciris(*words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def _search(result: Result, statement: RegionStatement, proof: Path, distances: Distances, rng: np.random.Generator, samples: int) -> None:
+def search(result: Result, region: ProvedRegion, distances: Distances, rng: np.random.Generator, samples: int) -> None:
     """Looks for the smallest distance in the region, in terms of the proof's numbers and of Drake's plant alone."""
-    region = _Region(statement, proof, distances)
     result.samples = samples
     points, nearest = region.samples(rng, samples), []
     worst = np.inf
@@ -126,13 +127,13 @@ def _search(result: Result, statement: RegionStatement, proof: Path, distances: 
         result.problem = f"the padded bodies are {result.least:.3g} m apart at q = {q}, and the proof says {result.margin:.3g} m"
 
 
-class _Region:
+class ProvedRegion:
     """A region as its proof states it: {s : C s <= d} with s = tan((q - q*)/2) for what turns, and q - q* for what slides."""
 
-    def __init__(self, statement: RegionStatement, proof: Path, distances: Distances) -> None:
-        read = RegionProof.from_bytes(proof.read_bytes())
+    def __init__(self, proof: bytes, distances: Distances) -> None:
+        read = RegionProof.from_bytes(proof)
         self.C, self.d, self.interior = read.C, read.d, read.interior
-        scene = statement.scene
+        scene = read.scene
         self._q_star, self._turns = scene.q_star, scene.revolute
         self._order = distances.order([joint.name for joint in scene.moving])
         self._distances = distances
@@ -160,7 +161,9 @@ class _Region:
     def descended(self, s: Array, distance: float, rng: np.random.Generator) -> tuple[float, Array]:
         """Returns the distance that is reached from a point by steps that stay in the region and come nearer, and where."""
         size, n = 0.05, len(s)
-        while size > 1e-7:
+        for _ in range(STEPS):
+            if distance <= 0:
+                break
             steps = np.concatenate([np.eye(n), -np.eye(n), rng.normal(size=(n, n)) / np.sqrt(n)]) * size * self._width
             tried = [s + min(1.0, (1 - 1e-12) * self._ends(s, step)[1]) * step for step in steps]
             found = [self._distances.least(self.to_q(point), max(distance, 0.0) + 1e-3) for point in tried]

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from certifier.growth.options import GrowthOptions
+from certifier.jobs.local import grow
 from certifier.scene import load_scene
+from certifier.verify.region import verify_region
 from client.cores import cores
 from tests.oracles.distances import Distances
-from tests.oracles.random_scenes import SAMPLES, campaign
+from tests.oracles.random_scenes import SAMPLES, ProvedRegion, Result, campaign, random_scene, search
 from tests.oracles.written_scenes import FORMATS, write_scene
 
 SCENES, DEADLINE = 30, 60.0
@@ -30,6 +33,24 @@ def test_the_scenes_have_every_format_and_are_read_as_drake_reads_them(tmp_path)
         assert sorted(distances.order([joint.name for joint in scene.moving])) == list(range(5))
         written |= {file.suffix[1:] for file in path.parent.iterdir()}
     assert written >= {*FORMATS, "obj"}
+
+
+def test_drake_agrees_with_a_small_region_and_not_with_all_that_is_within_the_limits(tmp_path):
+    """A box about a free configuration is certified, and the search finds contacts in a region that is too large."""
+    rng = np.random.default_rng(11)
+    path, distances, seed = random_scene(tmp_path, rng)
+    scene = load_scene(path)
+    q = np.empty(scene.n)
+    q[distances.order([joint.name for joint in scene.moving])] = seed
+    proof = grow(scene, GrowthOptions(seed={"q": q.tolist(), "method": "box"}, pushes=0, max_rounds=0, contractions=1)).proof
+    region, result = ProvedRegion(proof, distances), Result(0, scene.n, 0, 0.0, True, "", margin=verify_region(proof).gap)
+    search(result, region, distances, rng, 500)
+    assert result.problem == ""
+    assert result.margin <= result.least < np.inf
+    limits = scene.polytope([], [])
+    region.C, region.d = limits.C, limits.d
+    search(result, region, distances, rng, 500)
+    assert "the padded bodies are -" in result.problem
 
 
 def test_the_distances_see_a_collision(tmp_path):
