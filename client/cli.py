@@ -419,7 +419,7 @@ def parser() -> argparse.ArgumentParser:
     clearance = verbs.add_parser(
         "clearance", parents=[json], help="prove how far apart the bodies are all over a region, from its proof file"
     )
-    clearance.add_argument("proof", metavar="PROOF")
+    clearance.add_argument("proof", metavar="PROOF", help="the proof file of a region")
     clearance.add_argument("--out", metavar="FILE", help="new file for the proof of the clearance; default: none")
     clearance.set_defaults(run="client.clearance:clearance")
 
