@@ -104,7 +104,7 @@ def clearance(data: bytes, processes: int = 1, seed: int = 0) -> RegionClearance
     proof, known = RegionProof.from_bytes(data), verify_region(data, processes).gap
     scene, polytope = proof.scene, Polytope(proof.C, proof.d)
     if not scene.pairs:
-        raise RegionError("no_pairs", "the scene has no pair of bodies", hint="add what the robot can collide with")
+        raise RegionError("no_pairs", "the scene has no pair of bodies", field="PROOF", hint="add what the robot can collide with")
     distances = _Distances(scene)
     nearest, file, share = _sampled(distances, polytope, proof.interior, seed), None, 1.0
     for _ in range(TRIES):
@@ -211,6 +211,6 @@ def clearance_in_child(payload: dict[str, Any]) -> dict[str, Any]:
         with open(payload["path"], "rb") as file:
             data = file.read(FILE_BYTES + 1)
     except OSError as error:
-        raise CirisError("no_file", unreadable(error)) from None
+        raise CirisError("no_file", unreadable(error), hint="name a proof file") from None
     found = clearance(data, payload["processes"])
     return {**found.document(), "proof": None if found.proof is None else base64.b64encode(found.proof).decode()}
