@@ -350,6 +350,8 @@ class Motion:
     stop: Approach | None
     """The first contact, or where bodies first come nearer than ``padding`` allows, or too close to tell; None for a motion that is
     certified."""
+    not_covered_summary: str | None
+    """Which pairs of geometries the proof is not about, in a sentence; None in a verdict that an earlier version stored."""
     seconds: float
     proof: bytes | None = field(repr=False)
     """The proof file; None where it was not asked for."""

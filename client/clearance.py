@@ -59,6 +59,7 @@ def _print(found: dict[str, Any], written: str | None, proved_by_region: bool) -
     facts = [
         ("region", f"of {found['scene']['name']} ({found['scene']['hash'][:16]})"),
         ("clearance", f"at least {at_least_mm(found['clearance'])}, padded, proved at every configuration of the region"),
+        ("", found["not_covered_summary"]),
         ("closest", f"{nearest['a']} - {nearest['b']}, {1000 * nearest['distance']:.6g} mm apart"),
         ("", f"q = {', '.join(f'{value:.6g}' for value in nearest['q'])}"),
     ]

@@ -106,6 +106,7 @@ def _print(document: dict[str, Any]) -> None:
         facts.append(("padding", f"{document['padding']:.9g} m around every body, beyond the scene's"))
     if not stop:
         facts += _distances(document)
+    facts.append(("", document["not_covered_summary"]))
     if tube:
         facts.append(("tube", f"every joint up to {rounded_down(tube)} rad ({rounded_down(math.degrees(tube))} deg) or m off the motion"))
     facts.append(("time", f"{output.seconds(document['seconds'])}, {document['intervals']} intervals"))

@@ -108,6 +108,10 @@ class MotionVerdict(BaseModel):
         description="The first contact, or where bodies first come nearer than `padding` allows, or too close to tell; null for a motion "
         "that is certified."
     )
+    not_covered_summary: str | None = Field(
+        description="Which pairs of geometries the proof is not about, in a sentence; `not_covered` of the scene lists them. Null in a "
+        "verdict that an earlier version stored."
+    )
     intervals: int = Field(description="How many planes the proof has.")
     seconds: float = Field(description="How long the search and the verification took together.")
     verify_seconds: float = Field(description="How long the verification took.")
@@ -126,6 +130,7 @@ class JobMotion(MotionVerdict):
     @classmethod
     def _of_an_earlier_version(cls, stored: dict[str, Any]) -> dict[str, Any]:
         """Fills in what the verdict of an earlier version lacks."""
-        return {"padding": 0.0, "proved_distance": stored.get("margin"), "clearance": None, "nearest": None, **stored}
+        later = dict.fromkeys(("clearance", "nearest", "not_covered_summary"))
+        return {"padding": 0.0, "proved_distance": stored.get("margin"), **later, **stored}
 
     proof: str | None = Field(description="SHA-256 of the proof file, of the motion or of its beginning; null where nothing is proved.")

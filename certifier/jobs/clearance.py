@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from certifier.errors import CirisError, unreadable
+from certifier.errors import CirisError, RegionError, unreadable
 from certifier.growth.trials import alike
 from certifier.jobs.parallel import side_by_side
 from certifier.kinematics import Kinematics
@@ -26,6 +26,7 @@ from certifier.partition.certification import CellCertification
 from certifier.polytopes.sampling import hit_and_run
 from certifier.proof.limits import FILE_BYTES
 from certifier.proof.region import RegionProof, read_part
+from certifier.verify import uncovered
 from certifier.verify.region import verify_region
 
 SAMPLES, DESCENTS, STEPS = 4000, 24, 60
@@ -74,7 +75,7 @@ class RegionClearance:
     @property
     def tight(self) -> bool:
         """Returns whether the distance of ``nearest`` is larger by at most 10 % or 0.1 mm."""
-        return self.distance >= _proved_of(self.nearest.distance)
+        return _proved_of(self.nearest.distance) <= self.distance <= self.nearest.distance
 
     def document(self) -> dict[str, Any]:
         """Returns it as JSON-able data, whose keys are stable (docs/proofs.md)."""
@@ -84,6 +85,7 @@ class RegionClearance:
             "clearance": self.distance,
             "tight": self.tight,
             "nearest": {"a": nearest.pair.a, "b": nearest.pair.b, "q": q.tolist(), "distance": nearest.distance},
+            "not_covered_summary": uncovered.document(self.scene)["summary"],
         }
 
 
@@ -97,9 +99,12 @@ def clearance(data: bytes, processes: int = 1, seed: int = 0) -> RegionClearance
 
     Raises:
         ProofError: the file is no region's proof, or one that does not hold.
+        RegionError: ``no_pairs``.
     """
     proof, known = RegionProof.from_bytes(data), verify_region(data, processes).gap
     scene, polytope = proof.scene, Polytope(proof.C, proof.d)
+    if not scene.pairs:
+        raise RegionError("no_pairs", "the scene has no pair of bodies", field="PROOF", hint="add what the robot can collide with")
     distances = _Distances(scene)
     nearest, file, share = _sampled(distances, polytope, proof.interior, seed), None, 1.0
     for _ in range(TRIES):
@@ -206,6 +211,6 @@ def clearance_in_child(payload: dict[str, Any]) -> dict[str, Any]:
         with open(payload["path"], "rb") as file:
             data = file.read(FILE_BYTES + 1)
     except OSError as error:
-        raise CirisError("no_file", unreadable(error)) from None
+        raise CirisError("no_file", unreadable(error), hint="name a proof file") from None
     found = clearance(data, payload["processes"])
     return {**found.document(), "proof": None if found.proof is None else base64.b64encode(found.proof).decode()}

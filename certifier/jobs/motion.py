@@ -16,6 +16,7 @@ from certifier.motion.search import Approach, Stop, search
 from certifier.outcome import Guarantee, Outcome
 from certifier.proof.container import with_scene
 from certifier.proof.motion import Motion, MotionProof, Space
+from certifier.verify import uncovered
 from certifier.verify.motion import MotionStatement, verify_motion
 
 
@@ -68,6 +69,7 @@ class MotionVerdict:
             "nearest": self.nearest and self._approach(self.nearest),
             "tube": statement.rho if statement and statement.rho else None,
             "stop": stop and self._approach(stop),
+            "not_covered_summary": uncovered.document(scene)["summary"],
             "intervals": self.intervals,
             "seconds": self.seconds,
             "verify_seconds": self.verify_seconds,

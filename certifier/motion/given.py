@@ -62,7 +62,7 @@ def padding_of(value: float) -> float:
         RegionError: ``padding``, for what is no distance.
     """
     if not 0 <= value <= limits.MAGNITUDE:
-        raise RegionError("padding", f"must be from 0 to {limits.MAGNITUDE:g} metres, not {value:g}", field="padding")
+        raise RegionError("padding", f"must be from 0 to {limits.MAGNITUDE:g} metres, not {value!r}", field="padding")
     return float(value)
 
 

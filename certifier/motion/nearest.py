@@ -15,6 +15,8 @@ from certifier.model import Array
 STEPS = 100
 CONVERGED = 1e-10
 """A distance is known when it may be larger by this part of itself at most."""
+_ROUNDED = 1e-14
+"""A plane separates without doubt where it does by more than this part of how far the points are from 0."""
 
 
 @njit(cache=True)
@@ -86,6 +88,20 @@ def _on_tetrahedron(P: Array, z: Array) -> int:
 
 
 @njit(cache=True)
+def _on_faces(P: Array, z: Array) -> int:
+    """Fills in the point z of the faces of a tetrahedron, (4, 3), that is nearest to 0, and returns which corners it needs."""
+    used, best, other = 0, np.inf, np.empty(3)
+    for missing in range(4):
+        i, j, k = (missing + 1) % 4, (missing + 2) % 4, (missing + 3) % 4
+        bits = _on_triangle(P[i], P[j], P[k], other)
+        square = _dot(other, other)
+        if square < best:
+            best, z[:] = square, other
+            used = ((bits & 1) << i) | (((bits >> 1) & 1) << j) | (((bits >> 2) & 1) << k)
+    return used
+
+
+@njit(cache=True)
 def separation(A: Array, B: Array, normal: Array) -> float:
     """Returns how far the hulls of A (V, 3) and B (W, 3) are apart along the direction that is filled in, which is the best one found.
 
@@ -127,7 +143,10 @@ def separation(A: Array, B: Array, normal: Array) -> float:
         else:
             used = _on_tetrahedron(P, z)
             if used == 15:
-                return min(best, 0.0)
+                # Of a flat tetrahedron, rounding says on which side 0 is. A plane that separates the hulls knows better.
+                if best <= _ROUNDED * (np.sqrt(_dot(A[a], A[a])) + np.sqrt(_dot(B[b], B[b]))):
+                    return min(best, 0.0)
+                used = _on_faces(P, z)
         kept = 0
         for i in range(m):
             if (used >> i) & 1:

@@ -14,6 +14,8 @@ from certifier.scene.hollow import CONVEX_PARTS, beyond, standing_for
 
 SHELLS, EACH = np.geomspace(0.004, 1.0, 12), 40
 """A free configuration is looked for at these parts of the joints' half ranges from the seed, EACH times."""
+ROOM = (1e-3, 0.0)
+"""A free configuration that is named has the first of these distances to contact, in metres, that is found. On contact, none can grow."""
 STEPS = 8
 """What was found is moved back towards the seed in so many steps of bisection."""
 
@@ -91,9 +93,12 @@ def check_free(scene: Scene, q: Array, field: str) -> Nearest:
         return Nearest(q, field, distance - 2 * scene.padding, pair)
     overlap = f"overlap by {-distance:.3g} m" if np.isfinite(distance) else "overlap"
     how = overlap if distance <= 0 else f"are {distance:.3g} m apart, with a padding of {scene.padding:g} m on each"
-    found = nearest_free(scene, clearance, scene.in_windows(q))
+    searched = ((room, nearest_free(scene, clearance, scene.in_windows(q), room)) for room in ROOM)
+    room, found = next((one for one in searched if one[1] is not None), (0.0, None))
     hollow = _hollow(scene, pair) if distance <= 0 else ""
-    hint = "move the seed, or ignore the pair in the scene" if found is None else _said(scene, scene.in_windows(q), found)
+    hint = "move the seed, or ignore the pair in the scene"
+    if found is not None:
+        hint = _said(scene, scene.in_windows(q), found, written(clearance, found, room))
     raise RegionError("seed_in_collision", f"{pair.a} and {pair.b} {how}{hollow}", field=field, hint=hint)
 
 
@@ -134,8 +139,17 @@ def _towards(clearance: Clearance, q: Array, free: Array, room: float) -> Array:
     return inside
 
 
-def _said(scene: Scene, q: Array, found: Array) -> str:
+def written(clearance: Clearance, q: Array, room: float) -> str:
+    """Returns a free configuration as text, with enough decimals to be free with this room when it is read again."""
+    for decimals in (4, 6, 9):
+        rounded = np.round(q, decimals)
+        if clearance.free(rounded, room):
+            return ", ".join(f"{x:.{decimals}f}" for x in rounded)
+    return ", ".join(map(repr, q.tolist()))
+
+
+def _said(scene: Scene, q: Array, found: Array, text: str) -> str:
     moved = int(np.abs(found - q).argmax())
     joint, by = scene.moving[moved], abs(found[moved] - q[moved])
     how = f"{np.degrees(by):.2g} degrees" if joint.kind is JointKind.REVOLUTE else f"{by:.2g} m"
-    return f"the nearest free configuration found is q = {', '.join(f'{x:.4f}' for x in found)}; it moves {joint.name} most, by {how}"
+    return f"the nearest free configuration found is q = {text}; it moves {joint.name} most, by {how}"

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from certifier.model import JointKind, Scene
-from certifier.seeding.free import Clearance, Nearest, nearest_free
+from certifier.seeding.free import Clearance, Nearest, nearest_free, written
 from certifier.seeding.proposal import NO_ROOM, TOO_LONG
 
 NEAR = 5e-3
@@ -49,4 +49,4 @@ def _next_to_contact(scene: Scene, tight: Nearest) -> str:
     room, roomy = next((known for known in found if known[1] is not None), (0.0, None))
     if roomy is None:
         return text
-    return f"{text}; at q = {', '.join(f'{x:.4f}' for x in roomy)} every pair is {1e3 * room:g} mm apart or more"
+    return f"{text}; at q = {written(clearance, roomy, room)} every pair is {1e3 * room:g} mm apart or more"

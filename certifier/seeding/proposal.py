@@ -9,14 +9,16 @@ import numpy as np
 
 from certifier.model import Array
 
-NO_ROOM = ", which leaves no room for a region"
+NO_ROOM = ", and no region was found there"
 TOO_LONG = ", which is too little to be seen beside it"
 """One of these is in ``info["hindrance"]`` of a proposal."""
 
 
 def mend(hindrance: str) -> str:
     """Returns what to do about a hindrance."""
-    return "move the seed away from the contact" if NO_ROOM in hindrance else "set narrower limits for the joint in the scene file"
+    if NO_ROOM in hindrance:
+        return "move the seed away from the contact; `ciris certify` may still certify a polytope of yours"
+    return "set narrower limits for the joint in the scene file"
 
 
 @dataclass(frozen=True, eq=False)

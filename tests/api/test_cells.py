@@ -199,10 +199,14 @@ def job(database: Database) -> JobRow:
         return made
 
 
+BOX = {"mid": [0.0], "half": [1.0], "Y_lower": [[0.0, 0.0, 0.0, 1.0]], "Y_upper": [[0.0, 0.0, 1.0, 0.0]]}
+"""The root cell of all partitions, with multipliers of the faces and the limits."""
+
+
 def begin(database: Database, job: JobRow, index: int, parts: dict[int, int], reuse: dict[int, int] | None = None) -> pairs.Claim:
     """Claims all of a further iteration, in which pairs have so many parts."""
     new = [pairs.NewPair(i, f"a{i}", f"b{i}", 0.01, part) for i, count in parts.items() for part in range(count)]
-    more: dict[str, Any] = {"box": ([0.0], [1.0]), "begun": 0 if index else None, "cells": 100, "parts": parts}
+    more: dict[str, Any] = {"box": BOX, "begun": 0 if index else None, "cells": 100, "parts": parts}
     with database.write() as session:
         row = jobs.lock(session, job.id)
         polytope = {"C": [[1.0], [-1.0]], "d": [1.0, 1.0], "center": None}

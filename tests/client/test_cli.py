@@ -316,11 +316,11 @@ def test_regions_are_listed_shown_and_exported(ciris: Ciris, url: str, region: s
     assert [r["id"] for r in ciris("region", "ls", "--scene", "slider", "--json", CIRIS_URL=url).json] == [region]
     assert region in ciris("region", "ls", CIRIS_URL=url).stdout
     assert ciris("region", "show", region, "--json", CIRIS_URL=url).json == certified.manifest
-    shown = ciris("region", "show", region, CIRIS_URL=url).stdout
-    assert "guarantee  exact" in shown
-    assert "joints     model/slide: -0.3 to 0.2 m" in shown
+    shown = " ".join(ciris("region", "show", region, CIRIS_URL=url).stdout.split())
+    assert "guarantee exact" in shown
+    assert "joints model/slide: -0.3 to 0.2 m" in shown
     kept = output.share(certified.manifest["share"])
-    assert f"share      {kept} of the proposal's" in shown
+    assert f"share {kept} of the proposal's" in shown
     assert kept in ciris("region", "ls", CIRIS_URL=url).stdout
     assert ciris("region", "export", region, "--name", "here", CIRIS_URL=url).json == {"name": "here", **certified.manifest}
     with np.load(io.BytesIO(ciris("region", "export", region, "--format", "npz", CIRIS_URL=url).raw)) as arrays:
@@ -370,7 +370,7 @@ def test_a_region_that_was_stored_before_there_were_shares_is_shown(certified: R
     older = {name: value for name, value in certified.manifest.items() if name not in ("share", "joint_ranges", "not_covered")}
     output.print_region(older)
     lines = capsys.readouterr().out.splitlines()
-    assert "  joints     model/slide" in lines
+    assert ["joints", "model/slide"] in [line.split() for line in lines]
     assert not any("share" in line for line in lines)
 
 

@@ -14,7 +14,7 @@ from benchmarks import __main__ as benchmarks
 from client import cli
 from tests.client.mentions import HOLE, Mention, mentions, of_markdown, of_python, of_text, options
 
-PARSER: argparse.ArgumentParser = cli._parser()
+PARSER: argparse.ArgumentParser = cli.parser()
 BENCHMARKS = benchmarks._parser()
 OTHERS = {"--once": "of ./start"}
 """Options of other programs that messages name, and whose they are."""
@@ -25,27 +25,35 @@ PROSE = frozenset(
         "answers",
         "calls",
         "can",
+        "certifies",
         "ciris",
         "client",
         "computes",
         "does",
         "drafts",
+        "finds",
         "from",
         "grows",
         "has",
+        "in",
         "is",
+        "knows",
         "looks",
         "makes",
         "on",
         "proposes",
         "proves",
+        "reads",
         "refuses",
+        "reports",
+        "says",
         "service",
         "service?",
         "should",
         "takes",
         "this",
         "would",
+        "writes",
     )
 )
 """What sentences say after the program's name that is no command."""

@@ -102,7 +102,7 @@ def large_job(database: Database, scene: Scene, iterations: int, leaves: int) ->
             done = [
                 {
                     "job_id": job_id, "iteration": index, "pair_index": i, "part": 0, "a": pair.a, "b": pair.b, "forecast_seconds": 1.0,
-                    "state": states[(i * 7 + index) % len(states)], "seconds": (i % 97) / 10, "proved_distance": 0.001, "stage": Stage.SOS,
+                    "state": states[(i * 7 + index) % len(states)], "seconds": (i % 97) / 10, "margin": 0.001, "stage": Stage.SOS,
                 }
                 for i, pair in enumerate(scene.pairs)
             ]  # fmt: skip

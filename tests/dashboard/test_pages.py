@@ -120,7 +120,9 @@ def iteration(index: int, reused: dict[int, int]) -> Iteration:
 
 
 def cell(pair: int, index: int, state: PairState, **values: object) -> PairCell:
-    known = dict.fromkeys(("stage", "proved_distance", "seconds", "detail", "worker", "witness_q", "open_cells", "proof")) | values
+    known = (
+        dict.fromkeys(("stage", "proved_distance", "margin", "seconds", "detail", "worker", "witness_q", "open_cells", "proof")) | values
+    )
     return PairCell(iteration=index, pair=pair, parts=1, state=state, **known)  # type: ignore[arg-type]
 
 

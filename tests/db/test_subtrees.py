@@ -15,6 +15,10 @@ from tests.db.builders import a_running_job, all_pairs
 CERTIFIED = PairResult(Outcome.CERTIFIED, Stage.CELLS, margin=0.01, proof=b"proof")
 
 
+BOX = {"mid": [0.0], "half": [1.0], "Y_lower": [[0.0, 0.0, 0.0, 1.0]], "Y_upper": [[0.0, 0.0, 1.0, 0.0]]}
+"""The root cell of all partitions, with multipliers of the faces and the limits."""
+
+
 def left(data: bytes, outcome: Outcome = Outcome.INCONCLUSIVE, outline: bytes | None = None) -> PairResult:
     return PairResult(outcome, Stage.CELLS, subtrees=data, outline=outline, open_cells=3)
 
@@ -42,7 +46,7 @@ def next_round(db: Database, job_id: str, index: int, parts: tuple[int, ...] = (
     with db.write() as session:
         job = jobs.lock(session, job_id)
         new = [pairs.NewPair(i, f"a{i}", f"b{i}", 0.01, part) for i, count in enumerate(parts) for part in range(count)]
-        box, polytope = ([0.0], [1.0]), {"C": [[1.0], [-1.0]], "d": [1.0, 1.0], "center": None}
+        box, polytope = BOX, {"C": [[1.0], [-1.0]], "d": [1.0, 1.0], "center": None}
         more = {"box": box, "begun": 0, "parts": dict(enumerate(parts))}
         pairs.add_iteration(session, job, index=index, label="cells", **polytope, pairs=new, reuse={}, hard=[], failures=None, **more)
     return claim(db, job_id)

@@ -339,7 +339,14 @@ COMMANDS: list[Row] = [
     ),
     *rows(
         "certifier/jobs/clearance.py",
-        ("no_file", "", "{...}", "", "a file that goes away before the child process reads it"),
+        ("no_file", "", "{...}", "name a proof file", "a file that goes away before the child process reads it"),
+        (
+            "no_pairs",
+            "PROOF",
+            "the scene has no pair of bodies",
+            "add what the robot can collide with",
+            "a region of a scene without pairs",
+        ),
     ),
     *rows(
         "client/verify.py",

@@ -46,13 +46,6 @@ def room(shape: str) -> dict[str, dict[str, str]]:
     return {"files": {"room.sdf": SDF_SHAPE.format(shape)}}
 
 
-def sdf_joint(kind: str, tag: str = "", more: str = "") -> dict[str, dict[str, str]]:
-    """The room with a joint of a kind; ``tag`` is ``drake:`` for those of Drake's own."""
-    ends = f"<{tag}parent>walls</{tag}parent><{tag}child>door</{tag}child>{more}"
-    model = '<sdf xmlns:drake="http://drake.mit.edu" version="1.7"><model name="room"><link name="walls"/><link name="door"/>'
-    return {"files": {"room.sdf": f'{model}<{tag}joint name="b" type="{kind}">{ends}</{tag}joint></model></sdf>'}}
-
-
 def linked(more: str) -> dict[str, dict[str, str]]:
     """Returns a room with more in its link."""
     return {"files": {"room.sdf": SDF_SHAPE.format("<box><size>1 1 1</size></box>").replace("</collision>", f"</collision>{more}")}}
@@ -401,7 +394,7 @@ MODELS = [
             "directives",
             "{...}",
             "use a primitive or a mesh",
-            lambda t: t.scene(**mjcf("<joint name='j' range='-1 1'/><geom type='hfield' size='1'/>")),
+            "geometry that Drake leaves out and the strict readers take; none is known",
         ),
         (
             "scene_model",
@@ -422,14 +415,14 @@ MODELS = [
             "directives",
             "joint {name} is a {...} joint; revolute, prismatic and fixed joints are supported",
             "replace it by such joints, or weld its bodies",
-            lambda t: t.scene(**sdf_joint("ball")),
+            "a joint that the strict readers take, and that is no such joint; none is known",
         ),
         (
             "unsupported_joint",
             "directives",
             "joint {name} is a {...} joint; revolute, prismatic and fixed joints are supported",
             "write two slides and a turn, as docs/scenes.md does for a mobile base",
-            lambda t: t.scene(**sdf_joint("planar", "drake:", "<drake:damping>0 0 0</drake:damping>")),
+            "a planar joint that the strict readers take; none is known",
         ),
         (
             "unsupported_joint",
@@ -504,6 +497,13 @@ MODELS = [
             "{...} is a directory",
             "name a model file in it",
             lambda t: t.load(D.replace("a.urdf", ".")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{...} is no model",
+            "models end in {...}",
+            lambda t: t.load(D.replace("a.urdf", "a.txt") if t.write(a__txt="") else ""),
         ),
         (
             "scene_model",

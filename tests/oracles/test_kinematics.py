@@ -2,19 +2,27 @@
 
 import numpy as np
 import pytest
+from pydrake.geometry import SceneGraph
 from pydrake.multibody.rational import RationalForwardKinematics
 
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, JointKind, Scene
-from certifier.scene.parse import _bodies, _joints
+from certifier.scene.names import Names
+from certifier.scene.parse import joint_of
 from certifier.scene.tree import Tree
 from tests.oracles.trees import random_plant
 
 SEEDS = range(12)
 
 
+def tree_of(plant):
+    """Of a plant without a scene graph, whose inspector has nothing to name."""
+    names = Names(plant, SceneGraph().model_inspector())
+    return Tree([joint_of(plant.get_joint(index), names) for index in plant.GetJointIndices()], list(names.bodies))
+
+
 def scene_of(plant, q_star):
-    tree = Tree(_joints(plant), _bodies(plant))
+    tree = tree_of(plant)
     return Scene("tree", tree.joints, tree.bodies, (), (), (), q_star)
 
 
@@ -54,7 +62,7 @@ def test_numerators_are_drakes_poses_times_the_denominator(seed):
 
 def test_the_trees_have_every_kind_of_joint():
     plants = [random_plant(np.random.default_rng(seed), 7) for seed in SEEDS]
-    kinds = {joint.kind for plant in plants for joint in Tree(_joints(plant), _bodies(plant)).joints}
+    kinds = {joint.kind for plant in plants for joint in tree_of(plant).joints}
     assert kinds == set(JointKind)
 
 
