@@ -58,7 +58,7 @@ def pack_bundle(path: str | Path) -> bytes:
     Raises:
         SceneError: the scene file is wrong, or a reference cannot travel (``bundle_uri``).
     """
-    scene_file = read_scene_file(existing(path).resolve())
+    scene_file = read_scene_file(existing(path))
     files = {scene_file.path}
     waiting = [resolve(model, scene_file.path.parent, scene_file.packages) for model in scene_file.models]
     while waiting:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import importlib.metadata
 import logging
+import os
 import re
 import sys
 import textwrap
@@ -192,7 +193,7 @@ def _model_error(scene_file: SceneFile, error: BaseException) -> SceneError:
 def _one_line(scene_file: SceneFile, message: str) -> str:
     """Returns a message of Drake's in one printable line, with paths relative to the scene file."""
     message = message.replace("<string>", scene_file.path.name).replace(": error: ", ": ")
-    message = re.sub(rf"(file:)?/*{re.escape(str(scene_file.path.parent.resolve()))}/", "", message)
+    message = re.sub(rf"(file:)?/*{re.escape(os.path.abspath(scene_file.path.parent))}/", "", message)
     return textwrap.shorten(escaped(" ".join(message.removeprefix("error: ").split())), MAX_SENTENCE, placeholder=" ...")
 
 

@@ -16,7 +16,8 @@ from xml.parsers import expat
 import yaml
 
 from certifier.errors import SceneError
-from certifier.scene.file import MAX_DEPTH, compose
+from certifier.scene.nodes import MAX_DEPTH, compose, read_yaml
+from certifier.scene.paths import beside
 from certifier.scene.xml import parse_xml
 
 _ATTRIBUTES = {"file", "filename", "uri", "url"}
@@ -47,24 +48,25 @@ def references(path: Path) -> list[str]:
 
 
 def resolve(reference: str, directory: Path, packages: dict[str, Path]) -> Path:
-    """Returns the path that a reference means in a file of ``directory``.
+    """Returns the path that a reference means in a file of ``directory``. Drake, too, takes several slashes for one.
 
     Raises:
-        SceneError: ``bundle_uri`` for an absolute path, a scheme other than package:// and model://, or an unknown package.
+        SceneError: as :func:`certifier.scene.paths.beside`; ``bundle_uri`` for an absolute path, a scheme other than package:// and
+            model://, or an unknown package.
     """
     scheme = _SCHEME.match(reference)
     if scheme is None:
         if reference.startswith(("/", "~")) or "\\" in reference or "\0" in reference:
             hint = "name a directory above it under packages, and write package://NAME/FILE"
             raise SceneError("bundle_uri", f"{reference!r} is not a relative path", hint=hint)
-        return (directory / reference).resolve()
+        return beside(directory, reference)
     if scheme[1] not in ("package", "model") or not scheme[2]:
         raise SceneError("bundle_uri", f"{reference!r} is no file of the scene", hint="use a relative path or package://NAME/FILE")
     name, _, rest = reference[scheme.end() :].partition("/")
     if name not in packages:
         hint = f"known packages: {', '.join(packages)}" if packages else "name its directory under packages in the scene file"
         raise SceneError("bundle_uri", f"{reference!r} names the unknown package {name!r}", hint=hint)
-    return (packages[name] / rest).resolve()
+    return beside(packages[name], rest.lstrip("/"))
 
 
 def _xml(path: Path) -> list[str]:
@@ -100,7 +102,7 @@ def _xml(path: Path) -> list[str]:
 
 def _yaml(path: Path) -> list[str]:
     found: list[str] = []
-    waiting = [compose(path.read_text(encoding="utf-8"), path.name)]
+    waiting = [compose(read_yaml(path, path.name), path.name)]
     while waiting:
         node = waiting.pop()
         if isinstance(node, yaml.MappingNode):
