@@ -184,7 +184,7 @@ FILES = rows(
         "",
         lambda t: t.load("directives: [add_model]\n"),
     ),
-    ("scene_field", "directives", "line {...}: {value} is not a relative path", BELOW, lambda t: t.load(D.replace("a.urdf", "/a.urdf"))),
+    ("scene_field", "directives", "line {line}: {file} is not a relative path", BELOW, lambda t: t.load(D.replace("a.urdf", "/a.urdf"))),
 )
 
 NODES = rows(
@@ -636,6 +636,13 @@ MODELS = [
             "{what} is collision geometry, and of that only OBJ meshes are read",
             "convert it to OBJ; meshes that are only drawn may be of another kind",
             lambda t: t.scene(shape='<mesh filename="m.stl"/>'),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{...} is no model",
+            "models end in {...}",
+            lambda t: t.load(D.replace("a.urdf", "a.txt") if t.write(a__txt="") else ""),
         ),
         (
             "scene_model",
