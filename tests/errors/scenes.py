@@ -42,6 +42,9 @@ ONE_MODEL += "without its physics, lights and gui"
 NESTED = '<sdf version="1.9"><model name="room"><model name="shelf"><link name="board"/></model></model></sdf>'
 MUJOCO = "directives: [{add_model: {name: m, file: m.xml}}]\n"
 
+TWICE = "directives:\n- add_model: {name: m, file: m.xml}\n"
+IN_WORLD = "<mujoco><worldbody><geom name='w' size='1'/></worldbody></mujoco>"
+
 
 def room(shape: str) -> dict[str, dict[str, str]]:
     return {"files": {"room.sdf": SDF_SHAPE.format(shape)}}
@@ -485,6 +488,13 @@ MODELS = [
             "{models}{message}",
             "mend the model or the directive",
             lambda t: t.scene(shape='<mesh filename="nothing.obj"/>'),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{models}{message}",
+            "geometries in the world, outside of bodies, have one name each; put them into a body, or rename them in one file",
+            lambda t: t.scene(TWICE + "- add_model: {name: n, file: m.xml}\n", files={"m.xml": IN_WORLD}),
         ),
         (
             "scene_model",
