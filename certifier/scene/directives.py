@@ -19,6 +19,7 @@ from certifier.scene.paths import beside
 
 _SHORT = 1e-6
 """An axis of a rotation is at least so long. Drake makes a matrix that turns nothing of one that is 0."""
+_NULL = "tag:yaml.org,2002:null"
 _NAMES = {"add_model": "name", "add_directives": "model_namespace"}
 
 
@@ -67,14 +68,14 @@ def added_files(directives: yaml.Node) -> list[AddedFile]:
     found = []
     for kind, body in _each(directives):
         if kind in _NAMES and isinstance(body, yaml.MappingNode):
-            said = [(key.value, value) for key, value in body.value if isinstance(value, yaml.ScalarNode)]
+            said = [(key.value, value) for key, value in body.value if isinstance(value, yaml.ScalarNode) and value.tag != _NULL]
             named = next((value.value for key, value in said if key == _NAMES[kind]), "")
             found += [AddedFile(kind, value, named) for key, value in said if key == "file"]
     return found
 
 
 def check_directives(directives: yaml.Node, name: str) -> None:
-    """Checks that every text stands on one line, and that the numbers of transforms and positions are finite, and none above 1e6.
+    """Checks that every text is printable and on one line, and that the numbers of transforms and positions are finite, and none above 1e6.
 
     What has another structure than Drake's directives is left to Drake, which refuses it.
 
@@ -84,6 +85,8 @@ def check_directives(directives: yaml.Node, name: str) -> None:
     for node in _inside(directives):
         if isinstance(node, yaml.ScalarNode) and (node.style in ("|", ">") or node.start_mark.line != node.end_mark.line):
             _refuse(name, node, "the text goes over several lines", "write it on one line, in quotes")
+        if isinstance(node, yaml.ScalarNode) and not node.value.isprintable():
+            _refuse(name, node, f"the text {node.value[:80]!a} has a character that cannot be printed", "remove it")
     for _, body in _each(directives):
         for key, value in _pairs(body):
             if key in ("X_PC", "X_PF"):

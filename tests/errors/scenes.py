@@ -239,6 +239,13 @@ DIRECTIVES = rows(
     (
         "scene_field",
         "directives",
+        "the text {...} has a character that cannot be printed",
+        "remove it",
+        lambda t: t.load(D.replace("a.urdf", '"a.urdf\\0"')),
+    ),
+    (
+        "scene_field",
+        "directives",
         "axis of {what} is shorter than {_SHORT}",
         "write its direction with the length 1",
         lambda t: t.load(D.replace("}}", "}}, " + WELD.format("rotation: !AngleAxis {angle_deg: 1, axis: [0, 0, 0]}"))),

@@ -38,6 +38,7 @@ def posed(pose):
         ('add_model: {name: arm, file: "package://p//arm2.urdf"}', "scene.yaml:3: there is no file arm2.urdf"),
         ('add_model: {name: arm, file: "package://q/arm.urdf"}', "scene.yaml:3: 'package://q/arm.urdf' names the unknown package 'q'"),
         ('add_model: {name: arm, file: "http://p/arm.urdf"}', "scene.yaml:3: 'http://p/arm.urdf' is no file of the scene"),
+        ('add_model: {name: arm, file: "arm.urdf\\0"}', "scene.yaml:3: the text 'arm.urdf\\x00' has a character that cannot be printed"),
         ("add_model: {name: arm, file: >-\n      arm.urdf\n    }", "scene.yaml"),
         ("add_model:\n      name: arm\n      file: >-\n        arm.urdf", "scene.yaml:5: the text goes over several lines"),
         ("add_model:\n      name: arm\n      file: |-\n        arm.urdf", "scene.yaml:5: the text goes over several lines"),
@@ -139,3 +140,10 @@ def test_poses_are_read_as_written(tmp_path):
         center = next(j.X_PF for j in parsed(write(tmp_path, turned[0])).joints if j.child == "room/walls")
         placed = vertices @ center[:3, :3].T + center[:3, 3]
         np.testing.assert_allclose([placed.min(axis=0), placed.max(axis=0)], [[0.5, 0.05, 0.05], [1.5, 0.15, 1.05]], atol=1e-12)
+
+
+def test_a_namespace_of_null_is_none_as_for_drake(tmp_path):
+    """Without it, nothing takes the limits off a joint that turns without limits."""
+    more = f"directives: [{{add_model: {{name: {ADDED.replace('arm.urdf', 'package://p/arm.urdf')}}}}}]"
+    path = write(tmp_path, directive("add_directives: {file: more.yaml, model_namespace: ~}"), kind="continuous", files={"more.yaml": more})
+    assert any("arm/turn is continuous" in warning for warning in parsed(path).warnings)
