@@ -31,7 +31,7 @@ from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee, Outcome, Stage
 from certifier.pair.result import PairResult
 from certifier.polytopes.polytope import chebyshev_center
-from certifier.scene.drake_model import build_diagram, geometry_name
+from certifier.scene.drake_model import build_diagram, geometry_name, scene_name
 
 
 class Solver(StrEnum):
@@ -127,7 +127,7 @@ class Reference:
         result = self._answers.make().Solve(program.prog())
         solved = time.process_time()
         plane = self._polytopes.separating_planes()[program.plane_index]
-        frame = self._diagram.plant().get_body(plane.expressed_body).name()
+        frame = scene_name(self._diagram.plant().get_body(plane.expressed_body).name())
         outcome, status = self._outcome(result)
         return ReferenceResult(outcome, status, frame, built - start, solved - built)
 

@@ -19,7 +19,7 @@ from certifier.isolation.child import prepare
 from certifier.model import Scene
 from certifier.scene.file import existing, read_scene_file, with_relative_packages
 from certifier.scene.load import read_in_child
-from certifier.scene.references import references, resolve
+from certifier.scene.references import is_mjcf, mjcf_references, references, resolve
 
 INDEX = "bundle.json"
 """In this file the bundle says which file is the scene file."""
@@ -58,7 +58,7 @@ def pack_bundle(path: str | Path) -> bytes:
     Raises:
         SceneError: the scene file is wrong, or a reference cannot travel (``bundle_uri``).
     """
-    scene_file = read_scene_file(existing(path).resolve())
+    scene_file = read_scene_file(existing(path))
     files = {scene_file.path}
     waiting = [resolve(model, scene_file.path.parent, scene_file.packages) for model in scene_file.models]
     while waiting:
@@ -66,6 +66,8 @@ def pack_bundle(path: str | Path) -> bytes:
         if file not in files and file.is_file():
             files.add(file)
             waiting += [resolve(r, file.parent, scene_file.packages) for r in references(file)]
+            if is_mjcf(file):
+                waiting += mjcf_references(file, scene_file.packages)
     root = Path(os.path.commonpath([f.parent for f in files] + list(scene_file.packages.values())))
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -26,6 +26,7 @@ from certifier.model import WORLD, Array, JointKind, Pair, Scene
 from certifier.scene.contacts import touching
 from certifier.scene.load import MEMORY_BYTES, TIMEOUT_S, load_scene, read_in_child
 from certifier.scene.mimics import Mimic, at_rest
+from certifier.scene.paths import beside
 from certifier.scene.references import references
 from certifier.scene.xml import parse_xml
 
@@ -74,7 +75,7 @@ def draft(robot: Path, worlds: Sequence[Path], out: Path, packages: Mapping[str,
     models: dict[str, Path] = {}
     for path in (robot, *worlds):
         models[_unused(_name_in(path), models)] = path
-    directory = out.resolve().parent
+    directory = out.parent.resolve()
     found = {name: root for path in models.values() for name, root in _packages(path, packages).items()}
     head = _head(out, robot, found, directory)
     add = {name: f"  - add_model: {{name: {_quoted(name)}, file: {_quoted(_relative(path, directory))}}}" for name, path in models.items()}
@@ -167,7 +168,7 @@ def _head(out: Path, robot: Path, packages: Mapping[str, Path], directory: Path)
 def _inventory(text: str, models: Mapping[str, Path], directory: Path) -> dict[str, Any]:
     """Returns what the models of a scene file hold (:mod:`certifier.scene.inventory`)."""
     with _scene_file(text, directory) as path:
-        payload = {"path": str(path), "models": {name: str(model.resolve()) for name, model in models.items()}}
+        payload = {"path": str(path), "models": {name: str(beside(Path.cwd(), str(model))) for name, model in models.items()}}
         return read_in_child("certifier.scene.inventory:inventory", payload, "the draft", TIMEOUT_S, MEMORY_BYTES)
 
 
@@ -244,7 +245,7 @@ def _loaded(text: str, directory: Path) -> Scene:
 
 
 def _relative(path: Path, directory: Path) -> str:
-    return os.path.relpath(path.resolve(), directory)
+    return os.path.relpath(beside(Path.cwd(), str(path)), directory)
 
 
 def _joints(scene: Scene) -> str:

@@ -19,7 +19,8 @@ def build_diagram(scene: Scene) -> RobotDiagram:
     """Returns the scene as a Drake diagram, with the same joint positions in the same order. Only ``scene.pairs`` can collide in it.
 
     The geometries are the scene's conv(vertices) + ball(radius), without ``scene.padding``. So a configuration is free when the signed
-    distance of every pair is more than twice the padding. :func:`geometry_name` gives the scene's name of a geometry.
+    distance of every pair is more than twice the padding. Drake's names of bodies, joints and geometries are :func:`drake_name`, and
+    :func:`scene_name` and :func:`geometry_name` lead back.
 
     Raises:
         SceneError: ``unsupported_shape`` for more than two vertices with a radius; ``joint_order`` if Drake numbers the joints otherwise.
@@ -30,13 +31,13 @@ def build_diagram(scene: Scene) -> RobotDiagram:
     bodies = {WORLD: plant.world_body()}
     for name in scene.bodies:
         if name != WORLD:
-            bodies[name] = plant.AddRigidBody(name, instance, SpatialInertia.SolidSphereWithMass(1.0, 1.0))
+            bodies[name] = plant.AddRigidBody(drake_name(name), instance, SpatialInertia.SolidSphereWithMass(1.0, 1.0))
     for joint in scene.joints:
         _add_joint(plant, joint, bodies)
     ids = {g.name: _add_geometry(plant, g, bodies) for g in scene.geometries}
     plant.Finalize()
     for joint in scene.moving:
-        if plant.GetJointByName(joint.name).position_start() != joint.index:
+        if plant.GetJointByName(drake_name(joint.name)).position_start() != joint.index:
             message = f"joint {joint.name} is not number {joint.index} in a depth-first walk of the tree"
             raise SceneError("joint_order", message, hint="Drake numbers joints so; load the scene from its file again")
     only = CollisionFilterDeclaration().ExcludeWithin(GeometrySet(list(ids.values())))
@@ -46,32 +47,42 @@ def build_diagram(scene: Scene) -> RobotDiagram:
     return builder.Build()
 
 
+def drake_name(name: str) -> str:
+    """Returns the name that Drake gets for one of a scene. Drake accepts no ``::`` in it, and a scene's names have no ``|``."""
+    return name.replace(":", "|")
+
+
+def scene_name(drake_name: str) -> str:
+    """Returns the scene's name for one that :func:`drake_name` has made."""
+    return drake_name.replace("|", ":")
+
+
 def geometry_name(inspector: SceneGraphInspector, geometry_id: GeometryId) -> str:
     """Returns the scene's name of a geometry of :func:`build_diagram`."""
-    return inspector.GetName(geometry_id).removeprefix(f"{_INSTANCE}::")
+    return scene_name(inspector.GetName(geometry_id).removeprefix(f"{_INSTANCE}::"))
 
 
 def _add_joint(plant: MultibodyPlant, joint: Joint, bodies: dict[str, RigidBody]) -> None:
-    parent, child = bodies[joint.parent], bodies[joint.child]
+    name, parent, child = drake_name(joint.name), bodies[joint.parent], bodies[joint.child]
     X_PF, X_BM = _transform(joint.X_PF), _transform(joint.X_BM)
     if joint.kind is JointKind.WELD:
-        plant.AddJoint(WeldJoint(joint.name, parent.body_frame(), child.body_frame(), X_PF @ X_BM.inverse()))
+        plant.AddJoint(WeldJoint(name, parent.body_frame(), child.body_frame(), X_PF @ X_BM.inverse()))
         return
-    F = plant.AddFrame(FixedOffsetFrame(f"{joint.name}/F", parent.body_frame(), X_PF, child.model_instance()))
-    M = plant.AddFrame(FixedOffsetFrame(f"{joint.name}/M", child.body_frame(), X_BM, child.model_instance()))
+    F = plant.AddFrame(FixedOffsetFrame(f"{name}/F", parent.body_frame(), X_PF, child.model_instance()))
+    M = plant.AddFrame(FixedOffsetFrame(f"{name}/M", child.body_frame(), X_BM, child.model_instance()))
     kind = RevoluteJoint if joint.kind is JointKind.REVOLUTE else PrismaticJoint
-    plant.AddJoint(kind(joint.name, F, M, joint.axis, joint.lower, joint.upper))
+    plant.AddJoint(kind(name, F, M, joint.axis, joint.lower, joint.upper))
 
 
 def _add_geometry(plant: MultibodyPlant, geometry: Geometry, bodies: dict[str, RigidBody]) -> GeometryId:
     X_BG, shape = _shape(geometry)
-    return plant.RegisterCollisionGeometry(bodies[geometry.body], X_BG, shape, geometry.name, CoulombFriction())
+    return plant.RegisterCollisionGeometry(bodies[geometry.body], X_BG, shape, drake_name(geometry.name), CoulombFriction())
 
 
 def _shape(geometry: Geometry) -> tuple[RigidTransform, Shape]:
     vertices, radius = geometry.vertices, geometry.radius
     if radius == 0:
-        return RigidTransform(), Convex(vertices.T, geometry.name)
+        return RigidTransform(), Convex(vertices.T, drake_name(geometry.name))
     if len(vertices) == 1:
         return RigidTransform(vertices[0]), Sphere(radius)
     if len(vertices) == 2:

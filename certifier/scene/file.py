@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,15 +18,16 @@ import yaml
 from certifier.errors import SceneError, close_matches
 from certifier.model import ALPHABET, MAX_SENTENCE, is_name, is_sentence
 from certifier.positions import MAGNITUDE
+from certifier.scene.directives import added_files, check_directives, replaced, resolved
+from certifier.scene.nodes import MEND, compose, decoded
+from certifier.scene.paths import beside
 
 KEYS = ("name", "packages", "directives", "q_star", "limits", "fix", "padding", "ignore", "hulls", "mesh", "cylinder_sides")
 """The keys of a scene file."""
 MAX_BYTES = 2**20
-MAX_DEPTH = 50
 MIN_HULL_VERTICES = 8
 MAX_VERTICES, MAX_SIDES = 512, 128
 """What certifying costs grows with the vertices of a body, so nobody needs more."""
-_MEND = "mend the YAML there; docs/scenes.md shows a scene file"
 
 
 @dataclass(frozen=True)
@@ -76,14 +76,6 @@ class SceneFile:
     cylinder_sides: int = 12
 
 
-class _Loader(yaml.SafeLoader):
-    """This is YAML's safe loader, which here also reads ``1e-3`` as a number."""
-
-
-_Loader.yaml_implicit_resolvers = {k: list(v) for k, v in yaml.SafeLoader.yaml_implicit_resolvers.items()}
-_Loader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9][0-9]*(\.[0-9]*)?[eE][-+]?[0-9]+$"), list("-+0123456789"))
-
-
 def read_scene_file(path: Path) -> SceneFile:
     """Reads and checks a scene file.
 
@@ -100,14 +92,14 @@ def read_scene_file(path: Path) -> SceneFile:
     if mesh.get("mode", "hull") != "hull":
         raise _wrong("mesh.mode", f"must be hull, not {mesh['mode']!r}")
     directives = nodes["directives"]
-    _check_directives(directives)
+    _check_directives(directives, path.name)
     return SceneFile(
         path=path,
         name=_name(values.get("name", path.parent.name if path.stem == "scene" else path.stem), "name"),
         packages=_packages(values.get("packages", {}), path.parent),
         directives=text[directives.start_mark.index : directives.end_mark.index].rstrip(),
-        resolved_directives=_resolved(text, directives, path.parent),
-        models=tuple(node.value for _, node, _ in _file_nodes(directives)),
+        resolved_directives=resolved(text, directives, path.parent),
+        models=tuple(added.file for added in added_files(directives)),
         q_star=_q_star(values.get("q_star")),
         limits=_limits(values.get("limits", {})),
         fix={name: _number(value, f"fix.{name}") for name, value in _by_joint(values.get("fix", {}), "fix").items()},
@@ -120,7 +112,7 @@ def read_scene_file(path: Path) -> SceneFile:
 
 
 def existing(path: str | Path) -> Path:
-    """Returns the absolute path of a scene file that is there.
+    """Returns the absolute path of a scene file that is there. No directory in it is a symbolic link, and the file itself may be one.
 
     Raises:
         SceneError: ``scene_not_found``.
@@ -130,43 +122,7 @@ def existing(path: str | Path) -> Path:
         raise SceneError("scene_not_found", f"{path} is a directory", hint="name the scene file in it, which ends in .yaml")
     if not path.is_file():
         raise SceneError("scene_not_found", f"there is no scene file {path}", hint="`ciris scene init` drafts one for a robot's model")
-    return path.absolute()
-
-
-def compose(text: str, name: str) -> yaml.Node | None:
-    """Returns the YAML nodes of a stranger's text, which may have no aliases and may be no deeper than a scene needs.
-
-    Raises:
-        SceneError: ``scene_yaml``, with the line.
-    """
-    try:
-        depth = 0
-        for event in yaml.parse(text, Loader=_Loader):
-            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-            if isinstance(event, yaml.AliasEvent):
-                raise SceneError("scene_yaml", f"{name} uses the alias *{event.anchor}", hint="write out what it stands for")
-            if depth > MAX_DEPTH:
-                raise SceneError("scene_yaml", f"{name} may be nested at most {MAX_DEPTH} levels deep")
-        return yaml.compose(text, Loader=_Loader)
-    except yaml.MarkedYAMLError as error:
-        line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise SceneError("scene_yaml", f"{name}{line}: {error.problem}", hint=_MEND) from None
-    except yaml.YAMLError as error:
-        raise SceneError("scene_yaml", f"{name} is not YAML: {str(error).splitlines()[0]}", hint=_MEND) from None
-
-
-def directive_files(text: str, name: str) -> list[tuple[str, str, str]]:
-    """Returns the files that a document of Drake Model Directives names.
-
-    Each comes as ``add_model`` or ``add_directives``, the file as written, and the name of the model or of the models' namespace.
-
-    Raises:
-        SceneError: ``scene_yaml``, with the line.
-    """
-    root = compose(text, name)
-    entries = root.value if isinstance(root, yaml.MappingNode) else []
-    lists = [value for key, value in entries if key.value == "directives" and isinstance(value, yaml.SequenceNode)]
-    return [(kind, node.value, named) for directives in lists for kind, node, named in _file_nodes(directives)]
+    return path.parent.resolve() / path.name
 
 
 def _text(path: Path) -> str:
@@ -176,10 +132,7 @@ def _text(path: Path) -> str:
         raise SceneError("scene_not_found", f"the scene file {path} cannot be read", hint="is it there, and may you read it?") from None
     if len(data) > MAX_BYTES:
         raise SceneError("scene_yaml", f"{path.name} has {len(data)} bytes; a scene file may have at most {MAX_BYTES}")
-    try:
-        return data.decode()
-    except UnicodeDecodeError as error:
-        raise SceneError("scene_yaml", f"{path.name}: byte {error.start} is not UTF-8 text", hint="save the file as UTF-8") from None
+    return decoded(data, path.name)
 
 
 def _construct(node: yaml.Node, where: str) -> Any:
@@ -188,7 +141,7 @@ def _construct(node: yaml.Node, where: str) -> Any:
         return yaml.constructor.SafeConstructor().construct_document(node)
     except (yaml.YAMLError, ValueError) as error:
         problem = error.problem if isinstance(error, yaml.MarkedYAMLError) else str(error)
-        raise _wrong(where, f"line {node.start_mark.line + 1}: {problem}", hint=_MEND) from None
+        raise _wrong(where, f"line {node.start_mark.line + 1}: {problem}", hint=MEND) from None
 
 
 def _check_unique(node: yaml.Node, where: str) -> None:
@@ -283,7 +236,7 @@ def _packages(value: Any, directory: Path) -> dict[str, Path]:
         raise _wrong("packages", "must map names of packages to directories")
     roots = {}
     for name, root in value.items():
-        path = (directory / _string(root, f"packages.{name}")).resolve()
+        path = beside(directory, _string(root, f"packages.{name}"))
         if not path.is_dir():
             hint = "a path that does not begin with / starts at the directory of the scene file"
             raise _wrong(f"packages.{name}", f"there is no directory {path}", hint=hint)
@@ -342,27 +295,18 @@ def _hulls(value: Any) -> tuple[str, ...]:
     return tuple(dict.fromkeys(_string(name, f"hulls[{k}]") for k, name in enumerate(value)))
 
 
-def _check_directives(node: yaml.Node) -> None:
+def _check_directives(node: yaml.Node, name: str) -> None:
     if not isinstance(node, yaml.SequenceNode) or not node.value:
         raise _wrong("directives", "must be a list of Drake Model Directives with at least one entry")
     _check_unique(node, "directives")
     for i, entry in enumerate(node.value):
         if not isinstance(entry, yaml.MappingNode) or len(entry.value) != 1:
             raise _wrong(f"directives[{i}]", "must be a mapping with one key, the kind of directive, such as add_model")
-    for _, file, _ in _file_nodes(node):
-        if file.value.startswith(("/", "~", "file:")):
+    check_directives(node, name)
+    for added in added_files(node):
+        if added.file.startswith(("/", "~", "file:")):
             hint = "name a directory above it under packages, and write package://NAME/FILE"
-            raise _wrong("directives", f"line {file.start_mark.line + 1}: {file.value!a} is not a relative path", hint=hint)
-
-
-def _file_nodes(directives: yaml.Node) -> list[tuple[str, yaml.ScalarNode, str]]:
-    found = []
-    for kind, body in (pair for entry in directives.value if isinstance(entry, yaml.MappingNode) for pair in entry.value):
-        if kind.value in ("add_model", "add_directives") and isinstance(body, yaml.MappingNode):
-            said = [(key.value, value) for key, value in body.value if isinstance(value, yaml.ScalarNode)]
-            named = next((value.value for key, value in said if key == ("name" if kind.value == "add_model" else "model_namespace")), "")
-            found += [(kind.value, value, named) for key, value in said if key == "file"]
-    return found
+            raise _wrong("directives", f"line {added.line}: {added.file!a} is not a relative path", hint=hint)
 
 
 def with_relative_packages(path: Path) -> str:
@@ -371,27 +315,7 @@ def with_relative_packages(path: Path) -> str:
     root = compose(text, path.name)
     assert isinstance(root, yaml.MappingNode), "it has passed the schema"
     roots = [node for key, packages in root.value if key.value == "packages" for _, node in packages.value]
-    directory = path.parent.resolve()
+    directory = os.path.abspath(path.parent)
     absolute = [node for node in roots if node.value.startswith("/")]
-    relative = [json.dumps(os.path.relpath(Path(node.value).resolve(), directory), ensure_ascii=False) for node in absolute]
-    return _replaced(text, 0, len(text), list(zip(absolute, relative, strict=True)))
-
-
-def _replaced(text: str, start: int, end: int, changed: list[tuple[yaml.ScalarNode, str]]) -> str:
-    """Returns a part of the text with other texts in the place of some of its nodes, which are in order."""
-    pieces, last = [], start
-    for node, instead in changed:
-        pieces += [text[last : node.start_mark.index], instead]
-        last = node.end_mark.index
-    return "".join([*pieces, text[last:end]])
-
-
-def _resolved(text: str, directives: yaml.Node, directory: Path) -> str:
-    start, end = directives.start_mark.index, directives.end_mark.index
-    relative = [node for _, node, _ in _file_nodes(directives) if "://" not in node.value]
-    absolute = [json.dumps(f"file://{(directory / node.value).resolve()}", ensure_ascii=False) for node in relative]
-    resolved = _replaced(text, start, end, list(zip(relative, absolute, strict=True)))
-    line, column = directives.start_mark.line, directives.start_mark.column
-    if line == 0:
-        return f"directives: {resolved}"
-    return "\n" * (line - 1) + "directives:\n" + " " * column + resolved
+    relative = [json.dumps(os.path.relpath(node.value, directory), ensure_ascii=False) for node in absolute]
+    return replaced(text, 0, len(text), list(zip(absolute, relative, strict=True)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import importlib.metadata
 import logging
+import os
 import re
 import sys
 import textwrap
@@ -60,8 +61,9 @@ _SEVERAL_MODELS = re.compile(r"must have a single <model>|can only contain one m
 _ONE_MODEL = (
     "a file is one model: name a file for each, or put them all into one <model>, in place of <world>, without its physics, lights and gui"
 )
-
-
+_NAMED_TWICE = re.compile(r"The name '.*' has already been used by a geometry")
+"""So Drake says that two models have geometries of one name in the world, which has none for each model."""
+_OWN_NAMES = "geometries in the world, outside of bodies, have one name each; put them into a body, or rename them in one file"
 _CPLUSPLUS = re.compile(r"std::|\.array\(\)|\.all\(\)")
 """What Drake's assertions say to compilers only."""
 
@@ -185,14 +187,15 @@ def _model_error(scene_file: SceneFile, error: BaseException) -> SceneError:
         message = f"a number of a model makes no sense: Drake needs {re.sub(_CPLUSPLUS, '', assertion[1])}"
     said = where or any(Path(file).name in message for file in (scene_file.path.name, *scene_file.models))
     models = "" if said else f"{', '.join(scene_file.models)}: "
-    hint = _ONE_MODEL if _SEVERAL_MODELS.search(message) else "mend the model or the directive"
+    own = _OWN_NAMES if _NAMED_TWICE.search(message) else "mend the model or the directive"
+    hint = _ONE_MODEL if _SEVERAL_MODELS.search(message) else own
     return SceneError("scene_model", f"{models}{message}", field=where[0] if where else "directives", hint=hint)
 
 
 def _one_line(scene_file: SceneFile, message: str) -> str:
     """Returns a message of Drake's in one printable line, with paths relative to the scene file."""
     message = message.replace("<string>", scene_file.path.name).replace(": error: ", ": ")
-    message = re.sub(rf"(file:)?/*{re.escape(str(scene_file.path.parent.resolve()))}/", "", message)
+    message = re.sub(rf"(file:)?/*{re.escape(os.path.abspath(scene_file.path.parent))}/", "", message)
     return textwrap.shorten(escaped(" ".join(message.removeprefix("error: ").split())), MAX_SENTENCE, placeholder=" ...")
 
 

@@ -7,6 +7,7 @@ from a stranger.
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -16,11 +17,15 @@ from xml.parsers import expat
 import yaml
 
 from certifier.errors import SceneError
-from certifier.scene.file import MAX_DEPTH, compose
+from certifier.scene.nodes import MAX_DEPTH, compose, read_yaml
+from certifier.scene.paths import beside
 from certifier.scene.xml import parse_xml
 
 _ATTRIBUTES = {"file", "filename", "uri", "url"}
 _PLUGIN = "plugin"
+_GAZEBO = "gazebo"
+"""Drake reads nothing in this element of URDF."""
+_MJCF = (".xml", ".mjcf")
 _DIRECTORIES = {"meshdir", "texturedir", "assetdir"}
 _EXPORT = "export the mesh again"
 _SCHEME = re.compile(r"^([a-zA-Z][\w+.-]*):(//)?")
@@ -47,31 +52,64 @@ def references(path: Path) -> list[str]:
 
 
 def resolve(reference: str, directory: Path, packages: dict[str, Path]) -> Path:
-    """Returns the path that a reference means in a file of ``directory``.
+    """Returns the path that a reference means in a file of ``directory``. Drake, too, takes several slashes for one.
 
     Raises:
-        SceneError: ``bundle_uri`` for an absolute path, a scheme other than package:// and model://, or an unknown package.
+        SceneError: as :func:`certifier.scene.paths.beside`; ``bundle_uri`` for an absolute path, a scheme other than package:// and
+            model://, or an unknown package.
     """
     scheme = _SCHEME.match(reference)
     if scheme is None:
         if reference.startswith(("/", "~")) or "\\" in reference or "\0" in reference:
             hint = "name a directory above it under packages, and write package://NAME/FILE"
             raise SceneError("bundle_uri", f"{reference!r} is not a relative path", hint=hint)
-        return (directory / reference).resolve()
+        return beside(directory, reference)
     if scheme[1] not in ("package", "model") or not scheme[2]:
         raise SceneError("bundle_uri", f"{reference!r} is no file of the scene", hint="use a relative path or package://NAME/FILE")
     name, _, rest = reference[scheme.end() :].partition("/")
     if name not in packages:
         hint = f"known packages: {', '.join(packages)}" if packages else "name its directory under packages in the scene file"
         raise SceneError("bundle_uri", f"{reference!r} names the unknown package {name!r}", hint=hint)
-    return (packages[name] / rest).resolve()
+    return beside(packages[name], rest.lstrip("/"))
+
+
+def is_mjcf(path: Path) -> bool:
+    """Says whether Drake takes a file for MJCF, by its name."""
+    return path.suffix.lower() in _MJCF
+
+
+def mjcf_references(path: Path, packages: dict[str, Path]) -> list[Path]:
+    """Returns the files that an MJCF model refers to, also in files that it includes. Some of them may not exist.
+
+    All paths start at the directory of the model, or at a directory that a <compiler> of the model or of an included file names.
+
+    Raises:
+        SceneError: as :func:`references` and :func:`resolve`.
+    """
+    files, names, directories = [path], [""], ["."]
+    for file in files:
+        written, below = _written(file)
+        names += written
+        directories += below
+        included = [resolve(name, path.parent, packages) for name in written if is_mjcf(Path(name))]
+        files += [file for file in dict.fromkeys(included) if file.is_file() and file not in files]
+    return [resolve(name, path.parent / directory, packages) for directory in directories for name in names if name]
 
 
 def _xml(path: Path) -> list[str]:
+    found, directories = _written(path)
+    return found + [f"{directory}/{value}" for directory in directories for value in found]
+
+
+def _written(path: Path) -> tuple[list[str], list[str]]:
+    """Returns the references in an XML file, and the directories below which MJCF looks for some of them."""
     found: list[str] = []
     directories: list[str] = []
     stack: list[str] = []
     text: list[str] = []
+
+    def unread() -> bool:
+        return _GAZEBO in stack and path.suffix.lower() == ".urdf"
 
     def start(name: str, attributes: dict[str, str]) -> None:
         stack.append(name)
@@ -79,12 +117,12 @@ def _xml(path: Path) -> list[str]:
             raise SceneError("bundle_xml", f"{path.name} may be nested at most {MAX_DEPTH} levels deep")
         text.clear()
         directories.extend(value for key, value in attributes.items() if key in _DIRECTORIES)
-        if name != _PLUGIN:
+        if name != _PLUGIN and not unread():
             found.extend(value for key, value in attributes.items() if key in _ATTRIBUTES)
 
     def end(name: str) -> None:
         stack.pop()
-        if name in _ATTRIBUTES:
+        if name in _ATTRIBUTES and not unread():
             found.append("".join(text).strip())
         text.clear()
 
@@ -95,12 +133,12 @@ def _xml(path: Path) -> list[str]:
     if any(".." in Path(value).parts for value in directories):
         message = f"{path.name}: .. is not accepted in {', '.join(sorted(_DIRECTORIES))}"
         raise SceneError("bundle_uri", message, hint="keep the files below the directory of the model")
-    return [value for value in found if value] + [f"{d}/{value}" for d in directories for value in found if value]
+    return [value for value in found if value], directories
 
 
 def _yaml(path: Path) -> list[str]:
     found: list[str] = []
-    waiting = [compose(path.read_text(encoding="utf-8"), path.name)]
+    waiting = [compose(read_yaml(path, path.name), path.name)]
     while waiting:
         node = waiting.pop()
         if isinstance(node, yaml.MappingNode):
@@ -112,8 +150,9 @@ def _yaml(path: Path) -> list[str]:
 
 
 def _obj(path: Path) -> list[str]:
-    lines = path.read_text(encoding="utf-8").splitlines()
-    return [name for line in lines if line.lstrip().startswith("mtllib") for name in line.split()[1:]]
+    """Comments of OBJ files may be in any encoding."""
+    lines = path.read_bytes().splitlines()
+    return [os.fsdecode(name) for line in lines if line.lstrip().startswith(b"mtllib") for name in line.split()[1:]]
 
 
 def _gltf(path: Path) -> list[str]:
@@ -131,7 +170,7 @@ def _nothing(_: Path) -> list[str]:
 
 
 _READERS: dict[str, Callable[[Path], list[str]]] = {
-    **dict.fromkeys((".urdf", ".sdf", ".xml", ".mjcf"), _xml),
+    **dict.fromkeys((".urdf", ".sdf", *_MJCF), _xml),
     **dict.fromkeys((".yaml", ".yml"), _yaml),
     ".obj": _obj,
     ".gltf": _gltf,

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
 from pathlib import Path, PurePosixPath
 from typing import NoReturn
 
 from certifier.errors import SceneError
 from certifier.model import escaped
-from certifier.scene.file import SceneFile, directive_files
+from certifier.scene.directives import AddedFile, added_by
+from certifier.scene.file import SceneFile
 from certifier.scene.formats.mjcf import Mjcf
 from certifier.scene.formats.model_file import ModelFile, Reference
 from certifier.scene.formats.sdf import Sdf
 from certifier.scene.formats.urdf import Urdf
+from certifier.scene.nodes import read_yaml
 from certifier.scene.obj import ObjMesh, read_mesh
+from certifier.scene.paths import beside
 from certifier.scene.references import resolve
 
 _FORMATS: dict[str, type[ModelFile]] = {".urdf": Urdf, ".sdf": Sdf, ".xml": Mjcf}
@@ -32,7 +36,7 @@ class StrictReader:
     """
 
     def __init__(self, scene_file: SceneFile) -> None:
-        self._packages, self._root = scene_file.packages, scene_file.path.parent.resolve()
+        self._packages, self._root = scene_file.packages, Path(os.path.abspath(scene_file.path.parent))
         self.unlimited: list[tuple[str, str]] = []
         self._meshes: dict[Path, ObjMesh] = {}
         self._models: dict[tuple[Path, type[ModelFile]], ModelFile] = {}
@@ -59,7 +63,7 @@ class StrictReader:
     def check(self, directives: str, name: str) -> int:
         """Checks every model file and every collision mesh that is found.
 
-        What is not found, or is no model, is left to Drake.
+        A mesh that is not found is left to Drake.
 
         Args:
             directives: a YAML document of Drake Model Directives; its relative paths have no directory of their own to start from.
@@ -81,20 +85,22 @@ class StrictReader:
             around: the files that led here, from the first to the last.
         """
         return sum(
-            self._added(kind, reference, (*namespace, named) if named else namespace, around)
-            for kind, reference, named in directive_files(directives, name)
+            self._added(added, name, (*namespace, added.named) if added.named else namespace, around)
+            for added in added_by(directives, name)
         )
 
-    def _added(self, kind: str, reference: str, named: tuple[str, ...], around: tuple[_Read, ...]) -> int:
-        """Returns the number of collision geometries that an ``add_model`` or ``add_directives`` adds under a name or namespace."""
-        path, suffix = self._located(reference, [self._root]), _suffix(reference).lower()
-        if path is None:
-            return 0
+    def _added(self, added: AddedFile, name: str, named: tuple[str, ...], around: tuple[_Read, ...]) -> int:
+        """Returns the number of collision geometries that an ``add_model`` or ``add_directives`` adds under a name or namespace.
+
+        Args:
+            name: name of the document, for people.
+        """
+        path, suffix = self._found(added, name), _suffix(added.file).lower()
         if path.is_dir():
             raise SceneError("scene_model", f"{self._name(path)} is a directory", field="directives", hint="name a model file in it")
-        if kind == "add_directives":
+        if added.kind == "add_directives":
             name = self._name(path)
-            return self._once((path, None, named), around, lambda around: self._added_by(_text(path, name), name, named, around))
+            return self._once((path, None, named), around, lambda around: self._added_by(read_yaml(path, name), name, named, around))
         if suffix == _OBJ:
             self.mesh(path)
             return 1
@@ -106,6 +112,21 @@ class StrictReader:
         if isinstance(model, Urdf):
             self.unlimited += [("::".join(named), joint.file) for joint in model.unlimited]
         return self._counted(model, path, around)
+
+    def _found(self, added: AddedFile, name: str) -> Path:
+        """Returns the file that a directive adds. Drake is not asked for one that is not found here."""
+        where = f"{name}:{added.line}"
+        try:
+            if added.file.startswith("file:///"):
+                path = beside(Path("/"), added.file.removeprefix("file://"))
+            else:
+                path = resolve(added.file, self._root, self._packages)
+        except SceneError as error:
+            raise SceneError("scene_model", f"{where}: {error.message}", field="directives", hint=error.hint) from None
+        if not path.exists():
+            hint = "a relative path starts at the directory of the scene file, and that of package://NAME/FILE at the package"
+            raise SceneError("scene_model", f"{where}: there is no file {self._name(path)}", field="directives", hint=hint)
+        return path
 
     def _read(self, file: Path, kind: type[ModelFile]) -> ModelFile:
         if (file, kind) not in self._models:
@@ -150,7 +171,7 @@ class StrictReader:
             )
         if "://" not in include.file:
             self._starts = self._starts or {start}
-            if (self.working_directory / include.file).resolve() != found:
+            if Path(os.path.abspath(self.working_directory / include.file)) != found:
                 self._refuse(model, include, "is beside a model for which Drake would look in another directory", _BY_PACKAGE)
 
     def _once(self, read: _Read, around: tuple[_Read, ...], count: Callable[[tuple[_Read, ...]], int]) -> int:
@@ -172,8 +193,10 @@ class StrictReader:
         reference = reference.removeprefix("file://")
         for directory in directories:
             try:
-                path = Path(reference).resolve() if reference.startswith("/") else resolve(reference, directory, self._packages)
-            except SceneError:
+                path = beside(directory, reference) if reference.startswith("/") else resolve(reference, directory, self._packages)
+            except SceneError as error:
+                if error.code != "bundle_uri":
+                    raise
                 continue
             if path.exists():
                 return path
@@ -194,10 +217,3 @@ def _suffix(reference: str) -> str:
 def _not_read(what: str) -> SceneError:
     hint = "convert it to OBJ; meshes that are only drawn may be of another kind"
     return SceneError("scene_model", f"{what} is collision geometry, and of that only OBJ meshes are read", field="directives", hint=hint)
-
-
-def _text(path: Path, name: str) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        raise SceneError("scene_yaml", f"{name} cannot be read as UTF-8 text", field="directives", hint="is it a YAML file?") from None

@@ -11,7 +11,7 @@ from certifier.errors import SceneError
 from certifier.scene.bundle import INDEX, SMALLER, BundleLimits
 from certifier.scene.file import read_scene_file
 from certifier.scene.parse import parse
-from certifier.scene.references import references, resolve
+from certifier.scene.references import is_mjcf, references, resolve
 
 _DEPTH = 32
 _BELOW = "keep the file below the directory of the model"
@@ -47,7 +47,7 @@ def check_bundle(root: Path, scene: Path) -> None:
     for file in sorted(f for f in root.rglob("*") if f.is_file() and f.name != INDEX):
         where = file.relative_to(root).as_posix()
         for reference in references(file):
-            if file.suffix.lower() in (".mjcf", ".xml") and ".." in PurePosixPath(reference).parts:
+            if is_mjcf(file) and ".." in PurePosixPath(reference).parts:
                 raise SceneError("bundle_uri", f"{where}: {reference!r}: .. is not accepted here", hint=_BELOW)
             _inside(resolve(reference, file.parent, packages), root, f"{where}: {reference!r}")
 

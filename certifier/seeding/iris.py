@@ -39,7 +39,7 @@ from certifier.model import Array, Joint, JointKind, Scene
 from certifier.outcome import Guarantee
 from certifier.polytopes.polytope import drop_redundant
 from certifier.polytopes.proved import cleaned
-from certifier.scene.drake_model import build_diagram
+from certifier.scene.drake_model import build_diagram, drake_name
 from certifier.seeding.coarse_pairs import CoarsePairs, coarse_pairs_of, with_coarse_pairs
 from certifier.seeding.options import Method, SeedOptions
 
@@ -246,7 +246,7 @@ class _Iris:
 def checker(scene: Scene) -> SceneGraphCollisionChecker:
     """Returns Drake's collision checker of a scene, with its padding; its distance is the length in q."""
     diagram = build_diagram(_apart(scene))
-    robot = diagram.plant().GetJointByName(scene.moving[0].name).model_instance()
+    robot = diagram.plant().GetJointByName(drake_name(scene.moving[0].name)).model_instance()
     checker = SceneGraphCollisionChecker(
         model=diagram,
         robot_model_instances=[robot],

@@ -38,7 +38,7 @@ BUNDLES: list[Row] = [
             "known kinds: {kinds}",
             lambda t: t.stranger(run__sh="true"),
         ),
-        ("bundle_text", "", "{name}: byte {start} is not UTF-8 text", "save the file as UTF-8", lambda t: t.stranger(m__obj=b"\xff\xfe")),
+        ("bundle_text", "", "{name}: byte {start} is not UTF-8 text", "save the file as UTF-8", lambda t: t.stranger(m__gltf=b"\xff\xfe")),
         ("bundle_text", "", "{name} is not JSON", MESH, lambda t: t.stranger(m__gltf="{")),
         ("bundle_text", "", "{name} is not glTF", MESH, lambda t: t.stranger(m__gltf="[]")),
         ("bundle_uri", "", "{reference} is not a relative path", BELOW, lambda t: t.pack(shape='<mesh filename="/m.obj"/>')),

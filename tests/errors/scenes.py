@@ -18,6 +18,7 @@ MODEL = "name a model file: URDF, SDFormat or MJCF"
 MESH = "export the mesh again"
 MEND = "mend the model there"
 BY_PACKAGE = "write model://NAME/FILE, and name the directory of the file as NAME under packages in the scene file"
+WELD = "{{add_weld: {{parent: world, child: a::l, X_PC: {{{}}}}}}}"
 NOT_YAML = "line {...}: a key must be text"
 
 MIMIC = '<joint name="follow" type="revolute"><parent link="hand"/><child link="tip"/><axis xyz="0 0 1"/><mimic joint="turn"/>'
@@ -40,6 +41,9 @@ ONE_MODEL = "a file is one model: name a file for each, or put them all into one
 ONE_MODEL += "without its physics, lights and gui"
 NESTED = '<sdf version="1.9"><model name="room"><model name="shelf"><link name="board"/></model></model></sdf>'
 MUJOCO = "directives: [{add_model: {name: m, file: m.xml}}]\n"
+
+TWICE = "directives:\n- add_model: {name: m, file: m.xml}\n"
+IN_WORLD = "<mujoco><worldbody><geom name='w' size='1'/></worldbody></mujoco>"
 
 
 def room(shape: str) -> dict[str, dict[str, str]]:
@@ -75,6 +79,13 @@ def beside(t: Trial) -> None:
     t.load("directives:\n- add_model: {name: a, file: one/a.sdf}\n- add_model: {name: b, file: two/a.sdf}\n")
 
 
+def linked_away(t: Trial) -> None:
+    """Loads a model by a path that goes up from a link to a directory elsewhere."""
+    (t.directory / "far" / "away").mkdir(parents=True)
+    (t.directory / "link").symlink_to(t.directory / "far" / "away")
+    t.load(D.replace("a.urdf", "link/../a.urdf"))
+
+
 FILES = rows(
     "certifier/scene/file.py",
     ("scene_not_found", "", "{path} is a directory", "name the scene file in it, which ends in .yaml", lambda t: load_scene(t.directory)),
@@ -86,10 +97,6 @@ FILES = rows(
         lambda t: load_scene(t.directory / "nothing.yaml"),
     ),
     ("scene_not_found", "", "the scene file {path} cannot be read", "is it there, and may you read it?", "a file of another user"),
-    ("scene_yaml", "", "{name} uses the alias *{anchor}", "write out what it stands for", lambda t: t.load("a: &x [1]\nb: *x\n")),
-    ("scene_yaml", "", "{name} may be nested at most {MAX_DEPTH} levels deep", "", lambda t: t.load("[" * 60 + "]" * 60)),
-    ("scene_yaml", "", "{name}{line}: {problem}", YAML, lambda t: t.load("name: [unclosed\n" + D)),
-    ("scene_yaml", "", "{name} is not YAML: {...}", YAML, lambda t: t.load("name: \x07\n")),
     (
         "scene_yaml",
         "",
@@ -97,8 +104,7 @@ FILES = rows(
         "",
         lambda t: t.load("#" * (2**20 + 1)),
     ),
-    ("scene_yaml", "", "{name}: byte {start} is not UTF-8 text", "save the file as UTF-8", lambda t: t.load(b"\xff\xfename")),
-    ("scene_field", "name", "line {...}: {problem}", YAML, lambda t: t.load(D + "name: !thing x\n")),
+    ("scene_field", "name", "line {...}: {problem}", YAML, lambda t: t.load(D + "name: 2001-99-99\n")),
     ("scene_field", "limits", NOT_YAML, "", lambda t: t.load(D + "limits: {[a]: [0, 1]}\n")),
     (
         "scene_field",
@@ -174,7 +180,87 @@ FILES = rows(
         "",
         lambda t: t.load("directives: [add_model]\n"),
     ),
-    ("scene_field", "directives", "line {...}: {value} is not a relative path", BELOW, lambda t: t.load(D.replace("a.urdf", "/a.urdf"))),
+    ("scene_field", "directives", "line {line}: {file} is not a relative path", BELOW, lambda t: t.load(D.replace("a.urdf", "/a.urdf"))),
+)
+
+NODES = rows(
+    "certifier/scene/nodes.py",
+    ("scene_yaml", "", "{name}: byte {start} is not UTF-8 text", "save the file as UTF-8", lambda t: t.load(b"\xff\xfename")),
+    ("scene_yaml", "directives", "{name} cannot be read", "is it a file, and may you read it?", "directives in a file of another user"),
+    (
+        "scene_yaml",
+        "",
+        "{name}, line {line}: the character U+{...} ends a line for some readers and not for others",
+        "end lines by LF or CRLF",
+        lambda t: t.load("# a\u2028b\n" + D),
+    ),
+    ("scene_yaml", "", "{name} may be nested at most {MAX_DEPTH} levels deep", "", lambda t: t.load("[" * 60 + "]" * 60)),
+    ("scene_yaml", "", "{name}{where}: {problem}", YAML, lambda t: t.load("name: [unclosed\n" + D)),
+    ("scene_yaml", "", "{name} is not YAML: {...}", YAML, lambda t: t.load("name: \x07\n")),
+    (
+        "scene_yaml",
+        "",
+        "{where}: the anchor or alias {...} is refused",
+        "write out what it stands for",
+        lambda t: t.load("a: &x [1]\nb: *x\n"),
+    ),
+    (
+        "scene_yaml",
+        "",
+        "{where}: the tag {...} is refused",
+        "remove it, and write values as they are; known tags: {...}",
+        lambda t: t.load(D + "name: !thing x\n"),
+    ),
+    (
+        "scene_yaml",
+        "",
+        "{name}, line {...}: the merge key << is refused",
+        "write out the keys that it brings in",
+        lambda t: t.load(D + "limits: {<<: {a: [0, 1]}}\n"),
+    ),
+)
+
+DIRECTIVES = rows(
+    "certifier/scene/directives.py",
+    (
+        "scene_field",
+        "directives",
+        "the text goes over several lines",
+        "write it on one line, in quotes",
+        lambda t: t.load("directives:\n- add_model:\n    file: >-\n      a.urdf\n"),
+    ),
+    (
+        "scene_field",
+        "directives",
+        "the text {...} has a character that cannot be printed",
+        "remove it",
+        lambda t: t.load(D.replace("a.urdf", '"a.urdf\\0"')),
+    ),
+    (
+        "scene_field",
+        "directives",
+        "axis of {what} is shorter than {_SHORT}",
+        "write its direction with the length 1",
+        lambda t: t.load(D.replace("}}", "}}, " + WELD.format("rotation: !AngleAxis {angle_deg: 1, axis: [0, 0, 0]}"))),
+    ),
+    (
+        "scene_field",
+        "directives",
+        "{what} has {...} in the place of a finite decimal number of at most {MAGNITUDE}",
+        "write such numbers, in metres, degrees or radians",
+        lambda t: t.load(D.replace("}}", "}}, " + WELD.format("translation: [.nan, 0, 0]"))),
+    ),
+)
+
+PATHS = rows(
+    "certifier/scene/paths.py",
+    (
+        "scene_model",
+        "directives",
+        "{...} goes up by .. from a symbolic link, and readers disagree about where that leads",
+        "name the directory under packages, and write package://NAME/FILE",
+        linked_away,
+    ),
 )
 
 MODELS = [
@@ -407,6 +493,13 @@ MODELS = [
             "scene_model",
             "directives",
             "{models}{message}",
+            "geometries in the world, outside of bodies, have one name each; put them into a body, or rename them in one file",
+            lambda t: t.scene(TWICE + "- add_model: {name: n, file: m.xml}\n", files={"m.xml": IN_WORLD}),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{models}{message}",
             ONE_MODEL,
             lambda t: t.scene(files={"room.sdf": '<sdf version="1.9"><world name="w"/></sdf>'}),
         ),
@@ -562,11 +655,25 @@ MODELS = [
             lambda t: t.scene(shape='<mesh filename="m.stl"/>'),
         ),
         (
-            "scene_yaml",
+            "scene_model",
             "directives",
-            "{name} cannot be read as UTF-8 text",
-            "is it a YAML file?",
-            lambda t: t.load("directives: [{add_directives: {file: more.yaml}}]\n" if t.write(more__yaml=b"\xff") else ""),
+            "{...} is no model",
+            "models end in {...}",
+            lambda t: t.load(D.replace("a.urdf", "a.txt") if t.write(a__txt="") else ""),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{where}: {message}",
+            "{hint}",
+            lambda t: t.load(D.replace("a.urdf", "package://no/a.urdf")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{where}: there is no file {...}",
+            "a relative path starts at the directory of the scene file, and that of package://NAME/FILE at the package",
+            lambda t: t.load(D),
         ),
     ),
     *rows(
@@ -621,4 +728,4 @@ OBJ = {
     "arm__urdf": "<robot name='arm'><link name='base'><collision><geometry><mesh filename='m.obj'/></geometry></collision></link></robot>"
 }
 
-SCENES: list[Row] = [*FILES, *MODELS]
+SCENES: list[Row] = [*FILES, *NODES, *DIRECTIVES, *PATHS, *MODELS]

@@ -15,6 +15,7 @@ ERRORS = ("CirisError", "SceneError", "RegionError", "ProofError")
 MAKERS = {
     ("certifier/document.py", "refuse"): 0,
     ("certifier/proof", "refuse"): 0,
+    ("certifier/scene/directives.py", "_refuse"): 2,
     ("certifier/scene/file.py", "_wrong"): 1,
     ("certifier/scene/formats", "refuse"): 1,
     ("certifier/scene/obj.py", "refuse"): 1,

@@ -16,7 +16,7 @@ from certifier.jobs.motion import certify
 from certifier.motion.given import given
 from certifier.outcome import Outcome
 from certifier.proof.motion import Motion, Space
-from certifier.scene.drake_model import build_diagram, geometry_name
+from certifier.scene.drake_model import build_diagram, drake_name, geometry_name
 from tests.certifier.motions import positions
 
 EXAMPLES = ("planar_2dof", "arm_3dof", "iiwa_shelf", "ur3e_bin")
@@ -57,7 +57,7 @@ class Drake:
         variables, columns = [z], [np.eye(3)]
         for name, sign in ((pair.a, -1.0), (pair.b, 1.0)):
             geometry = self._scene.geometry(name)
-            body = self._plant.world_body() if geometry.body == "world" else self._plant.GetBodyByName(geometry.body)
+            body = self._plant.world_body() if geometry.body == "world" else self._plant.GetBodyByName(drake_name(geometry.body))
             pose = self._plant.EvalBodyPoseInWorld(self._at, body).GetAsMatrix34()
             weights = program.NewContinuousVariables(len(geometry.vertices))
             program.AddBoundingBoxConstraint(0, 1, weights)

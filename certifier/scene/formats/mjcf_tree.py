@@ -13,6 +13,7 @@ from xml.parsers import expat
 from certifier.errors import SceneError
 from certifier.model import escaped
 from certifier.scene.formats.model_file import decimals, wanted
+from certifier.scene.paths import beside
 from certifier.scene.xml import parse_xml
 
 MEND = "mend the model there"
@@ -98,7 +99,7 @@ def _included(node: Node, path: Path, name: str, read: set[Path]) -> Node:
     file = node.attributes.get("file", "")
     if node.attributes.keys() != {"file"} or node.children:
         refuse(node, "<include> must have the attribute file and nothing else")
-    found = path.parent / file
+    found = beside(path.parent, file)
     if not found.is_file():
         hint = "paths start at the directory of the model's first file, also in files that it includes"
         refuse(node, f"{file[:200]!a} is no file that was found", hint=hint)

@@ -125,7 +125,8 @@ def test_what_is_broken_in_a_bundle_is_named_without_the_servers_paths(tmp_path)
         ({"m.dmd.yaml": "directives: [{add_model: {file: '../x.urdf'}}]"}, "bundle_uri", "leads out"),
         ({"m.dmd.yaml": "a: &a [1]\nb: [*a]"}, "scene_yaml", "alias"),
         ({"m.obj": "mtllib ../../../etc/passwd\n"}, "bundle_uri", "leads out"),
-        ({"m.obj": b"\xff\xfe"}, "bundle_text", "m.obj"),
+        ({"m.obj": b"# \xe9\nmtllib ../../../etc/passwd\n"}, "bundle_uri", "leads out"),
+        ({"m.gltf": b"\xff\xfe"}, "bundle_text", "m.gltf"),
         ({"m.gltf": json.dumps({"buffers": [{"uri": "../x.bin"}]})}, "bundle_uri", "leads out"),
         ({"m.gltf": "[" * 100000}, "bundle_text", "m.gltf"),
         ({"m.gltf": "[]"}, "bundle_text", "m.gltf"),
@@ -190,3 +191,54 @@ def test_references_of_a_model(tmp_path):
     path = tmp_path / "a.sdf"
     path.write_text(ROOM.replace("<box><size>0.1 1 1</size></box>", "<mesh><uri>m.obj</uri><scale>1 1 1</scale></mesh>"))
     assert references(path) == ["m.obj"]
+
+
+MODEL = "<mujoco><compiler {}/>{}<worldbody><body name='b'><joint name='j' range='-1 1'/><geom type='mesh' mesh='m'/></body>"
+MODEL += "</worldbody></mujoco>"
+ASSET = "<asset><mesh name='m' file='{}'/></asset>"
+
+
+@pytest.mark.parametrize(
+    ("files", "packed"),
+    [
+        (
+            {
+                "arm.xml": MODEL.format("meshdir='meshes'", "<include file='assets.xml'/>"),
+                "assets.xml": f"<mujoco>{ASSET.format('m.obj')}</mujoco>",
+            },
+            "meshes/m.obj",
+        ),
+        (
+            {
+                "arm.xml": MODEL.format("", "<include file='sub/a.xml'/><include file='assets.xml'/>"),
+                "sub/a.xml": "<mujoco><include file='sub/b.xml'/></mujoco>",
+                "sub/b.xml": "<mujoco><compiler meshdir='meshes'/></mujoco>",
+                "assets.xml": f"<mujoco>{ASSET.format('m.obj')}</mujoco>",
+            },
+            "meshes/m.obj",
+        ),
+        (
+            {
+                "arm.xml": MODEL.format("", "<include file='sub/a.xml'/>"),
+                "sub/a.xml": "<mujoco><include file='sub/b.xml'/></mujoco>",
+                "sub/b.xml": f"<mujoco>{ASSET.format('sub/m.obj')}</mujoco>",
+            },
+            "sub/m.obj",
+        ),
+    ],
+)
+def test_what_included_mjcf_refers_to_starts_at_the_models_directory(tmp_path, files, packed):
+    for name, text in {**files, packed: TETRAHEDRON}.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    path = write(tmp_path, "directives: [{add_model: {name: arm, file: arm.xml}}]\n")
+    bundle = pack_bundle(path)
+    assert {*files, packed} <= {*names(bundle)}
+    assert load_bundle(bundle).hash == parsed(path).hash
+
+
+def test_what_nobody_reads_does_not_keep_a_scene_from_travelling(tmp_path):
+    more = "<gazebo><sensor filename='/x'><uri>http://example.org/x</uri></sensor></gazebo>"
+    path = write(tmp_path, shape='<mesh filename="t.obj"/>', more=more)
+    (tmp_path / "t.obj").write_bytes("# caf\u00e9\nmtllib \u00e9.mtl\n".encode("latin-1") + TETRAHEDRON.encode())
+    assert load_bundle(pack_bundle(path)).hash == parsed(path).hash

@@ -11,7 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from certifier.errors import SceneError
 from certifier.model import WORLD, JointKind, Scene
 from certifier.scene import load_scene
-from certifier.scene.drake_model import build_diagram, geometry_name
+from certifier.scene.drake_model import build_diagram, drake_name, geometry_name
 from certifier.scene.file import read_scene_file
 from tests.certifier.scene.workshop import EXAMPLES, NAMES, SCENE, parsed, write
 
@@ -95,7 +95,7 @@ def assert_same_kinematics(scene, plant):
         formula = poses(scene, q)
         for name in scene.bodies:
             theirs = plant.EvalBodyPoseInWorld(theirs_context, body_in(plant, name)).GetAsMatrix4()
-            mine = ours.world_body() if name == WORLD else ours.GetBodyByName(name)
+            mine = ours.world_body() if name == WORLD else ours.GetBodyByName(drake_name(name))
             np.testing.assert_allclose(ours.EvalBodyPoseInWorld(ours_context, mine).GetAsMatrix4(), theirs, atol=1e-13)
             np.testing.assert_allclose(formula[name].GetAsMatrix4(), theirs, atol=1e-13)
 
