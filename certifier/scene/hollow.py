@@ -7,6 +7,7 @@ the mesh without doubt, but for rounding. Other points, those inside of the hull
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -26,20 +27,12 @@ CONVEX_PARTS = "write it as several convex meshes or shapes"
 """This is what to do about a hull that closes an opening."""
 
 
-def beyond_mesh(points: Array, triangles: NDArray[np.int64], around: Array, inflation: float) -> float:
+def beyond_mesh(points: Array, triangles: NDArray[np.int64]) -> float:
     """Returns a lower estimate, in metres, of how far the hull of points (k, 3) reaches beyond the triangles, (t, 3) indices of points.
 
     It is 0 where that is next to nothing, or where there are no triangles.
-
-    Args:
-        around: vertices (v, 3) of a polytope around the hull, which has a volume where the hull has none.
-        inflation: the polytope reaches at most so far outside of the hull, metres.
     """
-    try:
-        corners, slack = points[ConvexHull(points).simplices], 0.0
-    except QhullError:
-        corners, slack = around[ConvexHull(around).simplices], inflation
-    return _beyond(corners, points[triangles], slack)
+    return _beyond(_faces(points), points[triangles], 0.0)
 
 
 def beyond_parts(hull: Array, parts: Sequence[Array], inflation: float) -> float:
@@ -47,8 +40,7 @@ def beyond_parts(hull: Array, parts: Sequence[Array], inflation: float) -> float
 
     ``inflation`` says how far the vertices may be outside of the parts' common hull, metres.
     """
-    triangles = np.concatenate([part[ConvexHull(part).simplices] for part in parts])
-    return _beyond(hull[ConvexHull(hull).simplices], triangles, inflation)
+    return _beyond(_faces(hull), np.concatenate([_faces(part) for part in parts]), inflation)
 
 
 def recorded(found: dict[str, float]) -> dict[str, dict[str, float]]:
@@ -68,6 +60,20 @@ def standing_for(geometry: Geometry) -> str:
     return "its parts" if geometry.shape["kind"] == "hull" else "its mesh"
 
 
+def _faces(points: Array) -> Array:
+    """Returns triangles (h, 3, 3) that cover the surface of the hull of points (k, 3), which may be flat, or a line, or a point."""
+    try:
+        return points[ConvexHull(points).simplices]
+    except QhullError:
+        in_plane = (points - points.mean(axis=0)) @ np.linalg.svd(points - points.mean(axis=0))[2].T
+    try:
+        outline = points[ConvexHull(in_plane[:, :2]).vertices]
+        return np.array([[outline[0], b, c] for b, c in itertools.pairwise(outline[1:])])
+    except QhullError:
+        first, last = points[in_plane[:, 0].argmin()], points[in_plane[:, 0].argmax()]
+        return np.array([[first, last, last]])
+
+
 def _beyond(hull: Array, triangles: Array, slack: float) -> float:
     """Returns the estimate for triangles (h, 3, 3) of a hull and (t, 3, 3) of what is in it; 0 where it is not notable."""
     if not len(triangles):
@@ -81,9 +87,10 @@ def _beyond(hull: Array, triangles: Array, slack: float) -> float:
 def _spread(triangles: Array) -> list[tuple[Array, Array]]:
     """Returns points of the largest of triangles (t, 3, 3), by their areas, on a lattice in each: weights (3,), and the triangle."""
     areas = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1) / 2
+    whole = areas.sum() or 1.0
     found = []
     for k in np.argsort(areas)[-_POINTS:]:
-        steps = max(1, int(np.ceil(np.sqrt(2 * _POINTS * areas[k] / areas.sum()))))
+        steps = max(1, int(np.ceil(np.sqrt(2 * _POINTS * areas[k] / whole))))
         lattice = [((i + 1 / 3) / steps, (j + 1 / 3) / steps) for i in range(steps) for j in range(steps - i)]
         found += [(np.array([1 - x - y, x, y]), triangles[k]) for x, y in lattice]
     return found

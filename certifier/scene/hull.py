@@ -13,6 +13,8 @@ inside only where it is deeper than that, or is a vertex. Otherwise the vertices
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
@@ -60,13 +62,14 @@ def outer(points: Array, max_vertices: int) -> tuple[Array, float, int]:
     solid = hull_vertices(_thickened(extreme))
     center = solid.mean(axis=0)
     solid = solid - center
-    around = _contain(solid if len(solid) <= max_vertices else _cut_down(solid, max_vertices), solid)
-    for growth in _GROWTHS:
-        vertices = around * (1 + growth)
-        if contains(vertices + center, points):
-            distance = max(_nearest(v, extreme - center)[1] for v in vertices)
-            inflation = max(distance * (1 + _SAFETY), distance + _ROUNDING * float(np.abs(points).max()))
-            return vertices + center, inflation, len(extreme)
+    with contextlib.suppress(QhullError):  # a needle far from the origin is flat to Qhull, thickened or not
+        around = _contain(solid if len(solid) <= max_vertices else _cut_down(solid, max_vertices), solid)
+        for growth in _GROWTHS:
+            vertices = around * (1 + growth)
+            if contains(vertices + center, points):
+                distance = max(_nearest(v, extreme - center)[1] for v in vertices)
+                inflation = max(distance * (1 + _SAFETY), distance + _ROUNDING * float(np.abs(points).max()))
+                return vertices + center, inflation, len(extreme)
     message = f"no polytope of {max_vertices} vertices was found around a mesh of {len(points)} points"
     raise SceneError("hull", message, field="mesh.max_vertices", hint="raise it, or simplify the mesh")
 

@@ -93,6 +93,8 @@ def read_mesh(path: Path, name: str) -> ObjMesh:
         refuse(farthest_line, f"the face names vertex {farthest} of {len(coordinates) // 3}")
     if not coordinates:
         refuse(1, "the file has no vertices")
+    if not triangles:
+        refuse(1, "the file has no faces")
     return ObjMesh(np.array(coordinates).reshape(-1, 3), np.array(triangles, dtype=np.int64).reshape(-1, 3))
 
 

@@ -42,6 +42,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from certifier.errors import SceneError
 from certifier.model import MAX_SENTENCE, Array, Geometry, Joint, JointKind, Scene, escaped
+from certifier.positions import MAGNITUDE
 from certifier.scene import shapes
 from certifier.scene.census import check_counts
 from certifier.scene.file import SceneFile, read_scene_file
@@ -92,6 +93,8 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     by_id = with_hulls(parts, scene_file.hulls, tree.bodies, scene_file.max_vertices, names.register, reached)
     candidates = list(dict.fromkeys((by_id[a].name, by_id[b].name) for a, b in inspector.GetCollisionCandidates()))
     geometries = tuple({id(geometry): geometry for geometry in by_id.values()}.values())
+    for geometry in geometries:
+        _check_hull(geometry)
     wanted, ignored, unused = pairs(candidates, geometries, tree, scene_file.ignore)
     scene = Scene(
         name=scene_file.name,
@@ -203,14 +206,18 @@ def joint_of(joint: DrakeJoint, names: Names) -> Joint:
     """Returns a joint of the plant.
 
     Raises:
-        SceneError: ``unsupported_joint`` or ``floating_body``.
+        SceneError: ``unsupported_joint``, ``floating_body``, or ``scene_model`` for a pose that is too far away.
     """
     parent, child, name = names.body(joint.parent_body()), names.body(joint.child_body()), names.joint(joint)
     X_PF = joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4()
     X_BM = joint.frame_on_child().GetFixedPoseInBodyFrame().GetAsMatrix4()
+    X_FM = joint.X_FM().GetAsMatrix4() if isinstance(joint, WeldJoint) else np.eye(4)
+    for pose in (X_PF, X_FM, X_BM):
+        if not (np.abs(pose) <= MAGNITUDE).all():
+            message = f"joint {name} has a pose with a coordinate that is not from {-MAGNITUDE:g} to {MAGNITUDE:g} m"
+            raise SceneError("scene_model", message, field="directives", hint="mend the pose in the directive or in the model")
     match joint:
         case WeldJoint():
-            X_FM = joint.X_FM().GetAsMatrix4()
             return Joint(name, JointKind.WELD, parent, child, np.zeros(3), X_PF @ X_FM, X_BM)
         case RevoluteJoint():
             kind, axis = JointKind.REVOLUTE, joint.revolute_axis()
@@ -299,6 +306,21 @@ def _placed(name: str, body: str, convex: shapes.Body, X_BG: RigidTransform) -> 
     return Geometry(name, body, vertices, convex.radius, shape, convex.substitution, convex.inflation)
 
 
+def _check_hull(geometry: Geometry) -> None:
+    """Refuses a polytope that is too thin for Drake, which finds contacts with it.
+
+    Raises:
+        SceneError: ``scene_model``.
+    """
+    if geometry.radius == 0:
+        try:
+            Convex(geometry.vertices.T, geometry.name).GetConvexHull()
+        except RuntimeError:
+            message = f"geometry {geometry.name} is too thin for its size and for its distance from the origin of its body"
+            hint = "make it thicker, or move its body's origin to it"
+            raise SceneError("scene_model", message, field="directives", hint=hint) from None
+
+
 def _convex(shape: Shape, name: str, scene_file: SceneFile, strict: StrictReader) -> shapes.Body:
     match shape:
         case Box():
@@ -330,12 +352,12 @@ def _mesh(shape: Convex | Mesh, strict: StrictReader) -> tuple[Array, NDArray[np
     First come those that are vertices of Drake's hull, in Drake's order, on which the hashes of scenes depend.
 
     Raises:
-        SceneError: the file is not what a collision mesh may be, or a scaled point is not finite.
+        SceneError: Drake has taken a file that the models do not name, or a coordinate of a scaled point is above MAGNITUDE.
     """
-    mesh = strict.mesh(shape.source().path())
+    mesh = strict.taken(shape.source().path())
     points = mesh.points * shape.scale3()
-    if not np.isfinite(points).all():
-        message = f"scaled by {shape.scale3().tolist()}, a point of {escaped(shape.source().path().name)} is not finite"
+    if not (np.abs(points) <= MAGNITUDE).all():
+        message = f"a coordinate of {escaped(shape.source().path().name)} is above {MAGNITUDE:g} m"
         raise SceneError("scene_model", message, field="directives", hint="mend the file or the scale")
     hull = shape.GetConvexHull()
     rank = {tuple(hull.vertex(k)): k for k in range(hull.num_vertices())}

@@ -88,7 +88,7 @@ def polytope(shape: dict[str, Any], points: Array, triangles: NDArray[np.int64],
         hull = f"convex hull with {len(vertices)} vertices"
     if shape["kind"] == "convex":
         return Body(vertices, 0.0, shape, f"convex -> {hull}" if inflation else None, inflation)
-    return Body(vertices, 0.0, shape, f"mesh -> {hull}", inflation, beyond_mesh(points, triangles, vertices, inflation))
+    return Body(vertices, 0.0, shape, f"mesh -> {hull}", inflation, beyond_mesh(points, triangles))
 
 
 def half_space(center: Array, reach: float) -> Body:

@@ -7,12 +7,15 @@ from collections.abc import Callable, Iterable
 from pathlib import Path, PurePosixPath
 from typing import NoReturn
 
+import numpy as np
+
 from certifier.errors import SceneError
 from certifier.model import escaped
+from certifier.positions import MAGNITUDE
 from certifier.scene.directives import AddedFile, added_by
 from certifier.scene.file import SceneFile
 from certifier.scene.formats.mjcf import Mjcf
-from certifier.scene.formats.model_file import ModelFile, Reference
+from certifier.scene.formats.model_file import MeshReference, ModelFile, Reference
 from certifier.scene.formats.sdf import Sdf
 from certifier.scene.formats.urdf import Urdf
 from certifier.scene.nodes import read_yaml
@@ -59,6 +62,17 @@ class StrictReader:
         if path not in self._meshes:
             self._meshes[path] = read_mesh(path, self._name(path))
         return self._meshes[path]
+
+    def taken(self, path: Path) -> ObjMesh:
+        """Returns the mesh of a file that Drake has taken.
+
+        Raises:
+            SceneError: ``scene_model``, when no model and no directive led :meth:`check` to this file.
+        """
+        if (mesh := self._meshes.get(path.resolve())) is None:
+            message = f"Drake has taken another mesh than the models name: {self._name(path)}"
+            raise SceneError("scene_model", message, field="directives", hint=_BY_PACKAGE)
+        return mesh
 
     def check(self, directives: str, name: str) -> int:
         """Checks every model file and every collision mesh that is found.
@@ -135,19 +149,17 @@ class StrictReader:
 
     def _counted(self, model: ModelFile, file: Path, around: tuple[_Read, ...]) -> int:
         """Checks the meshes and the includes of a model, and returns how many collision geometries it has with them."""
-        return self._once((file, type(model), ()), around, lambda around: self._with_includes(model, file, around))
+        added = next((read for read, kind, _ in around if kind is not None), file).parent
+        return self._once((file, type(model), (str(added),)), around, lambda around: self._with_includes(model, file, added, around))
 
-    def _with_includes(self, model: ModelFile, file: Path, around: tuple[_Read, ...]) -> int:
+    def _with_includes(self, model: ModelFile, file: Path, added: Path, around: tuple[_Read, ...]) -> int:
+        """Does the work of :meth:`_counted`; ``added`` is the directory of the model that the directive adds."""
         for mesh in model.meshes:
-            self._check_mesh(model, mesh, file.parent)
+            self._check_mesh(model, mesh, file.parent, added)
         count = len(model.collisions)
         for include in model.includes:
             found = self._included(model, include, file.parent)
             included = self._read(found, _FORMATS[_suffix(include.file)])
-            if isinstance(included, Urdf) and included.unlimited:
-                hint = "leave lower and upper out, or write type revolute"
-                what = "is a continuous joint, whose limits do not count, and Drake would apply them"
-                self._refuse(included, included.unlimited[0], what, hint)
             count += self._counted(included, found, around)
         return count
 
@@ -165,10 +177,11 @@ class StrictReader:
         """Refuses what Drake would not read where the model says. It looks for all relative includes of a scene in one directory."""
         if _suffix(include.file) not in _FORMATS:
             self._refuse(model, include, "would be left out by Drake", f"models that can be included end in {', '.join(_FORMATS)}")
-        if _FORMATS[_suffix(include.file)] is Mjcf:
-            self._refuse(
-                model, include, "is MJCF, which Drake would place in the world and not in the model", "add it by a directive of its own"
-            )
+        kind, hint = _FORMATS[_suffix(include.file)], "add it by a directive of its own"
+        if kind is Mjcf:
+            self._refuse(model, include, "is MJCF, which Drake would place in the world and not in the model", hint)
+        if kind is Urdf:
+            self._refuse(model, include, "is URDF, whose links Drake would place elsewhere if SDFormat includes it", hint)
         if "://" not in include.file:
             self._starts = self._starts or {start}
             if Path(os.path.abspath(self.working_directory / include.file)) != found:
@@ -183,11 +196,16 @@ class StrictReader:
             self._counts[read] = count((*around, read))
         return self._counts[read]
 
-    def _check_mesh(self, model: ModelFile, mesh: Reference, start: Path) -> None:
+    def _check_mesh(self, model: ModelFile, mesh: MeshReference, start: Path, added: Path) -> None:
+        """Checks a mesh. Drake looks for it from the model that the directive adds, also where an included file names it."""
         if _suffix(mesh.file).lower() != _OBJ:
             raise _not_read(f"{model.name}:{mesh.line}: {mesh.file[:200]!a}")
+        if "://" not in mesh.file.removeprefix("file://") and (added / mesh.file).resolve() != (start / mesh.file).resolve():
+            self._refuse(model, mesh, "is beside an included model, and Drake would look beside the model that includes it", _BY_PACKAGE)
         if (path := self._located(mesh.file, [start / directory for directory in model.mesh_directories])) is not None:
-            self.mesh(path)
+            reach = float(np.abs(self.mesh(path).points * mesh.scale).max())
+            if reach > MAGNITUDE:
+                self._refuse(model, mesh, f"has a coordinate of {reach:g} m; at most {MAGNITUDE:g} m is read", "mend the file or the scale")
 
     def _located(self, reference: str, directories: Iterable[Path]) -> Path | None:
         reference = reference.removeprefix("file://")

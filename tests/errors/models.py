@@ -8,6 +8,7 @@ from tests.errors.scenes import BALL_JOINT, MEND, MUJOCO, linked, room
 from tests.errors.scenes import mjcf as body
 
 EXPAND = "expand the file with xacro first: xacro FILE > robot.urdf"
+RANGE = "mend the number; lengths are in metres"
 LINK = "<link name='more'/><joint name='{}' type='fixed'><parent link='{}'/><child link='{}'/></joint>"
 ZERO_AXIS = "<joint name='j' type='continuous'><parent link='hand'/><child link='l'/><axis xyz='0 0 0'/>"
 
@@ -39,6 +40,20 @@ FORMATS = [
             "{what} is {...} instead of {...}",
             MEND,
             lambda t: t.scene(shape='<sphere radius="1,5"/>'),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{what} has {wrong} in it, and its magnitude must be {allowed}",
+            RANGE,
+            lambda t: t.scene(shape='<sphere radius="1e-300"/>'),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "{what} has the length {length}; it must be {DIRECTION}, best 1",
+            MEND,
+            lambda t: t.scene(limit=f"{LIMIT}</joint><link name='l'/>{ZERO_AXIS}"),
         ),
         (
             "scene_model",
@@ -125,7 +140,13 @@ FORMATS = [
             lambda t: t.scene(shape=f"0.1 {BOX}"),
         ),
         ("scene_model", "directives", "{what} must be positive, and is {...}", MEND, lambda t: t.scene(shape='<sphere radius="0"/>')),
-        ("scene_model", "directives", "{what} must not be 0", MEND, lambda t: t.scene(shape="<mesh filename='m.obj' scale='1 1 0'/>")),
+        (
+            "scene_model",
+            "directives",
+            "the name of <collision> is empty",
+            "give it a name of its own, or leave name out",
+            lambda t: t.scene(more=f"<link name='l'><collision name=''><geometry>{BOX}</geometry></collision></link>"),
+        ),
         (
             "scene_model",
             "directives",
@@ -158,13 +179,6 @@ FORMATS = [
             "link {name} is the child of another joint too, in line {line}",
             "only trees are supported",
             lambda t: t.scene(more=LINK.format("j", "base", "hand")),
-        ),
-        (
-            "scene_model",
-            "directives",
-            "xyz of <axis> has the length {length}; it must be {...} to {...}, best 1",
-            MEND,
-            lambda t: t.scene(limit=f"{LIMIT}</joint><link name='l'/>{ZERO_AXIS}"),
         ),
         (
             "scene_model",
@@ -225,6 +239,12 @@ FORMATS = [
                     "give each its own name",
                     lambda t: t.scene(**linked("</link><link name='walls'>")),
                 ),
+                (
+                    "<{name}> in <{place}> is not read",
+                    "write it outside of what SDFormat does not know",
+                    lambda t: t.scene(**linked("<my:data><collision/></my:data>")),
+                ),
+                ("<mesh> has no <uri>", MEND, lambda t: t.scene(**room("<mesh/>"))),
                 ("<collision> has no <geometry>", MEND, lambda t: t.scene(**linked("<collision name='x'/>"))),
                 ("<geometry> has no shape; <empty/> would say that there is none", MEND, lambda t: t.scene(**room(""))),
                 (
@@ -263,8 +283,8 @@ FORMATS = [
                     lambda t: t.scene(**linked("<pose frame='x'/>")),
                 ),
                 (
-                    "the quaternion of <pose> is 0 0 0 0, which is no rotation",
-                    MEND,
+                    "the quaternion of <pose> has the length {...} instead of 1, and Drake would not make it 1",
+                    "write more digits, or roll, pitch and yaw with degrees",
                     lambda t: t.scene(**linked("<pose rotation_format='quat_xyzw'>0 0 0 0 0 0 0</pose>")),
                 ),
             ]
@@ -449,6 +469,13 @@ FORMATS = [
         (
             "scene_model",
             "directives",
+            "{key} of <{name}> has {wrong} in it, and its magnitude must be {...}",
+            RANGE,
+            lambda t: t.scene(**body("<geom size='1' pos='1e90 0 0'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
             "the axes in xyaxes of <{name}> must not be parallel",
             MEND,
             lambda t: t.scene(**body("<geom xyaxes='1 0 0 2 0 0'/>")),
@@ -518,6 +545,13 @@ FORMATS = [
             "size of a {kind} must be positive, and {...} is in it",
             MEND,
             lambda t: t.scene(**body("<geom size='0'/>")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "size of a {kind} has {wrong} in it, and must be {SIZE}",
+            RANGE,
+            lambda t: t.scene(**body("<geom size='1e-300'/>")),
         ),
         (
             "scene_model",

@@ -40,6 +40,8 @@ BALL_JOINT = """<drake:joint name="b" type="ball"><parent link="hand"/><child li
 ONE_MODEL = "a file is one model: name a file for each, or put them all into one <model>, in place of <world>, "
 ONE_MODEL += "without its physics, lights and gui"
 NESTED = '<sdf version="1.9"><model name="room"><model name="shelf"><link name="board"/></model></model></sdf>'
+FAR_MESH = "v 0 0 0\nv 1e7 0 0\nv 0 1e7 0\nv 0 0 1e7\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+ADDED_MESH = "  - add_model: {name: m, file: m.obj}\n  - add_weld: {parent: world, child: m::m}\n"
 MUJOCO = "directives: [{add_model: {name: m, file: m.xml}}]\n"
 
 TWICE = "directives:\n- add_model: {name: m, file: m.xml}\n"
@@ -84,6 +86,14 @@ def linked_away(t: Trial) -> None:
     (t.directory / "far" / "away").mkdir(parents=True)
     (t.directory / "link").symlink_to(t.directory / "far" / "away")
     t.load(D.replace("a.urdf", "link/../a.urdf"))
+
+
+def below(t: Trial) -> None:
+    """Loads a model that includes one of another directory, beside which its mesh is."""
+    (t.directory / "sub").mkdir()
+    (t.directory / "sub" / "b.sdf").write_text(SDF_SHAPE.format("<mesh><uri>m.obj</uri></mesh>"))
+    (t.directory / "sub" / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    t.scene(files={"room.sdf": INCLUDE.format("sub/b.sdf")})
 
 
 FILES = rows(
@@ -455,6 +465,7 @@ MODELS = [
         ),
         ("scene_model", "directives", "the face names vertex {farthest} of {...}", MESH, lambda t: t.scene(**mesh("v 0 0 0\nf 1 1 9\n"))),
         ("scene_model", "directives", "the file has no vertices", MESH, lambda t: t.scene(**mesh("# nothing\n"))),
+        ("scene_model", "directives", "the file has no faces", MESH, lambda t: t.scene(**mesh("v 0 0 0\n"))),
     ),
     *rows(
         "certifier/scene/pairs.py",
@@ -541,9 +552,23 @@ MODELS = [
         (
             "scene_model",
             "directives",
-            "scaled by {...}, a point of {...} is not finite",
+            "a coordinate of {...} is above {MAGNITUDE} m",
             "mend the file or the scale",
-            "a mesh whose scale overflows, and whose hull Drake finds all the same",
+            lambda t: t.scene(f"{SCENE}{ADDED_MESH}", files={"m.obj": FAR_MESH}),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "joint {name} has a pose with a coordinate that is not from {...} to {MAGNITUDE} m",
+            "mend the pose in the directive or in the model",
+            lambda t: t.scene(SCENE.replace("room::walls}", "room::walls, X_PC: {translation: [.inf, 0, 0]}}")),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "geometry {name} is too thin for its size and for its distance from the origin of its body",
+            "make it thicker, or move its body's origin to it",
+            lambda t: t.scene(shape='<box size="1e6 1e-9 1"/>'),
         ),
     ),
     *rows(
@@ -608,9 +633,30 @@ MODELS = [
         (
             "scene_model",
             "directives",
-            "is a continuous joint, whose limits do not count, and Drake would apply them",
-            "leave lower and upper out, or write type revolute",
-            lambda t: t.scene(kind="continuous", files={"room.sdf": INCLUDE.format("arm.urdf")}),
+            "is URDF, whose links Drake would place elsewhere if SDFormat includes it",
+            "add it by a directive of its own",
+            lambda t: t.scene(files={"room.sdf": INCLUDE.format("arm.urdf")}),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "is beside an included model, and Drake would look beside the model that includes it",
+            BY_PACKAGE,
+            below,
+        ),
+        (
+            "scene_model",
+            "directives",
+            "has a coordinate of {reach} m; at most {MAGNITUDE} m is read",
+            "mend the file or the scale",
+            lambda t: t.scene(**mesh(FAR_MESH)),
+        ),
+        (
+            "scene_model",
+            "directives",
+            "Drake has taken another mesh than the models name: {...}",
+            BY_PACKAGE,
+            "a version of Drake that finds meshes in other places",
         ),
         (
             "scene_model",

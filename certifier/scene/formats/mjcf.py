@@ -11,7 +11,7 @@ from certifier.scene.formats.mjcf_defaults import Defaults
 from certifier.scene.formats.mjcf_geoms import Geom, Meshes
 from certifier.scene.formats.mjcf_names import check_names
 from certifier.scene.formats.mjcf_tree import Node, read_tree, refuse
-from certifier.scene.formats.model_file import ModelFile, Reference
+from certifier.scene.formats.model_file import MeshReference, ModelFile, Reference
 
 _VALUES = {
     "angle": "degree|radian",
@@ -47,10 +47,9 @@ class Mjcf(ModelFile):
         geoms = [Geom(node, defaults.attributes(node)) for node in placed if node.name == "geom"]
         _by_name([geom.node for geom in geoms], set())
         _check_drakes_names(root)
-        self._check_geoms(geoms, Meshes([node for node in placed if node.name == "mesh"]))
-        for node in placed:
-            if node.name == "mesh":
-                defaults.attributes(node)
+        meshes = [node for node in placed if node.name == "mesh"]
+        scales = {id(node): defaults.attributes(node).get("scale", "1 1 1") for node in meshes}
+        self._check_geoms(geoms, Meshes(meshes), scales)
         check_contacts(root.under("contact"), geoms, bodies)
         _check_constraints(root)
 
@@ -68,7 +67,7 @@ class Mjcf(ModelFile):
                     self.mesh_directories = [node.attributes[key] or "."]
         return autolimits
 
-    def _check_geoms(self, geoms: list[Geom], meshes: Meshes) -> None:
+    def _check_geoms(self, geoms: list[Geom], meshes: Meshes, scales: dict[int, str]) -> None:
         solid: list[Node] = []
         for geom in geoms:
             geom.check()
@@ -78,7 +77,9 @@ class Mjcf(ModelFile):
                 if mesh is not None and not any(mesh is other for other in solid):
                     solid.append(mesh)
         meshes.check_kinds(solid)
-        self.meshes = [Reference(mesh.attributes["file"], mesh.line) for mesh in solid]
+        for mesh in solid:
+            x, y, z = map(float, scales[id(mesh)].split())
+            self.meshes.append(MeshReference(mesh.attributes["file"], mesh.line, (x, y, z)))
 
 
 def _read_inside(part: Node) -> list[Node]:

@@ -7,6 +7,7 @@ from typing import NoReturn
 
 from certifier.scene.formats.mjcf_names import ORIENTATIONS
 from certifier.scene.formats.mjcf_tree import Node, numbers, refuse
+from certifier.scene.formats.ranges import POSITION, RANGE_HINT, SCALE
 
 COUNTS: dict[str, tuple[int, ...]] = {
     "pos": (3,),
@@ -20,6 +21,7 @@ COUNTS: dict[str, tuple[int, ...]] = {
     "ref": (1,),
 }
 COUNTS |= {"fromto": (6,), "scale": (3,), "size": (1, 2, 3)}
+_RANGES = {**dict.fromkeys(("pos", "fromto", "euler", "axisangle", "ref"), POSITION), "scale": SCALE}
 _LENGTHS = 1e-6, 1e6
 """Vectors that stand for directions and rotations have lengths between these. Far beyond, Drake loses them, or MuJoCo takes them for 0."""
 _OPPOSITE = 1e-9
@@ -30,7 +32,9 @@ def check_numbers(node: Node) -> None:
     """Checks the numbers of a body, joint, geom or mesh that are written at it, and not in a class."""
     for key, counts in COUNTS.items():
         if key in node.attributes:
-            numbers(node, key, counts)
+            found = numbers(node, key, counts)
+            if key in _RANGES and (wrong := _RANGES[key].outside(found)) is not None:
+                refuse(node, f"{key} of <{node.name}> has {wrong:g} in it, and its magnitude must be {_RANGES[key]}", hint=RANGE_HINT)
     for key in ("axis", "quat", "zaxis"):
         if key in node.attributes:
             _check_length(node, key, numbers(node, key, COUNTS[key]))

@@ -10,6 +10,7 @@ from pathlib import PurePosixPath
 from certifier.errors import close_matches
 from certifier.scene.formats.mjcf_names import ORIENTATIONS
 from certifier.scene.formats.mjcf_tree import MEND, Node, refuse
+from certifier.scene.formats.ranges import RANGE_HINT, SIZE
 
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
 _LONG = {"capsule", "cylinder"}
@@ -73,6 +74,8 @@ class Geom:
             refuse(self.node, f"size of a {self.kind} has too few numbers: {len(size)} instead of {count}")
         if min(size[:count]) <= 0:
             refuse(self.node, f"size of a {self.kind} must be positive, and {min(size[:count]):g} is in it")
+        if (wrong := SIZE.outside(size[:count])) is not None:
+            refuse(self.node, f"size of a {self.kind} has {wrong:g} in it, and must be {SIZE}", hint=RANGE_HINT)
 
     def _check_plane(self) -> None:
         size = [float(word) for word in self.attributes.get("size", "").split()]

@@ -17,6 +17,7 @@ from typing import ClassVar, NoReturn
 from xml.parsers import expat
 
 from certifier.errors import SceneError
+from certifier.scene.formats.ranges import DIRECTION, RANGE_HINT, Range
 from certifier.scene.xml import parse_xml
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
@@ -43,6 +44,13 @@ class Reference:
 
     file: str
     line: int
+
+
+@dataclass(frozen=True)
+class MeshReference(Reference):
+    """A mesh reference is a reference to a mesh file, and the scale of the mesh along x, y and z."""
+
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
 @dataclass
@@ -81,7 +89,7 @@ class ModelFile:
     def __init__(self, path: Path, name: str) -> None:
         self.name = name
         self.includes: list[Reference] = []
-        self.meshes: list[Reference] = []
+        self.meshes: list[MeshReference] = []
         self.mesh_directories = ["."]
         self.collisions: list[Reference] = []
         self._open: list[Element] = []
@@ -108,6 +116,14 @@ class ModelFile:
         if (numbers := decimals(text, counts)) is None:
             self.refuse(element, f"{what} is {text[:80]!a} instead of {wanted(counts)}")
         return numbers
+
+    def _check_range(self, element: Element, what: str, numbers: list[float], allowed: Range) -> None:
+        if (wrong := allowed.outside(numbers)) is not None:
+            self.refuse(element, f"{what} has {wrong:g} in it, and its magnitude must be {allowed}", RANGE_HINT)
+
+    def _check_length(self, element: Element, what: str, vector: list[float]) -> None:
+        if (length := DIRECTION.outside([math.hypot(*vector)])) is not None:
+            self.refuse(element, f"{what} has the length {length:g}; it must be {DIRECTION}, best 1")
 
     def _check_geometry(self, element: Element) -> None:
         if element.name == "geometry" and COLLISION in element.around and len(element.children & SHAPES) > 1:

@@ -8,7 +8,8 @@ from typing import ClassVar
 
 from certifier.errors import close_matches
 from certifier.scene.formats import sdf_names
-from certifier.scene.formats.model_file import Element, ModelFile, Reference
+from certifier.scene.formats.model_file import Element, MeshReference, ModelFile, Reference
+from certifier.scene.formats.ranges import POSITION, SCALE, SIZE
 
 
 class Sdf(ModelFile):
@@ -41,32 +42,56 @@ class Sdf(ModelFile):
     _TRUE, _FALSE = frozenset(["true", "1"]), frozenset(["false", "0"])
     _TWO_AXES = frozenset(["universal", "revolute2", "gearbox"])
     _POSES: ClassVar[dict[str, int]] = {"euler_rpy": 6, "quat_xyzw": 7}
+    _UNIT = 1e-7
+    """The length of a quaternion may differ from 1 by this."""
     ONCE = frozenset().union(*sdf_names.ONCE.values()).difference(*sdf_names.MANY.values())
     UNREAD = frozenset().union(*sdf_names.HARMLESS.values()) - sdf_names.READ
 
     def __init__(self, path: Path, name: str) -> None:
         self._limits: dict[str, float] = {}
+        self._uri = Reference("", 0)
+        self._scale = 1.0, 1.0, 1.0
+        """The file and the scale of the mesh that is being read."""
         super().__init__(path, name)
 
+    def _begin(self, element: Element, parent: str) -> None:
+        if sdf_names.local(element.name) in sdf_names.MEANT and not element.around & self.UNREAD:
+            for place in filter(sdf_names.is_custom, element.around):
+                self.refuse(element, f"<{element.name}> in <{place}> is not read", "write it outside of what SDFormat does not know")
+
     def _check(self, element: Element, parent: str) -> None:
+        if any(map(sdf_names.is_custom, element.around)):
+            return
         self._check_name(element, parent)
         self._check_twice(element)
         dimensions = self._DIMENSIONS.get(parent, {})
         if element.name in dimensions:
-            if min(self._text(element, (dimensions[element.name],))) <= 0:
+            sizes = self._text(element, (dimensions[element.name],))
+            if min(sizes) <= 0:
                 self.refuse(element, f"<{element.name}> must be positive, and Drake would read another number")
+            self._check_range(element, f"<{element.name}>", sizes, SIZE)
         elif element.name == "pose":
             self._check_pose(element)
         elif (counts := self._COUNTS.get((parent, element.name))) is not None:
             numbers = self._text(element, counts)
             if parent == "limit":
                 self._limits[element.name] = numbers[0]
+            elif parent == "mesh":
+                self._check_range(element, "<scale>", numbers, SCALE)
+                self._scale = numbers[0], numbers[1], numbers[2]
+            elif element.name in ("xyz", "normal"):
+                self._check_length(element, f"<{element.name}>", numbers)
         elif element.name == "limit":
             self._check_order(element, self._limits.pop("lower", -math.inf), self._limits.pop("upper", math.inf))
         elif element.name == "uri" and parent == "include":
             self.includes.append(Reference(self._whole(element), element.line))
         elif element.name == "uri" and parent == "mesh":
-            self.meshes.append(Reference(self._whole(element), element.line))
+            self._uri = Reference(self._whole(element), element.line)
+        elif element.name == "mesh" and parent == "geometry":
+            if "uri" not in element.children:
+                self.refuse(element, "<mesh> has no <uri>")
+            self.meshes.append(MeshReference(self._uri.file, self._uri.line, self._scale))
+            self._scale = 1.0, 1.0, 1.0
         elif element.name in self._DIMENSIONS and parent == "geometry":
             for missing in self._DIMENSIONS[element.name].keys() - element.children:
                 self.refuse(element, f"<{element.name}> has no <{missing}>, and Drake would make one up")
@@ -83,12 +108,14 @@ class Sdf(ModelFile):
         if parent in sdf_names.READ:
             if (instead := sdf_names.REFUSED.get(parent, {}).get(name)) is not None:
                 self.refuse(element, f"<{name}> in <{parent}> is not read", instead)
-            if name not in (known := sdf_names.known(parent)):
+            custom = sdf_names.is_custom(name) and sdf_names.local(name) not in sdf_names.MEANT and parent != "geometry"
+            if name not in (known := sdf_names.known(parent)) and not custom:
                 self.refuse(element, f"<{name}> is not known in <{parent}>", _nearest(name, known))
         if name not in sdf_names.READ or name in sdf_names.HARMLESS.get(parent, ()):
             return
         for key in element.attributes:
-            if key not in (known := list(sdf_names.ATTRIBUTES.get(name, ()))) and not key.startswith("xmlns"):
+            known = list(sdf_names.ATTRIBUTES.get(name, ()))
+            if key not in known and not (sdf_names.is_custom(key) and sdf_names.local(key) not in known):
                 self.refuse(element, f"the attribute {key[:80]!a} of <{name}> is not known", _nearest(key, known))
         if name in sdf_names.CONTAINERS and element.text.strip():
             self.refuse(element, f"<{name}> holds the text {element.text.strip()[:80]!a}, which nobody reads")
@@ -122,7 +149,8 @@ class Sdf(ModelFile):
                     self.refuse(element, "<joint> has an <axis2>, which its type does not have")
             case "drake:mimic":
                 for key in {"multiplier", "offset"} & element.attributes.keys():
-                    self._numbers(element, f"{key} of <drake:mimic>", element.attributes[key], (1,))
+                    what = f"{key} of <drake:mimic>"
+                    self._check_range(element, what, self._numbers(element, what, element.attributes[key], (1,)), POSITION)
 
     def _check_one_of(self, element: Element, key: str, known: tuple[str, ...]) -> None:
         value = element.attributes.get(key, "")
@@ -145,8 +173,10 @@ class Sdf(ModelFile):
         numbers = self._text(element, (0, self._POSES[rotation]))
         if "degrees" in element.attributes:
             self._check_switch(element, "degrees of <pose>", element.attributes["degrees"])
-        if len(numbers) == 7 and not any(numbers[3:]):
-            self.refuse(element, "the quaternion of <pose> is 0 0 0 0, which is no rotation")
+        self._check_range(element, "<pose>", numbers, POSITION)
+        if len(numbers) == 7 and not abs(math.hypot(*numbers[3:]) - 1) <= self._UNIT:
+            message = f"the quaternion of <pose> has the length {math.hypot(*numbers[3:]):.9g} instead of 1, and Drake would not make it 1"
+            self.refuse(element, message, "write more digits, or roll, pitch and yaw with degrees")
 
     def _whole(self, element: Element) -> str:
         if element.interrupted:

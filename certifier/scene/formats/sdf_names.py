@@ -44,8 +44,8 @@ MANY: dict[str, tuple[str, ...]] = {
 
 HARMLESS: dict[str, tuple[str, ...]] = {
     "world": (
-        *("gravity", "physics", "scene", "light", "gui", "plugin", "audio", "wind", "atmosphere", "magnetic_field", "road", "state"),
-        *("spherical_coordinates", "population"),
+        *("gravity", "physics", "scene", "light", "gui", "plugin", "audio", "wind", "atmosphere", "magnetic_field", "road"),
+        "spherical_coordinates",
     ),
     "model": (
         *("self_collide", "enable_wind", "allow_auto_disable", "gripper", "plugin", "drake:linear_bushing_rpy"),
@@ -77,6 +77,8 @@ REFUSED: dict[str, dict[str, str]] = {
     "world": {
         "joint": "put it into a model",
         "actor": "its geometry would be left out",
+        "population": "its models would be left out; write them out",
+        "state": "Drake takes the poses of the models themselves; write the poses there",
     },
     "model": {
         "drake:joint": "write revolute, prismatic and fixed joints; three of them stand for a planar one",
@@ -121,6 +123,23 @@ READ = frozenset(["sdf"]).union(*ONCE.values(), *MANY.values())
 
 CONTAINERS = frozenset([*ONCE, *MANY])
 """These have other elements in them, and no text."""
+
+
+_PREFIXES = frozenset(["", "drake", "experimental", "xacro"])
+
+
+def local(name: str) -> str:
+    """Returns a name without its prefix."""
+    return name.rpartition(":")[2]
+
+
+def is_custom(name: str) -> bool:
+    """Says whether an element or attribute has a prefix of the user's own, as SDFormat allows. Drake does not read it."""
+    return name.rpartition(":")[0] not in _PREFIXES
+
+
+MEANT = frozenset(local(name) for name in READ.union(*REFUSED.values()))
+"""The names of what is read or refused, without prefixes."""
 
 
 def known(parent: str) -> list[str]:

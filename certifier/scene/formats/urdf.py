@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import ClassVar
 
 from certifier.errors import close_matches
-from certifier.scene.formats.model_file import SHAPES, Element, ModelFile, Reference
+from certifier.scene.formats.model_file import SHAPES, Element, MeshReference, ModelFile, Reference
+from certifier.scene.formats.ranges import POSITION, SCALE, SIZE, Range
 from certifier.scene.formats.urdf_names import (
     DRAKE,
     EXPAND,
@@ -42,14 +43,17 @@ class Urdf(ModelFile):
     ONCE = SHAPES | {"origin", "axis", "limit", "geometry", "parent", "child", "mimic"}
     UNREAD = OPAQUE - {_VISUAL}
     """Of what is drawn, Drake reads the shapes, and refuses some of them without a line."""
-    _AXIS = 1e-6, 1e6
-    """An axis may be so short and so long; Drake makes its length 1."""
     _COUNTS: ClassVar[dict[str, tuple[int, ...]]] = {
         **dict.fromkeys(("xyz", "rpy", "size"), (3,)),
         **dict.fromkeys(("radius", "length", "lower", "upper", "a", "b", "c", "multiplier", "offset"), (1,)),
         "scale": (1, 3),
     }
     _SIZES = frozenset(["size", "radius", "length", "a", "b", "c"])
+    _RANGES: ClassVar[dict[str, Range]] = {
+        **dict.fromkeys(("xyz", "rpy", "multiplier", "offset"), POSITION),
+        **dict.fromkeys(_SIZES, SIZE),
+        "scale": SCALE,
+    }
 
     def __init__(self, path: Path, name: str) -> None:
         self.unlimited: list[Reference] = []
@@ -133,8 +137,8 @@ class Urdf(ModelFile):
             numbers = self._numbers(element, what, element.attributes[key], self._COUNTS[key])
             if key in self._SIZES and min(numbers) <= 0:
                 self.refuse(element, f"{what} must be positive, and is {element.attributes[key]}")
-            if key == "scale" and 0 in numbers:
-                self.refuse(element, f"{what} must not be 0")
+            if key in self._RANGES and element.name != "axis" and (key == "scale" or _VISUAL not in element.around):
+                self._check_range(element, what, numbers, self._RANGES[key])
             if element.name == "origin" and element.around == {"robot", "link"} and any(numbers):
                 self.refuse(element, "<origin> in <link> is not read", hint=nearest_element("link", "origin"))
 
@@ -152,8 +156,11 @@ class Urdf(ModelFile):
             case "geometry" if not element.children & SHAPES:
                 self.refuse(element, "<geometry> has no shape", hint=f"shapes: {', '.join(sorted(SHAPES & {name for _, name in READ}))}")
             case "mesh":
-                self.meshes.append(Reference(element.attributes["filename"], element.line))
+                x, y, z = (list(map(float, element.attributes.get("scale", "1").split())) * 3)[:3]
+                self.meshes.append(MeshReference(element.attributes["filename"], element.line, (x, y, z)))
             case "collision":
+                if element.attributes.get("name") == "":
+                    self.refuse(element, "the name of <collision> is empty", hint="give it a name of its own, or leave name out")
                 shape = next(name for name in self._parts if name in SHAPES)
                 self.collisions.append(Reference(element.attributes.get("name", shape), element.line))
             case "frame" | "parent" | "child":
@@ -179,11 +186,9 @@ class Urdf(ModelFile):
         name, limit, axis = child.attributes["link"], self._parts.get("limit"), self._parts.get("axis")
         if (first := self._held.setdefault(name, joint)) is not joint:
             self.refuse(child, f"link {name!a} is the child of another joint too, in line {first.line}", hint="only trees are supported")
-        if kind in MOVING and axis is not None:
-            length = math.hypot(*map(float, axis.attributes["xyz"].split()))
-            if not self._AXIS[0] <= length <= self._AXIS[1]:
-                self.refuse(axis, f"xyz of <axis> has the length {length:g}; it must be {self._AXIS[0]:g} to {self._AXIS[1]:g}, best 1")
         if kind in MOVING:
+            if axis is not None:
+                self._check_length(axis, "xyz of <axis>", list(map(float, axis.attributes["xyz"].split())))
             self._check_limit(joint, limit, kind)
 
     def _check_limit(self, joint: Element, limit: Element | None, kind: str) -> None:
@@ -192,10 +197,8 @@ class Urdf(ModelFile):
         A slide needs limits that are finite, so for one whose limits are missing the scene file has to give some.
         """
         given = {} if limit is None else {key: limit.attributes[key] for key in ("lower", "upper") if key in limit.attributes}
-        if kind == "continuous":
-            if given and limit is not None:
-                self.unlimited.append(Reference(joint.attributes["name"], limit.line))
-            return
+        if kind == "continuous" and given and limit is not None:
+            self.unlimited.append(Reference(joint.attributes["name"], limit.line))
         if kind == "revolute":
             for key in ("lower", "upper"):
                 if key not in given:

@@ -46,7 +46,7 @@ READ: Mapping[tuple[str, str], Known] = {
     ("drake:collision_filter_group", "drake:member_group"): Known(needed=("name",)),
     ("drake:collision_filter_group", "drake:ignored_collision_filter_group"): Known(needed=("name",)),
     ("link", "origin"): Known(read=_POSE),
-    ("link", "collision"): Known(read=("name",), harmless=("group", "concave"), holds=("geometry",)),
+    ("link", "collision"): Known(read=("name",), harmless=("group", "concave", "id"), holds=("geometry",)),
     ("collision", "origin"): Known(read=_POSE),
     ("collision", "geometry"): Known(harmless=("name",)),
     ("geometry", "box"): Known(needed=("size",)),
@@ -61,7 +61,8 @@ READ: Mapping[tuple[str, str], Known] = {
     ("joint", "origin"): Known(read=_POSE),
     ("joint", "axis"): Known(needed=("xyz",)),
     ("joint", "limit"): Known(
-        read=("lower", "upper"), harmless=(*_RATES, "drake:acceleration", "drake:jerk", "command_effort", "current", "gear_velocity")
+        read=("lower", "upper"),
+        harmless=(*_RATES, "drake:acceleration", "drake:jerk", "command_effort", "current", "gear_velocity", "damping", "friction"),
     ),
     ("joint", "mimic"): Known(needed=("joint",), read=("multiplier", "offset")),
 }
@@ -70,12 +71,12 @@ READ: Mapping[tuple[str, str], Known] = {
 _SIMULATED = ("gravity", "kinematic", "self_collide", "velocity_decay", "surface", "contact", "gazebo", "sensor")
 
 HARMLESS: Mapping[str, tuple[str, ...]] = {
-    "robot": ("material", "transmission", "gazebo", "ros2_control", "sensor", "mujoco"),
+    "robot": ("material", "transmission", "gazebo", "ros2_control", "sensor", "mujoco", "webots"),
     "link": ("visual", "inertial", "material", "self_filter", "self_collision_checking", "collision_checking", *_SIMULATED),
     "collision": ("material", "verbose", "drake:proximity_properties", "drake_compliance", "contact_coefficients", *_SIMULATED),
     "geometry": ("drake:declare_convex",),
     "mesh": ("drake:declare_convex",),
-    "joint": ("dynamics", "safety_controller", "calibration", "gazebo"),
+    "joint": ("dynamics", "safety_controller", "calibration", "gazebo", "hardwareInterface", "damping", "friction"),
 }
 """By the parent's name: elements that are not looked into, because they say nothing about where the robot can be."""
 
@@ -89,7 +90,7 @@ _DRAWN = {"origin", "geometry", *_SHAPES}
 MAY_HOLD: Mapping[str, frozenset[str]] = {
     "gazebo": NAMES,
     **dict.fromkeys(("transmission", "ros2_control"), NAMES - {"link", "collision"}),
-    **dict.fromkeys(("sensor", "mujoco"), NAMES - {"link", "collision", "joint"}),
+    **dict.fromkeys(("sensor", "mujoco", "webots"), NAMES - {"link", "collision", "joint"}),
     **dict.fromkeys(("visual", "self_filter"), frozenset(_DRAWN)),
     "inertial": frozenset(["origin"]),
     "collision_checking": _SHAPES,

@@ -36,7 +36,7 @@ def test_the_way_across_a_gap_is_half_of_it(gap):
     """Two cubes are ``gap`` apart, and the faces of their hull are at most half as far from the nearer cube."""
     points, triangles = plates([((0, 0, 0), (1, 1, 1)), ((1 + gap, 0, 0), (1, 1, 1))])
     rotation = Rotation.random(random_state=1).as_matrix()
-    found = beyond_mesh(3 * points @ rotation.T + 5, triangles, points, 0.0)
+    found = beyond_mesh(3 * points @ rotation.T + 5, triangles)
     assert 0.97 * 3 * gap / 2 <= found <= 3 * gap / 2 + 1e-9
 
 
@@ -45,19 +45,35 @@ def test_a_convex_mesh_has_none(scale):
     directions = np.random.default_rng(0).normal(size=(500, 3))
     ball = scale * directions / np.linalg.norm(directions, axis=1, keepdims=True)
     for points, triangles in ((ball, ConvexHull(ball).simplices), (scale * CORNERS, CUBE)):
-        assert beyond_mesh(points, triangles, points, 0.0) == 0
+        assert beyond_mesh(points, triangles) == 0
 
 
 def test_a_flat_mesh_is_measured_without_the_thickness_that_its_hull_gets():
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    up = np.array([0, 0, 1e-5])
-    around = np.concatenate([square - up, square + up])
-    assert beyond_mesh(square, np.array([[0, 1, 2], [0, 2, 3]]), around, 1e-5) == 0
-    assert 0.65 < beyond_mesh(square, np.array([[0, 1, 2]]), around, 1e-5) <= np.sqrt(0.5)
+    for turned in (square, square @ Rotation.random(random_state=1).as_matrix().T + 5):
+        assert beyond_mesh(turned, np.array([[0, 1, 2], [0, 2, 3]])) == 0
+        assert 0.65 < beyond_mesh(turned, np.array([[0, 1, 2]])) <= np.sqrt(0.5) + 1e-9
+
+
+def test_a_mesh_on_a_line_is_measured_along_it():
+    line = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 0, 0]])
+    assert beyond_mesh(line, np.array([[0, 2, 1]])) == 0
+    assert beyond_mesh(line, np.array([[0, 2, 2]])) > 0.1
+
+
+@pytest.mark.parametrize("corners", [3, 4])
+def test_a_flat_mesh_is_read(tmp_path, corners):
+    square = np.array([[0.0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]])[:corners]
+    text = obj(square, np.array([[0, k, k + 1] for k in range(1, corners - 1)]))
+    scene = parsed(write(tmp_path, shape='<mesh filename="m.obj"/>', files={"m.obj": text}))
+    assert len(scene.geometry("arm/hand/palm").vertices) == corners
+    two = '<mesh filename="m.obj"/></geometry></collision><collision name="b"><geometry><mesh filename="m.obj"/>'
+    hulls = parsed(write(tmp_path, shape=two, files={"m.obj": text}, extra="hulls: [arm/hand]\n"))
+    assert hulls.geometry("arm/hand/hull").radius == 0
 
 
 def test_a_mesh_without_faces_has_no_estimate():
-    assert beyond_mesh(CORNERS, np.zeros((0, 3), dtype=np.int64), CORNERS, 0.0) == 0
+    assert beyond_mesh(CORNERS, np.zeros((0, 3), dtype=np.int64)) == 0
 
 
 def test_twenty_thousand_faces_take_a_moment():
@@ -66,7 +82,7 @@ def test_twenty_thousand_faces_take_a_moment():
     triangles = ConvexHull(bowl).simplices
     bowl[:, 2] = np.where(bowl[:, 2] > 0, -0.6 * bowl[:, 2], bowl[:, 2])
     begun = time.process_time()
-    assert 0.59 < beyond_mesh(bowl, triangles, bowl, 0.0) < 0.6001
+    assert 0.59 < beyond_mesh(bowl, triangles) < 0.6001
     assert time.process_time() - begun < 5
 
 

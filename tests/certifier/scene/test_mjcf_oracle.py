@@ -61,6 +61,7 @@ SEEN = ["joints behind a pose", "pair of drawn geoms", "class without geom", "fr
 def test_the_oracle_sees_what_drake_reads_otherwise(tmp_path, monkeypatch, name):
     """Here nothing is refused, so Drake reads it."""
     monkeypatch.setattr(StrictReader, "check", lambda *_: 0)
+    monkeypatch.setattr(StrictReader, "taken", StrictReader.mesh)
     monkeypatch.setattr(certifier.scene.parse, "check_counts", lambda *_: None)
     monkeypatch.setattr(Mjcf, "__init__", lambda self, *_: setattr(self, "collisions", []))
     found = []

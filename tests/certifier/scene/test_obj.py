@@ -125,7 +125,7 @@ FINITE = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e6, max_va
 @given(st.lists(st.tuples(FINITE, FINITE, FINITE), min_size=4, max_size=30), st.sampled_from(["r", ".17g", ".3e", "f"]))
 def test_numbers_arrive_exactly(tmp_path_factory, vertices, form):
     written = [[repr(x) if form == "r" else format(x, form) for x in v] for v in vertices]
-    read = points(tmp_path_factory.mktemp("obj"), "".join(f"v {' '.join(v)}\n" for v in written))
+    read = points(tmp_path_factory.mktemp("obj"), "".join(f"v {' '.join(v)}\n" for v in written) + "f 1 2 3\n")
     np.testing.assert_array_equal(read, [[float(x) for x in v] for v in written])
 
 

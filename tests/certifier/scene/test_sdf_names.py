@@ -62,6 +62,19 @@ def arm(directory: Path, *, link="", joint=AXIS, model="", kind="revolute", vers
     return write(directory, SCENE.replace("arm.urdf", "arm.sdf"), files={"arm.sdf": text, **files})
 
 
+SHAPE = '<collision name="c"><geometry>{}</geometry></collision>'
+IN_WORLD = """<sdf version="1.6"><world name="w">{}
+<model name="room"><link name="walls"/></model></world></sdf>"""
+
+
+@pytest.mark.parametrize("name", ["population", "state"])
+def test_models_of_a_world_that_drake_leaves_out_are_refused(tmp_path, name):
+    more = f"<{name} name='p'><model name='can'><link name='l'/></model></{name}>"
+    path = write(tmp_path, files={"room.sdf": IN_WORLD.format(more)})
+    with pytest.raises(SceneError, match=rf"room\.sdf:1: <{name}> in <world> is not read"):
+        parsed(path)
+
+
 @pytest.mark.parametrize(
     ("change", "line", "words"),
     [
@@ -82,6 +95,30 @@ def arm(directory: Path, *, link="", joint=AXIS, model="", kind="revolute", vers
             ({"link": f'<collision name="c"><geometry><{shape}/></geometry></collision>'}, 4, f"<{shape}> in <geometry> is not read")
             for shape in ("heightmap", "polyline", "image", "cone")
         ),
+        *(
+            ({"link": f'<pose rotation_format="quat_xyzw">0 0 0 {q}</pose>'}, 4, f"the quaternion of <pose> has the length {length}")
+            for q, length in (("0 0 0 0", 0), ("0 0 0 2", 2), ("0.707107 0 0 0.707107", "1.00000031"), ("0 1e-200 0 1e-200", "1.4142135"))
+        ),
+        *(({"link": f"<pose>{x} 0 0 0 0 0</pose>"}, 4, f"<pose> has {x} in it") for x in ("1e+90", "-1.1e+06")),
+        ({"link": SHAPE.format("<box><size>1e20 1e-20 1</size></box>")}, 4, "<size> has 1e+20 in it"),
+        ({"link": SHAPE.format("<sphere><radius>1e-300</radius></sphere>")}, 4, "<radius> has 1e-300 in it"),
+        *(({"link": SHAPE.format(f"<plane><normal>{n}</normal></plane>")}, 4, "<normal> has the length") for n in ("0 0 0", "0 0 1e-7")),
+        *(
+            ({"link": SHAPE.format(f"<mesh><uri>m.obj</uri><scale>{x} 1 1</scale></mesh>")}, 4, f"<scale> has {x} in it")
+            for x in ("0", "1e-09", "1.1e+09")
+        ),
+        ({"link": SHAPE.format("<mesh><scale>1 1 1</scale></mesh>")}, 4, "<mesh> has no <uri>"),
+        *(({"joint": AXIS.replace("0 0 1", n)}, 6, "<xyz> has the length") for n in ("0 0 0", "0 1e-7 0", "1e7 0 0", "1e200 1e200 0")),
+        *(
+            ({"model": f"<my:data><{name}/></my:data>"}, 7, f"<{name}> in <my:data> is not read")
+            for name in ("collision", "model", "my:collision", "include")
+        ),
+        ({"link": f'<my:collision name="c">{BOX}</my:collision>'}, 4, "<geometry> in <my:collision> is not read"),
+        ({"link": '<my:collision name="c"/>'}, 4, "<my:collision> is not known in <link>"),
+        ({"link": f'<collision name="c">{BOX.replace("<box>", "<my:lens/><box>")}</collision>'}, 4, "<my:lens> is not known in <geometry>"),
+        ({"link": '<pose my:degrees="true">0 0 0 0 0 90</pose>'}, 4, "the attribute 'my:degrees' of <pose> is not known"),
+        ({"joint": f'{AXIS}<drake:mimic joint="turn" offset="1e90"/>'}, 6, "offset of <drake:mimic> has 1e+90 in it"),
+        ({"link": '<xacro:box size="1"/>'}, 4, "<xacro:box> is not known in <link>"),
         ({"link": "<kinematic>true</kinematic>"}, 4, "<kinematic> is true"),
         ({"joint": AXIS.replace("<xyz>", '<xyz expresed_in="base">')}, 6, "did you mean expressed_in?"),
         ({"joint": AXIS.replace("lower", "lowr")}, 6, "<lowr> is not known in <limit> (did you mean lower?"),
@@ -122,6 +159,9 @@ def test_what_is_not_known_is_refused_with_its_line(tmp_path, change, line, word
         {"model": '<plugin name="p" filename="p.so"><pose>x</pose></plugin><frame name="f" attached_to="hand"/>'},
         {"joint": AXIS.replace("</limit>", "<effort>1</effort><velocity>2</velocity></limit><dynamics><damping>1</damping></dynamics>")},
         {"kind": "continuous"},
+        {"link": '<pose rotation_format="quat_xyzw">0 0 0 0.70710678 0 0 0.70710678</pose>'},
+        {"link": "<my:data><my:more>3</my:more></my:data>", "model": '<my:data xmlns:my="http://x" a="1">move</my:data>'},
+        {"model": '<frame name="f" my:note="1"/><plugin name="p" filename="p.so"><my:data><pose>x</pose></my:data></plugin>'},
         {"joint": AXIS.replace("<xyz>", '<xyz expressed_in="base">')},
     ],
 )

@@ -3,11 +3,14 @@
 Drake 1.51.1 takes nearly every model of these tables without an error (docs/scenes.md); what it refuses, it refuses without the line.
 """
 
+import numpy as np
 import pytest
 
 from certifier.errors import SceneError
 from certifier.scene import load_bundle, load_scene, pack_bundle
 from certifier.scene.draft import draft
+from certifier.scene.file import read_scene_file
+from certifier.scene.strict import StrictReader
 from tests.certifier.scene.workshop import ROOM, SCENE, parsed, write
 
 TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -79,6 +82,29 @@ REFUSED = [
     (sdf(shape="<drake:ellipsoid><a>1</a><b>1,5</b><c>1</c></drake:ellipsoid>"), "room.sdf:4", "<b>"),
     (sdf(shape="<plane><normal>0 0 1 5</normal></plane>"), "room.sdf:4", "<normal>"),
     (sdf(more="<include><uri>room.txt</uri></include>"), "room.sdf:5", "is no file that was found"),
+    *((mjcf(geom=f'size="{x}"'), "arm.xml:5", f"size of a sphere has {x} in it") for x in ("1e-10", "1.1e+06")),
+    (mjcf(geom='type="box" size="1e20 1e-20 1"'), "arm.xml:5", "size of a box has 1e+20 in it"),
+    (mjcf(geom='size="0.1" pos="0 1e90 0"'), "arm.xml:5", "pos of <geom> has 1e+90 in it"),
+    (mjcf(geom='type="capsule" fromto="0 0 0 0 0 2e6" size="1"'), "arm.xml:5", "fromto of <geom> has 2e+06 in it"),
+    (mjcf(body='pos="-1e90 0 0"'), "arm.xml:3", "pos of <body> has -1e+90 in it"),
+    (mjcf(top='<default><mesh scale="1 0 1"/></default>'), "arm.xml:1", "scale of <mesh> has 0 in it"),
+    (mjcf(top='<asset><mesh file="t.obj" scale="1 1 1e-300"/></asset>', **{"t.obj": TETRAHEDRON}), "arm.xml:1", "has 1e-300 in it"),
+    (
+        mjcf(
+            top='<asset><mesh name="m" file="t.obj"/></asset><default><mesh scale="1e8 1 1"/></default>',
+            geom='type="mesh" mesh="m"',
+            **{"t.obj": TETRAHEDRON},
+        ),
+        "arm.xml:1",
+        "'t.obj' has a coordinate of 1e+07 m; at most 1e+06 m is read",
+    ),
+    ({"shape": '<mesh filename="m.obj"/>', "files": {"m.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\n"}}, "m.obj:1", "the file has no faces"),
+    ({"shape": '<mesh filename="t.obj" scale="1e8"/>', "files": {"t.obj": TETRAHEDRON}}, "arm.urdf:7", "'t.obj' has a coordinate of 1e+07"),
+    (
+        {"files": {"t.obj": TETRAHEDRON, **sdf(shape="<mesh><uri>t.obj</uri><scale>1 1e8 1</scale></mesh>")["files"]}},
+        "room.sdf:4",
+        "'t.obj' has a coordinate of 1e+07",
+    ),
     (mjcf(geom='size="abc"'), "arm.xml:5", "size of <geom>"),
     (mjcf(geom='size="1,5"'), "arm.xml:5", "size of <geom>"),
     (mjcf(geom='size="0.1" pos="0 0 1,5"'), "arm.xml:5", "pos of <geom>"),
@@ -205,6 +231,92 @@ def test_what_drake_prints_comes_in_one_printable_line(tmp_path):
     (said,) = (w for w in parsed(write(tmp_path, **mjcf(top='<asset><mesh name="m\u202e&#10;m"/></asset>'))).warnings if "mesh asset" in w)
     assert "m\\u202e m" in said
     assert said.isprintable()
+
+
+SOLID = """<sdf version="1.9"><model name="part"><static>true</static><link name="p">
+<collision name="c"><geometry><mesh><uri>{}</uri></mesh></geometry></collision></link></model></sdf>"""
+INCLUDES = {
+    "relative": '<model name="first"><static>true</static><include><uri>sub/part.sdf</uri></include></model>',
+    "package": '<model name="first"><static>true</static><include><uri>model://here/sub/part.sdf</uri></include></model>',
+    "merged": '<model name="first"><static>true</static><include merge="true"><uri>sub/part.sdf</uri></include></model>',
+    "in a world": '<world name="w"><include><uri>sub/part.sdf</uri><static>true</static></include></world>',
+    "in an include": '<model name="first"><static>true</static><include><uri>sub/mid.sdf</uri></include></model>',
+}
+
+
+def with_mesh(directory, kind, uri, more=""):
+    """The path of a scene whose model includes sub/part.sdf, with a mesh beside it and a smaller one of the same name one level up."""
+    (directory / "sub").mkdir()
+    for place, scale in ((directory, 1), (directory / "sub", 3)):
+        (place / "t.obj").write_text(TETRAHEDRON.replace("0.1", str(0.1 * scale)))
+    (directory / "first.sdf").write_text(f'<sdf version="1.9">{INCLUDES[kind]}</sdf>')
+    (directory / "sub" / "mid.sdf").write_text(
+        '<sdf version="1.9"><model name="mid"><include><uri>model://here/sub/part.sdf</uri></include></model></sdf>'
+    )
+    (directory / "sub" / "part.sdf").write_text(SOLID.format(uri))
+    scene = f"packages: {{here: .}}{SCENE}{more}  - add_model: {{name: first, file: first.sdf}}\n"
+    return write(directory, scene)
+
+
+@pytest.mark.parametrize("kind", INCLUDES)
+@pytest.mark.parametrize("more", ["", "  - add_model: {name: alone, file: sub/part.sdf}\n  - add_weld: {parent: world, child: alone::p}\n"])
+def test_a_mesh_of_an_included_model_that_drake_would_take_from_elsewhere_is_refused(tmp_path, kind, more):
+    with pytest.raises(SceneError, match=r"sub/part\.sdf:2: 't\.obj' is beside an included model, and Drake would look") as caught:
+        parsed(with_mesh(tmp_path, kind, "t.obj", more))
+    assert "write model://NAME/FILE" in caught.value.hint
+
+
+@pytest.mark.parametrize("kind", INCLUDES)
+def test_a_mesh_of_an_included_model_may_come_from_a_package(tmp_path, kind):
+    (solid,) = (g for g in parsed(with_mesh(tmp_path, kind, "package://here/sub/t.obj")).geometries if g.name.startswith("first"))
+    assert np.ptp(solid.vertices, axis=0).tolist() == pytest.approx([0.3] * 3)
+
+
+def test_a_mesh_of_an_included_model_may_be_relative_where_both_places_are_one(tmp_path):
+    path = with_mesh(tmp_path, "relative", "t.obj")
+    (tmp_path / "first.sdf").write_text((tmp_path / "first.sdf").read_text().replace("sub/part", "part"))
+    (tmp_path / "part.sdf").write_text(SOLID.format("t.obj"))
+    assert any(g.name.startswith("first") for g in parsed(path).geometries)
+
+
+def test_a_mesh_that_no_model_names_is_not_taken(tmp_path):
+    path = write(tmp_path, shape='<mesh filename="t.obj"/>', files={"t.obj": TETRAHEDRON, "other.obj": TETRAHEDRON})
+    strict = StrictReader(read_scene_file(path))
+    strict.check(read_scene_file(path).resolved_directives, path.name)
+    assert len(strict.taken(tmp_path / "t.obj").points) == 4
+    with pytest.raises(SceneError, match=r"Drake has taken another mesh than the models name: other\.obj"):
+        strict.taken(tmp_path / "other.obj")
+
+
+def test_urdf_in_sdformat_is_refused(tmp_path):
+    """Drake places all links but the first at the origin of the URDF file."""
+    path = write(tmp_path, **sdf(more="<include><uri>arm.urdf</uri></include>"))
+    with pytest.raises(SceneError, match=r"room\.sdf:5: 'arm\.urdf' is URDF, whose links Drake would place elsewhere") as caught:
+        parsed(path)
+    assert caught.value.hint == "add it by a directive of its own"
+
+
+@pytest.mark.parametrize("number", [".inf", ".nan", "1e90", "-1.1e6"])
+def test_a_pose_of_a_directive_that_is_too_far_away_is_refused(tmp_path, number):
+    scene = SCENE.replace("child: room::walls}", f"child: room::walls, X_PC: {{translation: [0, {number}, 0]}}}}")
+    with pytest.raises(SceneError, match="joint room/world_welds_to_walls has a pose with a coordinate that is not from"):
+        parsed(write(tmp_path, scene))
+
+
+THIN = "<box size='1e6 1e-9 1e-9'/>"
+
+
+@pytest.mark.parametrize(
+    ("shape", "name", "extra"),
+    [
+        ('<box size="1e6 1e-9 1"/>', "palm", ""),
+        ('<cylinder radius="1e-9" length="1e6"/>', "palm", ""),
+        (f"{THIN}</geometry></collision><collision name='b'><geometry>{THIN}", "hull", "hulls: [arm/hand]\n"),
+    ],
+)
+def test_a_shape_that_is_too_thin_is_refused(tmp_path, shape, name, extra):
+    with pytest.raises(SceneError, match=f"geometry arm/hand/{name} is too thin for its size"):
+        parsed(write(tmp_path, shape=shape, extra=extra))
 
 
 PART = '<sdf version="1.9"><model name="part"><link name="p"/></model></sdf>'

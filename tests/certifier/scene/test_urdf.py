@@ -116,9 +116,18 @@ REFUSED_PARTS = [
             'drake:ellipsoid a="1" b="0" c="1"',
         )
     ),
-    ({"shape": '<mesh filename="m.obj" scale="1 0 1"/>'}, 15, "scale of <mesh> must not be 0", ""),
+    ({"shape": '<mesh filename="m.obj" scale="1 0 1"/>'}, 15, "scale of <mesh> has 0 in it", ""),
     ({"in_link": '<visual><geometry><sphere radius="0"/></geometry></visual>'}, 11, "radius of <sphere> must be positive", ""),
     ({"in_link": "<collision/>"}, 11, "<collision> has no <geometry>", ""),
+    ({"in_link": f'<collision name=""><geometry>{BOX}</geometry></collision>'}, 11, "the name of <collision> is empty", "of its own"),
+    # numbers out of range
+    *(({"origin": f'rpy="0 0 {x}"'}, 5, f"rpy of <origin> has {x} in it", "mend the number") for x in ("1e+90", "-1.1e+06")),
+    ({"in_link": f'<collision><origin xyz="1e90 0 0"/><geometry>{BOX}</geometry></collision>'}, 11, "xyz of <origin> has 1e+90", ""),
+    ({"more": "<frame name='f' link='hand' xyz='0 -2e6 0'/>"}, 18, "xyz of <frame> has -2e+06 in it", "mend the number"),
+    ({"shape": '<box size="1e20 1e-20 1"/>'}, 15, "size of <box> has 1e+20 in it", "mend the number"),
+    ({"shape": '<sphere radius="1e-300"/>'}, 15, "radius of <sphere> has 1e-300 in it", "mend the number"),
+    ({"shape": '<capsule radius="1" length="2e6"/>'}, 15, "length of <capsule> has 2e+06 in it", "mend the number"),
+    *(({"shape": f'<mesh filename="m.obj" scale="1 {x} 1"/>'}, 15, f"scale of <mesh> has {x} in it", "") for x in ("1e-09", "-1.1e+09")),
     # joints
     ({"in_joint": "", "joint": 'name2="x"'}, 3, "name2 is not known in <joint>", "did you mean name"),
     ({"more": '<joint name="j"><parent link="hand"/><child link="base"/></joint>'}, 18, "<joint> has no type", ""),
@@ -137,6 +146,7 @@ REFUSED_PARTS = [
     ({"limit": ""}, 3, "the <limit> of a revolute joint has no lower", "or make the joint continuous"),
     ({"limit": '<limit lower="-1"/>'}, 7, "the <limit> of a revolute joint has no upper", "or make the joint continuous"),
     ({"limit": '<limit lower="1" upper="-1"/>'}, 7, "limits of a joint are 1 and -1", ""),
+    ({"kind": "continuous", "limit": '<limit lower="1" upper="-1"/>'}, 7, "limits of a joint are 1 and -1", ""),
     ({"kind": "prismatic", "limit": '<limit lower="1" upper="-1"/>'}, 7, "limits of a joint are 1 and -1", ""),
     ({"axis": '/><axis xyz="0 0 0"'}, 6, "second <axis>", ""),
     *(({"kind": kind}, 3, f"joint 'turn' is a '{kind}' joint", hint[:20]) for kind, hint in UNSUPPORTED.items()),
@@ -185,6 +195,9 @@ ACCEPTED = [
     {"more": LINKS.format("hand", "more", '<axis xyz="0 0 0"/><limit effort="1" velocity="1"/>')},
     {"more": LINKS.format("world", "base", "")},
     {"kind": "continuous", "limit": ""},
+    {"in_joint": "<hardwareInterface>x</hardwareInterface><friction>1</friction><damping>1</damping>", "collision": 'id="3"'},
+    {"limit": LIMIT.replace("/>", ' damping="1" friction="2"/>'), "more": "<webots><plugin type='a'><origin/></plugin></webots>"},
+    {"in_joint": "<dynamics damping='1' friction='x' extra='1'/>", "shape": '<box size="1e-9 1e6 1"/>', "origin": 'rpy="1e6 -1e6 0"'},
     {"kind": "prismatic", "limit": '<limit upper="1"/>'},
     {"shape": '<mesh filename="m.obj" scale="-1 1 2"><drake:declare_convex/></mesh>'},
     {
@@ -240,15 +253,6 @@ def test_limits_of_a_continuous_joint_do_not_count_behind_directives_with_a_name
     scene = parsed(path)
     assert [j.name for j in scene.moving] == ["far::arm/turn", "near::arm/turn"]
     assert [j.own_limits for j in scene.moving] == [(None, None)] * 2
-
-
-def test_limits_of_a_continuous_joint_in_an_included_model_are_refused(tmp_path):
-    path = write(tmp_path, f"packages: {{here: .}}{SCENE}", kind="continuous", limit='\n<limit lower="-1" upper="1"/>')
-    (tmp_path / "room.sdf").write_text(
-        '<sdf version="1.9"><model name="room">\n<include><uri>package://here/arm.urdf</uri></include><link name="walls"/></model></sdf>'
-    )
-    with pytest.raises(SceneError, match=r"arm\.urdf:6: 'turn' is a continuous joint"):
-        parsed(path)
 
 
 @pytest.mark.parametrize("limit", ["1e16", "1e9", "1.7976931348623157e308", "1e6"])
