@@ -212,7 +212,7 @@ def joint_of(joint: DrakeJoint, names: Names) -> Joint:
     X_PF = joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4()
     X_BM = joint.frame_on_child().GetFixedPoseInBodyFrame().GetAsMatrix4()
     X_FM = joint.X_FM().GetAsMatrix4() if isinstance(joint, WeldJoint) else np.eye(4)
-    for pose in (X_PF, X_FM, X_BM):
+    for pose in (X_PF @ X_FM, X_BM):
         if not (np.abs(pose) <= MAGNITUDE).all():
             message = f"joint {name} has a pose with a coordinate that is not from {-MAGNITUDE:g} to {MAGNITUDE:g} m"
             raise SceneError("scene_model", message, field="directives", hint="mend the pose in the directive or in the model")

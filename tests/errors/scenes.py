@@ -44,6 +44,8 @@ FAR_MESH = "v 0 0 0\nv 1e7 0 0\nv 0 1e7 0\nv 0 0 1e7\nf 1 3 2\nf 1 2 4\nf 1 4 3\
 ADDED_MESH = "  - add_model: {name: m, file: m.obj}\n  - add_weld: {parent: world, child: m::m}\n"
 MUJOCO = "directives: [{add_model: {name: m, file: m.xml}}]\n"
 
+TOO_FAR = """  - add_frame: {name: far, X_PF: {base_frame: world, translation: [9e5, 0, 0]}}
+  - add_weld: {parent: far, child: room::walls, X_PC: {translation: [9e5, 0, 0]}}"""
 TWICE = "directives:\n- add_model: {name: m, file: m.xml}\n"
 IN_WORLD = "<mujoco><worldbody><geom name='w' size='1'/></worldbody></mujoco>"
 
@@ -561,7 +563,7 @@ MODELS = [
             "directives",
             "joint {name} has a pose with a coordinate that is not from {...} to {MAGNITUDE} m",
             "mend the pose in the directive or in the model",
-            lambda t: t.scene(SCENE.replace("room::walls}", "room::walls, X_PC: {translation: [.inf, 0, 0]}}")),
+            lambda t: t.scene(SCENE.replace("  - add_weld: {parent: world, child: room::walls}", TOO_FAR)),
         ),
         (
             "scene_model",
