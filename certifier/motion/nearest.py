@@ -71,28 +71,18 @@ def _on_triangle(a: Array, b: Array, c: Array, z: Array) -> int:
 
 
 @njit(cache=True)
-def _on_tetrahedron(P: Array, z: Array) -> int:
-    """Fills in the point z of a tetrahedron, (4, 3), that is nearest to 0, and returns which corners it needs; 15 where 0 is inside."""
+def _on_tetrahedron(P: Array, every: bool, z: Array) -> int:
+    """Fills in the point z of a tetrahedron, (4, 3), that is nearest to 0, and returns which corners it needs; 15 where 0 is inside.
+
+    Args:
+        every: look for it on every face, also on those on whose inner side 0 is.
+    """
     used, best, normal, other = 15, np.inf, np.empty(3), np.empty(3)
     for missing in range(4):
         i, j, k = (missing + 1) % 4, (missing + 2) % 4, (missing + 3) % 4
         _cross(P[j] - P[i], P[k] - P[i], normal)
-        if _dot(normal, P[missing] - P[i]) * -_dot(normal, P[i]) > 0.0:
+        if not every and _dot(normal, P[missing] - P[i]) * -_dot(normal, P[i]) > 0.0:
             continue  # 0 is on the inner side of this face
-        bits = _on_triangle(P[i], P[j], P[k], other)
-        square = _dot(other, other)
-        if square < best:
-            best, z[:] = square, other
-            used = ((bits & 1) << i) | (((bits >> 1) & 1) << j) | (((bits >> 2) & 1) << k)
-    return used
-
-
-@njit(cache=True)
-def _on_faces(P: Array, z: Array) -> int:
-    """Fills in the point z of the faces of a tetrahedron, (4, 3), that is nearest to 0, and returns which corners it needs."""
-    used, best, other = 0, np.inf, np.empty(3)
-    for missing in range(4):
-        i, j, k = (missing + 1) % 4, (missing + 2) % 4, (missing + 3) % 4
         bits = _on_triangle(P[i], P[j], P[k], other)
         square = _dot(other, other)
         if square < best:
@@ -141,12 +131,12 @@ def separation(A: Array, B: Array, normal: Array) -> float:
         elif m == 3:
             used = _on_triangle(P[0], P[1], P[2], z)
         else:
-            used = _on_tetrahedron(P, z)
+            used = _on_tetrahedron(P, False, z)
             if used == 15:
                 # Of a flat tetrahedron, rounding says on which side 0 is. A plane that separates the hulls knows better.
                 if best <= _ROUNDED * (np.sqrt(_dot(A[a], A[a])) + np.sqrt(_dot(B[b], B[b]))):
                     return min(best, 0.0)
-                used = _on_faces(P, z)
+                used = _on_tetrahedron(P, True, z)
         kept = 0
         for i in range(m):
             if (used >> i) & 1:
