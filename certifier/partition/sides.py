@@ -9,8 +9,10 @@ from functools import lru_cache
 import numpy as np
 
 from certifier.model import Array, Volume
-from certifier.partition import bernstein, positive
+from certifier.partition import bernstein
 from certifier.partition.area import Area
+from certifier.partition.multipliers import REFUTED, UNDECIDED
+from certifier.partition.positive import DEPTH, Answer, Question, prove
 from certifier.partition.tree import Streams, joined
 
 PRECISION = 1e-7
@@ -112,16 +114,16 @@ class Side:
         for vertex in np.argsort(bernstein.leasts(c)):
             codes, counts, numbers, values = _room()
             lengths, point, halvings = np.zeros(3, np.int64), np.zeros(len(mid)), np.zeros(len(own) + len(outside), np.int64)
-            out = (codes, counts, numbers, values, lengths, point, halvings)
-            status = positive.prove(c[vertex], factors, ends, *g, PRECISION, most, *out, _stack(len(outside), len(own)))
-            if status == positive.REFUTED:
+            answer = Answer(codes, counts, numbers, values, lengths, point, halvings)
+            status = prove(Question(c[vertex], factors, ends, *g), PRECISION, most, answer, _stack(len(outside), len(own)))
+            if status == REFUTED:
                 s = mid.copy()
                 place = len(own) + len(outside)
                 s[own] = point[: len(own)]
                 s[outside] = mid[outside] + half[outside] * point[len(own) : place]
                 s[rest] = mid[rest] + half[rest] * point[place:]
                 return s
-            if status == positive.UNDECIDED:
+            if status == UNDECIDED:
                 return int([*own, *outside][int(halvings.argmax())])
             a, b, e = lengths
             found[int(vertex)] = Streams(codes[:a].copy(), counts[:b].copy(), faces[numbers[:e]].astype(np.int16), values[:e].copy())
@@ -131,7 +133,7 @@ class Side:
 @lru_cache(maxsize=8)
 def _stack(outside: int, own: int) -> Array:
     """Returns memory to work in, which all sides share, because a process may have hundreds of them."""
-    return np.empty((positive.DEPTH, 1 + outside, 4**own))
+    return np.empty((DEPTH, 1 + outside, 4**own))
 
 
 @lru_cache(maxsize=1)

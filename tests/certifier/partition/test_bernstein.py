@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from certifier.partition import bernstein as bernstein_form
 from certifier.partition import positive
 from certifier.partition.chords import chords
+from certifier.partition.multipliers import PROVED, UNDECIDED
 from certifier.proof import limits
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -133,9 +134,9 @@ def test_faces_help_only_in_pieces_that_turn_less_than_half_a_turn():
     constant, outside = np.full(2, 0.5), np.zeros((0, 2))
     codes, counts, faces, values = (np.zeros(100, kind) for kind in (np.int8, np.int16, np.int16, np.float32))
     lengths, point, halvings = np.zeros(3, np.int64), np.zeros(1), np.zeros(1, np.int64)
-    out = (codes, counts, faces, values, lengths, point, halvings, np.empty((positive.DEPTH, 1, 4)))
-    kind = positive.prove(c, den, ends, constant, own, outside, rest, 1e-7, 100, *out)
-    assert kind == positive.PROVED
+    answer = positive.Answer(codes, counts, faces, values, lengths, point, halvings)
+    question = positive.Question(c, den, ends, constant, own, outside, rest)
+    assert positive.prove(question, 1e-7, 100, answer, np.empty((positive.DEPTH, 1, 4))) == PROVED
     assert codes[0] == 0, "all of the range is not proved at once"
 
 
@@ -145,9 +146,8 @@ def test_no_piece_is_halved_more_often_than_the_verifier_takes():
     den = bernstein_form.factors(np.ones((1, 3)), ends)
     codes, counts, faces, values = (np.zeros(4000, kind) for kind in (np.int8, np.int16, np.int16, np.float32))
     lengths, point, halvings = np.zeros(3, np.int64), np.zeros(1), np.zeros(1, np.int64)
-    out = (codes, counts, faces, values, lengths, point, halvings, np.empty((positive.DEPTH, 1, 4)))
-    none = np.zeros((1, 0)), np.zeros((0, 0)), np.zeros((0, 0))
+    answer = positive.Answer(codes, counts, faces, values, lengths, point, halvings)
+    question = positive.Question(den[0] - den[1], den, ends, np.zeros(0), np.zeros((1, 0)), np.zeros((0, 0)), np.zeros((0, 0)))
     # Precision counts by the whole range, so it is far below what double numbers can hold here.
-    kind = positive.prove(den[0] - den[1], den, ends, np.zeros(0), *none, 1e-300, 1000, *out)
-    assert kind == positive.UNDECIDED
+    assert positive.prove(question, 1e-300, 1000, answer, np.empty((positive.DEPTH, 1, 4))) == UNDECIDED
     assert halvings[0] == limits.PIECE_DEPTH
