@@ -233,7 +233,7 @@ class Scene:
     def outer_limits(self) -> tuple[Array, Array]:
         """The largest and the least doubles, (n,) each, beyond which s never is within the joint limits.
 
-        Whoever believes the joint limits must not believe them rounded inwards, which would leave configurations out.
+        Code that relies on the joint limits must not round them inwards, because that would leave configurations out.
         """
         q_star, revolute = self.q_star.tolist(), self.revolute.tolist()
         lower = [-_not_less(*joint) for joint in zip(q_star, self.q_lower.tolist(), revolute, strict=True)]
@@ -463,7 +463,7 @@ def _texts(node: Node) -> tuple[str, str]:
 class Polytope:
     """A polytope is {s : C s <= d}, where C is (m, n) and d is (m,), both finite.
 
-    Whoever makes it decides whether the joint limits are among its rows. :meth:`given` checks what comes from users.
+    The code that makes it decides whether the joint limits are among its rows. :meth:`given` checks what comes from users.
     """
 
     C: Array
@@ -474,7 +474,7 @@ class Polytope:
         """Returns a polytope from what users give: nested lists or arrays of numbers.
 
         Args:
-            n: number of columns that C has to have; None for any. A C without rows counts as one of that many columns.
+            n: number of columns that C has to have; None for any. A C without rows is taken to have that many columns.
             field: field in which the user gave the polytope, for errors.
 
         Raises:

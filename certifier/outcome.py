@@ -11,7 +11,7 @@ class Outcome(StrEnum):
     REFUTED = "refuted"
     """A configuration inside the polytope, or of the motion, is in collision, and the result names it."""
     NOT_CERTIFIABLE = "not_certifiable"
-    """No certificate of the form of the program (11) exists, by a dual proof; a plane may separate the pair all the same."""
+    """No certificate of the form of the program (11) exists, by a dual proof; a plane may still separate the pair."""
     TOO_CLOSE = "too_close"
     """The bodies come so close to each other that no plane is found in a narrow cell, or for a short part of a motion; the result names a
     configuration and the distance."""

@@ -1,1 +1,1 @@
-"""What of a region's proof holds in a changed scene is found here; nothing here decides whether a proof holds."""
+"""This package finds which parts of a region's proof hold in a changed scene; it does not decide whether a proof holds."""

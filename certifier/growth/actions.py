@@ -1,4 +1,4 @@
-"""Actions are what growing a region asks for, and reports are what it is told.
+"""Actions are what the growth of a region asks for, and reports are the answers that it receives.
 
 :mod:`certifier.growth.machine` decides on the actions, and others carry them out. A report is a Proposal
 (:mod:`certifier.seeding.proposal`), Outcomes, what a step has Stepped to (:mod:`certifier.step.stepped`), or that the action Failed.
@@ -44,13 +44,13 @@ class Certify:
             are going to be cut off where the bodies are near.
         failures: end after this many failures, in the order of ``pairs`` (B.3); pairs not reached are left out of the report. None to
             certify all pairs.
-        cells: so many cells of each pair are looked at; 1 for the program (11) of the papers on all of the polytope.
+        cells: number of cells to look at for each pair; 1 for the program (11) of the papers on all of the polytope.
         box: the root cell of all partitions, proved around the polytope of the first of them; None for the polytope's smallest box.
         begun: the iteration in which the partitions of all pairs were begun; None where they begin in this one.
-        parts: pair index -> how many parts its open cells are dealt to; 1 for a pair that is left out.
-        ending: pairs whose open cells are going to be cut off where the volumes touch that these are tried with next; all of them where the
-            pair is hard as well.
-        together: pair index -> the other pairs that are certified with it as one, and are not among ``pairs`` or in ``reuse``.
+        parts: pair index -> how many parts its open cells are divided among; 1 for a pair that is left out.
+        ending: pairs whose open cells are going to be cut off where the volumes touch that are tried next in these cells; all open cells
+            where the pair is hard as well.
+        together: pair index -> the other pairs that share its certificate, and are not among ``pairs`` or in ``reuse``.
     """
 
     kind: ClassVar[str] = "certify"

@@ -20,11 +20,11 @@ from certifier.polytopes.gibbs import uniform_in_q
 from certifier.polytopes.proved import cleaned
 
 CHAINS, EACH = 1000, 16
-"""So many chains give so many samples each, for the faces of one round."""
+"""CHAINS chains give EACH samples each, for the faces of one round."""
 ENOUGH = 2000
 """With fewer samples left, others are drawn."""
 FEWEST = 200
-"""With fewer samples left in the middle of a round, others are drawn: a program that sees none loses what it likes."""
+"""With fewer samples left in the middle of a round, others are drawn: without samples, a program cannot tell how much it cuts off."""
 DRAWN = 4
 TAIL, AGAIN, MARGIN = 400, 3, 0.1
 """A program sees TAIL samples, the farthest ones on the way to a corner, and others that it loses in AGAIN rounds. The hinge loss begins
@@ -35,9 +35,9 @@ MOST_POINTS = 64
 MOST_FACES = 16
 """A pair gets at most this many faces in one round."""
 TRIED = 8
-"""So many faces of the polytope are tried, whether moving them in loses less than a new face does."""
+"""At most this many faces of the polytope are tried: moving one of them in may lose less than a new face does."""
 BETTER = 2.0
-"""A new face has to be so many times as good as one that is moved in, because every face makes later cells dearer."""
+"""A new face has to be this many times as good as one that is moved in, because every face makes later cells more expensive."""
 CLEAR, CLEARER = 0.005, 0.2
 """A face is moved away from what it cuts off, by CLEAR standard deviations and by CLEARER of the depth of what it cuts off."""
 LEAST_ROOM = 1e-6
@@ -48,12 +48,12 @@ BARELY = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """Says what has become of a polytope.
+    """Holds the result of cutting points off a polytope.
 
     Attributes:
         polytope: the polytope with faces that cut points off, itself where no face loses little enough; None where nothing can be cut off
             without a point to keep.
-        made: for each corner, what its faces came to.
+        made: for each corner, the result of its faces.
     """
 
     polytope: Polytope | None
@@ -62,12 +62,12 @@ class Cut:
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """Says what the faces of one corner came to.
+    """Holds the result of the faces of one corner.
 
     Attributes:
         faces: how many were added or moved in.
         lost: the share of the polytope that they cut off.
-        s: (n,) the point that the face was made for that lost most; None without a face.
+        s: (n,) the point for which the face that lost most was made; None without a face.
     """
 
     faces: int = 0
@@ -127,7 +127,7 @@ def cut(
             rated = [(face, float((samples @ face.row > face.offset).mean())) for face in faces]
             cheap = [(face, loss) for face, loss in rated if loss <= left_to_lose]
             if not cheap:
-                # Others of the pair's points may go all the same; these are left to the next round.
+                # Others of the pair's points may be cut off anyway; these are left to the next round.
                 blocked = blocked or not faces
                 points = points[~(points[:, None] == near).all(axis=2).any(axis=1)]
                 continue
@@ -210,7 +210,7 @@ def _face(beyond: Array, keep: Array, samples: Array, scale: Array) -> tuple[Arr
     """Returns a face (k,), offset in the pair's joints, |c| = 1; None where no face has both on their sides, with room."""
     middle = keep[0]
     far, near, rest = ((points - middle) / scale for points in (beyond, keep, samples))
-    # Only samples on the way to what is cut off can be lost; those that are lost all the same join them.
+    # Only samples on the way to what is cut off can be lost; those that are lost anyway join them.
     mean = rest.mean(axis=0)
     way = np.linalg.solve(np.cov(rest.T).reshape(len(scale), -1) + 1e-9 * np.eye(len(scale)), far.mean(axis=0) - mean)
     chosen = np.argsort(-(rest @ way), kind="stable")[:TAIL]

@@ -1,7 +1,7 @@
 """Targeted contraction adds faces that cut away where the program (11) of a pair fails, and little else.
 
-A pair that is not certifiable comes with the means of its dual point's pseudo-moments, where no plane of this degree works. It also
-comes with the derivatives of the program's optimum with respect to the joints' ranges.
+The result for a pair that is not certifiable has the means of its dual point's pseudo-moments: points where no certificate of this degree
+exists. It also has the derivatives of the program's optimum with respect to the joints' ranges.
 
 The polytope is measured by an ellipsoid about its analytic centre. Distances in it are taken from the hull of the centre and the points
 to keep.

@@ -1,7 +1,7 @@
 """A region is grown by a pure state machine: propose, contract until certified, push the faces out again, alternate (11) with (12).
 
 It follows appendix B.4 and Algorithm 1 of C-IRIS. :func:`begin` and :func:`advance` decide what to do next and compute nothing heavy.
-Whoever drives them (the service's coordinator, or :mod:`certifier.jobs.local`) carries out the action and reports back.
+The caller (the service's coordinator, or :mod:`certifier.jobs.local`) carries out the action and reports back.
 
 This module says what follows what. Its neighbours know how each phase goes.
 """

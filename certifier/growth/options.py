@@ -20,7 +20,7 @@ With up to 4 joints growing then takes seconds, and with up to 6 a minute. With 
 takes a minute.
 """
 NEAR = (1.0, 0.6, 0.3)
-"""For each contraction in turn: a pair's failure calls for a shorter range, and not for a face, when it is nearer than this."""
+"""For each contraction in turn: failures closer than this shrink a joint's range; others get a cutting face."""
 
 
 WHOLE_NUMBERS = {
@@ -51,10 +51,10 @@ class GrowthOptions:
         contraction: ``whole`` keeps the proposal and certifies it cell by cell; ``targeted`` and ``uniform`` shrink it until every pair
             has one plane that moves with the joints (11). None is ``whole`` where IRIS makes the proposal. Where a box, a polytope or the
             joint limits are the proposal, None is ``targeted``: much may collide in them, or much more be free.
-        cells: so many cells of each pair are looked at. Of ``grow`` it is in every stage, what is open then is cut off, and None is
-            MOST_CELLS; of ``certify``, 1 and None give the program (11) of the papers.
-        stages: of ``whole``, growth ends after so many stages, each of which comes to a larger region than the one before; None: when a
-            stage gains little.
+        cells: number of cells to look at for each pair. For ``grow`` it holds in every stage, undecided cells are then cut off, and None
+            is MOST_CELLS. For ``certify``, 1 and None give the program (11) of the papers.
+        stages: for ``whole``, growth ends after this many stages, each of which results in a larger region than the one before; None: when
+            a stage gains little.
         contractions: how many targeted contractions of the proposal are tried; each is given up when it is smaller than the best so far.
             None, for this and for ``pushes`` and ``max_rounds``, takes the default that pays: see EFFORT.
         bisection_steps: certifications spent on uniform contraction after the two ends are known.

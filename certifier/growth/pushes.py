@@ -18,7 +18,7 @@ PUSH, SMALLEST_PUSH = 1.5, 0.1
 
 
 def next_push(scene: Scene, state: GrowthState, start: Start, reach: float = PUSH) -> Transition | None:
-    """Begins the next push of the best region that may come to more; returns None when there were enough.
+    """Begins the next push of the best region that may result in a larger one; returns None when there were enough.
 
     Args:
         reach: factor by which the faces move out; smaller factors follow where it promises nothing.
@@ -35,10 +35,10 @@ def next_push(scene: Scene, state: GrowthState, start: Start, reach: float = PUS
 
 
 def further(state: GrowthState) -> float:
-    """Returns how far to push after a push that came through: PUSH, or twice as far as the last time when nothing had to be cut."""
+    """Returns how far to push after a push that succeeded: PUSH, or twice as far as the last time when nothing had to be cut."""
     return PUSH if state.cuts.attempts else 1 + 2 * (state.reach - 1)
 
 
 def less(reach: float) -> float:
-    """Returns how far to push after a push as far as ``reach`` came to nothing."""
+    """Returns how far to push after a push as far as ``reach`` failed."""
     return 1 + (reach - 1) / 2

@@ -9,7 +9,7 @@ from certifier.seeding.proposal import NO_ROOM, TOO_LONG, mend
 DEADLINE = "the deadline was reached"
 """The reason of a growth that had no time left."""
 THIN = "what is left around the seed is too thin to go on with"
-"""The reason of a growth that has come to a polytope without an interior that doubles can tell. Users have not given that polytope."""
+"""The reason of a growth that reached a polytope whose interior is too small for doubles. Users did not give that polytope."""
 
 
 def ended_by(error: CirisError, hindrance: str) -> CirisError:

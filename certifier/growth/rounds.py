@@ -23,7 +23,7 @@ def next_round(scene: Scene, state: GrowthState, start: Start) -> Transition:
 
 
 def certify_step(scene: Scene, state: GrowthState, stepped: Stepped) -> Transition:
-    """Asks to certify the polytope that a step has come to."""
+    """Asks to certify the polytope that a step resulted in."""
     assert state.best is not None
     assert state.start is not None, "a step follows a region, which comes from a proposal"
     C, d = cleaned(stepped.polytope.C, stepped.polytope.d, scene.s_lower, scene.s_upper, state.start.keep)

@@ -25,7 +25,7 @@ class Start:
         seed: (n,) the seed in s.
         keep: (k, n) points that stay inside, the first of them well inside.
         given: the proposal is a box or a polytope of the user's; beyond it nothing is known.
-        hindrance: why, should no region come of it; "" where nothing is known.
+        hindrance: the reason to give if no region can be grown; "" where none is known.
     """
 
     rows: Polytope
@@ -105,22 +105,22 @@ class Round:
 
 @dataclass(frozen=True, eq=False)
 class Whole:
-    """Says how far certifying the whole proposal has come.
+    """Holds the progress of certifying the whole proposal.
 
     Attributes:
-        reach: the faces of the region before were moved out to so many times their distance from the seed, or those of the proposal in the
-            first stage, where it is 1 at most (certifier.growth.whole).
+        reach: the faces of the region before were moved out to this many times their distance from the seed. In the first stage these are
+            the proposal's faces, and reach is at most 1 (certifier.growth.whole).
         kept: the share of the proposal that the best region kept when this stage began.
-        polytope: what is left of it; faces are added before the joint limits, which are its last 2n rows, and none is dropped.
+        polytope: what the cuts so far keep; faces are added before the joint limits, which are its last 2n rows, and none is dropped.
         mid, half, Y_lower, Y_upper: of the :class:`ProvedBox` that is the root cell of all partitions of this stage.
         holds: pair index -> iteration whose proof, on a larger polytope, holds on the present one.
         begun: the iteration with which this stage began; None before it.
         open_cells: pair index -> how many cells of its partition are open.
         spent: pair index -> how many cells were looked at.
-        cuts: pair index -> in how many rounds something was cut off for it; pairs for which nothing was are left out.
+        cuts: pair index -> in how many rounds something was cut off for it; pairs without a cut are left out.
         since, passed: the shares of the time until the deadline that had passed when this stage began, and now; 0 without a deadline.
         stage: the number of the stage, from 1 on.
-        together: pair index -> the other pairs that are certified with it as one.
+        together: pair index -> the other pairs that share its certificate.
     """
 
     reach: float

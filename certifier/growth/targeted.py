@@ -30,7 +30,7 @@ FAR = 8.0
 
 
 def next_contraction(scene: Scene, state: GrowthState, start: Start) -> Transition | None:
-    """Begins the next contraction of the proposal that may come to more than the best region; returns None when there were enough."""
+    """Begins the next contraction of the proposal that may result in a larger region than the best; returns None when there were enough."""
     starts = contraction_starts(scene, state, start)
     for tried in range(state.contractions, len(starts)):
         reach, near = starts[tried]
@@ -67,7 +67,7 @@ def pushed(scene: Scene, polytope: Polytope, center: Array, reach: float, within
 
 
 def trim(scene: Scene, state: GrowthState, start: Start, label: str, polytope: Polytope) -> Transition:
-    """Asks to certify what the cuts have come to; a pair certified on a larger polytope is certified on this one."""
+    """Asks to certify the polytope that the cuts result in; a pair certified on a larger polytope is certified on this one."""
     cuts, center = state.cuts, measure(polytope, start.keep[0]).center
     hard = sorted(index for index in cuts.attempts if index not in cuts.holds)
     return certify(scene, state, label, polytope, center, reuse=dict(cuts.holds), hard=hard, failures=FAILURES)

@@ -1,12 +1,12 @@
 """The whole proposal is certified cell by cell, and what cannot be is cut off by faces that lose least (certifier.growth.cutting).
 
-One round looks at so many cells of every pair that is not certified yet. Then faces are added where bodies touch, or come too close.
-What is proved stays proved, because the polytope only shrinks. The rounds go on until every pair is certified. When the effort is spent,
-all cells that are open still are cut off as well.
+One round looks at a fixed number of cells of every pair that is not certified yet. Then faces are added where bodies touch, or come too
+close. What is proved stays proved, because the polytope only shrinks. The rounds go on until every pair is certified. When the effort is
+spent, all cells that are still open are cut off as well.
 
 The first region comes from a smaller copy of the proposal about the seed, so there is a certified region early. In every further stage
-the faces of the region move out, as far as the proposal, and what is between is certified in the same way. So faces that were found where
-cells are cheap show where the next ones have to be, which takes a fraction of the cells that the proposal itself would take.
+the faces of the region move out, as far as the proposal, and what is between is certified in the same way. The faces that were found
+where cells are cheap show where the next faces have to be. This takes a fraction of the cells that the proposal itself would take.
 """
 
 from __future__ import annotations
@@ -37,29 +37,30 @@ SOON = 0.15
 GAIN = 0.02
 """Growth ends with a stage that gains less than this share of the proposal."""
 SLICE = 100
-"""So many cells of every part of a pair are looked at in one round."""
+"""Number of cells to look at in one round, for every part of a pair."""
 PARTS, PIECES = 3, 12
-"""The open cells of a pair are dealt to PARTS parts, or to more, so that a round has PIECES parts for the solvers to share. A round counts
-as so many slices of its effort even where it has fewer parts. When a stage is late, one part will do, so that rounds are short."""
+"""The open cells of a pair are divided among at least PARTS parts, so that a round has PIECES parts for the solvers to share. A round
+counts as at least PARTS slices of the pair's effort, even where it has fewer parts. When a stage is late, one part is enough, so that
+rounds are short."""
 VERIFIED = 5 * SLICE
-"""When no cell is open, what so many cells came to is a part to verify."""
+"""A pair without open cells is verified in parts: one for every this many cells that were looked at."""
 HARD = 6 * SLICE
-"""When so many cells of a pair were looked at, its open cells are cut off where the bodies are near, not only contacts. Where faces part
-volumes that fewer joints move (certifier.partition.search), cells are cut off from the first round on."""
+"""After this many cells of a pair, its open cells are cut off where the bodies are near, not only contacts. Where faces separate volumes
+that fewer joints move (certifier.partition.search), cells are cut off from the first round on."""
 LOSS, PATIENCE = 0.002, 36 * SLICE
-"""While open cells of a pair are cut off, its faces lose this share of the polytope in a round at most, and twice as much after PATIENCE
-cells of a hard pair."""
+"""While open cells of a pair are cut off, its faces lose at most the share LOSS of the polytope in a round. The share doubles after every
+PATIENCE cells of a hard pair."""
 FAST_LOSS = 0.05
-"""They lose this share at most before that, in the first stage, and when the pair's effort is spent. Then it is twice as much after PIECES
-slices more."""
+"""They lose at most this share before that, in the first stage, and when the pair's effort is spent. From then on, the share doubles after
+every PIECES slices."""
 CONTACT_LOSS = 0.01
-"""For contacts, which have to go sooner or later, they lose this share at least where that is needed."""
+"""Contacts have to be cut off sooner or later. For them, faces may always lose this share where that is needed."""
 ENDING = 60 * SLICE
-"""When the effort is spent, open cells are cut off where coarse volumes touch; after so many cells more, wherever they are."""
+"""When the effort is spent, open cells are cut off where coarse volumes touch; after this many more cells, wherever they are."""
 LATE = 0.5
-"""When this share of a stage's time until the deadline has passed, its effort counts as spent, so that a region comes of what was done."""
+"""When this share of a stage's time until the deadline has passed, its effort counts as spent, so that there is still time for a region."""
 LATE_LOSS, LATER = 0.01, 0.05
-"""From then on faces for a pair lose LATE_LOSS of the polytope at most in a round, and twice as much when LATER more of the time has
+"""From then on, faces for a pair lose at most LATE_LOSS of the polytope in a round. The share doubles whenever LATER more of the time has
 passed, so that the rounds end before the deadline, however long they take."""
 LATEST = 0.65
 """When this share has passed, all open cells are cut off, not only those where coarse volumes touch."""
@@ -70,7 +71,7 @@ EARLY_EFFORT = 24 * SLICE
 
 
 def begin_whole(scene: Scene, state: GrowthState, start: Start) -> Transition:
-    """Asks to certify a smaller copy of the proposal; all of it where the copy has not all points to keep inside."""
+    """Asks to certify a smaller copy of the proposal, or all of it where the copy does not contain all points to keep."""
     copy = _copy(scene, start, FIRST)
     if (start.keep @ copy.C.T < copy.d).all():
         return begin_stage(scene, state, FIRST, copy)
@@ -92,7 +93,7 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
 
 
 def begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float = 0.0, passed: float = 0.0) -> Transition:
-    """Asks to certify all pairs on a polytope; what was proved on the one of the stage before says nothing about it."""
+    """Asks to certify all pairs on a polytope; what was proved in the stage before does not carry over to it."""
     box = ProvedBox.of_program(scene, polytope)
     stage = 1 if state.whole is None else state.whole.stage + 1
     joined = _together(scene, state)
@@ -121,7 +122,7 @@ def keeps_more(scene: Scene, start: Start, polytope: Polytope, other: Polytope) 
 
 
 def after_cells(scene: Scene, state: GrowthState, start: Start, report: Outcomes) -> Transition:
-    """Cuts off what cannot be certified, and goes on with what is open."""
+    """Cuts off what cannot be certified, and goes on with the open cells."""
     whole, action = state.whole, report.action
     assert whole is not None
     holds = whole.holds | {i: action.iteration for i, outcome in report.outcomes.items() if outcome is Outcome.CERTIFIED}
@@ -182,7 +183,7 @@ def _most_loss(state: GrowthState, whole: Whole, pair: int, hard: int) -> float:
     """Returns which share of the polytope the faces for a pair may lose in this round, for points that are no contacts.
 
     Args:
-        hard: after so many cells open cells of the pair are cut off.
+        hard: open cells of the pair are cut off after this many cells.
     """
     if _gone(whole) >= LATE:
         return float(min(LATE_LOSS * 2.0 ** ((_gone(whole) - LATE) / LATER), 1.0))
@@ -206,7 +207,7 @@ def _gone(whole: Whole) -> float:
 
 
 def _parts(pairs: Sequence[int], whole: Whole) -> dict[int, int]:
-    """Returns how many parts each pair is dealt to, where there are several: its open cells, or those to verify when none is open."""
+    """Returns how many parts each pair is divided into, where there are several: its open cells, or those to verify when none is open."""
     known = [i for i in pairs if i in whole.open_cells]
     each = max(1 if _gone(whole) >= LATE else PARTS, math.ceil(PIECES / max(len(known), 1)))
     parts = {i: min(each, whole.open_cells[i] or whole.spent[i] // VERIFIED) for i in known}
@@ -223,7 +224,7 @@ def _ended(state: GrowthState, report: Outcomes, reason: str) -> Transition:
 
 
 def _together(scene: Scene, state: GrowthState) -> Together:
-    """Returns which pairs are certified as one, the same in all stages of a growth; none where a region is certified again."""
+    """Returns which pairs are grouped to share one certificate: the same in all stages; none where a region is certified again."""
     if state.whole is not None:
         return state.whole.together
     if state.start is None or state.options.kind == "recertify":

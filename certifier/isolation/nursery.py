@@ -81,7 +81,7 @@ def _call(module: ModuleType, connection: Connection, request: bytes) -> bytes:
     """Forks a child for the request, and returns how the child ended and its answer.
 
     Raises:
-        EOFError: whoever asked is gone, and so is the child.
+        EOFError: the asking process is gone, and so is the child.
     """
     reading, writing = os.pipe()
     nursery = os.getpid()
@@ -93,7 +93,7 @@ def _call(module: ModuleType, connection: Connection, request: bytes) -> bytes:
     os.close(writing)
     answer, gone = bytearray(), False
     while len(answer) <= _MOST_WRITTEN:
-        gone = connection in wait([reading, connection])  # whoever asked says nothing before there is an answer
+        gone = connection in wait([reading, connection])  # the asking process sends nothing before there is an answer
         chunk = b"" if gone else os.read(reading, _CHUNK)
         if not chunk:
             break

@@ -30,17 +30,17 @@ from certifier.verify import uncovered
 from certifier.verify.region import verify_region
 
 SAMPLES, DESCENTS, STEPS = 4000, 24, 60
-"""So many configurations are sampled, from so many of them the distance is followed downwards, in so many steps at most."""
+"""SAMPLES configurations are sampled. From at most DESCENTS of them, the distance is followed downwards, in at most STEPS steps."""
 EACH = 3
-"""No more than so many descents begin with one pair."""
+"""At most this many descents begin with one pair."""
 DIFFERENCE, INWARDS = 1e-6, 1e-9
-"""Derivatives are differences over so much of s. What a descent ends at is taken inwards by this part of its way."""
+"""Derivatives are differences over DIFFERENCE of s. The end of a descent is moved back inwards by the part INWARDS of its way."""
 SHARE, METRES = 0.1, 1e-4
 """A clearance is proved to this part of itself, or to this many metres, whichever is more."""
 TRIES = 12
-"""A region is certified again at most so often,"""
+"""A region is certified again at most this many times."""
 CELLS, FINER = 50_000, 16.0
-"""with at most so many cells of each pair, which are cut finer than those of a growth by a factor."""
+"""Each time, at most CELLS cells of each pair are looked at. They are cut finer than those of a growth, by the factor FINER."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""A former region is one of the scene before it changed; here it is read, and the manifest of what became of it is written."""
+"""A former region is one of the scene before it changed; it is read here, and what a new region's manifest says of it is written."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Former:
         Args:
             cut: the pairs of the new scene for which something was cut off.
             proposal: the former region's polytope, sampled.
-            region: what is left of it.
+            region: the part of it that the new region keeps.
         """
         carried = self.carried.proofs.keys()
         return {

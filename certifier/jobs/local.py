@@ -42,7 +42,7 @@ def _silent(kind: str, data: dict[str, Any]) -> None:
 
 @dataclass
 class _Run:
-    """Keeps what a job has come to so far.
+    """Holds the progress of a job.
 
     Attributes:
         results: iteration -> pair index -> results of its parts.
@@ -185,14 +185,14 @@ def grow(
     processes: int = 1,
     deliver: Deliver | None = None,
 ) -> Region:
-    """Grows a certified region in this process, or with so many children of it; the region is the same.
+    """Grows a certified region in this process, or with ``processes`` children of it; the region is the same.
 
     Args:
-        tell: hears of what happens.
-        deadline_s: after so many seconds growth ends with the best region so far, as soon as the action under way is carried out; None for
-            no deadline.
-        deliver: takes regions that come before the last one, which is returned. Not all of them: verifying their proofs takes a fifth of
-            the time at most (``REST``). None for the last one alone.
+        tell: receives reports of what happens.
+        deadline_s: after this many seconds growth ends with the best region so far, as soon as the action under way is carried out; None
+            for no deadline.
+        deliver: receives regions before the last one, which is returned. It does not get all of them: verifying their proofs takes at most
+            a fifth of the time (``REST``). None for the last one alone.
 
     Raises:
         CirisError: no region could be certified; the code is ``not_grown`` or that of the seeding's error.
@@ -209,7 +209,7 @@ def recertify(
     processes: int = 1,
     random_seed: int = 0,
 ) -> Region:
-    """Makes a region of a scene from one of the scene before it changed, in this process or with so many children of it.
+    """Makes a region of a scene from one of the scene before it changed, in this process or with ``processes`` children of it.
 
     Args:
         data: the proof file of the region before.

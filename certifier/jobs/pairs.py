@@ -1,6 +1,6 @@
 """The pairs of a certification are certified by the program (11) on all of the polytope, or cell by cell.
 
-The local driver and the service's workers both ask here, so they come to the same results.
+The local driver and the service's workers both use this module, so their results are the same.
 """
 
 from __future__ import annotations

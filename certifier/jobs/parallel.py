@@ -20,7 +20,7 @@ def side_by_side(certify: CertifyPart, asked: Sequence[Asked], processes: int, k
     """Yields the results of parts of pairs in their order, which do not depend on the number of processes.
 
     Args:
-        processes: so many children work; 1 for this process alone.
+        processes: number of child processes; 1 for this process alone.
         kind: returns the same for pairs, by their indices, that are alike. One child takes the same part of all of them, because what it
             finds for one helps with the next.
 

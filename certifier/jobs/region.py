@@ -57,7 +57,7 @@ def certified_region(
         provenance: options, versions, growth curve, and the seconds of the whole job, of the seeding and of all pairs.
         proposal: what the region was grown from; None for a given polytope.
         processes: how many processes verify.
-        progress: is told how far they have come.
+        progress: receives how many of how many parts they have checked.
 
     Raises:
         ProofError: the proof does not hold; nothing may be served as certified then.
@@ -174,7 +174,7 @@ def _through(scene: Scene, polytope: Polytope, seed: Array) -> list[tuple[float,
 
 
 def growth_point(iteration: int, seconds: float, ellipsoid_volume: float | None, share: float | None) -> dict[str, Any]:
-    """Returns a point of the manifest's growth curve: an iteration that came to a region ``seconds`` after the job began."""
+    """Returns a point of the manifest's growth curve: an iteration that resulted in a region ``seconds`` after the job began."""
     return {"iteration": iteration, "seconds": seconds, "ellipsoid_volume": ellipsoid_volume, "share": share}
 
 

@@ -1,4 +1,4 @@
-"""A verdict says what the certification of a given polytope has come to."""
+"""A verdict is the result of certifying a given polytope."""
 
 from __future__ import annotations
 

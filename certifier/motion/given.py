@@ -107,7 +107,7 @@ def _numbers(scene: Scene, waypoints: Any, field: str) -> Array:
 
 
 def _check_scene(scene: Scene, waypoints: int, field: str) -> None:
-    """Checks that the scene has pairs, and that a proof of them holds a motion of so many waypoints, or of one less pieces."""
+    """Checks that the scene has pairs, and that a proof of them has room for this many waypoints, or for ``waypoints - 1`` pieces."""
     if not scene.pairs:
         hint = "add what moves against something else"
         raise RegionError("motion_shape", "the scene has no pair of bodies to keep apart", field="scene", hint=hint)

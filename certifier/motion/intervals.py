@@ -185,7 +185,7 @@ def divide(
 
     Returns:
         how it ends; the piece where it does; the beginning and the end of the interval there; how far the bodies are apart beyond
-        ``reach`` at its beginning or, for a contact, where they touch; and what is left of rho.
+        ``reach`` at its beginning or, for a contact, where they touch; and rho at the end.
     """
     n, V, W = controls.shape[2], len(a.vertices), len(b.vertices)
     # The vertices of the interval's beginning come first, then those of its end.

@@ -18,7 +18,7 @@ from certifier.proof import limits
 from certifier.proof.motion import Motion, MotionProof, Space
 
 FIRST = 1 << 10
-"""There is room for so many intervals of a pair at first."""
+"""At first there is room for at most this many intervals of a pair."""
 OUTCOMES = {CONTACT: Outcome.REFUTED, MANY: Outcome.INCONCLUSIVE}
 ROUNDED = 2.0**-41
 """The planes leave this part of the bodies' sizes, for every joint and two more, for what the verifier rounds."""
@@ -56,7 +56,7 @@ class Stop(Approach):
 
 @dataclass(frozen=True)
 class Found:
-    """Holds what a search has come to.
+    """Holds the result of a search.
 
     Attributes:
         proof: of the motion, not yet verified, or of its beginning where there is a stop; None where a pair touches at once.
@@ -89,7 +89,7 @@ def search(scene: Scene, motion: Motion, tube: bool = False, padding: float = 0.
 
 
 class _Part(NamedTuple):
-    """What a pair has come to: how :func:`divide` ends, and its ends, normals and counts of intervals."""
+    """Holds the result for a pair: how :func:`divide` ends, and its ends, normals and counts of intervals."""
 
     how: int
     piece: int
@@ -119,7 +119,7 @@ class _Search:
         self._frames: dict[tuple[str, str], str] = {}
 
     def run(self, kept: float, rho: float = 0.0, shrinks: bool = True) -> Found:
-        """Returns what the search comes to.
+        """Returns the result of the search.
 
         Args:
             kept: how far apart the padded bodies have to be, metres.

@@ -3,8 +3,8 @@
 What was found                                       -> the outcome and what comes with it
 centre or a sample in contact, verified              -> refuted, with the configuration
 program (11) feasible, proof verified exactly        -> certified, with the proof
-program (11) infeasible, dual proof verified         -> not_certifiable, with the proof and the points where none of this degree works
-planes at rest infeasible, (11) too dear             -> inconclusive, with those points all the same
+program (11) infeasible, dual proof verified         -> not_certifiable, with the proof and points that have no certificate of this degree
+planes at rest infeasible, (11) too expensive        -> inconclusive, with those points as well
 anything else                                        -> inconclusive, with the reason
 """
 

@@ -3,7 +3,7 @@
 The solver ends with sum_r A_r'x_r = lam a and lam < 0. Here a is a multiple of sum_r A_r'x_w, and x_w is the centre, an interior
 point of the dual cone. So x_r + mu x_w with mu > 0 is in the interior too, and its sum vanishes to rounding.
 
-What is left of the sum is made to vanish by changing a few moments. Pivoted QR factorisations choose equations that are independent
+Changing a few moments makes the rest of the sum vanish. Pivoted QR factorisations choose equations that are independent
 and moments that meet them well.
 """
 

@@ -15,7 +15,8 @@ from certifier.pair.program import Sides
 FACES_AT_A_TIME = 16
 """A polytope with many faces is first replaced by its box; then the dual point asks for faces, and this many are added at a time."""
 DEAR_JOINTS = 10.0
-"""Few faces that couple the path's joints with others are tried all at once, unless the others make the program dearer by this factor."""
+"""Few faces that couple the path's joints with others are tried all at once, unless the others make the program take this many times as
+long."""
 
 
 class FaceChoice:
@@ -38,7 +39,7 @@ class FaceChoice:
 
         They are P's faces in the joints that the plane moves with, and the box's faces where P's may not bound those joints.
         Where P has many such faces, or the box comes first, the box's faces are used alone, unless ``every_face`` is set.
-        Where P has few faces and some couple those joints with others, all of P's faces are used, unless the other joints are dear.
+        Where P has few faces and some couple those joints with others, all of P's faces are used, unless the other joints are expensive.
         """
         (m, n), joints = self._faces.C.shape, list(frame.joints)
         box = [(m + n * (sign > 0) + i, i, sign) for sign in (-1, 1) for i in joints]

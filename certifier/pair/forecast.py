@@ -36,7 +36,7 @@ class PairCost:
         N_a, N_b: dimensions of the polynomial spaces (B.2).
         rationals: number of vertices of both bodies together.
         seconds: time on one thread of a 2.5 GHz core, roughly.
-        memory_bytes: size of the solver's factors and tables, for whatever may be tried.
+        memory_bytes: size of the solver's factors and tables; enough for everything that may be tried.
     """
 
     a: str

@@ -20,7 +20,7 @@ class Weakness:
         points: (w, n) configurations in s near which no plane of those tried works, or the one that is in contact.
         pull: (n,) how much it would help to shorten each joint's range; only the proportions matter. 0 where the bodies are in contact.
         ranges_alone: only planes at rest were tried; for them nothing of the polytope counts but the joints' ranges.
-        contacts: at so many of the first points the bodies touch, as far as a search over partitions knows.
+        contacts: number of the first points at which the bodies touch, as far as a search over partitions knows.
         joints: position indices of the joints that matter at the points after these; empty for those between the bodies.
     """
 
@@ -78,7 +78,7 @@ class PairResult:
             program's contacts and a DualProof when not certifiable.
         subtrees: what a search over partitions has left of the cells that it was given, when it has not certified the pair
             (:mod:`certifier.partition.subtrees`). It is no proof of anything. Later searches go on with it.
-        outline: says which cells these are and what became of each, for people (certifier.proof.outline).
+        outline: shows people these cells and the state of each (certifier.proof.outline).
         open_cells: how many cells of these are open.
         weakness: where the certification fails, when that is known.
         error: the CirisError document of an ``error``.

@@ -15,7 +15,7 @@ from certifier.polytopes.proved import ProvedBox
 from certifier.proof.ground import Ground
 
 CHAINS, EACH = 100, 20
-"""So many chains give so many samples each."""
+"""CHAINS chains give EACH samples each."""
 
 
 class Inside(NamedTuple):

@@ -15,9 +15,9 @@ from numba import njit
 from certifier.model import Array
 
 BLOCK = 2
-"""Control values are computed in blocks over so many coordinates, which fill the registers."""
+"""Control values are computed in blocks over this many coordinates, which fill the registers."""
 BATCH = 8
-"""The polynomials of so many vertices are computed side by side."""
+"""The polynomials of this many vertices are computed side by side."""
 LARGE = 1e300
 """All control values are less than this."""
 

@@ -20,24 +20,25 @@ from certifier.partition.tree import Streams, joined
 CHORDS = 40
 CORNERS = 64
 MORE = 400
-"""So many configurations may join the first ones of a cell."""
+"""At most this many configurations may join the first ones of a cell."""
 CALM = 0.3
-"""So much less weight is on the slopes of a plane than on the rest: it turns less, and its normal's length has a tight affine bound."""
+"""The slopes of a plane weigh less than the rest by this factor: it turns less, and its normal's length has a tight affine bound."""
 LEAST, ENOUGH = 3e-4, 0.8
 """A plane's margin is at least LEAST, relative to the bodies' extent, and at least ENOUGH of the widest one."""
 SAFE, ROUNDING = 1e-9, 1e-12
 """The bound of a normal's length is larger than it by the first part, and by the second part of the terms that it is made of."""
 LOOKS, ROUNDS = 20, 8
-"""So many planes are tried against configurations, and so many of those that hold there are tried to be proved, before a cell is cut."""
+"""Before a cell is cut, a proof is tried for at most ROUNDS planes. Each of them is found by trying at most LOOKS planes against
+configurations."""
 PIECES, MANY_PIECES = 25, 250
 """A vertex may take this many pieces: PIECES with up to 5 joints between the bodies, MANY_PIECES with more."""
 FEW_JOINTS = 5
 DESCENT = 8
-"""In so many steps a vertex is moved to where it is farther on the wrong side."""
+"""Number of steps in which a vertex is moved to where it is farther on the wrong side."""
 CLOSE = 0.05
-"""From bodies that come as close as this, relative to their extent, a contact is looked for."""
+"""Bodies that come as close as this, relative to their extent, start a search for a contact."""
 STEPS = 6
-"""A contact is looked for in so many steps."""
+"""The search for a contact takes this many steps."""
 TOUCH = 3e-4
 """Bodies that are nearer than this, relative to their extent, are too close for a plane."""
 
@@ -184,7 +185,7 @@ class Bodies:
         return self.approached(cell, configurations[place], STEPS)
 
     def approached(self, cell: Cell, s: Array, steps: int) -> tuple[Array, float]:
-        """Returns where the bodies are nearest in the cell, so many steps from a configuration on, and their gap in metres there."""
+        """Returns where the bodies are nearest in the cell, ``steps`` steps from a configuration on, and their gap in metres there."""
         s = s.copy()
         gap = approach(*self.hulls, np.array(self.joints), cell.half, cell.inside.C, cell.inside.d, s, steps, 0.0)
         return s, gap * self.extent

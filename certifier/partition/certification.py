@@ -4,7 +4,7 @@ What was found                                     -> the outcome and what comes
 every cell has a plane, or misses the polytope     -> certified, with the proof, which the verifier has checked
 a configuration in contact                         -> refuted, with the configuration and what is proved already
 a narrow cell in which no plane keeps them apart   -> too_close, with a configuration, their distance there, and what is proved already
-so many cells were looked at                       -> inconclusive, with what is proved already and where open cells are
+the limit of cells is reached                      -> inconclusive, with what is proved already and where open cells are
 
 Of a pair that was begun, a part that leaves no cell open is inconclusive as well, until the subtrees of all parts are put together.
 """
@@ -48,14 +48,14 @@ from certifier.verify.witness import check_witness
 GROUP_CELLS = 8
 """Volumes of several geometries are given up after this many cells."""
 NEAR_CONTACTS = 48
-"""So many configurations about a contact are looked at, at each of SCALES, to see how far it reaches."""
+"""To find how far a contact reaches, this many configurations about it are looked at, at each of SCALES."""
 SCALES = (0.5, 0.2, 0.07, 0.02)
 NEAR, POINTS_OF_A_CELL = 0.002, 8
 """Points of an open cell are named at which the bodies are as near as this, relative to their extent, and one at least."""
 AROUND = 0.1
 """Open cells of hard pairs are cut off where the bodies are nearer than this, relative to their extent."""
 LOOKS_AGAIN = 8
-"""So many looks for a contact follow the first one where cells stay open; one alone misses contacts in a small corner."""
+"""Where cells stay open, this many searches for a contact follow the first one; one search misses contacts in a small corner."""
 MOST_POINTS = 2000
 """A result names at most this many configurations."""
 
@@ -63,7 +63,8 @@ MOST_POINTS = 2000
 class CutOff(Enum):
     """Says of which open cells a result names points, because they will be cut off. Contacts are named in any case.
 
-    Where faces part volumes that fewer joints move, it is always those where these touch, so that they become enough, or all of them.
+    Where faces separate volumes that fewer joints move, points are always named: in cells where these volumes touch, or with ALL in all
+    cells. Once faces keep these volumes apart, no other ones are needed.
     """
 
     CONTACTS = "contacts"
@@ -84,7 +85,7 @@ class CellCertification:
         seed: seeds the samples.
         box: the root cell, proved around a polytope of which P is a part (:meth:`ProvedBox.on`); None for P's smallest box. What was begun
             must have had the same one.
-        together: pairs that are certified as one with others; None for none. What was begun must have had the same ones.
+        together: pairs that share one certificate with others; None for none. What was begun must have had the same ones.
         faces: faces will be added to the polytope where pairs are hard, and so their cells are cut in other ways.
         finer: as :class:`certifier.partition.area.Area` has it.
 
@@ -115,7 +116,7 @@ class CellCertification:
         """Certifies pair ``scene.pairs[index]``, alone or with others that the same proof covers.
 
         Args:
-            cells: end after so many cells.
+            cells: end after this many cells.
             cut_off: which points of open cells the result names, because they will be cut off.
             former: a proof about bodies that were much like these, whose cells and planes are tried first; None where there is none.
         """
@@ -127,7 +128,7 @@ class CellCertification:
     def go_on(
         self, index: int, cells: int, left: Sequence[bytes], part: int = 0, parts: int = 1, cut_off: CutOff = CutOff.CONTACTS
     ) -> PairResult:
-        """Goes on with the open cells of a pair that are dealt to one part.
+        """Goes on with the open cells of a pair that belong to one part.
 
         Args:
             cells, cut_off: as for :meth:`certify`.
@@ -148,7 +149,7 @@ class CellCertification:
         Args:
             rounds: the ``subtrees`` of all rounds, in order, each in the order of its parts.
             part: the number of this part, from 0; the first one returns the proof.
-            parts: the cells to verify are dealt to so many parts.
+            parts: the cells to verify are divided among this many parts.
         """
         start = time.perf_counter()
         # One process often verifies several parts of a pair, one after the other.

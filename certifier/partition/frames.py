@@ -13,9 +13,9 @@ from certifier.kinematics import Kinematics
 from certifier.model import Array, Joint, JointKind, Volume
 
 MOST_JOINTS = 6
-"""At most so many joints are between the frame and either volume, where that is possible: k joints make 4^k control values."""
+"""At most this many joints are between the frame and either volume, where that is possible: k joints make 4^k control values."""
 CONFIGURATIONS = 64
-"""How far volumes reach is seen at so many configurations of the root cell."""
+"""How far volumes reach is measured at this many configurations of the root cell."""
 
 
 def choose_frame(kinematics: Kinematics, volumes: tuple[Volume, Volume], lower: Array, upper: Array) -> tuple[str, list[int]]:

@@ -21,13 +21,13 @@ from certifier.proof import limits
 from certifier.proof.partition import Coarse
 
 APART, LOOKED = (0.99, 1.0), 500
-"""The fattest balls are apart at the first share of the configurations, the next ones at the second; so many are looked at. Of two chains
-all are apart at the first share."""
+"""The fattest balls are apart at the first share of LOOKED configurations, the next ones at the second share. Of two chains, all are apart
+at the first share."""
 
 LONG = 5
-"""Coarse volumes are tried where so many joints or more move one body against the other."""
+"""Coarse volumes are tried where at least this many joints move one body against the other."""
 MANY_JOINTS = 7
-"""Where so many joints or more move one body against the other, cells that are narrow in all of them are far too many."""
+"""Where at least this many joints move one body against the other, cells that are narrow in all of them are far too many."""
 
 Level = tuple[int, int]
 """The numbers of the volumes of a level: 0 for a volume itself, i for the coarse one with the number i - 1."""
@@ -53,9 +53,9 @@ class Levels(NamedTuple):
 def levels_of(area: Area, frame: str, volumes: tuple[Volume, Volume]) -> Levels:
     """Returns the levels of two volumes: of fewer than LONG joints, that of the volumes themselves alone.
 
-    Of two chains, there is one for every number of joints with which balls are apart at most configurations. So slim levels do not go when
-    faces make fatter ones come apart at all that are looked at. These still touch in corners, where faces that part them lose far more
-    (docs/trials.md).
+    Of two chains, there is one for every number of joints with which balls are apart at most configurations. So slim levels are kept
+    when faces make fatter ones come apart at all configurations that are looked at. The fatter ones still touch in corners, where faces to
+    separate them lose far more (docs/trials.md).
 
     Args:
         frame: any body; distances are computed in its frame.

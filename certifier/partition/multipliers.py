@@ -120,8 +120,8 @@ def multipliers(
         needed: (1 + m,) control values have to be larger than z times this.
         place: of the least control value of f, which is not as large as needed.
         z: (1 + m,) gets z_0 = 1 and the multipliers, in single precision; or z_0 = 0, where the faces alone do.
-        spot: (k + o + r,) gets the mean of the control points whose rows come to 0, when REFUTED: at it no face is negative, and f is not
-            positive, as far as control points tell. The own coordinates are as they are, the others in [-1, 1].
+        spot: (k + o + r,) when REFUTED, gets the weighted mean of the control points whose rows cancel: at it no face is negative, and f is
+            not positive, as far as control points tell. The own coordinates are as they are, the others in [-1, 1].
 
     Returns:
         PROVED, REFUTED or UNDECIDED.

@@ -1,6 +1,6 @@
-"""What faces will have to part is said here, before any cell is looked at: the volumes that growth keeps apart by faces.
+"""This module names what faces will have to separate, before any cell is looked at: the volumes that growth keeps apart by faces.
 
-A pair that few joints move takes few cells, whose planes come as near to contact as they have to. So only the others are looked at.
+A pair that few joints move takes few cells, whose planes come as near to contact as they have to. So only the other pairs are looked at.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def long_pairs(scene: Scene) -> list[int]:
 def parted(scene: Scene, polytope: Polytope, samples: Array, keep: Array) -> list[Bodies]:
     """Returns the volumes that faces keep apart, of every pair that LONG joints move or more.
 
-    Pairs that are certified as one have the same volumes, which are returned once.
+    Pairs that share one certificate have the same volumes, which are returned once.
 
     Args:
         polytope: joint limits included.

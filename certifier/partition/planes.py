@@ -20,7 +20,7 @@ from certifier.polytopes.simplex import WORK, corner
 WRONG = -1e-9
 """A vertex with a smaller value than this is on the wrong side."""
 STEEPEST = 5.0
-"""The bound of a normal's length counts as so many times the length at most."""
+"""The bound of a normal's length is taken to be at most this many times the length."""
 
 LENGTHS = INSIDE * 0.5 ** np.arange(SHORTEST)
 """A step of a descent goes one of these parts of the way."""
@@ -248,7 +248,7 @@ def look(
     Args:
         C, d: with rows of length 1.
         X: (capacity, n) its first N rows are points of the polytope; those at which planes failed are added.
-        rounds: give up after so many planes.
+        rounds: give up after this many planes.
         least, enough: as for :func:`separate`.
 
     Returns:

@@ -100,7 +100,7 @@ class _Piece(NamedTuple):
         least: (1 + m,) control values have to be larger than the multipliers times this.
         f: (4^k,) the least values of f in the outside coordinates.
         z: (1 + m,) the multipliers that are found.
-        near: (1 + n,) the multipliers that the last search came to, of the chosen faces.
+        near: (1 + n,) the multipliers that the last search found, of the chosen faces.
         chosen: numbers of the faces that were searched with.
         spot: (k + o + r,) where f is not positive, when a search refutes.
     """
@@ -361,7 +361,7 @@ def _write(z: Array, answer: Answer) -> bool:
 
 @njit(cache=True)
 def _hand_down(pieces: _Pieces, top: int, piece: _Piece, searched: int) -> None:
-    """Lets a piece's halves begin with the multipliers that the last search came to, where f has a share in them."""
+    """Lets a piece's halves begin with the multipliers that the last search found, where f has a share in them."""
     near = piece.near
     pieces.z[top, 0] = 1.0
     if searched and near[0] > SLIGHT * near[: 1 + searched].max():

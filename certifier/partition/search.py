@@ -44,27 +44,28 @@ NARROW_COARSE = np.radians(15.0)
 them any more."""
 NARROW_CUT = np.radians(7.0)
 """A cell is not cut for coarse volumes in a joint in which it turns less than this. A joint next to a volume may turn as far as it likes:
-the volume hardly moves for it, and cuts in others would go on for ever. There are two exceptions: volumes that faces part, and bodies of
-two chains, whose next level has more joints, and far too many cells (docs/trials.md)."""
+the volume hardly moves for it, and cuts in others would go on for ever. There are two exceptions: volumes that faces separate, and bodies
+of two chains, whose next level has more joints, and far too many cells (docs/trials.md)."""
 FEW_JOINTS, NARROWER = 6, np.radians(30.0)
 """Where more than FEW_JOINTS move one body against the other, a cell without a sample is cut for them until it turns less than NARROWER."""
 SAVED, MOST_PARTED, NARROW_PARTED = 2, 6, np.radians(3.5)
-"""Where faces are added, and MANY_JOINTS or more move one body against the other, they part the slimmest level that MOST_PARTED joints move
-or fewer. Of bodies that are no two chains, it has to save SAVED joints, and to have a coarse volume in the place of one of them only. Cells
-are cut for it until they turn less than NARROW_PARTED."""
+"""Where faces are added, and MANY_JOINTS or more move one body against the other, they separate the slimmest level that at most MOST_PARTED
+joints move. Of bodies that are no two chains, it has to save SAVED joints, and to have a coarse volume in the place of one of them only.
+Cells are cut for it until they turn less than NARROW_PARTED."""
 LOOKED_AT = 64
-"""Of two chains, a cell in which the volumes of a level touch is tried with the next level at once, but for volumes that faces part. Cuts
-for volumes that touch would only multiply the cells of the next level, which has to be cut in other joints. So many of the configurations
-of a cell, and fewer than twice as many, are looked at: cells are cut where volumes touch in a small corner only."""
+"""Of two chains, a cell in which the volumes of a level touch is tried with the next level at once, except for volumes that faces separate.
+Cuts for volumes that touch would only multiply the cells of the next level, which has to be cut in other joints. Of the configurations of a
+cell, this many, and fewer than twice as many, are looked at: cells are cut where volumes touch in a small corner only."""
 CUTS, LEAST_ROOM, MOST_ROOM = 3, 1e-5, 10.0
-"""For coarse volumes so many joints are compared to cut a cell in; less room for a plane than LEAST_ROOM counts as that, and so on."""
+"""For coarse volumes, a cell is cut in the best of CUTS joints. Room for a plane counts as LEAST_ROOM where it is less, and as MOST_ROOM
+where it is more."""
 BEYOND = 1e-9
 """A point may lie beyond a face by this."""
 FEW = 16
-"""So many points of a narrow cell are reported."""
+"""At most this many points of a narrow cell are reported."""
 SCOUTS, AMONG, SCOUT_STEPS = 64, 16, 12
-"""Before cells are looked at, contacts are looked for from SCOUTS of AMONG times as many points, where bodies are nearest, in so many
-steps. A contact that is not found costs many cells, because those about it cannot be proved."""
+"""Before cells are looked at, a search for contacts starts from SCOUTS points and takes SCOUT_STEPS steps. Of AMONG times as many points,
+these are the ones where bodies are nearest. A contact that is not found costs many cells, because those about it cannot be proved."""
 
 
 @dataclass
@@ -112,7 +113,7 @@ class Search:
         """Works on open cells, whose nodes it changes.
 
         Args:
-            most: end after so many cells.
+            most: end after this many cells.
         """
         area, report, ties = self._area, Report(), itertools.count()
         heap: list[tuple[float, int, Cell]] = []

@@ -11,7 +11,7 @@ from certifier.model import Array
 from certifier.partition.wolfe import unused, weigh
 
 FEW = 24
-"""So many configurations are looked at in each step for a plane, as long as one of them is on its wrong side."""
+"""Each step for a plane looks at no more than this many configurations, as long as one of them is on its wrong side."""
 
 
 class Support(NamedTuple):
@@ -131,15 +131,15 @@ def separate(
     Args:
         A, B: (v, 3, C), (w, 3, C) points at C configurations, of which the first N count.
         u: (k, C) the configurations.
-        ratio: (C,) the bodies keep so many times their radius away from the plane there.
+        ratio: (C,) the bodies keep this many times their radius away from the plane there.
         least: a plane with a smaller margin than this counts as none.
         enough: any plane with this share of the widest margin will do.
         z: (4 (k + 1),) the plane to begin with, of these points; it is replaced by the one found.
-        begun: the support of that plane; empty for none. Where nothing comes of it, the search begins anew.
+        begun: the support of that plane; empty for none. Where it leads to no result, the search begins anew.
 
     Returns:
-        (found, support): whether there is such a plane, 0 also where the steps did not suffice to find it. The support's points come to
-        the point that is nearest to 0, which is z.
+        (found, support): whether there is such a plane, 0 also where the steps did not suffice to find it. The weighted mean of the
+        support's points is the point nearest to 0, which is z.
     """
     k = len(u)
     D = 4 * (k + 1)

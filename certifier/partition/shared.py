@@ -16,7 +16,7 @@ from certifier.partition.bodies import Bodies, Separated, Undecided
 from certifier.partition.cell import Cell
 
 MOST = 2000
-"""What was found in so many cells is kept."""
+"""What was found is kept for at most this many cells."""
 
 
 @dataclass(eq=False)

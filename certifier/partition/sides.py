@@ -18,7 +18,7 @@ from certifier.partition.tree import Streams, joined
 PRECISION = 1e-7
 """Control values have to be this much larger than 0, relative to what they are made of. The verifier asks for less."""
 ROOM = 4096
-"""So many pieces are stored for a vertex at most, and ten times as many multipliers."""
+"""At most this many pieces are stored for a vertex, and ten times as many multipliers."""
 
 
 class Side:
@@ -78,7 +78,7 @@ class Side:
         Args:
             plane: (5, 1 + k), affine in s: the normal, the offset, and a bound of the normal's length.
             C, d: the polytope's faces that cut the cell; ``faces`` are their numbers.
-            most: so many pieces are tried for one vertex.
+            most: at most this many pieces are tried for one vertex.
 
         Returns:
             The streams of the proof; or a point (n,) of the polytope and the cell where a vertex is not on its side; or the joint along

@@ -68,7 +68,7 @@ def open_cells(files: Sequence[bytes]) -> list[OpenCell]:
 
 
 def dealt(cells: Sequence[T], part: int, parts: int) -> Sequence[T]:
-    """Returns the cells, or their nodes, that this part of a round is given, of so many parts."""
+    """Returns the cells, or their nodes, that this part of a round gets, when the round has ``parts`` parts."""
     return cells[part::parts]
 
 

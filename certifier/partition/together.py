@@ -1,4 +1,4 @@
-"""Pairs of the same two bodies are certified as one pair here, where the hulls of their geometries will do.
+"""Pairs of the same two bodies are grouped here to share one certificate, where the hulls of their geometries suffice.
 
 A link is often modelled by many balls. A plane that separates the hull of a link's balls from a board separates each of them, and one
 partition takes about as long as that of one ball. A hull may touch what none of its balls does, so hulls are taken only where they
@@ -17,16 +17,16 @@ from certifier.partition.hulls import gaps, hull
 from certifier.proof import limits
 
 THIN = 8
-"""One of so many samples of a proposal is enough to say which pairs are certified as one."""
+"""One in this many samples of a proposal is enough to say which pairs share one certificate."""
 LOST = 0.002
-"""Two hulls touch at this share of the samples at most, those left out at which two of the geometries themselves touch."""
+"""Two hulls touch at no more than this share of the samples. Samples at which two of the geometries themselves touch do not count."""
 
 Together = dict[int, tuple[int, ...]]
-"""Pair index -> the other pairs, by their indices, that are certified with it as one."""
+"""Pair index -> the other pairs, by their indices, that share its certificate."""
 
 
 def together(scene: Scene, samples: Array, keep: Array) -> Together:
-    """Returns which pairs are certified as one.
+    """Returns which pairs share one certificate.
 
     Args:
         samples: (S, n) configurations of the proposal.
@@ -70,7 +70,7 @@ def _clusters(scene: Scene) -> list[list[Geometry]]:
 def _joined(
     scene: Scene, first: list[Geometry], second: list[Geometry], numbers: dict[frozenset[str], int], samples: Array, keep: Array
 ) -> list[list[int]]:
-    """Returns the pairs, by their indices, of each two hulls of geometries of either list that will do; what is left stays by itself."""
+    """Returns the pairs, by their indices, of each two hulls of geometries of either list that suffice; other pairs stay alone."""
     if len(first) * len(second) == 1:
         return []
     asked = [numbers.get(frozenset((a.name, b.name))) for a in first for b in second]

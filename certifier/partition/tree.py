@@ -13,7 +13,7 @@ from certifier.proof.outline import OPEN
 from certifier.proof.partition import EMPTY, PLANE, STREAMS
 
 ALL = 127
-"""So many levels are more than there are."""
+"""Sentinel: more levels than there are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Streams:
 
 @dataclass(eq=False)
 class Node:
-    """A node is a cell and what became of it; a search changes open nodes.
+    """A node is a cell and its state; a search changes open nodes.
 
     Attributes:
         kind: the joint that is cut, or PLANE, EMPTY or OPEN.
@@ -37,7 +37,7 @@ class Node:
         plane: (5, 1 + k) of a cell with a plane, as a proof holds it.
         choice: which volumes the plane separates, as a proof says it.
         streams: the pieces and multipliers of a cell with a plane, or the multipliers of one that misses the polytope.
-        level: so many levels of volumes, the finest ones, are to be tried in this cell.
+        level: how many levels of volumes, the finest ones, are to be tried in this cell.
     """
 
     kind: int = OPEN
@@ -93,7 +93,7 @@ def to_streams(roots: Sequence[Node], k: int) -> dict[str, Any]:
 
 
 def of_streams(arrays: Mapping[str, np.ndarray], vertices: Sequence[int], count: int) -> list[Node]:
-    """Does the inverse of :func:`to_streams` for so many trees.
+    """Does the inverse of :func:`to_streams` for ``count`` trees.
 
     Args:
         vertices: the number of vertices of both volumes together, by choice.
@@ -129,7 +129,7 @@ class _Reader:
         return root
 
     def _trees(self, vertices: int) -> tuple[int, int]:
-        """Returns how many codes and how many leaves the trees of pieces of the next leaf have, which has so many vertices."""
+        """Returns how many codes and how many leaves the trees of pieces of the next leaf have, which has this many vertices."""
         begin = at = self._at[0]
         leaves = 0
         for _ in range(vertices):

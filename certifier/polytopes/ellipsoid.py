@@ -81,8 +81,8 @@ def _largest(A: Array) -> tuple[Array, Array]:
     """Returns the centre x (n,) and the square E^2 (n, n) of the largest ellipsoid {x + E u} in {A x <= 1}.
 
     That is: maximise log det E subject to |E a_i| + a_i'x <= 1. The method is the primal-dual one of Zhang and Gao, *On numerical solution
-    of the maximum volume ellipsoid problem* (SIOPT 2003), with E^-2 = A' diag(y) A eliminated. What is left is h_i = |E a_i|, the slacks z
-    and the multipliers y:
+    of the maximum volume ellipsoid problem* (SIOPT 2003), with E^-2 = A' diag(y) A eliminated. The remaining unknowns are h_i = |E a_i|,
+    the slacks z and the multipliers y:
 
         A'(y h) = 0,   h + z = 1 - A x,   y z = mu.
 

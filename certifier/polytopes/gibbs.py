@@ -24,7 +24,7 @@ def uniform_in_q(polytope: Polytope, revolute: NDArray[np.bool_], chains: int, e
     """Returns points of P in s, (chains, each, n), nearly uniform in q; the same seed gives the same points.
 
     The chains are independent of one another but for their starts, which hit-and-run draws. Samples of one chain may still depend on each
-    other, so whoever states an error takes it between the chains.
+    other, so an error has to be estimated between the chains.
 
     Args:
         polytope: bounded, for instance by the joint limits.

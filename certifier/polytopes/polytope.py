@@ -145,7 +145,7 @@ def _unbounded(direction: Array) -> RegionError:
 SCALED = "scale the rows of C to length 1, and leave out rows that nearly repeat others"
 """This is what to do where the numbers of a polytope are too hard."""
 _CLEARLY = 1e-9
-"""A row must be redundant by this relative distance to be dropped, so that whoever proves it again succeeds as well."""
+"""A row must be redundant by this relative distance to be dropped, so that another proof that it is redundant succeeds as well."""
 
 
 def drop_redundant(polytope: Polytope, fixed: int = 0, inside: Array | None = None) -> NDArray[np.int64]:
@@ -161,7 +161,7 @@ def drop_redundant(polytope: Polytope, fixed: int = 0, inside: Array | None = No
     rays at the points where that fails (Clarkson's algorithm).
 
     Args:
-        fixed: this many rows at the end stay whatever happens, for instance the joint limits.
+        fixed: this many rows at the end stay in every case, for instance the joint limits.
         inside: (n,) a point well inside, if one is known.
 
     Raises:

@@ -56,7 +56,7 @@ class ProvedBox(Box):
         """
         lower, upper, Y_lower, Y_upper = bound_multipliers(scene.polytope(polytope.C, polytope.d))
         box = Box.around(*bounds(polytope))
-        # Whoever verifies rounds the joint limits outwards, by the last digit.
+        # The verifier rounds the joint limits outwards, by the last digit.
         if (box.lower >= lower).any() or (box.upper <= upper).any():
             box = Box.around(lower, upper)
         return cls(box.mid, box.half, Y_lower, Y_upper)

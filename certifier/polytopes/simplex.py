@@ -23,7 +23,7 @@ _LEVEL = 1e-13
 _BEYOND = 1e-9
 """A vertex may be beyond a face by this."""
 WORK = 5
-"""A program needs so many numbers for each row to work with."""
+"""A program needs this many numbers for each row to work with."""
 _PIVOTS = 50
 """At most this many edges are followed for every row and unknown."""
 
@@ -190,7 +190,7 @@ def _rest(frame: Array, k: int, v: Array, rest: Array) -> float:
 
 @njit(cache=True)
 def _walked(left: Array, rates: Array, step: float) -> None:
-    """Takes so long a way off what is left to each row, (m,)."""
+    """Subtracts a step of this length from the room that each row still has, (m,)."""
     for j in range(len(left)):
         left[j] = max(left[j] - step * rates[j], 0.0)
 
@@ -203,7 +203,7 @@ def _first(columns: Array, left: Array, v: Array, basis: Array, size: int, lowes
     with the lowest number.
 
     Args:
-        left: (m,) what is left to each row.
+        left: (m,) the room that each row still has.
         rates, times: (m,) get A v, and how long the way to each row is.
     """
     entering, step, speed = -1, np.inf, 0.0

@@ -31,7 +31,7 @@ def extremes(polytope: Polytope) -> tuple[Array, Array]:
 
 
 def samples(polytope: Polytope, revolute: NDArray[np.bool_], count: int, seed: int) -> Array:
-    """Returns so many points of P in s, (count, n), nearly uniform in q; the same seed gives the same points."""
+    """Returns ``count`` points of P in s, (count, n), nearly uniform in q; the same seed gives the same points."""
     each = -(-count // CHAINS)
     drawn: Array = gibbs.uniform_in_q(polytope, revolute, CHAINS, each, seed).swapaxes(0, 1).reshape(-1, polytope.C.shape[1])
     return drawn[:count]

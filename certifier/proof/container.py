@@ -122,7 +122,7 @@ def _arrays(data: bytes, archive: zipfile.ZipFile, wanted: Wanted) -> dict[str, 
 
 
 def with_scene(data: bytes, scene: Scene) -> bytes:
-    """Returns the file with the scene itself besides its hash, so that whoever has the file can check it."""
+    """Returns the file with the scene itself besides its hash, so that anyone who has the file can check it."""
     header, arrays = unpack(data, header_of(data)["kind"])
     return pack({**header, "scene": scene.to_document()}, arrays)
 

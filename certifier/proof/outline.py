@@ -1,4 +1,4 @@
-"""An outline says which cells a partition has and what became of each, without planes and multipliers. It proves nothing.
+"""An outline says which cells a partition has and the state of each, without planes and multipliers. It proves nothing.
 
 The outlines of a proof are read from its file without inflating the rest of it. A search over partitions writes an outline of what it
 leaves (certifier.partition.certification), so that people can look at a pair while it is worked on, and after its job has ended.
@@ -173,7 +173,7 @@ class Outline:
         return cls(tuple(header["joints"]), arrays["lower"], arrays["upper"], (first, second), tree)
 
     def gone_on(self, rounds: Sequence[Sequence[Outline | None]]) -> Outline:
-        """Returns the outline with what later rounds have made of its open cells, which were dealt to the parts of each round in turn.
+        """Returns the outline with what later rounds have made of its open cells, which were divided among each round's parts in turn.
 
         Args:
             rounds: for each later round, in order, what each of its parts has left; None for a part that has left nothing yet.
@@ -192,7 +192,7 @@ class Outline:
         return replace(self, tree=self.tree.grafted(below))
 
     def shown(self, most: int) -> Outline:
-        """Returns the outline with at most so many nodes, at least one. Cells are folded from a depth on, the same one for all."""
+        """Returns the outline with at most ``most`` nodes, at least one. Cells are folded from a depth on, the same one for all."""
         nodes, cuts, choices = self.tree
         if len(nodes) <= most:
             return self

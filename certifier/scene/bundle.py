@@ -53,7 +53,7 @@ def pack_bundle(path: str | Path) -> bytes:
 
     Where the scene file gives a package's absolute path, the bundle has the relative one: the package lies elsewhere there.
 
-    A file that is referred to but does not exist is left out. Whoever loads the bundle gets Drake's message about it.
+    A file that is referred to but does not exist is left out. Loading the bundle then gives Drake's message about it.
 
     Raises:
         SceneError: the scene file is wrong, or a reference cannot travel (``bundle_uri``).

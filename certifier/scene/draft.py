@@ -31,9 +31,9 @@ from certifier.scene.references import references
 from certifier.scene.xml import parse_xml
 
 TRIED = 200
-"""So many random configurations tell which pairs always overlap."""
+"""This many random configurations show which pairs always overlap."""
 SEEDS = 2000
-"""A free configuration is looked for among so many."""
+"""A free configuration is looked for among this many."""
 MANY_PARTS = 4
 """Where a body that moves has more polytopes than this, the draft has their hull stand for them."""
 SLIDE = 1.0

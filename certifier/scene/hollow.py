@@ -1,6 +1,6 @@
 """How far a hull reaches beyond what it stands for is estimated here, from below.
 
-The hull of a bin closes its opening. A configuration inside of the opening then counts as a collision, and people need to be told why. So
+The hull of a bin closes its opening. A configuration inside of the opening then counts as a collision, and people need to know why. So
 points are spread over the faces of the hull, and their distances from the mesh are taken. The greatest is one that the hull reaches beyond
 the mesh without doubt, but for rounding. Other points, those inside of the hull among them, may be farther away.
 """
@@ -17,7 +17,7 @@ from scipy.spatial import ConvexHull, QhullError
 from certifier.model import Array, Geometry, Scene
 
 _POINTS = 500
-"""About so many points are spread over the faces of a hull."""
+"""About this many points are spread over the faces of a hull."""
 _CLIMBS = 12
 _MOVES = np.eye(3)[[0, 1, 2, 0, 1, 2]] - np.eye(3)[[1, 2, 0, 2, 0, 1]]
 _NOTABLE = 1e-3

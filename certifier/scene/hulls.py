@@ -32,7 +32,7 @@ def with_hulls(
     Args:
         hulls: names of bodies, as the scene file has them.
         bodies: all bodies of the scene.
-        max_vertices: so many vertices has a hull at most; it is a polytope around the hull where that has more.
+        max_vertices: a hull has at most this many vertices; where it would have more, a polytope around it takes its place.
         names: the names that bodies and geometries have; the hulls get theirs there.
         reached: gets the names of hulls that reach beyond their parts, and how far, in metres.
 

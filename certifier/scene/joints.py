@@ -24,7 +24,7 @@ EXACT = 1e-9
 
 
 UNBOUNDED = 1e6
-"""A limit of so many radians or metres means that there is none: exporters write 1e9, 1e16 or the greatest double for it."""
+"""A limit of at least this many radians or metres means that there is none: exporters write 1e9, 1e16 or the greatest double for it."""
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn:
 
 
 def _substituted(scene: Scene) -> list[str]:
-    """Returns a finding about every kind of replacement, such as a hull of so many vertices, and the geometries that it was made for."""
+    """Returns a finding about every kind of replacement, such as a hull of 64 vertices, and the geometries that it was made for."""
     groups: dict[str, list[Geometry]] = {}
     for g in scene.geometries:
         if g.substitution:
@@ -148,6 +148,6 @@ def _never_touching(scene: Scene) -> list[str]:
 
 
 def _tried(scene: Scene, samples: int) -> list[Array]:
-    """Returns q*, moved into the joint limits, and so many random configurations."""
+    """Returns q*, moved into the joint limits, and ``samples`` random configurations."""
     rng = np.random.default_rng(0)
     return [scene.q_star.clip(scene.q_lower, scene.q_upper), *rng.uniform(scene.q_lower, scene.q_upper, (samples, scene.n))]

@@ -1,7 +1,7 @@
 """Every body, joint and geometry that Drake has read gets its name here. No two of them get the same.
 
 A scene's pairs, its proofs and what a scene file ignores go by these names. A name has slashes between its parts, and the parts may have
-slashes, too. So two things can come to one name, and one would stand for both.
+slashes, too. So two things could get the same name, which would then stand for both.
 """
 
 from __future__ import annotations

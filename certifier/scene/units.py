@@ -14,7 +14,7 @@ _HUGE = 10.0
 _LARGE = 1.0
 """So is one on a body that moves, if it is longer than this and than ``_TIMES`` its model's others."""
 _TIMES = 10.0
-"""A slide that is so many times longer than the robot is remarked on too."""
+"""A slide that is more than this many times as long as the robot is remarked on too."""
 
 
 def units(scene: Scene, tree: Tree) -> list[str]:

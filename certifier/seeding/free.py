@@ -17,7 +17,7 @@ SHELLS, EACH = np.geomspace(0.004, 1.0, 12), 40
 ROOM = (1e-3, 0.0)
 """A free configuration that is named has the first of these distances to contact, in metres, that is found. On contact, none can grow."""
 STEPS = 8
-"""What was found is moved back towards the seed in so many steps of bisection."""
+"""What was found is moved back towards the seed in this many steps of bisection."""
 
 
 class Clearance:

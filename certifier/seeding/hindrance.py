@@ -1,7 +1,7 @@
-"""What hinders a region is said here, in terms of what users have given, should no region come of their seed.
+"""This module says what hinders a region, in terms of what users have given, in case no region can be grown from their seed.
 
-A seed may be free and still next to contact. A slide may be so long that nothing about the robot is large beside it. Whether a region can
-be grown all the same is seen by trying.
+A seed may be free and still next to contact. A slide may be so long that nothing about the robot is large beside it. Only trying shows
+whether a region can be grown anyway.
 """
 
 from __future__ import annotations

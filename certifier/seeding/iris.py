@@ -47,9 +47,9 @@ _START_RADIUS = 1e-2
 _COARSE = 0.01
 """The alternation between faces and ellipsoid has an epsilon of at least this."""
 _BEYOND = 0.05
-"""So much farther from the ellipsoid's centre than a point is another one that has to stay inside with it."""
+"""For each point that has to stay inside, another one has to: it is farther from the ellipsoid's centre by this part."""
 _LAST_ROUNDS = 3
-"""There are so many last rounds at most beside coarse volumes."""
+"""There are at most this many last rounds beside coarse volumes."""
 
 
 class Termination(StrEnum):
@@ -164,7 +164,7 @@ def _refined(
 def _onward(
     drake: _Iris, domain: HPolyhedron, region: HPolyhedron, account: dict[str, Any], points: Array, epsilon: float, most: int
 ) -> tuple[HPolyhedron, dict[str, Any]]:
-    """Goes on from the inscribed ellipsoid of a region, with so many alternations at most.
+    """Goes on from the inscribed ellipsoid of a region, with at most ``most`` alternations.
 
     Returns:
         What was found, and what Drake said of it. Where Drake fails, or a point would be lost, it is the region as it was, and its account

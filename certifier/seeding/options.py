@@ -28,7 +28,7 @@ class Method(StrEnum):
 
 IRIS = (Method.IRIS_NP2, Method.IRIS_ZO)
 IRIS_SEEDS = 2**31
-"""IRIS has so many seeds of its random choices, from 0 on."""
+"""IRIS has this many seeds of its random choices, from 0 on."""
 
 
 @dataclass(frozen=True)
@@ -43,14 +43,14 @@ class SeedOptions:
         center: (n,) a point inside that polytope, in s; default: the centre of its largest ball.
         half_width: half the side of the ``box``, in s.
         epsilon, delta: IRIS stops adding faces when, except with probability delta, at most the fraction epsilon of the volume in s is in
-            collision. Below 0.01, last rounds of faces come to epsilon; all before them comes to 0.01.
+            collision. Below 0.01, only the last rounds of faces reach epsilon; those before them stop at 0.01.
         max_iterations: IRIS' alternations between faces and ellipsoid; as many again where coarse volumes join the scene
             (:mod:`certifier.seeding.coarse_pairs`).
         max_iterations_separating_planes: IRIS' rounds of adding faces within each alternation.
         tolerance: IRIS ends when the ellipsoid's volume grows by less than this fraction.
         margin: distance in s at which IRIS' faces stay clear of the collisions found.
-        random_seed: seeds IRIS; None for the growth's own, and 0 where nothing grows. Other seeds come to other proposals.
-        tries: IRIS makes so many proposals at most, each with a random seed of its own, and the best is taken
+        random_seed: seeds IRIS; None for the growth's own, and 0 where nothing grows. Other seeds result in other proposals.
+        tries: IRIS makes at most this many proposals, each with a random seed of its own, and the best is taken
             (:mod:`certifier.seeding.tries`).
     """
 

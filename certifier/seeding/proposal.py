@@ -31,7 +31,7 @@ class Proposal:
         contain: (k, n) what else the region has to contain, in s, inside all faces and limits as well.
         info: JSON-able: method, guarantee (``sampled`` when IRIS passed its statistical test, else ``none``), faces, seconds, and for
             IRIS termination, iterations, epsilon, delta, Drake's warnings, the random seed, and how many random seeds were tried.
-            ``hindrance`` says why, should no region come of it, where something is known (:mod:`certifier.seeding.hindrance`).
+            ``hindrance`` is the reason to give if no region can be grown, where one is known (:mod:`certifier.seeding.hindrance`).
     """
 
     C: Array

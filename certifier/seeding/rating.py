@@ -18,7 +18,7 @@ LOST = 2.0
 
 @dataclass(frozen=True)
 class Rating:
-    """A rating says how large a proposal is, and how much of it faces have to part.
+    """A rating says how large a proposal is, and in how much of it faces have to separate volumes.
 
     Attributes:
         q_volume: volume in joint positions, in radians and metres.

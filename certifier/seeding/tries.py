@@ -1,8 +1,8 @@
 """IRIS is tried with several random seeds, and the proposal is taken of which a growth is likely to keep most.
 
-Which collisions IRIS happens to find decides where its faces lie. So another random seed may come to a proposal that is twice as large, or
-of which growth loses a fifth of what it loses of the first (docs/trials.md). The tries end early with a proposal that a growth is
-likely to keep nearly whole.
+Which collisions IRIS happens to find decides where its faces lie. So another random seed may result in a proposal that is twice as large.
+Or growth may lose only a fifth of what it loses of the first proposal (docs/trials.md). The tries end early with a proposal that a growth
+is likely to keep nearly whole.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LITTLE = 0.0002
 
 @dataclass(frozen=True, eq=False)
 class _Try:
-    """A try is what IRIS came to with one random seed.
+    """A try is the result of IRIS with one random seed.
 
     Attributes:
         C, d, account: as :func:`certifier.seeding.iris.iris` returns them.
@@ -57,7 +57,7 @@ def best_of_tries(scene: Scene, points: Array, options: SeedOptions) -> tuple[Ar
         points: (k, n) points in s, the seed first. Whether they are inside remains to be checked.
 
     Raises:
-        RegionError: no try came to a region; what became of the first one, as :func:`certifier.seeding.iris.iris` says it.
+        RegionError: no try resulted in a region; the error is that of the first try, as :func:`certifier.seeding.iris.iris` raises it.
     """
     first = options.random_seed or 0
     if options.tries == 1:

@@ -3,7 +3,7 @@
 Let y >= 0 be multipliers of the rows, and let ' mean transposed. Every point s of the polytope has c's <= y'd + r's with r = c - y'C.
 
 The numbers are doubles and are taken as they are, so r rarely vanishes. The rows that bound one coordinate alone (the joint limits)
-bound what is left of it.
+bound the remaining r's.
 """
 
 from __future__ import annotations

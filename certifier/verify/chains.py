@@ -16,7 +16,7 @@ size of a vertex is the sum of all lengths on the way to it: |v|, that of each o
 - n'(R v + p) is computed as (R'n)'v + n'p with three products each, rounded by 15 u of |n| times the size.
 
 All that is a part of the size, (m + 3) (2^-44 + the angles' error) of it to first order, times |n|. Terms of higher order are a part of
-that which is below 2^-9, because error() sees to it that the whole is below 2^-10; twice the angles' error has room for it. That no two
+that which is below 2^-9, because error() ensures that the whole is below 2^-10; twice the angles' error has room for it. That no two
 lengths are put together first is what makes this hold where they cancel. What is done with less of them, as n'R'v with the length of R v +
 offset, is wrong by a part of their sum nevertheless.
 

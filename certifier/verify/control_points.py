@@ -45,8 +45,8 @@ entries gives an upper bound that holds for all of them, and for all pieces of a
 factor 1.9 for the roundings of the size itself.
 
 Products may underflow: each is then wrong by 2^-1074 more. Every magnitude from which the sizes of C, D and T are made is at least 2^-40,
-and no product has more than 20 factors, so its size is at least 2^-800. An underflow is therefore less than u times the size, and counts as
-one of the roundings, of which every product was given one. What underflows in L and S is less than u times the 2^-40 that is added to the
+and no product has more than 20 factors, so its size is at least 2^-800. An underflow is therefore less than u times the size. It is
+covered by a rounding, of which every product was given one. What underflows in L and S is less than u times the 2^-40 that is added to the
 size of what multiplies D. Overflow makes something that is not finite, which is refused; with a zero of the matrices that halve, it may
 make others so as well. Zeros round nothing.
 """
@@ -71,7 +71,7 @@ LEAST = 2.0**-40
 
 
 def rounding(size: Array, multipliers: np.ndarray) -> Array:
-    """Returns a bound of what rounding does to numbers of these sizes that have so many multipliers."""
+    """Returns a bound of what rounding does to numbers of these sizes that have this many multipliers."""
     bound: Array = 2.0 * UNIT * (ROUNDINGS + multipliers) * size
     return bound
 

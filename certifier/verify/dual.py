@@ -29,7 +29,7 @@ R never vanishes in floating point. So the proof names as many moments as R has 
 with G c = -R makes these entries zero, where G holds what one unit of each moment adds to R. Ball arithmetic bounds |c|. Every matrix is
 then shown to be positive definite whatever such a change does.
 
-Where the equations are dependent, as for two balls, fewer of them are solved. What is left of the others bounds t relative to the plane's
+Where the equations are dependent, as for two balls, fewer of them are solved. The remainder of the others bounds t relative to the plane's
 coefficients. This bound is the ``slack``.
 
 Why the matrices are positive definite:
@@ -160,7 +160,7 @@ class _Check:
         return DualStatement(self._proof.pair, self._proof.frame, self._rounded, slack)
 
     def _correction(self, R: list[list[arb]]) -> tuple[arb, arb]:
-        """Returns a bound of the change that makes the named equations vanish, and one of the sum of what is left of the others."""
+        """Returns a bound of the change that makes the named equations vanish, and one of the sum of the others' remainders."""
         proof, named = self._proof, self._proof.equations
         if len(set(named)) != len(named) or len(named) != len(proof.entries) or not all(0 <= k < len(self._vanishing) for k in named):
             raise ProofError("proof_malformed", "the equations and the moments that meet them do not fit")

@@ -53,7 +53,7 @@ def verify_file(data: bytes, processes: int = 1, progress: Progress | None = Non
 
     Args:
         processes: how many processes check what can be divided among them.
-        progress: is told how far they have come.
+        progress: receives how many of how many parts they have checked.
 
     Raises:
         ProofError: the file is malformed, carries no scene, or its proof does not hold.

@@ -140,7 +140,7 @@ class ExactKinematics:
         """Returns the axes of the joints that move between two bodies, in path order, and the constant poses between their frames.
 
         A joint's axis goes through the origin of its frame, and its motion moves no point of its axis. So a joint's frames on either side
-        of the motion count as one.
+        of the motion are treated as the same frame.
 
         Returns:
             the m axes as unit vectors, and m + 1 poses, (4, 4): of the first joint's frame in F, of each further joint's frame in that of

@@ -82,7 +82,7 @@ def product(A: Array, B: Array) -> Array:
     The limbs returned, (a + b - 1, r, c), are below 2^48 and not normal.
 
     Raises:
-        ProofError: a sum has so many terms that it might round.
+        ProofError: a sum has more than MAX_TERMS terms, so it might round.
     """
     (a, r, s), (b, _, c) = A.shape, B.shape
     if s * min(a, b) > MAX_TERMS:

@@ -38,9 +38,9 @@ from certifier.verify.streams import Cells, Cuts, Multipliers, Pieces
 from certifier.verify.volume import check_volume
 
 TOGETHER = 1 << 19
-"""About so many control values are computed at once. NumPy's calls are cheap then; up to 2 PIECE_DEPTH times as many may wait."""
+"""About this many control values are computed at once, so that NumPy's calls are cheap; up to 2 PIECE_DEPTH times as many may wait."""
 CORNERS = 1 << 18
-"""About so many corners of cells are looked at at once."""
+"""About this many corners of cells are looked at at once."""
 _BARE, _END = -2, -1
 """Pieces that are halved no more have these axes: those with z0 = 1 and without multipliers, and others."""
 _TINY = 2.0**-1000
@@ -230,7 +230,7 @@ class CellCheck:
         return margins
 
     def _sorted(self, controls: Sequence[Control], number: np.ndarray, at: np.ndarray, cell: np.ndarray, vertex: np.ndarray) -> _Batch:
-        """Returns pieces sorted by what becomes of them, so that those of which the same becomes are slices of arrays."""
+        """Returns pieces sorted by what happens to them, so that those to which the same happens are slices of arrays."""
         kind = self._pieces.kind(at)
         bare = (kind == PLANE) & (self._multipliers.count(number[cell], self._pieces.rank(at)) == 0)
         axis = np.where(bare, _BARE, np.where(kind < 0, _END, kind)).astype(int)

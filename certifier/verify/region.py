@@ -70,7 +70,7 @@ def verify_region(data: bytes, processes: int = 1, progress: Progress | None = N
 
     Args:
         processes: how many processes check the proofs of the pairs.
-        progress: is told how far they have come.
+        progress: receives how many of how many parts they have checked.
 
     Raises:
         ProofError: the file is malformed or the proof does not hold.

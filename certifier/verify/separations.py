@@ -1,7 +1,7 @@
 """Many proofs of pairs, of any form, are checked here, by several processes if one likes. The results are the same for any number of them.
 
 The parts are the proofs, and some cells at a time of those over partitions. Processes are forked, so they share the proofs in memory, and
-each checks one part after the other. Only so many parts wait at once that memory stays bounded.
+each checks one part after the other. Few parts wait at once, so memory stays bounded.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from certifier.verify.streams import Cells
 from certifier.verify.volume import check_contained
 
 Progress = Callable[[int, int], None]
-"""A function of this kind is told how many of how many parts are checked: cells, and proofs without any."""
+"""A function of this kind receives how many of how many parts are checked: cells, and proofs without any."""
 CELLS = 256
-"""A part has at most so many cells."""
+"""A part has at most this many cells."""
 WAITING = 4
-"""At most so many parts wait or run for each process."""
+"""At most this many parts wait or run for each process."""
 
 
 class Part(NamedTuple):

@@ -14,7 +14,7 @@ from certifier.proof.ground import Ground
 from certifier.proof.partition import EMPTY, PLANE, STREAMS, PartitionProof
 
 _MULTIPLIED = 1 << 16
-"""About so many multipliers are added up at once."""
+"""About this many multipliers are added up at once."""
 
 
 def malformed(proof: PartitionProof, problem: str) -> ProofError:
