@@ -17,7 +17,7 @@ TOO_LONG = ", which is too little to be seen beside it"
 def mend(hindrance: str) -> str:
     """Returns what to do about a hindrance."""
     if NO_ROOM in hindrance:
-        return "move the seed away from the contact; `ciris certify` may still certify a polytope of yours"
+        return "move the seed away from the contact"
     return "set narrower limits for the joint in the scene file"
 
 

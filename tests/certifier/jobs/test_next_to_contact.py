@@ -93,7 +93,7 @@ def test_the_arm_of_the_example_a_hair_from_its_block():
         free, contact = (middle, contact) if clearance.free(np.array([middle, 0.0])) else (free, middle)
     said = answer(scene, np.array([free - 1e-9, 0.0]))
     assert "from contact of arm/link2/bar and world/obstacle, and no region was found there; at q = " in said
-    assert "(move the seed away from the contact; " in said
+    assert said.endswith("(move the seed away from the contact)")
 
 
 @pytest.mark.slow
