@@ -18,7 +18,7 @@ from certifier.scene.nodes import compose
 from certifier.scene.paths import beside
 
 _SHORT = 1e-6
-"""An axis of a rotation is at least so long. Drake makes a matrix that turns nothing of one that is 0."""
+"""Least length of the axis of a rotation. Of a zero axis, Drake makes a matrix that is no rotation."""
 _NULL = "tag:yaml.org,2002:null"
 _NAMES = {"add_model": "name", "add_directives": "model_namespace"}
 

@@ -1,4 +1,4 @@
-"""A seed next to contact comes to a region, or is answered in the user's terms: how near it is, to which pair, and where there is room.
+"""Growing from a seed next to contact gives a region or an answer in the user's terms: distance, pair, and where there is room.
 
 Nothing that users have not given is named: no polytope, no faces, no multipliers.
 """

@@ -1,4 +1,4 @@
-"""A hull that reaches beyond its mesh is told of: by at least how much, and where it is in the way."""
+"""Messages say by at least how much a hull reaches beyond its mesh, and where it is in the way."""
 
 from __future__ import annotations
 
