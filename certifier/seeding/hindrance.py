@@ -1,6 +1,6 @@
 """This module says what hinders a region, in terms of what users have given, in case no region can be grown from their seed.
 
-A seed may be free and still next to contact. A slide may be so long that nothing about the robot is large beside it. Only trying shows
+A seed may be free and still next to contact. A slide may be far longer than the robot. Only trying shows
 whether a region can be grown anyway.
 """
 

@@ -19,13 +19,29 @@ from tests.errors.proofs import PROOFS
 from tests.errors.python import PYTHON
 from tests.errors.regions import REGIONS
 from tests.errors.rows import Row, Trial, pattern
+from tests.errors.scene_files import SCENE_FILES
 from tests.errors.scenes import SCENES
 from tests.errors.service import SERVICE
 from tests.errors.sites import Site, sites
 from tests.errors.teams import TEAMS
 from tests.errors.workers import WORKERS
 
-TABLE = [*SCENES, *FORMATS, *BUNDLES, *REGIONS, *MOTIONS, *COVERS, *DRAWING, *SERVICE, *COMMANDS, *PYTHON, *PROOFS, *TEAMS, *WORKERS]
+TABLE = [
+    *SCENE_FILES,
+    *SCENES,
+    *FORMATS,
+    *BUNDLES,
+    *REGIONS,
+    *MOTIONS,
+    *COVERS,
+    *DRAWING,
+    *SERVICE,
+    *COMMANDS,
+    *PYTHON,
+    *PROOFS,
+    *TEAMS,
+    *WORKERS,
+]
 
 DEMANDS = re.compile(r"\bmust\b|\bat most\b|\bonly\b")
 """Words of a message that says by itself what has to be."""

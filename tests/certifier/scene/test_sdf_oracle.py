@@ -21,9 +21,9 @@ from tests.certifier.scene.sdf_robots import Link, SdfWriter, Written, mjcf, ran
 from tests.certifier.scene.workshop import parsed
 
 FEW, MANY = 30, 100
-"""So many robots are in the fast suite, and in the slow one."""
+"""Number of robots in the fast suite, and in the slow one."""
 MUTATIONS = 10
-"""So many mutations of each are tried."""
+"""Number of mutations of each robot."""
 CONFIGURATIONS = 5
 EXACT = 1e-9
 SCENE = "directives: [{add_model: {name: arm, file: arm.sdf}}]\n"

@@ -32,7 +32,7 @@ from tests.certifier.scene.urdf_models import (
 FAST = 30
 SLOW = 300
 MUTANTS = 10
-"""So many of each model in the slow campaign."""
+"""Number of mutants of each model in the slow campaign."""
 WITHOUT_LINE = {"floating_body", "loop", "no_joints", "joint_range", "scene_field", "unsupported_joint"}
 """Errors of the scene as a whole, which name the body or the joint instead."""
 NUMBERS = ("1,5", "0x10", "1e400", "nan", "", "1 2", "0", "-0.2", "0.123", "1e-3", "1_0", "7")
