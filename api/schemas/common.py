@@ -5,20 +5,27 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 from fastapi import Path, Query
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticKnownError
 
 from api.schemas import patterns
-from certifier.growth.options import WHOLE_NUMBERS
 
 MAX_INT = 2**31 - 1
 """The largest integer that the databases can store in a column."""
 
+
+def _integer(value: object) -> object:
+    """Refuses texts and truth for a whole number. Pydantic's own strictness would refuse 7.0 too, which is one in JSON."""
+    if isinstance(value, bool | str):
+        raise PydanticKnownError("int_type")
+    return value
+
+
+Whole = Annotated[int, BeforeValidator(_integer)]
+"""A whole number. No text and no truth value stands for one."""
 Real = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Vector = Annotated[list[Real], Field(min_length=1, max_length=64)]
-RandomSeed = Annotated[
-    int, Field(ge=WHOLE_NUMBERS["random_seed"][0], le=WHOLE_NUMBERS["random_seed"][1], description="Seed of every random choice.")
-]
+RandomSeed = Annotated[Whole, Field(ge=0, le=2**63 - 1, description="Seed of every random choice.")]
 SceneName = Annotated[str, Field(min_length=1, max_length=255, pattern=patterns.SOMETHING, description="The id or the name of a scene.")]
 Document = dict[str, Any]
 
@@ -41,26 +48,12 @@ WithDependents = Annotated[
     Query(description="`delete` deletes what depends on it, too; otherwise the request is refused where something does."),
 ]
 Offsets = Annotated[list[Real], Field(max_length=2000)]
-INTEGERS = (
-    *WHOLE_NUMBERS,
-    *("at_once", "max_iterations", "max_iterations_separating_planes", "priority", "size", "tries"),
-)
-"""The fields of requests that are whole numbers wherever there is one of this name."""
-
-
-def integer(value: object) -> object:
-    """Refuses texts and truth for a whole number. Pydantic's own strictness would refuse 7.0 too, which is one in JSON."""
-    if isinstance(value, bool | str):
-        raise PydanticKnownError("int_type")
-    return value
 
 
 class Request(BaseModel):
-    """All requests derive from this model: it refuses unknown fields, numbers that are not finite, and texts and truth in their place."""
+    """All requests derive from this model: it refuses unknown fields and numbers that are not finite."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-    _integers = field_validator(*INTEGERS, mode="before", check_fields=False)(integer)
 
 
 class Page(BaseModel):

@@ -2,66 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from pydantic import BaseModel, Field
 
-from pydantic import BaseModel, Field, field_validator
-
-from api.schemas.common import Real, Request, Vector, integer
+from api.schemas.options import model_of
 from certifier.outcome import Outcome
 from db.states import JobState
-from planner.cover.options import ENOUGH, MOST_GIVEN, MOST_JOINTS, STAGES, WHOLE_NUMBERS, CoverOptions
-
-DEFAULTS = CoverOptions()
-Given = Annotated[list[Vector], Field(max_length=MOST_GIVEN)]
+from planner.cover.options import CoverOptions
 
 
-def _whole(option: str, description: str) -> Any:
-    """Returns the field of an option that is a whole number within its bounds."""
-    least, greatest = WHOLE_NUMBERS[option]
-    return Field(ge=least, le=greatest, description=description)
-
-
-class CoverRequestOptions(Request):
+class CoverRequestOptions(model_of(CoverOptions)):  # type: ignore[misc]
     """Says what a cover shall reach, where it begins, and how much effort a region is worth."""
-
-    seeds: Given = Field(default_factory=list, description="Configurations (joint positions) that get regions first.")
-    connect: Given = Field(
-        default_factory=list, description="Configurations that each get a region, and that shall end in one connected component."
-    )
-    paths: Annotated[list[Annotated[list[Vector], Field(min_length=2, max_length=MOST_GIVEN)]], Field(max_length=MOST_GIVEN)] = Field(
-        default_factory=list,
-        description="Demonstrations: the motions, straight in joint positions from waypoint to waypoint, that shall be covered.",
-    )
-    coverage: Annotated[
-        Real | None,
-        Field(
-            gt=0,
-            le=1,
-            description="Goal: this share of the collision-free configurations, uniform in joint positions within the limits, is in "
-            f"regions. Default: {ENOUGH} where nothing else is asked for, else no goal.",
-        ),
-    ] = None
-    connected: Annotated[bool, Field(description="Goal: all regions of the scene are connected.")] = False
-    regions: Annotated[int, _whole("regions", "Grow at most this many regions.")] = DEFAULTS.regions
-    at_once: Annotated[int, _whole("at_once", "Number of regions that grow at the same time.")] = DEFAULTS.at_once
-    region_seconds: Annotated[
-        Real | None, Field(gt=0, le=30 * 86400, description="A region ends after so long, with what there is of it.")
-    ] = None
-    cells: Annotated[
-        int,
-        _whole("cells", "Cells of a pair in each stage of a region. New faces remove the cells that are undecided after that."),
-    ] = DEFAULTS.cells
-    stages: Annotated[
-        int | None,
-        _whole(
-            "stages",
-            f"Each region ends after this many stages. Default: {STAGES} for robots with more than {MOST_JOINTS} joints; else it ends "
-            "when a stage gains little. One stage gives the first regions sooner, and less coverage in the end.",
-        ),
-    ] = None
-    random_seed: Annotated[int, _whole("random_seed", "Seed of every random choice.")] = DEFAULTS.random_seed
-
-    _integer = field_validator("regions", mode="before")(integer)
 
 
 class Coverage(BaseModel):

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from api.schemas.common import Real, Request, SceneName, Vector
+from api.schemas.common import Real, Request, SceneName, Vector, Whole
 from api.schemas.planning import REGION, SCENE, Q, RegionId
 from certifier.model import JointKind
 
@@ -105,7 +105,7 @@ class SliceRequest(Request):
     q: Vector = Field(description="(n,), where the other joints stay, in radians or metres.", examples=[[0.4, 0.3]])
     x: str = Field(max_length=200, description="Name of the joint of the horizontal axis.", examples=["arm/shoulder"])
     y: str = Field(max_length=200, description="Name of the joint of the vertical axis.", examples=["arm/elbow"])
-    size: int = Field(100, ge=8, le=MAX_SIZE, description="Number of squares of the slice in each direction.")
+    size: Whole = Field(100, ge=8, le=MAX_SIZE, description="Number of squares of the slice in each direction.")
     regions: list[str] | None = Field(
         None,
         max_length=MAX_REGIONS,

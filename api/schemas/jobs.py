@@ -4,117 +4,32 @@ from __future__ import annotations
 
 from base64 import b64decode
 from datetime import datetime
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from api.schemas import patterns
-from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector
+from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector, Whole
 from api.schemas.covers import CoverRequestOptions
 from api.schemas.motions import GivenMotion
+from api.schemas.options import model_of
 from api.schemas.progress import Progress
 from api.schemas.scenes import PairInfo
-from certifier.growth.options import LARGEST_TOLERANCE, MOST_CELLS, WHOLE_NUMBERS, GrowthOptions
+from certifier.growth.options import GrowthOptions
 from certifier.model import MAX_NAME
 from certifier.outcome import Outcome, Stage
-from certifier.seeding.options import Method
+from certifier.seeding.options import SeedOptions
 from db import traces
 from db.models import EventRow, JobRow
 from db.states import IterationState, JobKind, JobState, PairState
 
-DEFAULTS = GrowthOptions()
+
+class GrowOptions(model_of(GrowthOptions)):  # type: ignore[misc]
+    """Says how to grow the region, and when growing stops."""
 
 
-def _whole(option: str, description: str) -> Any:
-    """Returns the field of a growth option that is a whole number within its bounds."""
-    least, greatest = WHOLE_NUMBERS[option]
-    return Field(ge=least, le=greatest, description=description)
-
-
-class GrowOptions(Request):
-    """Says how to grow the region: how the first polytope contracts, how far the region is pushed out, and when growing stops."""
-
-    contraction: Annotated[
-        Literal["whole", "targeted", "uniform"] | None,
-        Field(
-            description="`whole` keeps the first polytope, certifies it cell by cell, and cuts off only what cannot be certified. The "
-            "other two shrink it until every pair has one plane that moves with the joints: `targeted` adds faces where pairs fail; "
-            "`uniform` moves every face inwards by the same amount. Default: `whole` where IRIS makes the first polytope, else `targeted`."
-        ),
-    ] = DEFAULTS.contraction
-    cells: Annotated[
-        int | None,
-        _whole(
-            "cells",
-            "For `whole`: cells of a pair in each stage. Cells still undecided when this budget is spent are removed by new faces. "
-            f"Default: {MOST_CELLS}.",
-        ),
-    ] = DEFAULTS.cells
-    stages: Annotated[
-        int | None,
-        _whole("stages", "For `whole`: number of stages after which growth ends. Default: it ends when a stage gains little."),
-    ] = DEFAULTS.stages
-    contractions: Annotated[
-        int | None,
-        _whole(
-            "contractions",
-            "Number of targeted contractions. Each begins to cut at another distance; the largest region counts. "
-            "Default: 2 for arms with at most six joints between two bodies, else 1.",
-        ),
-    ] = None
-    bisection_steps: Annotated[int, _whole("bisection_steps", "Steps of uniform contraction's bisection, one certification each.")] = (
-        DEFAULTS.bisection_steps
-    )
-    max_rounds: Annotated[
-        int | None,
-        _whole("max_rounds", "Most rounds of the polytope step. Default: 3 for arms with at most four joints between two bodies, else 0."),
-    ] = None
-    pushes: Annotated[
-        int | None,
-        _whole(
-            "pushes",
-            "How often the faces are pushed out after the contractions. "
-            "Default: 10 for arms with at most four joints between two bodies, 2 for at most six, else 0.",
-        ),
-    ] = None
-    tolerance: Annotated[
-        Real,
-        Field(gt=0, lt=LARGEST_TOLERANCE, description="Relative growth of the ellipsoid's volume that is still worth a push or a round."),
-    ] = DEFAULTS.tolerance
-    backoff: Annotated[int, _whole("backoff", "How often a polytope step that fails to certify is halved.")] = DEFAULTS.backoff
-    random_seed: RandomSeed = DEFAULTS.random_seed
-
-
-class Seed(Request):
-    """Says where growing begins and how the first polytope is found. An option that is left out has the certifier's default."""
-
-    method: Method | None = Field(None, description="How the first polytope is found. Default: `iris_np2`.")
-    q: Vector | None = Field(
-        None, description="The seed: joint positions in radians or metres, in position order. Every method but `polytope` needs it."
-    )
-    contain: Rows | None = Field(
-        None, description="More configurations (joint positions) that the region must contain, such as where it meets another region."
-    )
-    C: Rows | None = Field(None, description="(m, n), the first polytope {s : C s <= d}, one row a face, in s; for the method `polytope`.")
-    d: Offsets | None = Field(None, description="(m,), the right-hand sides of these faces.")
-    center: Vector | None = Field(None, description="(n,), a point inside that polytope, in s.")
-    half_width: Real | None = Field(None, description="Half the edge length of the first polytope, in s; for the method `box`.")
-    epsilon: Real | None = Field(None, description="Largest fraction of the volume that IRIS may leave in collision.")
-    delta: Real | None = Field(None, description="Probability with which IRIS may be wrong about `epsilon`.")
-    max_iterations: int | None = Field(
-        None, description="Largest number of alternations of IRIS between faces and ellipsoid, and again beside balls about a hand."
-    )
-    max_iterations_separating_planes: int | None = Field(
-        None, description="Number of rounds in which IRIS adds faces, within each alternation."
-    )
-    tolerance: Real | None = Field(None, description="IRIS ends when the ellipsoid's volume grows by less than this fraction.")
-    margin: Real | None = Field(None, description="Distance in s that IRIS' faces keep from the collisions found.")
-    random_seed: int | None = Field(
-        None, description="Seed of IRIS' random choices. Default: `random_seed` of the options. Another seed gives another proposal."
-    )
-    tries: int | None = Field(
-        None, description="IRIS makes at most this many proposals, each with its own random seed, and growth takes the best. Default: 2."
-    )
+class Seed(model_of(SeedOptions)):  # type: ignore[misc]
+    """Says where growing begins and how the first polytope is found."""
 
 
 class WebhookRequest(Request):
@@ -153,7 +68,7 @@ class JobRequest(Request):
     """Holds what the requests for all kinds of job have in common."""
 
     scene: SceneName
-    priority: int = Field(0, ge=-3, le=3, description="Each step up doubles the job's share of the work for its API key.")
+    priority: Whole = Field(0, ge=-3, le=3, description="Each step up doubles the job's share of the work for its API key.")
     deadline_seconds: Real | None = Field(
         None, gt=0, le=30 * 86400, description="The job ends this many seconds after its creation, with the regions it has by then."
     )
@@ -191,10 +106,11 @@ class CertifyRequest(JobRequest):
     kind: Literal["certify"] = Field(description="The kind of the job.")
     polytope: PolytopeBody = Field(description="The polytope to certify.")
     cells: Annotated[
-        int,
-        _whole(
-            "cells",
-            "Number of cells of the polytope that are tried for each pair, each with its own plane. "
+        Whole,
+        Field(
+            ge=1,
+            le=10_000_000,
+            description="Number of cells of the polytope that are tried for each pair, each with its own plane. "
             "With 1, each pair has one plane on all of the polytope.",
         ),
     ] = 1

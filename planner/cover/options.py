@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from certifier.errors import RegionError
+from certifier.options import option, read
 
 Q = tuple[float, ...]
 
-WHOLE_NUMBERS = {"regions": (1, 100_000), "at_once": (1, 64), "cells": (1, 10_000_000), "stages": (1, 100), "random_seed": (0, 2**31 - 1)}
-"""Maps an option to its least and its greatest value."""
 MOST_GIVEN = 1000
 """Number of configurations that may be given in each of the lists."""
 MOST_JOINTS = 4
@@ -23,34 +21,50 @@ ENOUGH = 0.95
 
 @dataclass(frozen=True)
 class CoverOptions:
-    """The options say what a job asks for that covers a scene.
+    """The options say what a job asks for that covers a scene. The ``text`` of each says what it means."""
 
-    Attributes:
-        seeds: (n,) each, joint positions that get regions first.
-        connect: (n,) each, joint positions of which each gets a region, and which shall end in one connected component.
-        paths: waypoints, (n,) each; the motions that are straight in q between them shall be covered.
-        coverage: ends when this share of the collision-free configurations, uniform in q within the joint limits, is in regions. None is
-            ENOUGH where neither ``connect`` nor ``paths`` nor ``connected`` asks for anything, and no goal elsewhere.
-        connected: ends when all regions of the scene are connected.
-        regions: largest number of regions that are begun.
-        at_once: number of regions that grow at the same time.
-        region_seconds: each region is given up, or ends with what there is of it, after so long; None sets no limit.
-        cells: number of cells of each pair in every stage of a region (certifier.growth.options).
-        stages: each region ends after this many stages (certifier.growth.options); None sets no limit.
-        random_seed: seeds every random choice.
-    """
-
-    seeds: tuple[Q, ...] = ()
-    connect: tuple[Q, ...] = ()
-    paths: tuple[tuple[Q, ...], ...] = ()
-    coverage: float | None = None
-    connected: bool = False
-    regions: int = 1000
-    at_once: int = 2
-    region_seconds: float | None = None
-    cells: int = 6000
-    stages: int | None = None
-    random_seed: int = 0
+    seeds: tuple[Q, ...] = option((), "Configurations (joint positions) that get regions first.", argument="seed", most=MOST_GIVEN)
+    connect: tuple[Q, ...] = option(
+        (), "Configurations that each get a region, and that shall end in one connected component.", most=MOST_GIVEN
+    )
+    paths: tuple[tuple[Q, ...], ...] = option(
+        (),
+        "Demonstrations: the motions, straight in joint positions from waypoint to waypoint, that shall be covered.",
+        argument="path",
+        most=MOST_GIVEN,
+    )
+    coverage: float | None = option(
+        None,
+        "Goal: this share of the collision-free configurations, uniform in joint positions within the limits, is in regions.",
+        otherwise=f"{ENOUGH} where nothing else is asked for, else no goal",
+        above=0,
+        greatest=1,
+    )
+    connected: bool = option(False, "Goal: all regions of the scene are connected.")
+    regions: int = option(1000, "Grow at most this many regions.", least=1, greatest=100_000)
+    at_once: int = option(2, "Number of regions that grow at the same time.", least=1, greatest=64)
+    region_seconds: float | None = option(
+        None,
+        "A region ends after so long, with what there is of it.",
+        otherwise="no limit",
+        unit="s",
+        above=0,
+        greatest=30 * 86400,
+    )
+    cells: int = option(
+        6000,
+        "Cells of a pair in each stage of a region. New faces remove the cells that are undecided after that.",
+        least=1,
+        greatest=10_000_000,
+    )
+    stages: int | None = option(
+        None,
+        "Each region ends after this many stages. One stage gives the first regions sooner, and less coverage in the end.",
+        otherwise=f"{STAGES} for robots with more than {MOST_JOINTS} joints; else a region ends when a stage gains little",
+        least=1,
+        greatest=100,
+    )
+    random_seed: int = option(0, "Seed of every random choice.", least=0, greatest=2**31 - 1)
 
     @property
     def enough(self) -> float | None:
@@ -70,26 +84,7 @@ class CoverOptions:
         Raises:
             RegionError: an option is unknown or out of range; the error names it.
         """
-        known = {f.name for f in fields(cls)}
-        for name in document:
-            if name not in known:
-                hint = f"options: {', '.join(sorted(known))}"
-                raise RegionError("unknown_option", f"there is no option {name!r}", field=f"options.{name}", hint=hint)
-        given = dict(document)
-        for name in ("seeds", "connect"):
-            given[name] = tuple(tuple(float(x) for x in q) for q in given.get(name, ()))
-        given["paths"] = tuple(tuple(tuple(float(x) for x in q) for q in path) for path in given.get("paths", ()))
-        options = cls(**given)
-        for name, (least, greatest) in WHOLE_NUMBERS.items():
-            value = getattr(options, name)
-            if name == "stages" and value is None:
-                continue
-            if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= greatest:
-                raise RegionError("option_value", f"{name} must be an integer from {least} to {greatest}", field=f"options.{name}")
-        if options.coverage is not None and not 0 < options.coverage <= 1:
-            raise RegionError("option_value", "coverage must be a number above 0 and at most 1", field="options.coverage")
-        if options.region_seconds is not None and not 0 < options.region_seconds < math.inf:
-            raise RegionError("option_value", "region_seconds must be a number above 0", field="options.region_seconds")
+        options = read(cls, document, "options")
         if len(options.connect) == 1:
             message = "at least two configurations can be connected, and one was given"
             raise RegionError("option_value", message, field="options.connect", hint="give another one, or give it as a seed")

@@ -65,7 +65,7 @@ REFUSED: list[tuple[dict[str, Any], int, str, str | None]] = [
     (GROW | {"seed": {}}, 422, "missing_option", "seed.q"),
     (GROW | {"seed": {"q": [0.1], "C": [[1]]}}, 422, "option_value", "seed.C"),
     (GROW | {"seed": {"method": "polytope", "C": [[1, 2]], "d": [1]}}, 422, "polytope_shape", "seed.C[0]"),
-    (GROW | {"seed": {"q": [0.1], "epsilon": 2}}, 422, "option_value", "seed.epsilon"),
+    (GROW | {"seed": {"q": [0.1], "epsilon": 2}}, 422, "invalid_request", "seed.epsilon"),
     (GROW | {"color": "red"}, 422, "invalid_request", "color"),
     (GROW | {"options": {"max_rounds": -1}}, 422, "invalid_request", "options.max_rounds"),
     (GROW | {"options": {"rounds": 1}}, 422, "invalid_request", "options.rounds"),

@@ -5,20 +5,20 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterator
-from typing import Any, get_args
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 from hypothesis import HealthCheck, given
 from hypothesis import settings as examples
 from hypothesis import strategies as st
+from pydantic import ValidationError
 from sqlalchemy.exc import OperationalError
 
 from api import guard
 from api.access import KEYS_SECONDS
 from api.app import create_app
-from api.schemas.common import INTEGERS, Request
-from api.schemas.covers import CoverRequestOptions
+from api.schemas.common import Request
 from certifier.model import Scene
 from db import jobs
 from db.session import Database
@@ -86,11 +86,16 @@ def requests(model: type[Request]) -> Iterator[type[Request]]:
 
 
 def test_every_whole_number_of_a_request_is_one() -> None:
-    fields = [(name, field.annotation) for model in requests(Request) for name, field in model.model_fields.items()]
-    whole = {name for name, kind in fields if int in {getattr(one, "__origin__", one) for one in get_args(kind) or [kind]}}
-    assert whole == {*INTEGERS, "regions"}
-    with pytest.raises(ValueError, match="valid integer"):
-        CoverRequestOptions(regions="7")
+    """No text stands for one, and no truth value does."""
+    whole = [
+        (model, name) for model in requests(Request) for name, field in model.model_fields.items() if field.annotation in (int, int | None)
+    ]
+    assert {"cells", "regions", "tries", "priority", "random_seed"} <= {name for _, name in whole}
+    for model, name in whole:
+        for wrong in ("7", True):
+            with pytest.raises(ValidationError) as refused:
+                model.model_validate({name: wrong})
+            assert any(error["loc"] == (name,) and error["type"] == "int_type" for error in refused.value.errors())
 
 
 def test_a_whole_number_may_be_written_with_a_point(client: TestClient, scene: Scene) -> None:

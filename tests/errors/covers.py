@@ -50,10 +50,6 @@ def from_a_region(t: Trial) -> str:
 COVERS: list[Row] = [
     *rows(
         "planner/cover/options.py",
-        ("unknown_option", "options.{name}", "there is no option {name}", "options: {...}", lambda t: options(colour=1)),
-        ("option_value", "options.{name}", "{name} must be an integer from {least} to {greatest}", "", lambda t: options(regions=0)),
-        ("option_value", "options.coverage", "coverage must be a number above 0 and at most 1", "", lambda t: options(coverage=2.0)),
-        ("option_value", "options.region_seconds", "region_seconds must be a number above 0", "", lambda t: options(region_seconds=-1.0)),
         (
             "option_value",
             "options.connect",

@@ -23,6 +23,7 @@ from certifier.proof.motion import Space
 from certifier.seeding.options import SeedOptions
 from certifier.seeding.propose import propose
 from certifier.step.step import step
+from planner.cover.options import MOST_GIVEN, CoverOptions
 from tests.certifier.scenes import planar_arm
 from tests.certifier.seeding.test_propose import crane
 from tests.errors.rows import Row, rows
@@ -134,30 +135,29 @@ GROWTH = [
         ),
     ),
     *rows(
-        "certifier/growth/options.py",
-        ("unknown_option", "options.{name}", "there is no option {name}", "options: {...}", lambda t: grow(speed=3)),
-        ("option_value", "options.kind", "kind must be 'grow', 'certify' or 'recertify'", "", lambda t: grow(kind="shrink")),
+        "certifier/options.py",
+        ("unknown_option", "{place}.{name}", "there is no option {name}", "{...}", lambda t: grow(speed=3)),
+        ("unknown_option", "{place}.{name}", "there is no option {name}", "options: {...}", lambda t: grow(xyz=3)),
+        ("option_value", "{where}", "{name} must be {what}", "", lambda t: grow(pushes=-1)),
+        ("option_value", "{where}", "{...} must be a list{...}", "", lambda t: seeded(q="0,0")),
+        ("option_value", "{where}", "{...} must be a list of numbers", "", lambda t: seeded(q=["0", "0"])),
         (
             "option_value",
-            "options.contraction",
-            "contraction must be 'whole', 'targeted' or 'uniform'",
+            "{where}",
+            "{...} must have at most {most} items",
             "",
-            lambda t: grow(contraction="other"),
+            lambda t: CoverOptions.from_document({"seeds": MOST_GIVEN * [[0.0]] + [[0.0]]}),
         ),
-        ("option_value", "options.{name}", "{name} must be an integer from {least} to {greatest}", "", lambda t: grow(pushes=-1)),
+    ),
+    *rows(
+        "certifier/growth/options.py",
+        ("option_value", "options.kind", "kind must be 'grow', 'certify' or 'recertify'", "", lambda t: grow(kind="shrink")),
         (
             "option_value",
             "options.contraction",
             "uniform contraction does not keep points inside",
             "leave out the points, or contract otherwise",
             lambda t: grow(contraction="uniform", seed={"q": [0.0], "contain": [[0.1]]}),
-        ),
-        (
-            "option_value",
-            "options.tolerance",
-            "tolerance must be a number between 0 and {LARGEST_TOLERANCE}",
-            "",
-            lambda t: grow(tolerance=0),
         ),
     ),
     *rows(
@@ -389,8 +389,6 @@ SEEDS = [
     ),
     *rows(
         "certifier/seeding/options.py",
-        ("unknown_option", "seed.speed", "there is no option {name}", "options: {...}", lambda t: seeded(q=[0, 0], speed=3)),
-        ("option_value", "seed.method", "method must be one of {...}", "", lambda t: seeded(q=[0, 0], method="magic")),
         ("missing_option", "seed.q", "the method {...} needs {name}", "give it", lambda t: seeded(method="box")),
         (
             "option_value",
@@ -399,16 +397,6 @@ SEEDS = [
             "leave it out",
             lambda t: seeded(q=[0, 0], center=[0, 0]),
         ),
-        ("option_value", "seed.delta", "{name} must be a positive number below {most}", "", lambda t: seeded(q=[0, 0], delta=1)),
-        ("option_value", "seed.tolerance", "{name} must be a positive number", "", lambda t: seeded(q=[0, 0], tolerance=-1)),
-        (
-            "option_value",
-            "seed.max_iterations",
-            "{name} must be an integer from {least} to {most}",
-            "",
-            lambda t: seeded(q=[0, 0], max_iterations=0),
-        ),
-        ("option_value", "seed.q", "{name} must be a list of numbers", "", lambda t: seeded(q="0,0")),
     ),
     *rows(
         "certifier/seeding/propose.py",

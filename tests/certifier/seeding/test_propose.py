@@ -255,7 +255,7 @@ def test_polytopes_that_are_refused(document, code, field):
         ({"q": [0, "x"]}, "seed.q"),
         ({"q": [0, True]}, "seed.q"),
         ({"method": "polytope", "C": [[1], "x"], "d": [1, 1]}, "seed.C[1]"),
-        ({"method": "polytope", "C": 3, "d": [1, 1]}, "seed.C[0]"),
+        ({"method": "polytope", "C": 3, "d": [1, 1]}, "seed.C"),
         ({"q": [0], "epsilon": 0}, "seed.epsilon"),
         ({"q": [0], "delta": 1}, "seed.delta"),
         ({"q": [0], "tolerance": math.nan}, "seed.tolerance"),
