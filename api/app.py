@@ -26,7 +26,22 @@ from api.pages.rendering import render_problem
 from api.questions import LARGE, SMALL
 from api.reading import READERS
 from api.room import Room
-from api.routers import cells, drawing, events, jobs, motions, planning, plans, project, regions, scenes, service, webhooks, workers
+from api.routers import (
+    cells,
+    drawing,
+    events,
+    jobs,
+    motions,
+    planning,
+    plans,
+    project,
+    regions,
+    results,
+    scenes,
+    service,
+    webhooks,
+    workers,
+)
 from api.writing import WRITERS
 from certifier.scene.bundle import expect_bundles
 from db.session import CONNECTIONS, Database, database
@@ -78,7 +93,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     )
     app.add_middleware(AccessLog, requests=app.state.requests)
     problems.install(app, render_problem)
-    for module in (scenes, jobs, webhooks, events, regions, cells, planning, plans, drawing, motions, project, workers, service):
+    for module in (scenes, jobs, results, webhooks, events, regions, cells, planning, plans, drawing, motions, project, workers, service):
         app.include_router(module.router)
     app.include_router(events.project)
     app.include_router(login.router)

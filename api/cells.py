@@ -121,13 +121,13 @@ def of_job_pair(database: Database, kept: OutlinesKept, scene: Scene, job_id: st
         row, parts = found
         own = parts[0].pair_index
         state = pairs.state_of_parts([PairState(part.state) for part in parts])
-        begun = row.index if row.begun is None else row.begun
+        begun = row.index if row.action["begun"] is None else row.action["begun"]
         left = subtrees.outlines(session, job_id, own, begun, row.index)
         counts = pairs.parts_of(session, job_id, own, left)
     if state is PairState.CERTIFIED:
         proof = kept.of(database, parts[0].proof_digest or "", scene)[0]
         return partition(scene, index, proof.cells, state, _kind(proof), row.index)
-    if row.cells == 1:
+    if row.action["cells"] == 1:
         raise _without_cells(index, f"one plane on all of the polytope was tried for it in iteration {row.index}, and it is {state}")
     cells = _gone_on(left, counts)
     if cells is None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from api.schemas.progress import HeldWork, Work
+from api.schemas.progress import DECIDE, PAIRS, HeldWork
 from db.models import JobRow, PairRow, StepRow
-from db.states import StepKind
+
+SAID = {"propose": "seed"}
+"""What the API calls a kind of step, where that is another word."""
 
 
 def certifying(rows: Sequence[PairRow]) -> list[HeldWork]:
@@ -18,7 +20,7 @@ def certifying(rows: Sequence[PairRow]) -> list[HeldWork]:
         HeldWork(
             job=held[0].job_id,
             process=held[0].worker or "",
-            work=Work.PAIRS,
+            work=PAIRS,
             iteration=held[0].iteration,
             pairs=sorted({row.pair_index for row in held}),
             until=held[0].lease_until,
@@ -29,10 +31,11 @@ def certifying(rows: Sequence[PairRow]) -> list[HeldWork]:
 
 def doing(step: StepRow) -> HeldWork:
     """Describes a step that is held."""
-    work = Work.SEED if step.kind == StepKind.PROPOSE else Work(step.kind)
-    return HeldWork(job=step.job_id, process=step.worker or "", work=work, iteration=None, pairs=[], until=step.lease_until)
+    return HeldWork(
+        job=step.job_id, process=step.worker or "", work=SAID.get(step.kind, step.kind), iteration=None, pairs=[], until=step.lease_until
+    )
 
 
 def deciding(job: JobRow) -> HeldWork:
     """Describes the decision about a job that somebody is making."""
-    return HeldWork(job=job.id, process=job.coordinator or "", work=Work.DECIDE, iteration=None, pairs=[], until=job.coordinator_until)
+    return HeldWork(job=job.id, process=job.coordinator or "", work=DECIDE, iteration=None, pairs=[], until=job.coordinator_until)

@@ -14,11 +14,11 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
-from api.schemas.patterns import SAID
 from certifier.errors import CirisError
 from db.disk import lacks_room
 from db.session import UNAVAILABLE
-from db.states import JobKind
+from jobs.patterns import SAID
+from jobs.registry import KINDS
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -199,7 +199,7 @@ def _field(loc: Sequence[str | int]) -> str:
     Where a field may be of several types, pydantic names the one it has tried, as in ``("body", "start", "list[float]", 0)``.
     """
     parts = [part for part in loc[1:] if isinstance(part, int) or not _TYPE.match(part)]
-    if loc[0] == "body" and parts and parts[0] in set(JobKind):
+    if loc[0] == "body" and parts and parts[0] in KINDS:
         del parts[0]
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".")
 
@@ -210,6 +210,6 @@ def _sentence(error: dict[str, Any]) -> str:
     if error["type"] == "string_pattern_mismatch":
         return SAID[error["ctx"]["pattern"]]
     if error["type"] in _TAGS:
-        return f"it must be one of {', '.join(JobKind)}"
+        return f"it must be one of {', '.join(KINDS)}"
     message = str(error["msg"]).removeprefix("Value error, ").replace(" after validation", "")
     return message[:1].lower() + message[1:]

@@ -8,31 +8,31 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
+from urllib.parse import urlsplit
 
 from sqlalchemy.orm import Session
 
-from api import checks
 from api.access import Caller
-from api.schemas.jobs import CertifyPathRequest, CertifyRequest, CoverRequest, GrowRequest, RecertifyRequest
 from certifier.errors import CirisError
-from certifier.model import Scene
-from db import clock, jobs, regions, scenes, webhooks
+from db import clock, jobs, scenes, webhooks
 from db.models import JobRow
 from db.session import Database
-
-AnyRequest = GrowRequest | CertifyRequest | RecertifyRequest | CertifyPathRequest | CoverRequest
+from db.settings import settings
+from jobs.registry import KINDS
+from jobs.request import JobRequest, WebhookRequest
+from workers.addresses import is_public
 
 
 @dataclass(frozen=True)
 class Checked:
     """A request whose names and numbers fit its scene, and the options that the job will have."""
 
-    body: AnyRequest
+    body: JobRequest
     scene_id: str
     options: dict[str, Any]
 
 
-def checked(db: Database, body: AnyRequest, where: str = "") -> Checked:
+def checked(db: Database, body: JobRequest, where: str = "") -> Checked:
     """Checks a request.
 
     Args:
@@ -45,9 +45,9 @@ def checked(db: Database, body: AnyRequest, where: str = "") -> Checked:
         with db.read() as session:
             scene_id = scenes.find(session, body.scene)
         scene = scenes.load(db, scene_id)
-        options = _recertify(body, scene, db) if isinstance(body, RecertifyRequest) else _options(body, scene)
+        options = KINDS[body.kind].options(body, scene, db)
         if body.webhook is not None:
-            checks.webhook(body.webhook)
+            _check_webhook(body.webhook)
     except CirisError as error:
         if where:
             error.field = f"{where}.{error.field}" if error.field else where
@@ -99,30 +99,32 @@ def _name(caller: Caller) -> str:
     return caller.key_id or "open"
 
 
-def _options(body: GrowRequest | CertifyRequest | CertifyPathRequest | CoverRequest, scene: Scene) -> dict[str, Any]:
-    """Returns the document of GrowthOptions, CoverOptions or a motion that the request asks for, its numbers checked against the scene."""
-    if isinstance(body, CoverRequest):
-        return checks.cover(scene, body.options).to_document()
-    if isinstance(body, CertifyPathRequest):
-        return checks.motion(scene, body)
-    if isinstance(body, GrowRequest):
-        return {"kind": "grow", "seed": checks.seed(scene, body.seed).to_document(), **body.options.model_dump()}
-    checks.polytope(scene, body.polytope)
-    return {"kind": "certify", "seed": body.polytope.model_dump(exclude_none=True), "cells": body.cells, "random_seed": body.random_seed}
-
-
-def _recertify(body: RecertifyRequest, scene: Scene, db: Database) -> dict[str, Any]:
-    """Does as :func:`_options` for a region of another scene."""
-    with db.read() as session:
-        row = regions.get(session, body.region)
-        region, digest, manifest, old = row.id, row.proof_digest, row.manifest, row.scene_id
-    checks.same_robot(scenes.load(db, old), scene)
-    polytope = {"C": manifest["halfspace_normals"], "d": manifest["halfspace_offsets"], "q": checks.kept(scene, manifest)}
-    return {"kind": "recertify", "seed": {**polytope, "region": region, "proof": digest}, "random_seed": body.random_seed}
-
-
 def _digest(asked: Checked) -> str:
     body = asked.body
     document: list[Any] = [asked.scene_id, asked.options, body.priority, body.deadline_seconds, body.webhook and body.webhook.model_dump()]
     document += [body.labels] if body.labels else []
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
+
+
+def _check_webhook(body: WebhookRequest) -> None:
+    """Refuses a webhook whose receiver the service could never call.
+
+    Raises:
+        CirisError: webhook_url, webhook_address.
+    """
+    try:
+        url = urlsplit(body.url)
+        usable = url.hostname and url.username is None and url.port != 0
+    except ValueError:
+        usable = False
+    if not usable or not body.url.isascii() or not body.url.isprintable() or " " in body.url:
+        raise CirisError(
+            "webhook_url", f"{body.url!r} cannot be called", field="webhook.url", hint="write https://host/path, without credentials"
+        )
+    try:
+        private = not is_public(url.hostname or "")
+    except ValueError:
+        return  # the host is a name: the worker that calls it resolves it
+    if private and not settings().webhook_private:
+        hint = "CIRIS_WEBHOOK_PRIVATE=1 allows it"
+        raise CirisError("webhook_address", f"{url.hostname} is not a public address", field="webhook.url", hint=hint)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from certifier import stored
 from certifier.errors import CirisError
 from certifier.model import Scene, StoredRegion
 from certifier.pair.collisions import in_collision
@@ -122,13 +123,13 @@ def _seed(task: Task, options: CoverOptions) -> dict[str, Any]:
 
 def _iris(scene: dict[str, Any], seed: dict[str, Any]) -> dict[str, Any]:
     """Runs in a process of the pool."""
-    return propose(Scene.from_document(scene), SeedOptions.from_document(seed)).to_document()
+    return dict(stored.document(propose(Scene.from_document(scene), SeedOptions.from_document(seed))))
 
 
 def _came(future: Future[dict[str, Any]], regions: _Regions) -> str | None:
     """Takes the region of a process; returns why there is none."""
     try:
-        regions.add(Proposal.from_document(future.result()))
+        regions.add(stored.value(Proposal, future.result()))
     except CirisError as error:
         return error.message
     return None

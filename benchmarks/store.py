@@ -14,10 +14,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from sqlalchemy import select
 
 from benchmarks import catalogue, measure
 from benchmarks.measure import Progress
+from certifier import stored
+from certifier.growth.actions import Certify
+from certifier.model import Polytope
 from certifier.outcome import Outcome, Stage
 from certifier.pair.result import PairResult
 from db import jobs, leases, migrate, pairs, scenes, work
@@ -83,19 +87,9 @@ def begin(database: Database, count: int, seconds: float) -> tuple[str, float]:
         job_id = job.id
     start = time.perf_counter()
     with database.write() as session:
-        pairs.add_iteration(
-            session,
-            jobs.lock(session, job_id),
-            index=0,
-            label="store",
-            C=[[1.0], [-1.0]],
-            d=[1.0, 1.0],
-            center=None,
-            pairs=[pairs.NewPair(index, f"a{index}", f"b{index}", seconds) for index in range(count)],
-            reuse={},
-            hard=[],
-            failures=1,
-        )
+        action = Certify(0, "store", Polytope(np.array([[1.0], [-1.0]]), np.ones(2)), None, [*range(count)], {}, [], failures=1)
+        new = [pairs.NewPair(index, f"a{index}", f"b{index}", seconds) for index in range(count)]
+        pairs.add_iteration(session, jobs.lock(session, job_id), stored.document(action), new)
     return job_id, time.perf_counter() - start
 
 

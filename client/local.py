@@ -67,8 +67,7 @@ def grow(
 
     region = local.grow(loaded, asked, _teller(loaded, screen, watch), deadline_s, cores(), deliver)
     screen.clear()
-    provenance = region.manifest["provenance"]
-    return Grown(region.manifest, region.proof, provenance["seconds"], remark=provenance["reason"])
+    return Grown(region.manifest, region.proof, region.manifest["provenance"]["seconds"], remark=region.reason)
 
 
 def recertify(data: bytes, scene: str, keep: list[list[float]] | None, deadline_s: float | None, screen: Screen, watch: bool) -> Grown:
@@ -83,8 +82,7 @@ def recertify(data: bytes, scene: str, keep: list[list[float]] | None, deadline_
 
     region = local.recertify(loaded, data, keep, _teller(loaded, screen, watch), deadline_s, cores())
     screen.clear()
-    provenance = region.manifest["provenance"]
-    return Grown(region.manifest, region.proof, provenance["seconds"], remark=provenance["reason"])
+    return Grown(region.manifest, region.proof, region.manifest["provenance"]["seconds"], remark=region.reason)
 
 
 def _teller(scene: Scene, screen: Screen, watch: bool) -> Callable[[str, dict[str, Any]], None]:

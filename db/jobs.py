@@ -12,15 +12,18 @@ from sqlalchemy import ColumnElement, and_, exists, func, or_, select
 from sqlalchemy.orm import Session, aliased
 
 from certifier.errors import CirisError
+from certifier.outcome import Outcome
 from db import events, labels, leases, pages, traces, webhooks
 from db.ids import expanded
 from db.models import GrowthRow, JobRow, SceneRow, StepRow
 from db.pages import Page
 from db.session import insert_new
 from db.settings import settings
-from db.states import JOB, STEP, JobKind, JobState, StepKind, transition, unfinished
+from db.states import ACCEPT, JOB, STEP, JobState, transition, unfinished
 from db.types import utcnow
 
+FINISH = "finish"
+"""The kind of the action of a job that is to end."""
 ROW_BYTES = 1000
 """A job counts as this many bytes besides its options and labels."""
 
@@ -248,6 +251,17 @@ def next_turn(job: JobRow, action: dict[str, Any]) -> None:
     job.coordinator_attempts = job.coordinator_deaths = 0
 
 
+def finishing(outcome: str, reason: str) -> dict[str, Any]:
+    """Returns the action of a job that is to end as soon as nothing of it goes on."""
+    return {"kind": FINISH, "outcome": str(outcome), "reason": reason}
+
+
+def finish_of(job: JobRow) -> tuple[Outcome, str] | None:
+    """Returns with which outcome, and why, a job is to end; None as long as it is not to."""
+    action = job.action or {}
+    return (Outcome(action["outcome"]), action["reason"]) if action.get("kind") == FINISH else None
+
+
 def start(session: Session, job: JobRow, served: float = 0.0) -> None:
     """Moves a queued job to running. The caller holds its lock.
 
@@ -261,9 +275,11 @@ def start(session: Session, job: JobRow, served: float = 0.0) -> None:
 def charge(session: Session, job: JobRow, seconds: float) -> None:
     """Counts seconds of work as done for the job. Each API key has the same share of the workers.
 
-    The running jobs of a key divide that share in proportion to 2^priority. A cover leaves its part to its regions.
+    The running jobs of a key divide that share in proportion to 2^priority. A job leaves its part to those that it has made.
     """
-    at_work = (_of_key(job.key_id), JobRow.state == JobState.RUNNING, JobRow.kind != JobKind.COVER)
+    other = aliased(JobRow)
+    leaves = exists().where(other.parent_id == JobRow.id, other.state == JobState.RUNNING)
+    at_work = (_of_key(job.key_id), JobRow.state == JobState.RUNNING, ~leaves)
     running = session.scalars(select(JobRow.priority).where(*at_work))
     job.served += seconds * sum(2.0 ** (priority - job.priority) for priority in running)
 
@@ -313,7 +329,7 @@ def awaiting_coordination(session: Session, now: datetime) -> list[str]:
     A coordination is due when the job is being cancelled, when its deadline has passed, or when it waits for no pair, no step and no child.
     """
     no_pair = and_(JobRow.open_pairs == 0, JobRow.running_pairs == 0)
-    step = exists().where(StepRow.job_id == JobRow.id, StepRow.state.in_(unfinished(STEP)), StepRow.kind != StepKind.ACCEPT)
+    step = exists().where(StepRow.job_id == JobRow.id, StepRow.state.in_(unfinished(STEP)), StepRow.kind != ACCEPT)
     other = aliased(JobRow)
     child = exists().where(other.parent_id == JobRow.id, other.state.in_(unfinished(JOB)))
     due = or_(JobRow.state == JobState.CANCELLING, JobRow.deadline_at <= now, no_pair & ~step & ~child)

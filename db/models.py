@@ -153,7 +153,7 @@ class JobRow(Owned, Base):
 
     id: Mapped[str] = mapped_column(String(36), primary_key=True)
     kind: Mapped[str] = mapped_column(String(16))
-    """A value of JobKind."""
+    """The name of a kind of jobs.registry."""
     scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"), index=True)
     state: Mapped[str] = mapped_column(String(16), default=states.JobState.QUEUED)
     outcome: Mapped[str | None] = mapped_column(String(16))
@@ -245,7 +245,7 @@ class GrowthRow(Base):
 
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
     document: Mapped[Document]
-    """What certifier.growth.state.GrowthState.to_document() returned after the last transition; or CoverState of planner.cover.state."""
+    """The document of the job's state after the last decision: certifier.growth.state.GrowthState, or planner.cover.state.CoverState."""
 
 
 class IterationRow(Base):
@@ -258,26 +258,15 @@ class IterationRow(Base):
     index: Mapped[int] = mapped_column(primary_key=True)
     label: Mapped[str]
     """Says to people what this polytope is."""
-    arrays: Mapped[Arrays]
-    """In s: C (m, n), d (m,) with the joint limits; center (n,) where one was given.
-
-    Where the root cell of the pairs' partitions was given, also its mid and half, (n,).
-    """
+    action: Mapped[Document]
+    """The document of the certifier.growth.actions.Certify that asked for it. What follows is what queries ask for of it."""
     faces: Mapped[int]
     """Number of faces, m."""
     state: Mapped[str] = mapped_column(String(16), default=states.IterationState.RUNNING)
-    hard: Mapped[list[int]]
-    """Indices of the pairs for which nothing less than all faces is tried."""
     failures: Mapped[int | None]
     """How many failures end the iteration; None when none does."""
-    cells: Mapped[int] = mapped_column(default=1)
-    """Number of cells that are tried for each pair; 1 for the program (11) on all of the polytope."""
-    begun: Mapped[int | None]
-    """The iteration in which the partitions of the pairs were begun; None where they begin in this one."""
     parts: Mapped[Document] = mapped_column(default=dict)
     """Pair index (as a string) -> into how many parts its open cells are divided, where there are several."""
-    ending: Mapped[list[int]] = mapped_column(default=list)
-    """Indices of the pairs whose open cells are going to be cut off."""
     together: Mapped[Document] = mapped_column(default=dict)
     """Pair index (as a string) -> the indices of the other pairs of its group, which have no rows of their own."""
     reuse: Mapped[Document]
@@ -317,7 +306,7 @@ class PairRow(Leased, Base):
     detail: Mapped[str | None]
     witness_s: Mapped[list[float] | None] = mapped_column(JSON(none_as_null=True))
     weakness: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
-    """What certifier.pair.result.Weakness.to_document() returned, until the job's next action is decided."""
+    """The document of a certifier.pair.result.Weakness, until the job's next action is decided."""
     proof_digest: Mapped[str | None] = mapped_column(ForeignKey("proofs.digest"))
     open_cells: Mapped[int | None]
     """How many of the cells that the search was given or made are open."""
@@ -359,7 +348,7 @@ class StepRow(Leased, Base):
     turn: Mapped[int]
     """The job's turn that asked for the step."""
     kind: Mapped[str] = mapped_column(String(16))
-    """A value of StepKind."""
+    """``accept``, or what the kind of the job calls it."""
     state: Mapped[str] = mapped_column(String(16), default=states.StepState.OPEN)
     input: Mapped[Document]
     """What the step works on: the action, or the accepted polytope."""

@@ -13,11 +13,10 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike
 from sqlalchemy import ColumnElement, Select, exists, func, insert, select, tuple_, update
 from sqlalchemy.orm import Session, defer
 
+from certifier import stored
 from certifier.outcome import Outcome, combine
 from certifier.pair.result import PairResult
 from db import events, jobs, leases, proofs, subtrees
@@ -79,51 +78,17 @@ class Saved:
     finished: bool
 
 
-def add_iteration(
-    session: Session,
-    job: JobRow,
-    *,
-    index: int,
-    label: str,
-    C: ArrayLike,
-    d: ArrayLike,
-    center: ArrayLike | None,
-    pairs: Sequence[NewPair],
-    reuse: Mapping[int, int],
-    hard: Sequence[int],
-    failures: int | None,
-    cells: int = 1,
-    box: Mapping[str, ArrayLike] | None = None,
-    begun: int | None = None,
-    parts: Mapping[int, int] | None = None,
-    ending: Sequence[int] = (),
-    together: Mapping[int, Sequence[int]] | None = None,
-) -> None:
+def add_iteration(session: Session, job: JobRow, action: dict[str, Any], pairs: Sequence[NewPair]) -> None:
     """Adds an iteration and its pairs. An iteration without pairs is certified at once. The caller holds the job's lock.
 
     Args:
-        box: the arrays of the root cell of all partitions, by their names: ``mid``, ``half``, and the multipliers that prove it.
+        action: the document of the certifier.growth.actions.Certify that asks for it.
     """
-    given = {"C": C, "d": d, "center": center, **(box or {})}
+    index, label, reuse = action["iteration"], action["label"], action["reuse"]
     certified = {} if pairs else {"state": IterationState.CERTIFIED, "finished_at": utcnow()}
-    session.add(
-        IterationRow(
-            job_id=job.id,
-            index=index,
-            label=label,
-            faces=np.size(d),
-            arrays={name: np.asarray(array) for name, array in given.items() if array is not None},
-            reuse={str(pair): iteration for pair, iteration in reuse.items()},
-            hard=list(hard),
-            failures=failures,
-            cells=cells,
-            begun=begun,
-            parts={str(pair): count for pair, count in (parts or {}).items()},
-            ending=list(ending),
-            together={str(pair): list(others) for pair, others in (together or {}).items()},
-            **certified,
-        )
-    )
+    known = {name: action[name] for name in ("reuse", "failures", "parts", "together")}
+    faces = len(action["polytope"]["d"])
+    session.add(IterationRow(job_id=job.id, index=index, label=label, faces=faces, action=action, **known, **certified))
     if pairs:
         session.connection().execute(  # the session would take twice as long
             insert(PairRow),
@@ -286,12 +251,6 @@ def forget_weaknesses(session: Session, job_id: str, iteration: int) -> None:
     session.execute(update(PairRow).where(*mine).values(weakness=None))
 
 
-def order(session: Session, iteration: IterationRow) -> list[int]:
-    """Returns the indices of an iteration's pairs, in the order in which they are claimed."""
-    mine = (PairRow.job_id == iteration.job_id, PairRow.iteration == iteration.index, PairRow.part == 0)
-    return list(session.scalars(select(PairRow.pair_index).where(*mine).order_by(PairRow.id)))
-
-
 def of_iteration(session: Session, job_id: str, iteration: int, pair: int) -> Sequence[PairRow]:
     """Returns the parts of a pair in one iteration, in order, or of the pair that it is certified with as one; none where it has none."""
     found = session.get(IterationRow, (job_id, iteration))
@@ -413,9 +372,9 @@ def states(session: Session, job_id: str, since: int) -> dict[int, dict[int, Pai
 
 
 def iterations(session: Session, job_id: str) -> Sequence[IterationRow]:
-    """Returns the job's iterations, in order, without their arrays."""
+    """Returns the job's iterations, in order, without their actions."""
     query = select(IterationRow).where(IterationRow.job_id == job_id).order_by(IterationRow.index)
-    return session.scalars(query.options(defer(IterationRow.arrays, raiseload=True))).all()
+    return session.scalars(query.options(defer(IterationRow.action, raiseload=True))).all()
 
 
 def begun(session: Session, job_id: str) -> int:
@@ -489,7 +448,7 @@ def _columns(result: PairResult, digests: Mapping[bytes, str]) -> dict[str, Any]
         "detail": result.detail,
         "open_cells": result.open_cells,
         "witness_s": None if result.witness_s is None else result.witness_s.tolist(),
-        "weakness": None if result.weakness is None else result.weakness.to_document(),
+        "weakness": None if result.weakness is None else stored.document(result.weakness),
     }
 
 

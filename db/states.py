@@ -34,19 +34,6 @@ class JobState(StrEnum):
     """The job ended by request. Regions certified before remain."""
 
 
-class JobKind(StrEnum):
-    GROW = "grow"
-    """The job grows a certified polytope from a seed, as large as the options allow."""
-    CERTIFY = "certify"
-    """The job finds one verdict for each pair on a given polytope."""
-    RECERTIFY = "recertify"
-    """The job makes a region of a scene from a region of the scene before it changed."""
-    CERTIFY_PATH = "certify-path"
-    """The job certifies a motion, or finds its first contact."""
-    COVER = "cover"
-    """The job starts grow jobs, which are its children, until their regions cover the scene or connect configurations."""
-
-
 class PairState(StrEnum):
     OPEN = "open"
     """The pair is to be certified; no worker has claimed it."""
@@ -81,17 +68,8 @@ class StepState(StrEnum):
     """The step is not needed any more: the job ended, or (``accept``) a later region was accepted."""
 
 
-class StepKind(StrEnum):
-    PROPOSE = "propose"
-    """Seeding: the step finds a polytope around the seed, not yet certified."""
-    STEP = "step"
-    """The polytope step (12) of the alternation."""
-    ACCEPT = "accept"
-    """The step assembles, verifies and stores the region of a certified polytope."""
-    SCOUT = "scout"
-    """The step looks at how much of a scene is covered, and where its next regions are best grown."""
-    MOTION = "motion"
-    """The step certifies a motion; ``report`` has the verdict, and the digest of its proof."""
+ACCEPT = "accept"
+"""The kind of the step that assembles, verifies and stores the region of a certified polytope. The job does not wait for it."""
 
 
 class IterationState(StrEnum):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from db import events, jobs, leases, proofs
 from db.models import JobRow, StepRow
-from db.states import STEP, StepKind, StepState, transition, unfinished
+from db.states import ACCEPT, STEP, StepState, transition, unfinished
 
 UNFINISHED = unfinished(STEP)
 
@@ -25,13 +25,14 @@ class Claim:
     job_id: str
     scene_id: str
     traceparent: str | None
-    kind: StepKind
+    job_kind: str
+    kind: str
     input: dict[str, Any]
     attempt: int
     deaths: int
 
 
-def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any]) -> StepRow:
+def add(session: Session, job: JobRow, kind: str, input: dict[str, Any]) -> StepRow:
     """Adds a step of the job's present turn. The caller holds the job's lock."""
     step = StepRow(job_id=job.id, turn=job.turn, kind=kind, input=input)
     session.add(step)
@@ -40,15 +41,18 @@ def add(session: Session, job: JobRow, kind: StepKind, input: dict[str, Any]) ->
     return step
 
 
-def claim(session: Session, job: JobRow, kinds: Collection[StepKind], *, lease_seconds: float) -> Claim | None:
-    """Claims the job's latest step of these kinds that is open; returns None without one. The caller holds the job's lock."""
-    query = select(StepRow).where(is_open(StepRow, job.id, kinds))
+def claim(session: Session, job: JobRow, *, accepts: bool, lease_seconds: float) -> Claim | None:
+    """Claims the job's latest open step: one that accepts a region, or one that the job waits for. Returns None without one.
+
+    The caller holds the job's lock.
+    """
+    query = select(StepRow).where(is_open(StepRow, job.id, accepts=accepts))
     step = session.scalar(query.order_by(StepRow.turn.desc()).limit(1))
     if step is None:
         return None
     attempt, deaths = step.attempts + 1, step.deaths
     token = leases.take(session, StepRow, [step.id], seconds=lease_seconds)
-    return Claim(token, step.id, job.id, job.scene_id, job.traceparent, StepKind(step.kind), step.input, attempt, deaths)
+    return Claim(token, step.id, job.id, job.scene_id, job.traceparent, job.kind, step.kind, step.input, attempt, deaths)
 
 
 def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any], seconds: float) -> bool:
@@ -62,9 +66,9 @@ def save(session: Session, claim: Claim, state: StepState, report: dict[str, Any
     job = jobs.get(session, claim.job_id)
     jobs.charge(session, job, seconds)
     events.emit(session, job, "step", {"kind": claim.kind, "state": state, "seconds": seconds})
-    if claim.kind == StepKind.ACCEPT and state == StepState.DONE:
+    if claim.kind == ACCEPT and state == StepState.DONE:
         turn = select(StepRow.turn).where(StepRow.id == claim.step_id).scalar_subquery()
-        earlier = (StepRow.job_id == job.id, StepRow.kind == StepKind.ACCEPT, StepRow.turn < turn)
+        earlier = (StepRow.job_id == job.id, StepRow.kind == ACCEPT, StepRow.turn < turn)
         transition(session, StepRow, StepState.SKIPPED, *earlier, StepRow.state == StepState.OPEN)
     return True
 
@@ -74,18 +78,18 @@ def keep_proof(session: Session, claim: Claim, proof: bytes) -> None:
     session.get_one(StepRow, claim.step_id).proof_digest = proofs.put(session, [proof])[proof]
 
 
-def is_open(step: type[StepRow], job_id: str | InstrumentedAttribute[str], kinds: Collection[StepKind]) -> ColumnElement[bool]:
-    """Returns the condition that the step is an open one of the job, of one of these kinds."""
-    return (step.job_id == job_id) & (step.state == StepState.OPEN) & step.kind.in_(kinds)
+def is_open(step: type[StepRow], job_id: str | InstrumentedAttribute[str], *, accepts: bool) -> ColumnElement[bool]:
+    """Returns the condition that the step is an open one of the job: one that accepts a region, or one that the job waits for."""
+    return (step.job_id == job_id) & (step.state == StepState.OPEN) & ((step.kind == ACCEPT) == accepts)
 
 
 def skip(session: Session, job_id: str) -> None:
     """Skips the job's unfinished steps, but not those that accept certified polytopes."""
-    where = (StepRow.job_id == job_id, StepRow.kind != StepKind.ACCEPT, StepRow.state.in_(UNFINISHED))
+    where = (StepRow.job_id == job_id, StepRow.kind != ACCEPT, StepRow.state.in_(UNFINISHED))
     transition(session, StepRow, StepState.SKIPPED, *where)
 
 
-def of_turn(session: Session, job: JobRow, kind: StepKind) -> StepRow | None:
+def of_turn(session: Session, job: JobRow, kind: str) -> StepRow | None:
     """Returns the step of this kind that the job's present turn asked for."""
     return session.scalar(select(StepRow).where(StepRow.job_id == job.id, StepRow.turn == job.turn, StepRow.kind == kind))
 
@@ -95,12 +99,12 @@ def of_job(session: Session, job_id: str) -> Sequence[StepRow]:
     return session.scalars(select(StepRow).where(StepRow.job_id == job_id).order_by(StepRow.turn, StepRow.id)).all()
 
 
-def verdict(session: Session, job_id: str) -> dict[str, Any] | None:
-    """Returns the report of the job's step that has certified a motion; None while there is none, or where the step has failed."""
-    done = (StepRow.job_id == job_id, StepRow.kind == StepKind.MOTION, StepRow.state == StepState.DONE)
+def found(session: Session, job_id: str, kind: str) -> dict[str, Any] | None:
+    """Returns the report of the job's step of this kind; None while there is none, or where the step has failed."""
+    done = (StepRow.job_id == job_id, StepRow.kind == kind, StepRow.state == StepState.DONE)
     return session.scalar(select(StepRow.report).where(*done))
 
 
 def accepted(session: Session, job_id: str) -> list[StepRow]:
     """Returns the job's steps that accept a region, in order, whatever their result."""
-    return [step for step in of_job(session, job_id) if step.kind == StepKind.ACCEPT]
+    return [step for step in of_job(session, job_id) if step.kind == ACCEPT]

@@ -19,11 +19,8 @@ from sqlalchemy.orm import Session, aliased
 
 from db import jobs, leases, pairs, steps
 from db.models import JobRow, PairRow, StepRow
-from db.states import JobState, PairState, StepKind, StepState
+from db.states import ACCEPT, JobState, PairState, StepState
 from db.types import Utc, utcnow
-
-URGENT = (StepKind.PROPOSE, StepKind.STEP, StepKind.SCOUT, StepKind.MOTION)
-"""The job waits for these steps. It does not wait for the acceptance of a region."""
 
 ROUNDING = 1e-9
 """Sums of fractions of batches may be too large by so much."""
@@ -43,9 +40,9 @@ def claim(session: Session, job_id: str, *, lease_seconds: float, batch_seconds:
     job = jobs.lock(session, job_id)
     claimed: pairs.Claim | steps.Claim | None = None
     if job.state == JobState.RUNNING:
-        claimed = steps.claim(session, job, URGENT, lease_seconds=lease_seconds)
+        claimed = steps.claim(session, job, accepts=False, lease_seconds=lease_seconds)
     if claimed is None and session.scalar(_has_region_now(), {"job": job_id, "now": utcnow()}):
-        claimed = steps.claim(session, job, [StepKind.ACCEPT], lease_seconds=lease_seconds)
+        claimed = steps.claim(session, job, accepts=True, lease_seconds=lease_seconds)
     if claimed is None and job.state == JobState.RUNNING:
         claimed = pairs.claim(session, job, lease_seconds=lease_seconds, batch_seconds=batch_seconds)
     return claimed
@@ -64,7 +61,7 @@ def busy_solvers(session: Session, *, batch_seconds: float) -> int:
         share = case((PairRow.forecast_seconds < seconds, PairRow.forecast_seconds / seconds), else_=1.0)
         full = session.scalar(select(func.sum(share)).where(PairRow.job_id == job_id, PairRow.state == PairState.OPEN)) or 0.0
         batches += max(1, math.ceil(max(full, count / pairs.MOST_TOGETHER) - ROUNDING))
-    urgent = steps.is_open(StepRow, JobRow.id, URGENT)
+    urgent = steps.is_open(StepRow, JobRow.id, accepts=False)
     steps_open = session.scalar(select(func.count()).select_from(StepRow).join(JobRow, urgent).where(JobRow.state == JobState.RUNNING))
     regions = session.scalar(select(func.count()).select_from(JobRow).where(_has_region()), {"now": utcnow()})
     held = leases.count_of_workers(session).total()
@@ -99,13 +96,13 @@ def _has_region_now() -> Select[str]:
 
 def _has_work() -> ColumnElement[bool]:
     """Returns the condition that :func:`claim` would find work."""
-    step = exists().where(steps.is_open(StepRow, JobRow.id, URGENT))
+    step = exists().where(steps.is_open(StepRow, JobRow.id, accepts=False))
     return or_(and_(JobRow.state == JobState.RUNNING, or_(JobRow.open_pairs > 0, step)), _has_region())
 
 
 def _has_region() -> ColumnElement[bool]:
     """Returns the condition that the job has a region to accept, has rested, and nobody is accepting one of its regions."""
     step, other = aliased(StepRow), aliased(StepRow)
-    waits = exists().where(steps.is_open(step, JobRow.id, [StepKind.ACCEPT]))
-    accepting = exists().where(other.job_id == JobRow.id, other.kind == StepKind.ACCEPT, other.state == StepState.RUNNING)
+    waits = exists().where(steps.is_open(step, JobRow.id, accepts=True))
+    accepting = exists().where(other.job_id == JobRow.id, other.kind == ACCEPT, other.state == StepState.RUNNING)
     return and_(JobRow.state.in_((JobState.RUNNING, JobState.CANCELLING)), JobRow.accept_after <= _NOW, waits, ~accepting)

@@ -57,7 +57,7 @@ def main() -> None:
         die_with_parent(parent=worker)
         database.cache_clear()
         if queue == SOLVE:
-            from workers.steps import SEEDING
+            from jobs.growing import SEEDING
 
             prepare(SEEDING)
         traces.configure(queue)

@@ -9,6 +9,7 @@ from functools import lru_cache, partial
 
 from structlog.contextvars import bound_contextvars
 
+from certifier import stored
 from certifier.errors import CirisError
 from certifier.growth.actions import Certify
 from certifier.growth.options import GrowthOptions
@@ -20,11 +21,10 @@ from db.models import IterationRow, PairRow
 from db.session import database
 from db.settings import settings
 from db.states import JobState
-from workers.actions import certify_action
-from workers.failures import IN_LOG, LOST, ON_LOSS
-from workers.former import former_of
-from workers.scenes import load_scene
-from workers.transaction import persistently
+from db.transaction import persistently
+from jobs.failures import IN_LOG, LOST, ON_LOSS
+from jobs.former import former_of
+from jobs.scenes import load_scene
 
 log = logging.getLogger(__name__)
 
@@ -94,7 +94,7 @@ def _certification(scene_id: str, job_id: str, iteration: int) -> CertifyPart:
 
     def read() -> tuple[Certify, GrowthOptions]:
         with database().read() as session:
-            action = certify_action(session.get_one(IterationRow, (job_id, iteration)), pairs=[])
+            action = stored.value(Certify, session.get_one(IterationRow, (job_id, iteration)).action)
             return action, GrowthOptions.from_document(jobs.get(session, job_id).options)
 
     action, options = persistently(read)

@@ -19,9 +19,9 @@ from db import clock, events, jobs, leases, pairs, projects, retention, work, wo
 from db.models import JobRow, PairRow, StepRow
 from db.session import database
 from db.settings import settings
+from db.transaction import writing
 from db.types import utcnow
 from workers.app import CONTROL, SOLVE, send_coordinate, send_work, waiting
-from workers.transaction import writing
 from workers.troubles import Troubles
 
 log = logging.getLogger(__name__)

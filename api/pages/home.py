@@ -13,7 +13,8 @@ from api.routers import jobs, regions, scenes
 from api.schemas.common import Cursor
 from db.regions import grown
 from db.session import Database
-from db.states import JobKind, JobState
+from db.states import JobState
+from jobs.registry import KINDS
 
 ENDED = {"active": False, "ended": True}
 """Groups of states that people ask for, and whether their jobs have ended."""
@@ -44,10 +45,10 @@ def _home(db: Database, chosen: dict[str, str], after: str | None) -> dict[str, 
     A form sends an empty text for what nobody has chosen. A state or a kind that does not exist is none, as an old bookmark may have it.
     """
     state = JobState(chosen["state"]) if chosen["state"] in [*JobState] else None
-    kind = JobKind(chosen["kind"]) if chosen["kind"] in [*JobKind] else None
+    kind = chosen["kind"] if chosen["kind"] in KINDS else None
     found = jobs.list_jobs(db, state=state, kind=kind, scene=chosen["scene"] or None, ended=ENDED.get(chosen["state"]), after=after)
     known = scenes.list_scenes(db, limit=1000).scenes
-    covers = [job.id for job in found.jobs if job.kind is JobKind.COVER]
+    covers = [job.id for job in found.jobs if KINDS[job.kind].makes_jobs]
     with db.read() as session:
         numbers = grown(session, covers)
     filters = {name: value for name, value in chosen.items() if value}
@@ -58,7 +59,7 @@ def _home(db: Database, chosen: dict[str, str], after: str | None) -> dict[str, 
         "query": urlencode(filters | ({"after": after} if after else {})),
         "older": urlencode(filters | {"after": found.next}) if found.next else None,
         "states": [*ENDED, *JobState],
-        "kinds": [*JobKind],
+        "kinds": [*KINDS],
         "scenes": known,
         "scene_names": {scene.id: scene.name for scene in known},
         "regions": regions.list_regions(db, limit=10).regions if not filters and after is None else [],

@@ -16,9 +16,10 @@ from api.schemas.common import MAX_INT
 from api.schemas.jobs import Iteration, Job, PairMatrix
 from api.schemas.webhooks import Webhook
 from certifier.errors import CirisError
+from db import jobs as rows
 from db import pairs
 from db.session import Database
-from db.states import JobKind
+from jobs.registry import KINDS
 
 router = APIRouter()
 
@@ -35,13 +36,15 @@ def job_live(request: Request, job_id: str, db: Db) -> Response:
 
 def _job(db: Database, job_id: str) -> dict[str, Any]:
     job = jobs.get_job(job_id, db)
+    kind = KINDS[job.kind]
     with db.read() as session:
-        begun = pairs.begun(session, job.id)
+        begun, result = pairs.begun(session, job.id), kind.result(session, rows.get(session, job.id))
     # Only the last iteration is looked at: a job may have 100 000 results. The matrix is drawn in the browser.
     last = jobs.get_job_pairs(job_id, db, begun - 1, limit=MAX_INT) if begun else None
     return {
         "job": job,
-        "cover": jobs.get_job_cover(job_id, db) if job.kind is JobKind.COVER else None,
+        "kind": kind,
+        "result": result,
         "elapsed": elapsed(job),
         "scene": scenes.get_scene(job.scene, db),
         "begun": begun,

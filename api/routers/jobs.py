@@ -9,19 +9,17 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, BackgroundTasks, Header, Query, Response, status
 from pydantic import Field
 
-from api import held, obstacles, submission
+from api import held, submission
 from api.access import READ, SUBMIT, Admin, Db, Submitter
 from api.announce import Announcements
 from api.reading import ReadingRoute
 from api.room import KeptRoom
-from api.schemas import patterns
 from api.schemas.common import MAX_INT, Cursor, JobGiven, OfIteration, OfScene, PairGiven, WithDependents
-from api.schemas.covers import Cover, CoverRegion
 from api.schemas.jobs import (
     MOST_TOGETHER,
     CancelRequest,
@@ -30,6 +28,7 @@ from api.schemas.jobs import (
     Iteration,
     IterationStates,
     Job,
+    JobKind,
     JobList,
     JobPage,
     NewJob,
@@ -38,24 +37,21 @@ from api.schemas.jobs import (
     PairMatrix,
     PairStates,
 )
-from api.schemas.motions import JobMotion
-from api.schemas.progress import JobWorkers, Obstacles
+from api.schemas.progress import JobWorkers, Obstacle, Obstacles
 from api.schemas.scenes import PairInfo
 from api.schemas.service import Dependents
 from api.writing import writing
 from certifier.errors import CirisError
 from certifier.model import Scene
-from certifier.outcome import Outcome, Stage
+from certifier.outcome import Stage
 from certifier.proof.container import with_scene
-from db import audit, clock, jobs, labels, leases, pages, pairs, proofs, regions, retention, scenes, steps
+from db import audit, clock, jobs, labels, leases, pages, pairs, proofs, regions, retention, scenes
 from db.audit import Action
 from db.models import IterationRow, JobRow, PairRow, StepRow
 from db.session import Database
-from db.states import IterationState, JobKind, JobState, PairState
-from db.types import utcnow
-from planner.cover.options import CoverOptions
-from planner.cover.result import said
-from planner.cover.state import CoverState
+from db.states import IterationState, JobState, PairState
+from jobs import obstacles, patterns
+from jobs.registry import KINDS
 
 MOST_PAIRS = 5000
 """One page of a pair matrix has at most this many results."""
@@ -250,69 +246,6 @@ def retry_job(
     return _described(db, [job])[0]
 
 
-@router.get("/{job_id}/cover")
-def get_job_cover(job_id: JobGiven, db: Db) -> Cover:
-    """Returns the results of a cover: how much is covered, which regions are connected, and which it has grown."""
-    with db.read() as session:
-        job = jobs.get(session, job_id)
-        if job.kind != JobKind.COVER:
-            message = f"the job {job.id} is no cover, but a {job.kind} job"
-            raise CirisError("cover_not_found", message, field="job", hint="its own page and /v1/jobs/{id} describe it")
-        growth, children = jobs.growth(session, job.id), jobs.children(session, job.id)
-        made = regions.of_cover(session, job.id)
-    known = {} if growth is None else said(CoverState.from_document(growth, CoverOptions.from_document(job.options))) or {}
-    names = ("coverage", "components", "largest", "connected", "connect", "seeds", "paths", "missing", "obstacles")
-    return Cover(
-        state=JobState(job.state),
-        outcome=None if job.outcome is None else Outcome(job.outcome),
-        reason=job.reason,
-        seconds=None if job.started_at is None else ((job.finished_at or utcnow()) - job.started_at).total_seconds(),
-        regions=[region.id for region in made],
-        grown=[
-            CoverRegion(job=child.id, number=child.number or 0, state=JobState(child.state), region=child.region_id, reason=child.reason)
-            for child in children
-        ],
-        **{name: known.get(name) for name in names},
-    )
-
-
-@router.get("/{job_id}/motion")
-def get_job_motion(job_id: JobGiven, db: Db) -> JobMotion:
-    """Returns what has become of the motion that a job has certified."""
-    return JobMotion.model_validate(_verdict(db, job_id)[1])
-
-
-@router.get("/{job_id}/motion/proof", response_class=Response, responses={200: {"content": {"application/octet-stream": {}}}})
-def download_motion_proof(job_id: JobGiven, db: Db) -> Response:
-    """Returns the proof of the motion that a job has certified, or of its beginning, together with the scene.
-
-    `ciris verify` checks the file offline.
-    """
-    job, verdict = _verdict(db, job_id)
-    if verdict["proof"] is None:
-        raise CirisError("proof_not_found", "nothing is proved of this motion", field="job", hint="the contact is where it begins")
-    with db.read() as session:
-        data = proofs.get(session, verdict["proof"])
-    headers = {"Content-Disposition": f'attachment; filename="{job}.proof"'}
-    return Response(data, media_type="application/octet-stream", headers=headers)
-
-
-def _verdict(db: Database, job_id: str) -> tuple[str, dict[str, Any]]:
-    """Returns the id of a job, and the report of its step that has certified a motion.
-
-    Raises:
-        CirisError: motion_not_found.
-    """
-    with db.read() as session:
-        job = jobs.get(session, job_id)
-        verdict = steps.verdict(session, job.id)
-        if verdict is None:
-            message = f"the {job.kind} job {job.id} is {job.state} and has no verdict of a motion{f': {job.reason}' if job.reason else ''}"
-            hint = "a certify-path job has one when it has ended before its deadline"
-            raise CirisError("motion_not_found", message, field="job", hint=hint)
-        return job.id, verdict
-
-
 @router.get("/{job_id}/pairs")
 def get_job_pairs(
     job_id: JobGiven,
@@ -479,8 +412,8 @@ def get_job_obstacles(
     """
     with db.read() as session:
         job = jobs.get(session, job_id)
-    found = obstacles.of_job(db, scenes.load(db, job.scene_id), job)
-    return Obstacles(obstacles=found[:limit], total=len(found))
+    found = obstacles.of_job(db, scenes.load(db, job.scene_id), KINDS[job.kind], job)
+    return Obstacles(obstacles=[Obstacle(**vars(one)) for one in found[:limit]], total=len(found))
 
 
 @router.get("/{job_id}/growth")

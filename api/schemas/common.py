@@ -5,31 +5,13 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 from fastapi import Path, Query
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
-from pydantic_core import PydanticKnownError
-
-from api.schemas import patterns
+from pydantic import BaseModel, Field
 
 MAX_INT = 2**31 - 1
 """The largest integer that the databases can store in a column."""
 
-
-def _integer(value: object) -> object:
-    """Refuses texts and truth for a whole number. Pydantic's own strictness would refuse 7.0 too, which is one in JSON."""
-    if isinstance(value, bool | str):
-        raise PydanticKnownError("int_type")
-    return value
-
-
-Whole = Annotated[int, BeforeValidator(_integer)]
-"""A whole number. No text and no truth value stands for one."""
-Real = Annotated[float, Field(allow_inf_nan=False, strict=True)]
-Vector = Annotated[list[Real], Field(min_length=1, max_length=64)]
-RandomSeed = Annotated[Whole, Field(ge=0, le=2**63 - 1, description="Seed of every random choice.")]
-SceneName = Annotated[str, Field(min_length=1, max_length=255, pattern=patterns.SOMETHING, description="The id or the name of a scene.")]
 Document = dict[str, Any]
 
-Rows = Annotated[list[Vector], Field(max_length=2000)]
 Cursor = Annotated[
     str | None, Query(max_length=200, description="The value of `next` from the page before; leave it out for the first page.")
 ]
@@ -47,13 +29,6 @@ WithDependents = Annotated[
     Literal["keep", "delete"],
     Query(description="`delete` deletes what depends on it, too; otherwise the request is refused where something does."),
 ]
-Offsets = Annotated[list[Real], Field(max_length=2000)]
-
-
-class Request(BaseModel):
-    """All requests derive from this model: it refuses unknown fields and numbers that are not finite."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 class Page(BaseModel):

@@ -4,14 +4,8 @@ from __future__ import annotations
 
 from pydantic import BaseModel, Field
 
-from api.schemas.options import model_of
 from certifier.outcome import Outcome
 from db.states import JobState
-from planner.cover.options import CoverOptions
-
-
-class CoverRequestOptions(model_of(CoverOptions)):  # type: ignore[misc]
-    """Says what a cover shall reach, where it begins, and how much effort a region is worth."""
 
 
 class Coverage(BaseModel):

@@ -6,9 +6,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from api.schemas.common import Real, Request, SceneName, Vector, Whole
 from api.schemas.planning import REGION, SCENE, Q, RegionId
 from certifier.model import JointKind
+from jobs.fields import Real, Request, SceneName, Vector, Whole
 
 MAX_CONTACTS, MAX_SIZE, MAX_REGIONS, MAX_SAMPLES = 100, 200, 200, 500
 

@@ -2,164 +2,34 @@
 
 from __future__ import annotations
 
-from base64 import b64decode
 from datetime import datetime
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from api.schemas import patterns
-from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector, Whole
-from api.schemas.covers import CoverRequestOptions
-from api.schemas.motions import GivenMotion
-from api.schemas.options import model_of
+from api.schemas.common import Document, Page
 from api.schemas.progress import Progress
 from api.schemas.scenes import PairInfo
-from certifier.growth.options import GrowthOptions
-from certifier.model import MAX_NAME
 from certifier.outcome import Outcome, Stage
-from certifier.seeding.options import SeedOptions
 from db import traces
 from db.models import EventRow, JobRow
-from db.states import IterationState, JobKind, JobState, PairState
+from db.states import IterationState, JobState, PairState
+from jobs.fields import Request
+from jobs.registry import KINDS
+from jobs.request import JobRequest, Labels
 
 
-class GrowOptions(model_of(GrowthOptions)):  # type: ignore[misc]
-    """Says how to grow the region, and when growing stops."""
+def _known(kind: str) -> str:
+    if kind not in KINDS:
+        raise ValueError(f"it must be one of {', '.join(KINDS)}")
+    return kind
 
 
-class Seed(model_of(SeedOptions)):  # type: ignore[misc]
-    """Says where growing begins and how the first polytope is found."""
-
-
-class WebhookRequest(Request):
-    """Asks the service to call this receiver with a POST when the job has ended.
-
-    The message is signed as Standard Webhooks describes. The service repeats it until the receiver answers with success, or until the last
-    attempt has failed.
-    """
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [{"url": "https://planner.example.org/ciris", "secret": "whsec_AAECAwQFBgcICQoLDA0ODxAREhMUFRYXGBkaGxwdHh8="}]
-        }
-    )
-
-    url: str = Field(max_length=2000, pattern=patterns.WEBHOOK_URL, description="URL to call, http:// or https://, at a public address.")
-    secret: str = Field(
-        pattern=patterns.WEBHOOK_SECRET,
-        description="`whsec_` and the base64 of 24 to 64 random bytes. The service signs the message with them and never shows them again.",
-    )
-
-    @field_validator("secret")
-    @classmethod
-    def _is_base64(cls, secret: str) -> str:
-        if not 24 <= len(b64decode(secret.removeprefix("whsec_"), validate=True)) <= 64:
-            raise ValueError("it must stand for 24 to 64 bytes")
-        return secret
-
-
-LabelName = Annotated[str, Field(min_length=1, max_length=64, pattern=patterns.LABEL_NAME)]
-LabelValue = Annotated[str, Field(max_length=200, pattern=patterns.ANY)]
-Labels = Annotated[dict[LabelName, LabelValue], Field(max_length=20)]
-
-
-class JobRequest(Request):
-    """Holds what the requests for all kinds of job have in common."""
-
-    scene: SceneName
-    priority: Whole = Field(0, ge=-3, le=3, description="Each step up doubles the job's share of the work for its API key.")
-    deadline_seconds: Real | None = Field(
-        None, gt=0, le=30 * 86400, description="The job ends this many seconds after its creation, with the regions it has by then."
-    )
-    labels: Labels = Field(default_factory=dict, description="Labels to find the job by, at most 20: name -> value.")
-    webhook: WebhookRequest | None = Field(None, description="Whom to tell when the job has ended; nobody by default.")
-
-
-class GrowRequest(JobRequest):
-    """Asks for a certified region that grows around a configuration."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"kind": "grow", "scene": "iiwa-shelf", "seed": {"q": [0, 0.3, 0, -1.8, 0, 0.9, 0]}}]}
-    )
-
-    kind: Literal["grow"] = Field(description="The kind of the job.")
-    seed: Seed = Field(description="Where growing begins.")
-    options: GrowOptions = Field(default_factory=GrowOptions, description="How the region grows.")
-
-
-class PolytopeBody(Request):
-    """Describes the polytope {s : C s <= d}. The service always adds the joint limits."""
-
-    C: Rows = Field(description="(m, n), one row a face, in s, with the joints in position order.")
-    d: Offsets = Field(description="(m,), the right-hand sides of the faces.")
-    center: Vector | None = Field(None, description="(n,), an interior point, in s; the service finds one if none is given.")
-
-
-class CertifyRequest(JobRequest):
-    """Asks for one outcome for each pair on a given polytope."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"kind": "certify", "scene": "planar-2dof", "polytope": {"C": [[1, 0], [-1, 0]], "d": [0.1, 0.1]}}]}
-    )
-
-    kind: Literal["certify"] = Field(description="The kind of the job.")
-    polytope: PolytopeBody = Field(description="The polytope to certify.")
-    cells: Annotated[
-        Whole,
-        Field(
-            ge=1,
-            le=10_000_000,
-            description="Number of cells of the polytope that are tried for each pair, each with its own plane. "
-            "With 1, each pair has one plane on all of the polytope.",
-        ),
-    ] = 1
-    random_seed: RandomSeed = 0
-
-
-class RecertifyRequest(JobRequest):
-    """Asks which part of another scene's region still holds in this scene, for instance after this scene has changed.
-
-    Proofs of pairs with the same numbers are taken over; the others are made again, cell by cell. What cannot be certified is cut off.
-    """
-
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"kind": "recertify", "scene": "iiwa-shelf", "region": "1f9b2a7c-5b0e-4b58-9c39-2f1d6a3c8e10"}]}
-    )
-
-    kind: Literal["recertify"] = Field(description="The kind of the job.")
-    region: str = Field(
-        max_length=MAX_NAME,
-        description="Id of the region, or its first characters. Its scene must have the same joints, limits and q* as `scene`. "
-        "The seed that it was grown from, and what it had to contain, stay inside.",
-    )
-    random_seed: RandomSeed = 0
-
-
-class CertifyPathRequest(JobRequest, GivenMotion):
-    """Asks for a proof of a motion, or for its first contact, where that takes longer than a request may."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [{"kind": "certify-path", "scene": "planar-2dof", "q": [[0.2, -0.4], [-0.4, 0.3]], "clearance": True}]
-        }
-    )
-
-    kind: Literal["certify-path"] = Field(description="The kind of the job.")
-
-
-class CoverRequest(JobRequest):
-    """Asks for regions, one after another, until they cover the scene or connect configurations."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"examples": [{"kind": "cover", "scene": "planar-2dof", "deadline_seconds": 60, "options": {"coverage": 0.95}}]}
-    )
-
-    kind: Literal["cover"] = Field(description="The kind of the job.")
-    options: CoverRequestOptions = Field(default_factory=CoverRequestOptions, description="What to cover, and when to end.")
-
-
-NewJob = Annotated[GrowRequest | CertifyRequest | RecertifyRequest | CertifyPathRequest | CoverRequest, Field(discriminator="kind")]
+JobKind = Annotated[str, AfterValidator(_known), Field(json_schema_extra={"enum": [*KINDS]})]
+if TYPE_CHECKING:
+    NewJob = JobRequest
+else:
+    NewJob = Annotated[tuple(kind.request for kind in KINDS.values()), Field(discriminator="kind")]
 
 
 class Job(BaseModel):
@@ -197,7 +67,7 @@ class Job(BaseModel):
         """
         return cls(
             id=row.id,
-            kind=JobKind(row.kind),
+            kind=row.kind,
             scene=row.scene_id,
             state=JobState(row.state),
             outcome=None if row.outcome is None else Outcome(row.outcome),

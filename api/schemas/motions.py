@@ -2,45 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Self
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from api.schemas.common import Real, Request, SceneName, Vector
-from api.schemas.curves import BEZIER, CONTROL_POINTS, KNOTS, Bezier, ControlPoints, Knots, one_curve
 from certifier.outcome import Guarantee, Outcome
+from jobs.certify_path import GivenMotion
+from jobs.fields import SceneName
 from planner.motion.space import Space
-
-MAX_PIECES = 2000
-Waypoints = Annotated[list[Vector], Field(min_length=2, max_length=2000)]
-
-
-class GivenMotion(Request):
-    """Gives a motion: straight between waypoints `q` or `s`, or along Bezier pieces or a B-spline."""
-
-    q: Waypoints | None = Field(None, description="(k, n), joint positions in radians or metres, one row for each waypoint.")
-    s: Waypoints | None = Field(None, description="(k, n), tangent-space coordinates s, one row for each waypoint.")
-    bezier: Bezier | None = Field(None, max_length=MAX_PIECES, description=BEZIER)
-    knots: Knots | None = Field(None, description=KNOTS)
-    control_points: ControlPoints | None = Field(None, description=CONTROL_POINTS)
-    space: Space | None = Field(
-        None,
-        description="In which coordinates the motion is straight; without it, in those given. Of `bezier` and `control_points`, which ones "
-        "they are; without it, joint positions.",
-    )
-    tube: bool = Field(False, description="Whether to look for the largest certified tube about the motion.")
-    padding: Real = Field(
-        0.0,
-        ge=0,
-        description="Metres that are added around every body, beyond the scene's padding. So the bodies of a pair have to be twice this "
-        "farther apart.",
-    )
-    clearance: bool = Field(False, description="Whether to look for a proof of nearly the least distance: `clearance` of the answer.")
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        one_curve(self.q, self.s, self.bezier, self.knots, self.control_points)
-        return self
 
 
 class MotionRequest(GivenMotion):

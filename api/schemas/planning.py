@@ -7,9 +7,9 @@ from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from api.schemas.common import Real, Request, SceneName, Vector
-from api.schemas.curves import BEZIER, CONTROL_POINTS, KNOTS, Bezier, ControlPoints, Knots, one_curve
 from certifier.outcome import Guarantee
+from jobs.curves import BEZIER, CONTROL_POINTS, KNOTS, Bezier, ControlPoints, Knots, one_curve
+from jobs.fields import Real, Request, SceneName, Vector
 from planner.motion.space import Space
 
 MAX_POINTS, MAX_NEAREST = 10_000, 1000

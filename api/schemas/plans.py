@@ -7,9 +7,9 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from api.schemas.common import Request, SceneName
 from api.schemas.planning import REGION, Answer, Distance, Near, Piece, Q, RegionId, Uncovered
 from certifier.outcome import Guarantee
+from jobs.fields import Request, SceneName
 
 SPEED, ACCELERATION = 1.0, 2.0
 """Limits of every joint where a request gives none, in rad/s and rad/s² (or m/s and m/s²)."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from datetime import datetime
-from enum import StrEnum
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -21,23 +20,7 @@ class Progress(BaseModel):
     )
 
 
-class Work(StrEnum):
-    """Names what a process does for a job."""
-
-    PAIRS = "pairs"
-    """It certifies pairs, or parts of pairs."""
-    SEED = "seed"
-    """It looks for the polytope that growing begins with."""
-    STEP = "step"
-    """It moves the faces of the last region, all pairs coupled."""
-    ACCEPT = "accept"
-    """It puts the proof of a region together and verifies it."""
-    SCOUT = "scout"
-    """It looks how much a cover has covered, and where the next regions are to be grown."""
-    MOTION = "motion"
-    """It certifies a motion."""
-    DECIDE = "decide"
-    """It decides what the job does next."""
+PAIRS, DECIDE = "pairs", "decide"
 
 
 class HeldWork(BaseModel):
@@ -45,7 +28,11 @@ class HeldWork(BaseModel):
 
     job: str = Field(description="The job's id.")
     process: str = Field(description="Name of the process: host, process number, and when it began, with colons between.")
-    work: Work = Field(description="What the process does.")
+    work: str = Field(
+        description="What the process does: `pairs` certifies pairs, `decide` decides what the job does next. Else it is a step of the "
+        "job: `seed` looks for the polytope that growing begins with; `step` moves the faces of the last region, all pairs coupled; "
+        "`accept` puts the proof of a region together and verifies it; `scout` looks how much a cover has covered; `motion` certifies a motion."
+    )
     iteration: int | None = Field(description="Iteration of the pairs; null where the work is no pairs.")
     pairs: list[int] = Field(description="Indices of the pairs that it certifies, ascending; those that are done already are left out.")
     until: datetime | None = Field(description="Without a sign of life until then, the work is given to another process.")

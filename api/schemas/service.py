@@ -7,11 +7,12 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, Field
 
-from api.schemas import patterns
-from api.schemas.common import Page, Request
+from api.schemas.common import Page
 from db.audit import Action
 from db.keys import Scope
 from db.models import ApiKeyRow, AuditRow
+from jobs import patterns
+from jobs.fields import Request
 
 
 class Health(BaseModel):

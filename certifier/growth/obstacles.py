@@ -43,16 +43,6 @@ class Obstacle:
         """Returns what one round has cut off; ``s`` is (n,)."""
         return cls(stage, 1, faces, lost, None if s is None else tuple(map(float, s)), contact)
 
-    def to_document(self) -> dict[str, Any]:
-        """Returns the obstacle as JSON-able data."""
-        return {**vars(self), "s": None if self.s is None else list(self.s)}
-
-    @classmethod
-    def from_document(cls, document: dict[str, Any]) -> Obstacle:
-        """Does the inverse of :meth:`to_document`."""
-        s = document["s"]
-        return cls(**{**document, "s": None if s is None else tuple(s)})
-
 
 def lost_together(*shares: float) -> float:
     """Returns the share that is lost when each of these is lost of what those before it have left."""

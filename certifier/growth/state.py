@@ -5,12 +5,8 @@ It is JSON-able, so that a job can be resumed from its database rows alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
 
-import numpy as np
-
-from certifier.errors import CirisError
 from certifier.growth.obstacles import Obstacle
 from certifier.growth.options import NEAR, GrowthOptions
 from certifier.model import Array, Polytope
@@ -169,85 +165,3 @@ class GrowthState:
     bisection: Bisection | None = None
     round: Round | None = None
     obstacles: dict[int, Obstacle] = field(default_factory=dict)
-
-    def to_document(self) -> dict[str, Any]:
-        """Returns the state as JSON-able data, without the options."""
-        return {
-            "next": self.next,
-            "best": None if self.best is None else _document(self.best),
-            "suspects": list(self.suspects),
-            "start": None if self.start is None else _document(self.start),
-            "contractions": self.contractions,
-            "pushes": self.pushes,
-            "rounds": self.rounds,
-            "near": self.near,
-            "reach": self.reach,
-            "whole": None if self.whole is None else _document(self.whole),
-            "cuts": _document(self.cuts),
-            "bisection": None if self.bisection is None else _document(self.bisection),
-            "round": None if self.round is None else _document(self.round),
-            "obstacles": {str(pair): obstacle.to_document() for pair, obstacle in self.obstacles.items()},
-        }
-
-    @classmethod
-    def from_document(cls, document: dict[str, Any], options: GrowthOptions) -> GrowthState:
-        """Does the inverse of :meth:`to_document`.
-
-        Raises:
-            CirisError: ``other_version`` when another version of this program stored the state.
-        """
-        try:
-            cuts = document["cuts"]
-            parts: dict[str, Any] = {
-                "best": _part(Best, document["best"]),
-                "start": _part(Start, document["start"]),
-                "whole": _whole(document["whole"]),
-                "cuts": Cuts(_by_pair(cuts["holds"]), _by_pair(cuts["attempts"])),
-                "bisection": _part(Bisection, document["bisection"]),
-                "round": _part(Round, document["round"]),
-                "obstacles": {pair: Obstacle.from_document(one) for pair, one in _by_pair(document.get("obstacles", {})).items()},
-            }
-            return cls(options, **{**document, **parts, "suspects": tuple(document["suspects"])})
-        except (KeyError, TypeError) as error:
-            message = "this job was begun by another version of ciris and cannot go on"
-            raise CirisError("other_version", message, field="job", hint="retry it") from error
-
-
-def _whole(document: dict[str, Any] | None) -> Whole | None:
-    if document is None:
-        return None
-    known = {name: _by_pair(document[name]) for name in ("holds", "open_cells", "spent", "cuts")}
-    known["together"] = {pair: tuple(others) for pair, others in _by_pair(document.get("together", {})).items()}
-    return replace(_part(Whole, {**document, **dict.fromkeys(known, None)}), **known)
-
-
-def _document(part: Best | Start | Whole | Cuts | Bisection | Round) -> dict[str, Any]:
-    return {name: _plain(value) for name, value in vars(part).items()}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Polytope):
-        return {"C": value.C.tolist(), "d": value.d.tolist()}
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, dict):
-        return {str(pair): list(held) if isinstance(held, tuple) else held for pair, held in value.items()}
-    return value
-
-
-def _part(kind: type[Any], document: dict[str, Any] | None) -> Any:
-    """Makes a part of the state from its document, in which polytopes are mappings with C and d and arrays are lists."""
-    return None if document is None else kind(**{name: _value(name, value) for name, value in document.items()})
-
-
-def _value(name: str, value: Any) -> Any:
-    if isinstance(value, dict) and name != "holds":
-        return Polytope(np.array(value["C"]), np.array(value["d"]))
-    if isinstance(value, dict):
-        return {pair: (iteration, scale) for pair, (iteration, scale) in _by_pair(value).items()}
-    return np.array(value) if isinstance(value, list) else value
-
-
-def _by_pair(document: dict[str, Any]) -> dict[int, Any]:
-    """Turns the keys of a JSON object, which are text, back into pair indices."""
-    return {int(pair): value for pair, value in document.items()}

@@ -1,4 +1,4 @@
-"""Jobs are carried out in this process, without the service: plain calls drive the state machine of certifier.growth.machine."""
+"""Jobs are carried out in this process, without the service: their store is its memory."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from certifier.errors import CirisError
-from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Step, Transition
-from certifier.growth.machine import advance, begin
+from certifier.growth.actions import Action, Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Step, Transition
 from certifier.growth.options import GrowthOptions
-from certifier.growth.refusal import DEADLINE, at_deadline, ended_by, refusal
-from certifier.growth.state import Start
+from certifier.growth.state import GrowthState
 from certifier.growth.trials import alike
+from certifier.jobs.driver import drive
 from certifier.jobs.former import Former
+from certifier.jobs.growing import REST, Account, Certified, decided, failure, late, make_region, refused
 from certifier.jobs.pairs import part_certifier
 from certifier.jobs.parallel import side_by_side
-from certifier.jobs.region import REST, Region, certified_region, growth_point, versions
+from certifier.jobs.region import Region
 from certifier.jobs.share import SampledProposal
 from certifier.jobs.verdict import Verdict
 from certifier.model import Array, Polytope, Scene
@@ -40,38 +40,50 @@ def _silent(kind: str, data: dict[str, Any]) -> None:
     """Hears nothing."""
 
 
+@dataclass(frozen=True)
+class _Turn:
+    """Holds the report on the present action; None before the first one."""
+
+    report: Report | None
+
+
 @dataclass
-class _Run:
-    """Holds the progress of a job.
+class _Memory:
+    """Holds a job in memory: a store of :mod:`certifier.jobs.driver`.
 
     Attributes:
+        former: the region that is certified again; None where one is grown.
+        deliver: takes regions before the last one; None for the last one alone.
+        start: when the job began.
+        state, action: after the last decision; None before the first.
+        error: what went wrong, if something did.
         results: iteration -> pair index -> results of its parts.
         seeding_seconds: how long the seeding took.
-        candidate: the last accepted candidate; None before there is one.
+        certified: the polytopes that were certified, in order.
+        candidate: the last certified polytope; None before there is one.
         made: the candidate that a region was made of last; None before there is one.
         rests_until: no region but the last one is made before this many seconds of the job.
         proposal: what the region is grown from; None before there is a candidate.
-        curve: the growth curve of the manifest.
-        former: the region that is certified again; None where one is grown.
-        cuts: of the last stage, as :class:`certifier.growth.state.Whole` has them.
-        start: when the job began.
     """
 
     scene: Scene
-    seed: int
+    options: GrowthOptions
     tell: Tell
     processes: int = 1
     deadline_s: float | None = None
+    former: Former | None = None
+    deliver: Deliver | None = None
     start: float = field(default_factory=lambda: time.perf_counter())
+    state: GrowthState | None = None
+    action: Action | None = None
+    error: CirisError | None = None
     results: dict[int, dict[int, list[PairResult]]] = field(default_factory=dict)
     seeding_seconds: float = 0.0
+    certified: list[Certified] = field(default_factory=list)
     candidate: Candidate | None = None
     made: Candidate | None = None
     rests_until: float = 0.0
     proposal: SampledProposal | None = None
-    curve: list[dict[str, Any]] = field(default_factory=list)
-    former: Former | None = None
-    cuts: dict[int, int] = field(default_factory=dict)
 
     @property
     def seconds(self) -> float:
@@ -85,24 +97,54 @@ class _Run:
             return 0.0
         return self.seconds / self.deadline_s if self.deadline_s > 0 else math.inf
 
-    def accept(self, candidate: Candidate, start: Start) -> None:
-        self.proposal = self.proposal or SampledProposal.of(self.scene, start.rows)
-        kept = self.proposal.share(candidate.polytope)
-        self.curve.append(growth_point(candidate.iteration, self.seconds, candidate.ellipsoid_volume, kept["value"]))
+    @property
+    def finish(self) -> Finish:
+        """Returns the end of the job."""
+        assert isinstance(self.action, Finish), "the job has ended"
+        return self.action
+
+    def turn(self) -> _Turn | None:
+        """Carries out the present action."""
+        if isinstance(self.action, Finish):
+            return None
+        return _Turn(None if self.action is None else self._carry_out(self.action))
+
+    def decide(self, turn: _Turn) -> Transition:
+        self.error = failure(self.state, turn.report) or self.error
+        return decided(self.scene, self.options, self.state, turn.report)
+
+    def save(self, turn: _Turn, decision: Transition | CirisError) -> bool:
+        if isinstance(decision, CirisError):
+            raise decision
+        self.state, self.action = decision.state, decision.action
+        if decision.candidate is not None:
+            self._accept(decision.candidate)
+        if isinstance(self.action, Finish):
+            return False
+        if self.passed >= 1:
+            self.action = late(self.state, self.candidate is not None)
+            return False
+        if self.deliver is not None and self.candidate is not self.made and self.seconds >= self.rests_until:
+            self.deliver(self.region())
+        return True
+
+    def _accept(self, candidate: Candidate) -> None:
+        if self.proposal is None and self.state is not None and self.state.start is not None:
+            self.proposal = SampledProposal.of(self.scene, self.state.start.rows)
+        self.certified.append(Certified(candidate.iteration, candidate.polytope, candidate.ellipsoid_volume, self.seconds))
         self.candidate = candidate
 
-    @property
-    def has_news(self) -> bool:
-        """Returns whether there is a candidate that no region was made of, and it is time to make one."""
-        return self.candidate is not self.made and self.seconds >= self.rests_until
-
-    def make_region(self, options: GrowthOptions, reason: str) -> Region:
+    def region(self) -> Region:
         """Makes a region of the last candidate, which verifies its proof, and tells of it."""
         assert self.candidate is not None, "a region is made of a certified polytope"
+        assert self.state is not None
         begun = self.seconds
-        provenance, proofs = self.provenance(options, reason), self.proofs(self.candidate)
+        spent = sum(result.seconds for found in self.results.values() for parts in found.values() for result in parts)
+        account = Account(self.certified, self.seeding_seconds, spent, self.seconds)
         self.tell("step", {"kind": "accept", "state": "running", "seconds": None})
-        region = certified_region(self.scene, self.candidate, proofs, provenance, self.proposal, self.processes, self._tell_verified)
+        proofs = self.proofs(self.candidate)
+        made = (self.scene, self.state, self.candidate, proofs, account, self.proposal, self.former, self.processes, self._tell_verified)
+        region = make_region(*made)
         taken = self.seconds - begun
         self.tell("step", {"kind": "accept", "state": "done", "seconds": taken})
         said = {name: region.manifest[name] for name in ("q_volume", "share")}
@@ -116,8 +158,24 @@ class _Run:
     def _tell_verified(self, done: int, total: int) -> None:
         self._tell_note(f"verifying the region: {done} of {total} cells and proofs", done / total)
 
-    def certify(self, action: Certify) -> Outcomes:
-        certify = part_certifier(self.scene, action, self.seed, self.left, None if self.former is None else self.former.carried)
+    def _carry_out(self, action: Propose | Certify | Step) -> Report:
+        try:
+            if isinstance(action, Certify):
+                return self._certify(action)
+            if isinstance(action, Propose):
+                self.tell("step", {"kind": "propose", "state": "running", "seconds": None})
+                found = propose(self.scene, SeedOptions.from_document(action.seed))
+                self.seeding_seconds = found.info["seconds"]
+                self.tell("step", {"kind": "propose", "state": "done", "seconds": self.seeding_seconds})
+                return found
+            assert self.candidate is not None, "a step follows a certified polytope"
+            return step(self.scene, action.polytope, self.proofs(self.candidate), action.contain, self._tell_note)
+        except CirisError as error:
+            return Failed(error)
+
+    def _certify(self, action: Certify) -> Outcomes:
+        carried = None if self.former is None else self.former.carried
+        certify = part_certifier(self.scene, action, self.options.random_seed, self._left, carried)
         found = self.results.setdefault(action.iteration, {})
         failures, work = 0, action.work
         said = {"index": action.iteration, "label": action.label, "pairs": len(action.pairs), "parts": len(work)}
@@ -141,40 +199,11 @@ class _Run:
         }
         return Outcomes.of_parts(action, reached, self.passed)
 
-    def left(self, iteration: int, index: int) -> list[bytes]:
+    def _left(self, iteration: int, index: int) -> list[bytes]:
         return [result.subtrees for result in self.results[iteration][index] if result.subtrees is not None]
 
     def proofs(self, candidate: Candidate) -> dict[int, bytes]:
         return {index: self.results[iteration][index][0].proof or b"" for index, iteration in candidate.proofs.items()}
-
-    def provenance(self, options: GrowthOptions, reason: str) -> dict[str, Any]:
-        """Returns what the manifest says of how a region came about."""
-        assert self.candidate is not None, "a region is made of a certified polytope"
-        said = {}
-        if self.former is not None and self.proposal is not None:
-            said["recertified"] = self.former.document(self.scene, self.cuts, self.proposal, self.candidate.polytope)
-        return {
-            "options": options.to_document(),
-            "versions": versions(self.scene),
-            "reason": reason,
-            **said,
-            "growth_curve": self.curve,
-            "seeding_seconds": self.seeding_seconds,
-            "pair_seconds": sum(result.seconds for found in self.results.values() for parts in found.values() for result in parts),
-            "seconds": self.seconds,
-        }
-
-    def carry_out(self, action: Propose | Certify | Step) -> Report:
-        if isinstance(action, Certify):
-            return self.certify(action)
-        if isinstance(action, Propose):
-            self.tell("step", {"kind": "propose", "state": "running", "seconds": None})
-            found = propose(self.scene, SeedOptions.from_document(action.seed))
-            self.seeding_seconds = found.info["seconds"]
-            self.tell("step", {"kind": "propose", "state": "done", "seconds": self.seeding_seconds})
-            return found
-        assert self.candidate is not None, "a step follows an accepted region"
-        return step(self.scene, action.polytope, self.proofs(self.candidate), action.contain, self._tell_note)
 
 
 def grow(
@@ -197,7 +226,7 @@ def grow(
     Raises:
         CirisError: no region could be certified; the code is ``not_grown`` or that of the seeding's error.
     """
-    return _carried_out(_Run(scene, options.random_seed, tell, processes, deadline_s), options, deliver)
+    return _grown(_Memory(scene, options, tell, processes, deadline_s, deliver=deliver))
 
 
 def recertify(
@@ -226,39 +255,15 @@ def recertify(
     former = Former.of(old, digest(data), scene)
     seed = {"C": old.C.tolist(), "d": old.d.tolist(), "q": keep or [scene.to_q(old.interior).tolist()]}
     options = GrowthOptions.from_document({"kind": "recertify", "seed": seed, "random_seed": random_seed})
-    return _carried_out(_Run(scene, options.random_seed, tell, processes, deadline_s, start, former=former), options)
+    return _grown(_Memory(scene, options, tell, processes, deadline_s, former, start=start))
 
 
-def _carried_out(run: _Run, options: GrowthOptions, deliver: Deliver | None = None) -> Region:
-    """Carries out what the growth asks for until it ends, and returns the region."""
-    scene = run.scene
-    transition, late = begin(scene, options), False
-    while not isinstance(transition.action, Finish):
-        failure: CirisError | None = None
-        try:
-            report = run.carry_out(transition.action)
-        except CirisError as error:
-            failure = error if transition.state.start is None else ended_by(error, transition.state.start.hindrance)
-            report = Failed(failure)
-        transition = advance(scene, transition.state, report)
-        if failure and run.candidate is None:
-            raise failure
-        if transition.candidate:
-            assert transition.state.start is not None, "what is grown comes from a proposal"
-            run.accept(transition.candidate, transition.state.start)
-        run.cuts = run.cuts if transition.state.whole is None else transition.state.whole.cuts
-        late = run.passed >= 1
-        if late and not isinstance(transition.action, Finish):
-            start = transition.state.start
-            end = Finish(Outcome.CERTIFIED, DEADLINE)
-            if run.candidate is None:
-                end = Finish(Outcome.INCONCLUSIVE, at_deadline("" if start is None else start.hindrance))
-            transition = Transition(transition.state, end)
-        if deliver is not None and run.has_news and not isinstance(transition.action, Finish):
-            deliver(run.make_region(options, "growing"))
-    if run.candidate is None:
-        raise refusal(transition.action.reason, late)
-    return run.make_region(options, transition.action.reason)
+def _grown(job: _Memory) -> Region:
+    """Drives a growth to its end, and returns its last region."""
+    drive(job)
+    if error := refused(job.finish, job.error):
+        raise error
+    return replace(job.region(), reason=job.finish.reason)
 
 
 def certify(
@@ -280,15 +285,12 @@ def certify(
     Raises:
         RegionError: the polytope is malformed, empty or unbounded, or ``cells`` is out of range.
     """
-    start = time.perf_counter()
     seed = {"C": polytope.C.tolist(), "d": polytope.d.tolist(), "center": None if center is None else center.tolist()}
-    options = GrowthOptions.from_document({"kind": "certify", "seed": seed, "cells": cells})
-    first = begin(scene, options)
-    action = first.action
-    assert isinstance(action, Certify)
-    run = _Run(scene, options.random_seed, tell, processes)
-    report = run.certify(action)
-    results = {index: result for index, (result,) in run.results[action.iteration].items()}
-    run.candidate = advance(scene, first.state, report).candidate if assemble else None
-    region = None if run.candidate is None else run.make_region(options, "certified")
-    return Verdict(results, Guarantee.EXACT, time.perf_counter() - start, region)
+    job = _Memory(scene, GrowthOptions.from_document({"kind": "certify", "seed": seed, "cells": cells}), tell, processes)
+    drive(job)
+    if job.error is not None:
+        raise job.error
+    (found,) = job.results.values()
+    results = {index: result for index, (result,) in found.items()}
+    region = job.region() if assemble and job.candidate is not None else None
+    return Verdict(results, Guarantee.EXACT, job.seconds, region)

@@ -22,9 +22,6 @@ from certifier.verify import uncovered
 from certifier.verify.region import RegionStatement, verify_region
 from certifier.verify.separations import Progress
 
-REST = 4.0
-"""While a region goes on growing, none is made for REST times as long as making the last one took, which is mostly verifying its proof."""
-
 
 @dataclass(frozen=True)
 class Region:
@@ -34,11 +31,13 @@ class Region:
         manifest: JSON-able; the caller adds ``seconds`` and the proof's path.
         proof: the portable proof file.
         statement: what the verifier says that the proof proves.
+        reason: why growing ended, in a sentence; empty while it goes on.
     """
 
     manifest: dict[str, Any]
     proof: bytes
     statement: RegionStatement
+    reason: str = ""
 
 
 def certified_region(

@@ -50,18 +50,6 @@ class Weakness:
         joints = () if () in others else tuple(sorted({joint for some in others for joint in some}))
         return cls(np.concatenate(points), parts[0].pull, parts[0].ranges_alone, sum(part.contacts for part in parts), joints)
 
-    def to_document(self) -> dict[str, Any]:
-        """Returns the weakness as JSON-able data."""
-        document = {"points": self.points.tolist(), "pull": self.pull.tolist(), "ranges_alone": self.ranges_alone}
-        return document | {"contacts": self.contacts, "joints": list(self.joints)}
-
-    @classmethod
-    def from_document(cls, document: dict[str, Any]) -> Weakness:
-        """Does the inverse of :meth:`to_document`."""
-        pull = np.array(document["pull"], dtype=float)
-        points = np.array(document["points"], dtype=float).reshape(-1, len(pull))
-        return cls(points, pull, bool(document["ranges_alone"]), int(document["contacts"]), tuple(document["joints"]))
-
 
 @dataclass(frozen=True)
 class PairResult:

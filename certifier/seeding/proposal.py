@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from certifier.model import Array
 
 NO_ROOM = ", and no region was found there"
@@ -39,20 +37,3 @@ class Proposal:
     center: Array
     contain: Array
     info: dict[str, Any]
-
-    def to_document(self) -> dict[str, Any]:
-        """Returns the proposal as JSON-able data."""
-        return {
-            "C": self.C.tolist(),
-            "d": self.d.tolist(),
-            "center": self.center.tolist(),
-            "contain": self.contain.tolist(),
-            "info": self.info,
-        }
-
-    @classmethod
-    def from_document(cls, document: dict[str, Any]) -> Proposal:
-        """Does the inverse of :meth:`to_document`."""
-        center = np.array(document["center"], dtype=float)
-        C, contain = (np.array(document[name], dtype=float).reshape(-1, len(center)) for name in ("C", "contain"))
-        return cls(C, np.array(document["d"], dtype=float), center, contain, document["info"])

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from certifier import stored
 from certifier.errors import RegionError
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Guarantee
@@ -103,7 +104,8 @@ def warm_up() -> None:
 
 def propose_in_child(payload: dict[str, Any]) -> dict[str, Any]:
     """Runs :func:`propose` in a child process: takes documents and returns the document of the proposal."""
-    return propose(Scene.from_document(payload["scene"]), SeedOptions.from_document(payload["seed"])).to_document()
+    found = propose(Scene.from_document(payload["scene"]), SeedOptions.from_document(payload["seed"]))
+    return dict(stored.document(found))
 
 
 def _given(scene: Scene, options: SeedOptions) -> tuple[Array, Array, Array]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from certifier.model import Array, Polytope
 
 
@@ -28,21 +26,3 @@ class Stepped:
     base: Polytope
     growth: float
     info: dict[str, Any]
-
-    def to_document(self) -> dict[str, Any]:
-        """Returns the step's result as JSON-able data."""
-        return {
-            "C": self.polytope.C.tolist(),
-            "d": self.polytope.d.tolist(),
-            "center": self.center.tolist(),
-            "base_C": self.base.C.tolist(),
-            "base_d": self.base.d.tolist(),
-            "growth": self.growth,
-            "info": self.info,
-        }
-
-    @classmethod
-    def from_document(cls, document: dict[str, Any]) -> Stepped:
-        """Does the inverse of :meth:`to_document`."""
-        moved, base = (Polytope(np.array(document[C]), np.array(document[d])) for C, d in (("C", "d"), ("base_C", "base_d")))
-        return cls(moved, np.array(document["center"]), base, document["growth"], document["info"])

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, Self
 
 from planner.cover.options import CoverOptions, Q
 
@@ -48,11 +47,6 @@ class Task:
     def key(self) -> str:
         """Returns what it is about, as a text."""
         return self.purpose.value if self.purpose is Purpose.COVER else f"{self.purpose}[{self.about}]"
-
-    @classmethod
-    def from_document(cls, document: Mapping[str, Any]) -> Self:
-        contain = tuple(tuple(q) for q in document["contain"])
-        return cls(tuple(document["q"]), Purpose(document["purpose"]), document["about"], contain)
 
 
 @dataclass(frozen=True)
@@ -101,16 +95,6 @@ class Scouted:
     def joined(self) -> bool:
         """Returns whether the configurations to connect are in one component."""
         return None not in self.connect and len(set(self.connect)) <= 1
-
-    def to_document(self) -> dict[str, Any]:
-        """Returns the report as JSON-able data."""
-        return asdict(self)
-
-    @classmethod
-    def from_document(cls, document: Mapping[str, Any]) -> Self:
-        """Does the inverse of :meth:`to_document`."""
-        lists = {name: tuple(document[name]) for name in ("components", "seeds", "connect", "paths", "obstacles")}
-        return cls(**{**document, **lists, "proposals": tuple(Task.from_document(task) for task in document["proposals"])})
 
 
 @dataclass(frozen=True)
@@ -195,19 +179,6 @@ class CoverState:
     looks: int = 0
     fruitless: int = 0
     closing: str | None = None
-
-    def to_document(self) -> dict[str, Any]:
-        """Returns the state as JSON-able data, without the options."""
-        document = asdict(replace(self, growing={}))
-        del document["options"]
-        return document | {"growing": {str(number): asdict(task) for number, task in self.growing.items()}}
-
-    @classmethod
-    def from_document(cls, document: Mapping[str, Any], options: CoverOptions) -> Self:
-        """Does the inverse of :meth:`to_document`."""
-        growing = {int(number): Task.from_document(task) for number, task in document["growing"].items()}
-        last = None if document["last"] is None else Scouted.from_document(document["last"])
-        return cls(options, **{**document, "growing": growing, "last": last})
 
 
 @dataclass(frozen=True)

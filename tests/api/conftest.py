@@ -25,6 +25,7 @@ from db.session import Database
 from db.settings import settings
 from db.types import utcnow
 from tests.certifier.scenes import accepted, cube, planar_arm
+from tests.db.builders import add_iteration
 from tests.scenes import slider
 from tests.services import Queue
 from tests.workers.service import SECRET_KEY
@@ -164,7 +165,7 @@ def store_region(database: Database, certified: Region) -> str:
         job, _ = jobs.create(session, kind="grow", scene_id=row.id, options={"kind": "grow", "seed": {"q": [0.0]}, "random_seed": 0})
         jobs.start(session, job)
         names = [(index, pair["a"], pair["b"]) for index, pair in enumerate(manifest["pairs"])]
-        pairs.add_iteration(
+        add_iteration(
             session,
             job,
             index=0,

@@ -22,9 +22,10 @@ from db import jobs, pairs, proofs, regions, scenes, steps, subtrees
 from db.leases import this_worker
 from db.models import JobRow, SubtreesRow
 from db.session import Database
-from db.states import PairState, StepKind, StepState
+from db.states import PairState, StepState
 from db.types import utcnow
 from tests.certifier.scenes import ball, box, planar_arm
+from tests.db.builders import add_iteration
 from tests.scenes import slider
 
 Ask = Callable[[str], Any]
@@ -210,9 +211,7 @@ def begin(database: Database, job: JobRow, index: int, parts: dict[int, int], re
     with database.write() as session:
         row = jobs.lock(session, job.id)
         polytope = {"C": [[1.0], [-1.0]], "d": [1.0, 1.0], "center": None}
-        pairs.add_iteration(
-            session, row, index=index, label="cells", **polytope, pairs=new, reuse=reuse or {}, hard=[], failures=None, **more
-        )
+        add_iteration(session, row, index=index, label="cells", **polytope, pairs=new, reuse=reuse or {}, hard=[], failures=None, **more)
         claim = pairs.claim(session, row, lease_seconds=60, batch_seconds=1e9)
     assert claim is not None
     return claim
@@ -328,8 +327,8 @@ def test_the_first_contact_of_a_motion_is_its_obstacle(database: Database, job: 
     with database.write() as session:
         row = jobs.lock(session, job.id)
         row.kind = "certify-path"
-        steps.add(session, row, StepKind.MOTION, {})
-        claim = steps.claim(session, row, [StepKind.MOTION], lease_seconds=60)
+        steps.add(session, row, "motion", {})
+        claim = steps.claim(session, row, accepts=False, lease_seconds=60)
         assert claim is not None
         steps.save(session, claim, StepState.DONE, {"stop": stop}, 0.1)
     (found,) = ask(f"jobs/{job.id}/obstacles")["obstacles"]
@@ -341,8 +340,8 @@ def test_the_first_contact_of_a_motion_is_its_obstacle(database: Database, job: 
 def test_steps_and_decisions_have_workers_too(database: Database, job: JobRow, ask: Ask) -> None:
     with database.write() as session:
         row = jobs.lock(session, job.id)
-        steps.add(session, row, StepKind.PROPOSE, {"seed": {}})
-        steps.claim(session, row, [StepKind.PROPOSE], lease_seconds=60)
+        steps.add(session, row, "propose", {"seed": {}})
+        steps.claim(session, row, accepts=False, lease_seconds=60)
         row.coordinator, row.coordinator_until = this_worker(), utcnow().replace(year=2100)
     assert [one["work"] for one in ask(f"jobs/{job.id}/workers")["workers"]] == ["seed", "decide"]
 

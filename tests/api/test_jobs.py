@@ -21,6 +21,7 @@ from certifier.verify.file import verify_file
 from db import jobs, pairs, scenes
 from db.session import Database
 from tests.api.conftest import BASE_URL, PROBLEM
+from tests.db.builders import add_iteration
 from tests.scenes import slider
 from workers.app import CONTROL, waiting
 
@@ -171,7 +172,7 @@ def test_a_witness_is_given_in_joint_positions(client: TestClient, database: Dat
         jobs.start(session, job)
         new = [pairs.NewPair(0, scene.pairs[0].a, scene.pairs[0].b, 1.0)]
         C, d = [[1.0], [-1.0]], [1.0, 1.0]
-        pairs.add_iteration(session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={1: 0}, hard=[], failures=None)
+        add_iteration(session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={1: 0}, hard=[], failures=None)
         claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
         assert claim is not None
         refuted = PairResult(Outcome.REFUTED, Stage.SCREEN, seconds=0.1, witness_s=np.array([0.25]))
@@ -197,9 +198,7 @@ def test_only_outcomes_that_have_a_proof_offer_one(client: TestClient, database:
         jobs.start(session, job)
         new = [pairs.NewPair(i, pair.a, pair.b, 1.0) for i, pair in enumerate(scene.pairs)]
         C, d = polytope.C, polytope.d
-        pairs.add_iteration(
-            session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={}, hard=[], failures=None, cells=50
-        )
+        add_iteration(session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={}, hard=[], failures=None, cells=50)
         claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
         assert claim is not None
         pairs.save(session, claim, {(0, 0): left, (1, 0): certified})
@@ -227,9 +226,7 @@ def test_the_parts_of_a_pair_are_shown_as_one(client: TestClient, database: Data
         new = [pairs.NewPair(index, f"a{index}", f"b{index}", 1.0, part) for index, part in ((0, 0), (0, 1), (1, 0))]
         more = {"cells": 50, "begun": 0, "parts": {0: 2}}
         C, d = polytope.C, polytope.d
-        pairs.add_iteration(
-            session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={}, hard=[], failures=None, **more
-        )
+        add_iteration(session, job, index=0, label="given", C=C, d=d, center=None, pairs=new, reuse={}, hard=[], failures=None, **more)
         claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
         assert claim is not None
         pairs.save(session, claim, {(0, 0): first, (1, 0): second})
@@ -265,7 +262,7 @@ def test_a_pair_that_is_certified_with_another_one_is_found_there(client: TestCl
         jobs.start(session, job)
         new, given = [pairs.NewPair(0, "a0", "b0", 1.0)], {"C": polytope.C, "d": polytope.d, "center": None}
         more = {"hard": [], "failures": None, "cells": 50, "together": {0: (1,)}}
-        pairs.add_iteration(session, job, index=0, label="cells", **given, pairs=new, reuse={}, **more)
+        add_iteration(session, job, index=0, label="cells", **given, pairs=new, reuse={}, **more)
         claim = pairs.claim(session, job, lease_seconds=60, batch_seconds=60)
         assert claim is not None
         pairs.save(session, claim, {(0, 0): certified})
@@ -345,7 +342,7 @@ def test_the_pair_matrix_comes_in_pages_that_do_not_part_the_parts_of_a_pair(cli
         for index in range(3):
             new = [pairs.NewPair(i, one.a, one.b, 1.0, part) for i, one in enumerate(scene.pairs) for part in range(index + 1)]
             given = {"C": [[1.0], [-1.0]], "d": [1.0, 1.0], "center": None, "reuse": {}, "hard": [], "failures": None}
-            pairs.add_iteration(session, job, index=index, label="given", pairs=new, **given)
+            add_iteration(session, job, index=index, label="given", pairs=new, **given)
     path = f"/v1/jobs/{job_id}/pairs"
     whole = client.get(path).json()
     assert ([(c["iteration"], c["pair"]) for c in whole["cells"]], whole["next"]) == ([(i, p) for i in range(3) for p in range(2)], None)

@@ -18,10 +18,10 @@ from sqlalchemy.exc import OperationalError
 from api import guard
 from api.access import KEYS_SECONDS
 from api.app import create_app
-from api.schemas.common import Request
 from certifier.model import Scene
 from db import jobs
 from db.session import Database
+from jobs.fields import Request
 from tests.api.conftest import BASE_URL, PROBLEM
 from tests.api.test_jobs import CERTIFY, GROW
 

@@ -10,7 +10,6 @@ from pydantic import TypeAdapter
 
 from api import checks
 from api.problems import Problem
-from api.schemas import patterns
 from api.schemas.jobs import NewJob, WebhookRequest
 from api.schemas.planning import ContainsRequest, NearestRequest, PathRequest, SegmentRequest
 from api.schemas.plans import PlanRequest
@@ -18,6 +17,7 @@ from certifier.scene import load_scene
 from db import scenes
 from db.keys import Scope
 from db.session import Database
+from jobs import patterns
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -17,6 +17,7 @@ from db import jobs, pairs, scenes
 from db.models import IterationRow, PairRow
 from db.session import Database
 from db.states import IterationState, PairState
+from tests.db.builders import add_iteration
 
 SLIDE: dict[str, Any] = {"C": [[1.0], [-1.0]], "d": [0.5, 0.5], "center": [0.0]}
 
@@ -33,7 +34,7 @@ def begin(database: Database, scene: Scene, job_id: str, *, cells: int = 1) -> N
     new = [pairs.NewPair(index, pair.a, pair.b, 1.0) for index, pair in enumerate(scene.pairs)]
     with database.write() as session:
         job = jobs.lock(session, job_id)
-        pairs.add_iteration(session, job, index=0, label="proposal", **SLIDE, pairs=new, reuse={}, hard=[], failures=None, cells=cells)
+        add_iteration(session, job, index=0, label="proposal", **SLIDE, pairs=new, reuse={}, hard=[], failures=None, cells=cells)
 
 
 def settle(database: Database, job_id: str, *results: PairResult, batch: float = 100.0) -> None:
@@ -110,6 +111,6 @@ def large_job(database: Database, scene: Scene, iterations: int, leaves: int) ->
     new = [pairs.NewPair(index, pair.a, pair.b, 1.0) for index, pair in enumerate(scene.pairs)]
     with database.write() as session:
         job = jobs.lock(session, job_id)
-        pairs.add_iteration(session, job, index=iterations, label="last", **SLIDE, pairs=new, reuse={}, hard=[], failures=None, cells=64)
+        add_iteration(session, job, index=iterations, label="last", **SLIDE, pairs=new, reuse={}, hard=[], failures=None, cells=64)
     settle(database, job_id, left_open(scene, leaves), batch=0)
     return job_id

@@ -14,6 +14,7 @@ from db import jobs, keys, pairs
 from db.keys import Scope
 from db.session import Database
 from db.states import JobState
+from tests.db.builders import add_iteration
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True}
 
@@ -31,7 +32,7 @@ def begin(database: Database, scene: Scene, job_id: str) -> None:
         jobs.start(session, job)
         polytope: dict[str, Any] = {"C": [[1.0], [-1.0]], "d": [0.5, 0.5], "center": [0.0]}
         new = [pairs.NewPair(index, pair.a, pair.b, 1.0) for index, pair in enumerate(scene.pairs)]
-        pairs.add_iteration(session, job, index=0, label="contract", **polytope, pairs=new, reuse={}, hard=[], failures=None)
+        add_iteration(session, job, index=0, label="contract", **polytope, pairs=new, reuse={}, hard=[], failures=None)
 
 
 def settle(database: Database, job_id: str, index: int) -> None:

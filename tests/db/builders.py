@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from certifier import stored
+from certifier.growth.actions import Certify
+from certifier.model import Polytope
 from certifier.outcome import Outcome, Stage
 from certifier.pair.result import PairResult
 from db import jobs, pairs, regions, scenes
+from db import pairs as rows
 from db.models import IterationRow, JobRow, PairRow, RegionRow, SceneRow
+from db.pairs import NewPair
 from tests.scenes import slider
 
 
@@ -34,19 +41,19 @@ def a_running_job(session: Session, pair_count: int = 4, *, failures: int | None
 
 def add_pairs(session: Session, job: JobRow, pair_count: int, *, failures: int | None = 1) -> None:
     """Iteration 0 with so many open pairs of 1 s each."""
-    pairs.add_iteration(
-        session,
-        job,
-        index=0,
-        label="contract",
-        C=[[1.0], [-1.0]],
-        d=[1.0, 1.0],
-        center=[0.0],
-        pairs=[pairs.NewPair(i, f"a{i}", f"b{i}", 1.0) for i in range(pair_count)],
-        reuse={},
-        hard=[],
-        failures=failures,
-    )
+    new = [pairs.NewPair(i, f"a{i}", f"b{i}", 1.0) for i in range(pair_count)]
+    add_iteration(session, job, index=0, label="contract", C=[[1.0], [-1.0]], d=[1.0, 1.0], center=[0.0], pairs=new, failures=failures)
+
+
+def add_iteration(
+    session: Session, job: JobRow, *, index: int, label: str, C: ArrayLike, d: ArrayLike, pairs: Sequence[NewPair], **asked: Any
+) -> None:
+    """Adds an iteration with these pairs; ``asked`` are further fields of the action that asks for it."""
+    given = {"center": None, "reuse": {}, "hard": [], "failures": None, **asked}
+    polytope = Polytope(np.array(C, dtype=float), np.array(d, dtype=float))
+    center = None if given["center"] is None else np.array(given["center"], dtype=float)
+    action = Certify(index, label, polytope, pairs=list(dict.fromkeys(pair.index for pair in pairs)), **{**given, "center": center})
+    rows.add_iteration(session, job, stored.document(action), pairs)
 
 
 def certified(index: int, proof: bytes = b"proof") -> dict[tuple[int, int], PairResult]:
@@ -57,7 +64,7 @@ def add_region(session: Session, job: JobRow, lower: float = -1.0, upper: float 
     """Stores lower <= s <= upper as the region of a new iteration of the job."""
     index = session.scalar(select(func.count()).where(IterationRow.job_id == job.id)) or 0
     faces = {"C": np.array([[1.0], [-1.0]]), "d": np.array([upper, -lower])}
-    session.add(IterationRow(job_id=job.id, index=index, label="contract", arrays=faces, faces=2, hard=[], reuse={}))
+    add_iteration(session, job, index=index, label="contract", pairs=[], **faces)
     session.flush()
     manifest = {
         "scene": {"hash": job.scene_id},

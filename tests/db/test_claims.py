@@ -20,7 +20,7 @@ from certifier.pair.result import PairResult, Weakness
 from db import events, jobs, leases, pairs, steps, work
 from db.models import IterationRow, PairRow, ProofRow, StepRow
 from db.session import Database
-from db.states import IterationState, JobState, PairState, StepKind, StepState, transition_each
+from db.states import IterationState, JobState, PairState, StepState, transition_each
 from db.types import utcnow
 from tests.db.builders import a_running_job, all_pairs, certified
 
@@ -300,12 +300,12 @@ def test_a_holder_whose_work_is_not_wanted_any_more_dies(db: Database, database_
 def test_a_step_is_done_once_and_accepting_survives_a_cancel(db: Database) -> None:
     with db.write() as session:
         job = a_running_job(session, 0)
-        steps.add(session, job, StepKind.PROPOSE, {})
-        steps.add(session, job, StepKind.ACCEPT, {})
+        steps.add(session, job, "propose", {})
+        steps.add(session, job, "accept", {})
         job_id = job.id
     held = claim_step(db, job_id)
     assert held is not None
-    assert held.kind == StepKind.PROPOSE
+    assert held.kind == "propose"
     with db.write() as session:
         assert steps.save(session, held, StepState.DONE, {"x": 1}, 0.5)
         assert not steps.save(session, held, StepState.DONE, {"x": 2}, 0.5)
@@ -336,7 +336,7 @@ def test_the_latest_region_is_accepted_and_an_earlier_one_only_if_it_is_refused(
         job = a_running_job(session, 0)
         for turn in (1, 2):
             job.turn = turn
-            steps.add(session, job, StepKind.ACCEPT, {"turn": turn})
+            steps.add(session, job, "accept", {"turn": turn})
         job_id = job.id
     held = claim_step(db, job_id)
     assert held is not None

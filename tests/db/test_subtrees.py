@@ -10,7 +10,7 @@ from certifier.pair.result import PairResult
 from db import jobs, leases, pairs, subtrees
 from db.models import ProofRow, SubtreesRow
 from db.session import Database
-from tests.db.builders import a_running_job, all_pairs
+from tests.db.builders import a_running_job, add_iteration, all_pairs
 
 CERTIFIED = PairResult(Outcome.CERTIFIED, Stage.CELLS, margin=0.01, proof=b"proof")
 
@@ -48,7 +48,7 @@ def next_round(db: Database, job_id: str, index: int, parts: tuple[int, ...] = (
         new = [pairs.NewPair(i, f"a{i}", f"b{i}", 0.01, part) for i, count in enumerate(parts) for part in range(count)]
         box, polytope = BOX, {"C": [[1.0], [-1.0]], "d": [1.0, 1.0], "center": None}
         more = {"box": box, "begun": 0, "parts": dict(enumerate(parts))}
-        pairs.add_iteration(session, job, index=index, label="cells", **polytope, pairs=new, reuse={}, hard=[], failures=None, **more)
+        add_iteration(session, job, index=index, label="cells", **polytope, pairs=new, reuse={}, hard=[], failures=None, **more)
     return claim(db, job_id)
 
 

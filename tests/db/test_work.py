@@ -15,7 +15,7 @@ from db.models import ApiKeyRow, JobRow
 from db.pairs import batch
 from db.session import Database
 from db.settings import settings
-from db.states import JobState, StepKind, StepState
+from db.states import JobState, StepState
 from db.types import utcnow
 from tests.db.builders import a_job, add_pairs
 
@@ -94,7 +94,7 @@ def test_a_region_is_accepted_before_more_pairs_and_then_the_job_rests(db: Datab
         with db.write() as session:
             job = jobs.lock(session, job_id)
             job.turn += 1
-            steps.add(session, job, StepKind.ACCEPT, {})
+            steps.add(session, job, "accept", {})
 
     def claimed() -> steps.Claim | pairs.Claim | None:
         with db.write() as session:

@@ -11,7 +11,7 @@ from certifier.errors import CirisError
 from db import jobs, leases, projects, steps, work, workers
 from db.models import PairRow, WorkerRow
 from db.session import Database
-from db.states import StepKind, WorkerState
+from db.states import WorkerState
 from db.types import utcnow
 from db.workers import GONE_SECONDS, Made, WorkerKind
 from tests.db.builders import a_job, a_running_job
@@ -132,7 +132,7 @@ def test_a_job_waits_for_one_step(db: Database) -> None:
     with db.write() as session:
         job = a_job(session)
         jobs.start(session, job)
-        steps.add(session, job, StepKind.PROPOSE, {})
+        steps.add(session, job, "propose", {})
         job_id = job.id
     assert busy(db) == 1
     claim(db, job_id)

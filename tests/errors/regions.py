@@ -23,6 +23,7 @@ from certifier.proof.motion import Space
 from certifier.seeding.options import SeedOptions
 from certifier.seeding.propose import propose
 from certifier.step.step import step
+from certifier.stored import value
 from planner.cover.options import MOST_GIVEN, CoverOptions
 from tests.certifier.scenes import planar_arm
 from tests.certifier.seeding.test_propose import crane
@@ -161,13 +162,13 @@ GROWTH = [
         ),
     ),
     *rows(
-        "certifier/growth/state.py",
+        "certifier/stored.py",
         (
             "other_version",
             "job",
             "this job was begun by another version of ciris and cannot go on",
             "retry it",
-            lambda t: GrowthState.from_document({}, grow()),
+            lambda t: value(GrowthState, {}),
         ),
     ),
     *rows(

@@ -12,7 +12,7 @@ from certifier.verify.region import verify_region
 from db import jobs, pairs, proofs, regions, scenes, steps
 from db.models import RegionRow
 from db.session import database
-from db.states import IterationState, PairState, StepKind, StepState
+from db.states import IterationState, PairState, StepState
 from tests.db.builders import all_pairs
 from tests.workers.service import events_of
 
@@ -48,7 +48,7 @@ def check_record(job_id: str) -> None:
     assert Counter(event.data["kind"] for event in events if event.kind == "step" and event.data["state"] == "done") == done
     assert {step.state for step in did} <= {StepState.DONE, StepState.SKIPPED}, [step.report for step in did]
     assert sorted(event.data["region_id"] for event in events if event.kind == "region") == sorted(region.id for region in stored)
-    assert len(stored) == done[StepKind.ACCEPT]
+    assert len(stored) == done["accept"]
 
 
 def region_of(job_id: str) -> dict[str, Any]:

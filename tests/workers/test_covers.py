@@ -18,7 +18,7 @@ from certifier.verify.region import verify_region
 from db import jobs, proofs, regions, scenes, steps
 from db.models import JobRow
 from db.session import database
-from db.states import JOB, StepKind, unfinished
+from db.states import JOB, unfinished
 from db.types import utcnow
 from planner.cover.options import CoverOptions
 from planner.cover.result import said
@@ -108,7 +108,7 @@ def test_it_goes_on_when_workers_die_between_its_regions(planar: Scene, service:
 
     def looking() -> int | None:
         with database().read() as session:
-            step = next((step for step in steps.of_job(session, job_id) if step.kind == StepKind.SCOUT and step.state == "running"), None)
+            step = next((step for step in steps.of_job(session, job_id) if step.kind == "scout" and step.state == "running"), None)
         return None if step is None else int((step.worker or "").rsplit(":", 2)[1])
 
     os.kill(eventually(looking, "somebody looks at the scene"), signal.SIGKILL)

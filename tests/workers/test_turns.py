@@ -23,6 +23,8 @@ from db.models import IterationRow, JobRow, PairRow, ProofRow, StepRow, Subtrees
 from db.session import database
 from db.settings import settings
 from db.types import utcnow
+from jobs.scenes import load_scene
+from tests.db.builders import add_iteration
 from tests.scenes import slider
 from tests.services import Queue
 from tests.workers.options import box_around, grow_box
@@ -30,7 +32,6 @@ from tests.workers.record import check_record
 from tests.workers.service import environment, events_of, job_of, pairs_of, submit
 from workers import admission, sweeper, transaction, turns
 from workers.app import CONTROL, SOLVE, send_coordinate, waiting
-from workers.scenes import load_scene
 from workers.solver import Piece, work
 from workers.troubles import Troubles
 from workers.turns import coordinate
@@ -555,7 +556,7 @@ def work_all_pairs_and_forge_a_later_region(job_id: str) -> None:
     with database().write() as session:
         (good,) = steps.of_job(session, job_id)
         job, polytope = jobs.lock(session, job_id), {"C": [[1.0], [-1.0]], "d": [0.1, 0.1], "center": [0.0]}
-        pairs.add_iteration(session, job, index=1, label="push", **polytope, pairs=[], reuse={}, hard=[], failures=1)
+        add_iteration(session, job, index=1, label="push", **polytope, pairs=[], reuse={}, hard=[], failures=1)
         session.add(StepRow(job_id=job_id, turn=good.turn + 1, kind="accept", input={**good.input, "iteration": 1, "proofs": {}}))
 
 

@@ -54,7 +54,7 @@ export function JobIsland({ job, kind, scene, ended, begun }: { job: string; kin
           <Obstacles
             obstacles={store.obstacles}
             robot={robot}
-            whom={{ cover: "the cover", "certify-path": "the motion" }[kind] ?? "the region"}
+            whom={subject}
           />
           {!store.ended && <Workers store={store} />}
           <Log store={store} />

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from certifier import stored
 from certifier.growth.actions import Certify, Finish, Outcomes, Propose
 from certifier.growth.faces import Failure, contract, measure
 from certifier.growth.machine import advance, begin
@@ -33,7 +34,7 @@ def grow(disc, radius, options, spread=0.0, limit=300):
     """The accepted polytopes and the end when the pair of both joints fails while the polytope meets the disc nearest to the seed."""
     transition, accepted = begin(SCENE, options), []
     for _ in range(limit):
-        state = GrowthState.from_document(json.loads(json.dumps(transition.state.to_document())), options)
+        state = stored.value(GrowthState, json.loads(json.dumps(stored.document(transition.state))))
         if transition.candidate:
             accepted.append(transition.candidate.polytope)
         if isinstance(transition.action, Finish):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from certifier import stored
 from certifier.errors import CirisError, RegionError
 from certifier.growth.actions import Certify, Failed, Finish, Outcomes, Propose, Step
 from certifier.growth.machine import advance, begin
@@ -38,9 +39,9 @@ def drive(scene, options, verdict, limit=100):
     made, accepted = [], []
     transition = begin(scene, options)
     for _ in range(limit):
-        action, document = transition.action, transition.state.to_document()
-        state = GrowthState.from_document(json.loads(json.dumps(document)), options)
-        assert state.to_document() == document, "the state survives JSON"
+        action, document = transition.action, stored.document(transition.state)
+        state = stored.value(GrowthState, json.loads(json.dumps(document)))
+        assert stored.document(state) == document, "the state survives JSON"
         if transition.candidate:
             accepted.append(transition.candidate)
         if isinstance(action, Finish):

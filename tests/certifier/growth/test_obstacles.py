@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from certifier import stored
 from certifier.growth.obstacles import Obstacle, in_manifest, joined
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
@@ -40,14 +41,14 @@ def test_times_are_known_where_faces_are_not():
 @given(st.lists(st.floats(0, 1), min_size=1), st.integers(0, 5), st.booleans())
 def test_the_state_keeps_obstacles(s, faces, contact):
     kept = {3: Obstacle.at(2, np.array(s), contact=contact, faces=faces, lost=0.25), 0: Obstacle(1, 4)}
-    document = json.loads(json.dumps(GrowthState(OPTIONS, obstacles=kept).to_document()))
-    assert GrowthState.from_document(document, OPTIONS).obstacles == kept
+    document = json.loads(json.dumps(stored.document(GrowthState(OPTIONS, obstacles=kept))))
+    assert stored.value(GrowthState, document).obstacles == kept
 
 
 def test_a_state_of_an_earlier_version_has_none():
-    document = GrowthState(OPTIONS, next=3).to_document()
+    document = stored.document(GrowthState(OPTIONS, next=3))
     del document["obstacles"]
-    found = GrowthState.from_document(document, OPTIONS)
+    found = stored.value(GrowthState, document)
     assert (found.obstacles, found.next) == ({}, 3)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
+from certifier import stored
 from certifier.errors import CirisError
 from certifier.growth import whole
 from certifier.growth.actions import Certify, Finish, Outcomes, Propose
@@ -63,9 +64,9 @@ def drive(verdict, asked, limit=40, passed=lambda action: 0.0):
     made, accepted = [], []
     transition = begin(SCENE, asked)
     for _ in range(limit):
-        document = transition.state.to_document()
-        state = GrowthState.from_document(json.loads(json.dumps(document)), asked)
-        assert state.to_document() == document, "the state survives JSON"
+        document = stored.document(transition.state)
+        state = stored.value(GrowthState, json.loads(json.dumps(document)))
+        assert stored.document(state) == document, "the state survives JSON"
         if transition.candidate:
             accepted.append(transition.candidate)
         action = transition.action

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from certifier import stored
 from certifier.pair.result import Weakness
 
 HERE, THERE = np.array([[0.1, 0.2, 0.3]]), np.array([[0.4, 0.5, 0.6], [0.7, 0.8, 0.9]])
@@ -15,8 +16,8 @@ HERE, THERE = np.array([[0.1, 0.2, 0.3]]), np.array([[0.4, 0.5, 0.6], [0.7, 0.8,
 @pytest.mark.parametrize("joints", [(), (0, 2)])
 def test_a_weakness_survives_its_document(joints):
     weakness = Weakness(THERE, np.array([1.0, 0.0, 2.0]), ranges_alone=True, contacts=1, joints=joints)
-    read = Weakness.from_document(json.loads(json.dumps(weakness.to_document())))
-    assert read.to_document() == weakness.to_document()
+    read = stored.value(Weakness, json.loads(json.dumps(stored.document(weakness))))
+    assert stored.document(read) == stored.document(weakness)
     assert (read.joints, read.contacts, read.ranges_alone) == (joints, 1, True)
 
 

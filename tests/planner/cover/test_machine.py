@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from certifier import stored
 from certifier.errors import RegionError
 from planner.cover.machine import IDLE, LATE, LOOKS, TRIES, advance, begin, unreached
 from planner.cover.options import ENOUGH, CoverOptions
@@ -66,8 +67,8 @@ def test_whatever_is_reported_in_whatever_order_it_ends_and_says_why(data: st.Da
     transition, late, told = begin(options), False, 0
     for _ in range(100):
         state, action = transition.state, transition.action
-        document = json.loads(json.dumps(state.to_document()))
-        assert CoverState.from_document(document, CoverOptions.from_document(json.loads(json.dumps(options.to_document())))) == state
+        document = json.loads(json.dumps(stored.document(state)))
+        assert stored.value(CoverState, document) == state
         assert len(state.growing) <= options.at_once
         assert state.begun <= options.regions
         if isinstance(action, Finish):

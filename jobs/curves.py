@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from api.schemas.common import Real, Vector
+from jobs.fields import Real, Vector
 
 BEZIER = (
     "(k, m + 1, n), the control points of every polynomial piece, all of one degree m from 1 to 15. A piece begins exactly where the one "

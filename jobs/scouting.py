@@ -4,29 +4,29 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache, partial
-from typing import Any
 
+from certifier import stored
 from certifier.model import Scene
 from certifier.pair.collisions import in_collision
 from db import jobs, overlaps, regions
 from db.overlaps import Overlap
 from db.session import database
+from db.transaction import persistently
+from jobs.scenes import load_scene
 from planner.cover.known import Known
 from planner.cover.look import Look
 from planner.cover.options import CoverOptions
-from planner.cover.state import CoverState
+from planner.cover.state import CoverState, Scouted
 from planner.library import Library, renewed
 from planner.overlap import compare
-from workers.scenes import load_scene
-from workers.transaction import persistently
 
 _libraries: dict[str, Library] = {}
 MOST = 4
 """Number of scenes whose regions are kept, those that were looked at last."""
 
 
-def scout(scene: Scene, scene_id: str, job_id: str) -> dict[str, Any]:
-    """Looks at the scene for a cover, and returns the document of what was seen.
+def scout(scene: Scene, scene_id: str, job_id: str) -> Scouted:
+    """Looks at the scene for a cover, and returns what was seen.
 
     Raises:
         RegionError: as :class:`planner.cover.look.Look`.
@@ -36,11 +36,11 @@ def scout(scene: Scene, scene_id: str, job_id: str) -> dict[str, Any]:
         with database().read() as session:
             growth = jobs.growth(session, job_id)
             assert growth is not None, "a cover has begun when it has a look at the scene"
-            return CoverState.from_document(growth, CoverOptions.from_document(jobs.get(session, job_id).options))
+            return stored.value(CoverState, growth)
 
     state = persistently(read)
     known = persistently(lambda: _known(scene, scene_id))
-    return _look(scene_id, job_id)(known, state).to_document()
+    return _look(scene_id, job_id)(known, state)
 
 
 @lru_cache(maxsize=4)

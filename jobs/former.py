@@ -10,7 +10,7 @@ from certifier.model import Scene
 from certifier.proof.region import RegionProof
 from db import proofs
 from db.session import database
-from workers.transaction import persistently
+from db.transaction import persistently
 
 
 def former_of(scene: Scene, options: GrowthOptions) -> Former | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from certifier.model import Scene
 from db import scenes
 from db.session import database
-from workers.transaction import persistently
+from db.transaction import persistently
 
 
 def load_scene(scene_id: str) -> Scene:

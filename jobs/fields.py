@@ -1,13 +1,37 @@
-"""The models of options in requests are made from the tables in which the options are written (certifier.options)."""
+"""What requests are made of: numbers and names with their checks, and the models of options (certifier.options)."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, create_model
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
+from pydantic_core import PydanticKnownError
 
-from api.schemas.common import Real, Request, Rows, Vector, Whole
 from certifier.options import Option, Takes, table
+from jobs import patterns
+
+
+def _integer(value: object) -> object:
+    """Refuses texts and truth for a whole number. Pydantic's own strictness would refuse 7.0 too, which is one in JSON."""
+    if isinstance(value, bool | str):
+        raise PydanticKnownError("int_type")
+    return value
+
+
+Whole = Annotated[int, BeforeValidator(_integer)]
+"""A whole number. No text and no truth value stands for one."""
+Real = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Vector = Annotated[list[Real], Field(min_length=1, max_length=64)]
+RandomSeed = Annotated[Whole, Field(ge=0, le=2**63 - 1, description="Seed of every random choice.")]
+SceneName = Annotated[str, Field(min_length=1, max_length=255, pattern=patterns.SOMETHING, description="The id or the name of a scene.")]
+Rows = Annotated[list[Vector], Field(max_length=2000)]
+Offsets = Annotated[list[Real], Field(max_length=2000)]
+
+
+class Request(BaseModel):
+    """All requests derive from this model: it refuses unknown fields and numbers that are not finite."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 def model_of(cls: type) -> type[Request]:

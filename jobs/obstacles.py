@@ -8,44 +8,50 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from api.schemas.progress import Obstacle
+from sqlalchemy.orm import Session
+
+from certifier import stored
 from certifier.growth import obstacles as growth
 from certifier.model import Pair, Scene
 from certifier.outcome import Outcome
-from db import jobs, pairs, steps
+from db import jobs, pairs
 from db.models import JobRow, PairRow
 from db.session import Database
-from db.states import JobKind, PairState
-from planner.cover.options import CoverOptions
-from planner.cover.result import said
-from planner.cover.state import CoverState
+from db.states import PairState
+from jobs.kind import Held, Kind
 
 WORST = (PairState.REFUTED, PairState.NOT_CERTIFIABLE, PairState.TOO_CLOSE, PairState.ERROR, PairState.INCONCLUSIVE)
 """How pairs fail, the worst first."""
 
 
-def of_job(database: Database, scene: Scene, job: JobRow) -> list[Obstacle]:
-    """Returns what holds the region of a job back, worst first."""
+def of_job(database: Database, scene: Scene, kind: Kind, job: JobRow) -> list[Held]:
+    """Returns what holds a job back, worst first. Of a job that has ended badly, it is at least the reason."""
     with database.read() as session:
-        known = jobs.growth(session, job.id) or {}
-        failed = pairs.lately_failed(session, job.id)
-        verdict = steps.verdict(session, job.id)
-    if job.kind == JobKind.COVER:
-        found = [_in_general(text) for text in _of_cover(job, known)]
-    elif job.kind == JobKind.CERTIFY_PATH:
-        found = [] if verdict is None or verdict["stop"] is None else [_of_motion(scene, verdict["stop"])]
-    else:
-        cut = _cut(known)
-        rated = [(_rank(job, cut.get(i), failed.get(i, [])), i) for i in cut.keys() | failed.keys()]
-        found = [_of_pair(scene, i, cut.get(i), failed.get(i, [])) for _, i in sorted(rated)]
+        found = kind.held(session, scene, job)
     ended_badly = job.region_id is None and job.finished_at is not None and job.outcome != Outcome.CERTIFIED
-    return found or ([_in_general(_said(job), _seed(job))] if ended_badly and _said(job) else [])
+    return found or ([Held(_said(job), _seed(job))] if ended_badly and _said(job) else [])
+
+
+def of_growth(session: Session, scene: Scene, job: JobRow) -> list[Held]:
+    """Returns what holds the region of a job back: pairs that are not certified, and pairs for which something was cut off."""
+    cut, failed = _cut(jobs.growth(session, job.id) or {}), pairs.lately_failed(session, job.id)
+    rated = [(_rank(job, cut.get(i), failed.get(i, [])), i) for i in cut.keys() | failed.keys()]
+    return [_of_pair(scene, i, cut.get(i), failed.get(i, [])) for _, i in sorted(rated)]
+
+
+def of_motion(scene: Scene, stop: dict[str, Any]) -> Held:
+    """Returns the first place on a motion that could not be certified."""
+    pair = Pair(stop["a"], stop["b"])
+    how = "touch" if stop["distance"] <= 0 else f"are only {stop['distance']:.3g} m apart"
+    text = f"{pair.a} and {pair.b} {how} at the configuration named, the first on the motion that could not be certified."
+    index = scene.pairs.index(pair) if pair in scene.pairs else None
+    return Held(text, stop["q"], index, pair.a, pair.b)
 
 
 def _cut(known: dict[str, Any]) -> dict[int, growth.Obstacle]:
     """Returns pair index -> what was cut off for it, from the state of a growth, which may be of an earlier version."""
     if "obstacles" in known:
-        return {int(pair): growth.Obstacle.from_document(one) for pair, one in known["obstacles"].items()}
+        return {int(pair): stored.value(growth.Obstacle, one) for pair, one in known["obstacles"].items()}
     times = (known.get("whole") or {}).get("cuts") or (known.get("cuts") or {}).get("attempts") or {}
     return {int(pair): growth.Obstacle(stage=0, times=count) for pair, count in times.items()}
 
@@ -63,7 +69,7 @@ def _worst(failed: Sequence[PairRow]) -> PairState | None:
     return min((PairState(row.state) for row in failed), key=WORST.index, default=None)
 
 
-def _of_pair(scene: Scene, index: int, cut: growth.Obstacle | None, failed: Sequence[PairRow]) -> Obstacle:
+def _of_pair(scene: Scene, index: int, cut: growth.Obstacle | None, failed: Sequence[PairRow]) -> Held:
     pair, state = scene.pairs[index], _worst(failed)
     row = next((row for row in failed if row.state == state), None)
     witness = None if row is None else row.witness_s
@@ -71,7 +77,7 @@ def _of_pair(scene: Scene, index: int, cut: growth.Obstacle | None, failed: Sequ
     sentences = [] if row is None or state is None else [_how_it_failed(pair, state, row, failed)]
     if cut is not None:
         sentences += _what_was_cut(pair, cut, where=witness is None and cut.s is not None)
-    return Obstacle(
+    return Held(
         pair=index,
         a=pair.a,
         b=pair.b,
@@ -115,23 +121,6 @@ def _what_was_cut(pair: Pair, cut: growth.Obstacle, *, where: bool) -> list[str]
 
 def _times(count: int) -> str:
     return "once" if count == 1 else f"{count} times"
-
-
-def _of_motion(scene: Scene, stop: dict[str, Any]) -> Obstacle:
-    pair = Pair(stop["a"], stop["b"])
-    how = "touch" if stop["distance"] <= 0 else f"are only {stop['distance']:.3g} m apart"
-    text = f"{pair.a} and {pair.b} {how} at the configuration named, the first on the motion that could not be certified."
-    index = scene.pairs.index(pair) if pair in scene.pairs else None
-    return Obstacle(pair=index, a=pair.a, b=pair.b, text=text, q=stop["q"], faces=None, lost=None)
-
-
-def _of_cover(job: JobRow, known: dict[str, Any]) -> list[str]:
-    seen = said(CoverState.from_document(known, CoverOptions.from_document(job.options))) if known else None
-    return [] if seen is None else list(seen["obstacles"])
-
-
-def _in_general(text: str, q: list[float] | None = None) -> Obstacle:
-    return Obstacle(pair=None, a=None, b=None, text=text, q=q, faces=None, lost=None)
 
 
 def _said(job: JobRow) -> str:
