@@ -47,7 +47,7 @@ def checked(db: Database, body: JobRequest, where: str = "") -> Checked:
         scene = scenes.load(db, scene_id)
         options = KINDS[body.kind].options(body, scene, db)
         if body.webhook is not None:
-            _check_webhook(body.webhook)
+            check_webhook(body.webhook)
     except CirisError as error:
         if where:
             error.field = f"{where}.{error.field}" if error.field else where
@@ -106,7 +106,7 @@ def _digest(asked: Checked) -> str:
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 
-def _check_webhook(body: WebhookRequest) -> None:
+def check_webhook(body: WebhookRequest) -> None:
     """Refuses a webhook whose receiver the service could never call.
 
     Raises:

@@ -177,7 +177,7 @@ def _grown(name: str, seed: dict[str, Any], options: dict[str, Any], limit: floa
         "ellipsoid": manifest["volume"]["ellipsoid"],
         "faces": len(manifest["halfspace_offsets"]),
         "curve": manifest["provenance"]["growth_curve"],
-        "ended": manifest["provenance"]["reason"],
+        "ended": region.reason,
     }
 
 

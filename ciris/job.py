@@ -41,8 +41,6 @@ def why_no_region(job: Document) -> CirisError:
     if job["error"]:
         return CirisError.from_document(job["error"])
     hint = f"`ciris job show {job['id'][:8]}`, or `obstacles` of the job in Python, tells more"
-    if job["kind"] == "certify-path":
-        return CirisError("no_region", "a job that certifies a motion has no region", hint="`motion` of the job returns its verdict")
     if job["state"] == "succeeded":
         return CirisError("no_region", f"the job has ended without a region; its outcome is {job['outcome']}", hint=hint)
     reason = job["reason"] or f"the job is {job['state']}"

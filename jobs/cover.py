@@ -160,7 +160,8 @@ class Cover(Kind):
 
     def _said(self, session: Session, job: JobRow) -> dict[str, Any]:
         known = jobs.growth(session, job.id)
-        return {} if known is None else said(stored.value(CoverState, known)) or {}
+        # A cover of an earlier version may have ended with a state that does not name its options.
+        return {} if known is None else said(stored.value(CoverState, {"options": job.options, **known})) or {}
 
     def _is_over(self, job: JobRow) -> bool:
         return job.deadline_at is not None and job.deadline_at <= utcnow()

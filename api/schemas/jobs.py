@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from datetime import datetime
+from functools import reduce
+from operator import or_
 from typing import TYPE_CHECKING, Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
@@ -29,7 +31,7 @@ JobKind = Annotated[str, AfterValidator(_known), Field(json_schema_extra={"enum"
 if TYPE_CHECKING:
     NewJob = JobRequest
 else:
-    NewJob = Annotated[tuple(kind.request for kind in KINDS.values()), Field(discriminator="kind")]
+    NewJob = Annotated[reduce(or_, (kind.request for kind in KINDS.values())), Field(discriminator="kind")]
 
 
 class Job(BaseModel):

@@ -8,12 +8,13 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from api.schemas.covers import CoverRequestOptions
+from certifier import stored
 from certifier.model import Scene
 from db import jobs, scenes
 from db.models import JobRow
 from db.session import Database
 from db.settings import settings
+from jobs.cover import CoverRequestOptions
 from planner.cover.machine import advance, begin
 from planner.cover.options import CoverOptions
 from planner.cover.state import Scouted
@@ -98,7 +99,7 @@ def test_what_it_has_come_to_is_told(client: TestClient, scene: Scene, database:
     seen = Scouted(version=3, regions=3, samples=100, covered=40, components=(2, 1), largest=30, connect=(0, 1), obstacles=("no way",))
     with database.write() as session:
         job = jobs.lock(session, cover["id"])
-        jobs.keep_growth(session, job, advance(begin(CoverOptions.from_document(job.options)).state, seen).state.to_document())
+        jobs.keep_growth(session, job, stored.document(advance(begin(CoverOptions.from_document(job.options)).state, seen).state))
     found = client.get(f"/v1/jobs/{cover['id']}/cover").json()
     assert found["coverage"] == {"value": 0.4, "stderr": pytest.approx(0.049, abs=1e-3), "samples": 100}
     assert (found["components"], found["largest"], found["connected"], found["connect"]) == ([2, 1], 0.75, False, [0, 1])

@@ -9,7 +9,6 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api.app import create_app
-from api.schemas.jobs import GrowOptions, Seed
 from certifier.growth.machine import begin
 from certifier.growth.options import GrowthOptions
 from certifier.model import Scene
@@ -20,6 +19,7 @@ from certifier.seeding.options import SeedOptions
 from certifier.verify.file import verify_file
 from db import jobs, pairs, scenes
 from db.session import Database
+from jobs.grow import GrowOptions, Seed
 from tests.api.conftest import BASE_URL, PROBLEM
 from tests.db.builders import add_iteration
 from tests.scenes import slider

@@ -8,9 +8,9 @@ import jsonschema_rs
 from fastapi.testclient import TestClient
 from pydantic import TypeAdapter
 
-from api import checks
+from api import submission
 from api.problems import Problem
-from api.schemas.jobs import NewJob, WebhookRequest
+from api.schemas.jobs import NewJob
 from api.schemas.planning import ContainsRequest, NearestRequest, PathRequest, SegmentRequest
 from api.schemas.plans import PlanRequest
 from certifier.scene import load_scene
@@ -18,6 +18,7 @@ from db import scenes
 from db.keys import Scope
 from db.session import Database
 from jobs import patterns
+from jobs.request import WebhookRequest
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -125,7 +126,7 @@ def test_the_examples_are_accepted_by_the_schemas(client: TestClient) -> None:
         for example in schemas[model.__name__]["examples"]:
             model.model_validate(example)
     for example in schemas["WebhookRequest"]["examples"]:
-        checks.webhook(WebhookRequest.model_validate(example))
+        submission.check_webhook(WebhookRequest.model_validate(example))
     for example in schemas["Problem"]["examples"]:
         Problem.model_validate(example)
 

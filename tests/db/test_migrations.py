@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from datetime import timedelta
 
-from sqlalchemy import inspect
+from sqlalchemy import inspect, select
 
 from db import events, jobs, migrate, overlaps, pairs, regions, retention, scenes, subtrees, work
-from db.models import SceneRow
+from db.models import IterationRow, SceneRow
 from db.session import Database
 from db.types import utcnow
 from tests.db.builders import a_job, a_running_job, add_region, all_pairs, certified
@@ -76,7 +76,8 @@ def test_jobs_and_their_pairs_survive_the_way_down_and_up(empty_database_url: st
         job = jobs.get(session, job_id)
         assert (job.state, len(all_pairs(session, job_id))) == ("running", 3)
         assert (job.action, jobs.growth(session, job_id)) == (certify, {"next": 1})
-        assert [(row.hard, row.failures, row.faces) for row in pairs.iterations(session, job_id)] == [([], 1, 2)]
+        (row,) = session.scalars(select(IterationRow))
+        assert (row.action["hard"], row.action["polytope"]["d"], row.failures, row.faces) == ([], [1.0, 1.0], 1, 2)
     database.close()
 
 
@@ -119,7 +120,8 @@ def test_iterations_stored_before_there_were_cells_say_that_they_have_none(empty
     migrate.upgrade(empty_database_url)
     database = Database(empty_database_url)
     with database.read() as session:
-        assert [(row.cells, row.begun, row.parts, row.ending) for row in pairs.iterations(session, job_id)] == [(1, None, {}, [])]
+        (row,) = session.scalars(select(IterationRow))
+        assert [row.action[name] for name in ("cells", "begun", "parts", "ending")] == [1, None, {}, []]
         assert {row.open_cells for row in all_pairs(session, job_id)} == {None}
     database.close()
 

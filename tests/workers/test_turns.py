@@ -386,13 +386,13 @@ def test_a_job_that_is_deleted_is_coordinated_no_more(options: dict[str, Any], m
     gone, going = (submit(slider(), options) for _ in range(2))
     delete(gone)
     coordinate(gone)
-    decide = turns._decide
+    decide = turns._Rows.decide
 
-    def meanwhile(turn: turns.Turn) -> Any:
+    def meanwhile(rows: Any, turn: Any) -> Any:
         delete(going)
-        return decide(turn)
+        return decide(rows, turn)
 
-    monkeypatch.setattr(turns, "_decide", meanwhile)
+    monkeypatch.setattr(turns._Rows, "decide", meanwhile)
     coordinate(going)
     with database().read() as session:
         assert session.scalars(select(JobRow)).all() == []

@@ -11,7 +11,7 @@ import { useRoute } from "./route";
 import { JobStore, type Drawable } from "./store";
 import { Workers } from "./workers";
 
-export function JobIsland({ job, kind, scene, ended, begun }: { job: string; kind: string; scene: string; ended: boolean; begun: number }) {
+export function JobIsland({ job, subject, scene, ended, begun }: { job: string; subject: string; scene: string; ended: boolean; begun: number }) {
   const [version, changed] = useReducer((count: number) => count + 1, 0);
   const [robot, setRobot] = useState<Drawable>({ model: null, problem: null });
   const store = useMemo(() => new JobStore(job, ended, begun, () => changed(undefined)), [job]);

@@ -386,19 +386,19 @@ def test_a_deadline_ends_growth_with_the_best_region_so_far(monkeypatch):
     # The clock stands still until a region is reported, and then the deadline is over.
     clock = [0.0]
     monkeypatch.setattr(local, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
-    accept = local._Run.accept
+    accept = local._Memory._accept
 
     def accepted(*arguments):
         accept(*arguments)
         clock[0] += 10.0
 
-    monkeypatch.setattr(local._Run, "accept", accepted)
-    manifest = grow(scene, asked, deadline_s=10.0).manifest
-    assert manifest["provenance"]["reason"] == "the deadline was reached"
-    assert len(manifest["provenance"]["growth_curve"]) == 1
-    later = grow(scene, asked, deadline_s=1000.0).manifest
-    assert later["provenance"]["reason"] == "certified"
-    assert len(later["provenance"]["growth_curve"]) > 1
+    monkeypatch.setattr(local._Memory, "_accept", accepted)
+    region = grow(scene, asked, deadline_s=10.0)
+    assert region.reason == "the deadline was reached"
+    assert len(region.manifest["provenance"]["growth_curve"]) == 1
+    later = grow(scene, asked, deadline_s=1000.0)
+    assert later.reason == "certified"
+    assert len(later.manifest["provenance"]["growth_curve"]) > 1
     with pytest.raises(CirisError, match="the deadline was reached") as refused:
         grow(scene, asked, deadline_s=0.0)
     assert (refused.value.code, refused.value.hint) == ("not_grown", "allow more time")
@@ -437,6 +437,6 @@ def test_a_child_that_dies_leaves_the_region_before(monkeypatch):
 
     monkeypatch.setattr(local, "part_certifier", dying)
     region = grow(scene, GrowthOptions(seed={"q": q}), processes=2)
-    assert "a process that certified pairs died" in region.manifest["provenance"]["reason"]
+    assert "a process that certified pairs died" in region.reason
     assert 0 < region.manifest["share"]["value"] < 1
     verify_region(region.proof)
