@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import types
+from collections.abc import Collection
 from dataclasses import MISSING, fields, is_dataclass
 from datetime import datetime
 from enum import StrEnum
@@ -17,11 +18,16 @@ T = TypeVar("T")
 
 def read(kind: type[T], document: Any) -> T:
     """Returns the document as a dataclass. Fields that it lacks have their defaults; others of its entries are left out."""
-    hints, values = get_type_hints(kind), {}
-    for field in fields(kind):  # type: ignore[arg-type]
-        if field.name in document or field.default is MISSING:
-            values[field.name] = _value(hints[field.name], document[field.name])
-    return kind(**values)
+    return kind(**values(kind, document))
+
+
+def values(kind: type, document: Any, known: Collection[str] = ()) -> dict[str, Any]:
+    """Returns the fields of a dataclass from a document, without those that are known already."""
+    hints, found = get_type_hints(kind), {}
+    for field in fields(kind):
+        if field.name not in known and (field.name in document or field.default is MISSING):
+            found[field.name] = _value(hints[field.name], document[field.name])
+    return found
 
 
 def _value(kind: Any, value: Any) -> Any:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from certifier.outcome import Guarantee
 from ciris.answers import SHORT, Document, NotCovered, QVolume, Share
-from ciris.reading import read
+from ciris.reading import values
 from ciris.space import Array, InSpace, Space, frozen
 
 
@@ -77,19 +77,11 @@ def region_fields(document: Document) -> dict[str, Any]:
     manifest = document["manifest"]
     given = manifest["space"]
     q_star, lower, upper = (frozen(given[name]) for name in ("q_star", "q_lower", "q_upper"))
-    return {
-        "id": document["id"],
-        "scene": document["scene"],
+    known = {
         "scene_name": manifest["scene"]["name"],
-        "job": document["job"],
-        "guarantee": Guarantee(document["guarantee"]),
         "C": frozen(manifest["halfspace_normals"]),
         "d": frozen(manifest["halfspace_offsets"]),
         "center": frozen(manifest["interior_point"]),
         "space": Space(tuple(given["joints"]), q_star, lower, upper, frozen(given["revolute"], bool)),
-        "q_volume": document["q_volume"] and read(QVolume, document["q_volume"]),
-        "share": document["share"] and read(Share, document["share"]),
-        "not_covered": read(NotCovered, document["not_covered"]),
-        "created_at": datetime.fromisoformat(document["created_at"]),
-        "manifest": manifest,
     }
+    return known | values(RegionData, document, known)

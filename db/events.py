@@ -20,7 +20,7 @@ def emit(session: Session, job: JobRow, kind: str, data: dict[str, Any]) -> None
     - ``iteration``: index, label, state, pairs, parts;
     - ``pairs``: iteration, and pairs (each with index, part, state, stage, proved_distance, margin (the same), seconds);
     - ``step``: kind, state, seconds;
-    - ``region``: region_id, iteration, guarantee, ellipsoid_volume, q_volume and share (as in the manifest);
+    - ``region``: region_id, iteration, guarantee, ellipsoid_volume, and what lists show of the manifest: q_volume and share;
     - ``cover``: of a cover, what a look at the scene has found, as :func:`planner.cover.result.said` says it;
     - ``child``: of a cover, job (its id), number, purpose, q and state; at its end also region_id and reason;
     - ``lost``: worker, reason, and either iteration and pairs or step, which are open again.

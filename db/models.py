@@ -396,10 +396,8 @@ class RegionRow(Owned, Base):
     proof_digest: Mapped[str] = mapped_column(ForeignKey("proofs.digest"))
     ellipsoid_volume: Mapped[float]
     """In s."""
-    q_volume: Mapped[Document | None]
-    """How large the region is in q, as its manifest says it; None for a region of an earlier version."""
-    share: Mapped[Document | None]
-    """How much of the proposal the region keeps, as its manifest says it; None for a given polytope."""
+    summary: Mapped[Document]
+    """What lists show of the manifest: certifier.jobs.region.SUMMARY."""
     created_at: Mapped[datetime] = mapped_column(default=utcnow)
 
 

@@ -21,8 +21,12 @@ from db.session import insert_new
 _UNREAD = [defer(column, raiseload=True) for column in (RegionRow.manifest, RegionRow.arrays, RegionRow.box)]
 
 
-def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any], proof: bytes) -> RegionRow:
-    """Stores a region whose proof has been verified. The caller holds the job's lock."""
+def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any], summary: dict[str, Any], proof: bytes) -> RegionRow:
+    """Stores a region whose proof has been verified. The caller holds the job's lock.
+
+    Args:
+        summary: what lists show of the manifest.
+    """
     volume = manifest["volume"]["ellipsoid"]
     d = np.array(manifest["halfspace_offsets"])
     region = RegionRow(
@@ -39,15 +43,14 @@ def add(session: Session, job: JobRow, iteration: int, manifest: dict[str, Any],
         faces=len(d),
         proof_digest=proofs.put(session, [proof])[proof],
         ellipsoid_volume=volume,
-        q_volume=manifest["q_volume"],
-        share=manifest["share"],
+        summary=summary,
     )
     session.add(region)
     session.get_one(IterationRow, (job.id, iteration)).ellipsoid_volume = volume
     session.flush()
     job.region_id = session.scalar(_latest(job.id))
     data = {"region_id": region.id, "iteration": iteration, "guarantee": region.guarantee, "ellipsoid_volume": volume}
-    events.emit(session, job, "region", data | {"q_volume": region.q_volume, "share": region.share})
+    events.emit(session, job, "region", data | summary)
     return region
 
 
@@ -84,8 +87,8 @@ def of_job(session: Session, job_id: str) -> Sequence[RegionRow]:
 
 def shares(session: Session, region_ids: Collection[str]) -> dict[str, float | None]:
     """Returns id -> the share of the proposal that the region keeps, for these regions; None where it has none."""
-    rows = session.execute(select(RegionRow.id, RegionRow.share).where(RegionRow.id.in_(region_ids))) if region_ids else ()
-    return {region_id: None if share is None else share["value"] for region_id, share in rows}
+    rows = session.execute(select(RegionRow.id, RegionRow.summary).where(RegionRow.id.in_(region_ids))) if region_ids else ()
+    return {region_id: summary["share"] and summary["share"]["value"] for region_id, summary in rows}
 
 
 def of_cover(session: Session, job_id: str) -> Sequence[RegionRow]:

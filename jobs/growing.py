@@ -158,7 +158,7 @@ def _accept(claim: steps.Claim, scene: Scene) -> Done:
     region = growing.make_region(scene, state, candidate, held, account, proposal, former_of(scene, state.options))
 
     def save(session: Session, job: JobRow) -> None:
-        regions.add(session, job, candidate.iteration, region.manifest, region.proof)
+        regions.add(session, job, candidate.iteration, region.manifest, region.summary, region.proof)
 
     return Done({"iteration": candidate.iteration}, save)
 

@@ -428,7 +428,7 @@ def get_job_growth(job_id: JobGiven, db: Db) -> GrowthCurve:
             iteration=row.iteration,
             region=row.id,
             ellipsoid_volume=row.ellipsoid_volume,
-            share=None if row.share is None else row.share["value"],
+            share=row.summary["share"] and row.summary["share"]["value"],
             seconds=(row.created_at - start).total_seconds(),
         )
         for row in rows

@@ -58,8 +58,7 @@ class RegionSummary(BaseModel):
             guarantee=Guarantee(row.guarantee),
             faces=row.faces,
             ellipsoid_volume=row.ellipsoid_volume,
-            q_volume=None if row.q_volume is None else QVolume(**row.q_volume),
-            share=None if row.share is None else Share(**row.share),
+            **row.summary,
             proof=row.proof_digest,
             created_at=row.created_at,
         )

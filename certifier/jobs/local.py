@@ -147,8 +147,7 @@ class _Memory:
         region = make_region(*made)
         taken = self.seconds - begun
         self.tell("step", {"kind": "accept", "state": "done", "seconds": taken})
-        said = {name: region.manifest[name] for name in ("q_volume", "share")}
-        self.tell("region", {"iteration": self.candidate.iteration, "ellipsoid_volume": self.candidate.ellipsoid_volume, **said})
+        self.tell("region", {"iteration": self.candidate.iteration, "ellipsoid_volume": self.candidate.ellipsoid_volume, **region.summary})
         self.made, self.rests_until = self.candidate, self.seconds + REST * taken
         return region
 

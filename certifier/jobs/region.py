@@ -22,6 +22,9 @@ from certifier.verify import uncovered
 from certifier.verify.region import RegionStatement, verify_region
 from certifier.verify.separations import Progress
 
+SUMMARY = ("q_volume", "share")
+"""What lists of regions show of the manifest, in events, rows and answers of the API."""
+
 
 @dataclass(frozen=True)
 class Region:
@@ -38,6 +41,11 @@ class Region:
     proof: bytes
     statement: RegionStatement
     reason: str = ""
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Returns what lists show of the manifest."""
+        return {name: self.manifest[name] for name in SUMMARY}
 
 
 def certified_region(

@@ -182,6 +182,6 @@ def store_region(database: Database, certified: Region) -> str:
         assert claim is not None
         found = PairResult(Outcome.CERTIFIED, Stage.SOS, seconds=0.1, margin=0.3, proof=b"proof of a pair")
         pairs.save(session, claim, {(index, 0): found for index, _, _ in names})
-        region = regions.add(session, job, 0, manifest, certified.proof)
+        region = regions.add(session, job, 0, manifest, certified.summary, certified.proof)
         jobs.finish(session, job, jobs.JobState.SUCCEEDED, reason="as large as asked for", outcome="certified")
         return region.id

@@ -91,7 +91,7 @@ def test_the_page_of_a_region_that_was_stored_before_there_were_shares(client: T
     with database.write() as session:
         row = regions.get(session, region)
         row.manifest = {name: value for name, value in row.manifest.items() if name not in ("share", "joint_ranges")}
-        row.share = None
+        row.summary = {**row.summary, "share": None}
     text = client.get(f"/regions/{region}").text
     assert "<dt>Share of proposal</dt><dd>\N{EN DASH}</dd>" in text
     assert "samples" not in text

@@ -77,7 +77,7 @@ def add_region(session: Session, job: JobRow, lower: float = -1.0, upper: float 
         "bounding_box": {"lower": [lower], "upper": [upper]},
         "share": None,
     }
-    return regions.add(session, job, index, manifest, proof)
+    return regions.add(session, job, index, manifest, {name: manifest[name] for name in ("q_volume", "share")}, proof)
 
 
 def all_pairs(session: Session, job_id: str) -> Sequence[PairRow]:

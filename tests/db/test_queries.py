@@ -28,6 +28,7 @@ MANIFEST = {
     "bounding_box": {"lower": [-1.0], "upper": [1.0]},
     "share": SHARE,
 }
+SUMMARY = {"q_volume": SIZE, "share": SHARE}
 
 
 def test_a_scene_is_stored_once_and_comes_back_equal(db: Database) -> None:
@@ -149,8 +150,8 @@ def test_the_events_of_many_writers_are_numbered_without_gaps(db: Database) -> N
 def test_a_region_is_its_jobs_latest_until_it_is_deleted(db: Database) -> None:
     with db.write() as session:
         job = a_running_job(session)
-        earlier = regions.add(session, job, 0, MANIFEST, b"first")
-        assert (job.region_id, earlier.q_volume, earlier.share) == (earlier.id, SIZE, SHARE)
+        earlier = regions.add(session, job, 0, MANIFEST, SUMMARY, b"first")
+        assert (job.region_id, earlier.summary) == (earlier.id, SUMMARY)
         assert events.since(session, job.id)[-1].data["share"] == SHARE
         job_id, scene_id, region_id, digest = job.id, job.scene_id, earlier.id, earlier.proof_digest
     with db.read() as session:
