@@ -16,6 +16,7 @@ from certifier.model import Pair, Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair.result import PairResult
 from certifier.partition.certification import CellCertification
+from certifier.polytopes.proved import ProvedBox
 from certifier.proof.outline import OPEN, Outline, Silhouette, Tree
 from certifier.proof.partition import EMPTY, PLANE
 from db import jobs, pairs, proofs, regions, scenes, steps, subtrees
@@ -200,7 +201,7 @@ def job(database: Database) -> JobRow:
         return made
 
 
-BOX = {"mid": [0.0], "half": [1.0], "Y_lower": [[0.0, 0.0, 0.0, 1.0]], "Y_upper": [[0.0, 0.0, 1.0, 0.0]]}
+BOX = ProvedBox(np.zeros(1), np.ones(1), np.array([[0.0, 0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, 1.0, 0.0]]))
 """The root cell of all partitions, with multipliers of the faces and the limits."""
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from certifier import stored
 from certifier.model import Scene
 from certifier.pair.collisions import in_collision
 from certifier.verify.region import verify_region
@@ -52,9 +53,9 @@ def children(job_id: str) -> list[JobRow]:
 
 def known(job_id: str) -> dict[str, Any]:
     with database().read() as session:
-        growth, options = jobs.growth(session, job_id), jobs.get(session, job_id).options
+        growth = jobs.growth(session, job_id)
         assert growth is not None
-        return said(CoverState.from_document(growth, CoverOptions.from_document(options))) or {}
+        return said(stored.value(CoverState, growth)) or {}
 
 
 def check_rows(job_id: str) -> None:
