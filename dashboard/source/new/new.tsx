@@ -1,11 +1,12 @@
 // The form that starts a job: a scene, a configuration that the robot shows, and what shall be done.
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { get, post, said } from "../common/api";
-import { asText, positions, type SceneModel } from "../common/kinematics";
-import { MomentText, touchingOf, useMoment, type Contacts } from "../common/moment";
+import { asText, positions } from "../common/kinematics";
+import { MomentText, touchingOf, useMoment } from "../common/moment";
 import { Robot } from "../common/robot";
+import type { ContactsResponse, Job, SceneModel, ScenePage } from "../common/schema";
 import { Sliders } from "../common/sliders";
-import { ChooseScene, type SceneSummary } from "./choose";
+import { ChooseScene, type Scene } from "./choose";
 import { FIRST, request, type Wish } from "./request";
 import { Wishes } from "./wishes";
 
@@ -13,13 +14,13 @@ const TRIES = 100;
 
 export function NewIsland() {
   const asked = new URLSearchParams(location.search);
-  const [scenes, setScenes] = useState<SceneSummary[] | null>(null);
+  const [scenes, setScenes] = useState<Scene[] | null>(null);
   const [chosen, setChosen] = useState<string | null>(asked.get("scene"));
   const [model, setModel] = useState<SceneModel | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
 
   useEffect(() => {
-    get<{ scenes: SceneSummary[] }>("/v1/scenes?limit=1000").then(
+    get<ScenePage>("/v1/scenes?limit=1000").then(
       (page) => {
         setScenes(page.scenes);
         setChosen((old) => old ?? page.scenes[0]?.id ?? null);
@@ -46,7 +47,7 @@ export function NewIsland() {
 
   if (!scenes) return <p class={problem ? "notice bad" : "empty"}>{problem ?? "Loading the scenes …"}</p>;
   const known = model && !scenes.some(({ id }) => id === model.scene) ? [{ id: model.scene, name: model.name, joints: model.q_star.length, pairs: model.pairs.length, warnings: 0 }, ...scenes] : scenes;
-  const take = (scene: SceneSummary): void => {
+  const take = (scene: Scene): void => {
     setScenes([scene, ...scenes.filter(({ id }) => id !== scene.id)]);
     setChosen(scene.id);
   };
@@ -75,8 +76,8 @@ function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
   const search = async (): Promise<void> => {
     const drawn = Array.from({ length: TRIES }, () => model.q_lower.map((low, i) => low + (model.q_upper[i]! - low) * Math.random()));
     try {
-      const { contacts } = await post<{ contacts: Contacts[] }>("/v1/planning/contacts", { scene: model.scene, q: drawn });
-      const free = contacts.findIndex(({ pairs, outside }) => pairs.length === 0 && outside.length === 0);
+      const { contacts } = await post<ContactsResponse>("/v1/planning/contacts", { scene: model.scene, q: drawn });
+      const free = contacts.findIndex(({ pairs, outside }) => pairs?.length === 0 && outside.length === 0);
       setProblem(free < 0 ? `None of ${TRIES} random configurations is free.` : null);
       if (free >= 0) setQ(drawn[free]!);
     } catch (reason) {
@@ -89,12 +90,12 @@ function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
     setSending(true);
     setProblem(null);
     try {
-      const { contacts } = await post<{ contacts: Contacts[] }>("/v1/planning/contacts", { scene: model.scene, q: [q] });
-      if (wish.kind === "grow" && contacts[0]!.pairs.length > 0) {
+      const { contacts } = await post<ContactsResponse>("/v1/planning/contacts", { scene: model.scene, q: [q] });
+      if (wish.kind === "grow" && contacts[0]!.pairs?.length) {
         setSending(false);
         return setProblem("The robot is in collision there, so no region can hold the configuration. Move it first.");
       }
-      const job = await post<{ id: string }>("/v1/jobs", body);
+      const job = await post<Job>("/v1/jobs", body);
       location.assign(`/jobs/${job.id}`);
     } catch (reason) {
       setProblem(said(reason));
