@@ -1,18 +1,19 @@
 // The form that starts a job: a scene, a configuration that the robot shows, and what shall be done.
 import { useEffect, useMemo, useState } from "preact/hooks";
-import { get, post, said } from "../common/api";
+import { get, post, said, ServiceError } from "../common/api";
 import { asText, positions } from "../common/kinematics";
 import { MomentText, touchingOf, useMoment } from "../common/moment";
 import { Robot } from "../common/robot";
 import type { ContactsResponse, Job, SceneModel, ScenePage } from "../common/schema";
 import { Sliders } from "../common/sliders";
 import { ChooseScene, type Scene } from "./choose";
-import { FIRST, request, type Wish } from "./request";
+import type { Refused } from "./options";
+import { FIRST, request, type Parts, type Wish } from "./request";
 import { Wishes } from "./wishes";
 
 const TRIES = 100;
 
-export function NewIsland() {
+export function NewIsland({ parts }: { parts: Parts }) {
   const asked = new URLSearchParams(location.search);
   const [scenes, setScenes] = useState<Scene[] | null>(null);
   const [chosen, setChosen] = useState<string | null>(asked.get("scene"));
@@ -55,21 +56,22 @@ export function NewIsland() {
     <div class="new">
       <ChooseScene scenes={known} chosen={chosen} onChoose={setChosen} onUpload={take} />
       {problem && <p class="notice bad">{problem}</p>}
-      {model && model.scene === chosen && <Start model={model} asked={asked.get("q")} key={model.scene} />}
+      {model && model.scene === chosen && <Start model={model} parts={parts} asked={asked.get("q")} key={model.scene} />}
     </div>
   );
 }
 
-function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
+function Start({ model, parts, asked }: { model: SceneModel; parts: Parts; asked: string | null }) {
   const names = useMemo(() => positions(model), [model]);
   const [q, setQ] = useState(() => within(model, read(asked, model.q_star.length) ?? model.q_star));
   const [unread] = useState(() => asked !== null && q.join() !== read(asked, model.q_star.length)?.join());
   const [wish, setWish] = useState<Wish>(FIRST);
   const [problem, setProblem] = useState<string | null>(null);
+  const [refused, setRefused] = useState<Refused | null>(null);
   const [sending, setSending] = useState(false);
   const moment = useMoment(model.scene, q);
   const touching = useMemo(() => touchingOf(model, moment), [model, moment]);
-  const body = request(model.scene, q, wish);
+  const body = request(model.scene, q, wish, parts);
 
   useEffect(() => history.replaceState(null, "", `?scene=${model.scene}&q=${q.map((value) => Number(value.toFixed(4))).join(",")}`), [model, q.join()]);
 
@@ -89,6 +91,7 @@ function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
     if (wish.kind === "cover" && wish.goal === "connect" && wish.marks.length < 2) return setProblem("Add at least two configurations to connect.");
     setSending(true);
     setProblem(null);
+    setRefused(null);
     try {
       const { contacts } = await post<ContactsResponse>("/v1/planning/contacts", { scene: model.scene, q: [q] });
       if (wish.kind === "grow" && contacts[0]!.pairs?.length) {
@@ -98,7 +101,12 @@ function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
       const job = await post<Job>("/v1/jobs", body);
       location.assign(`/jobs/${job.id}`);
     } catch (reason) {
-      setProblem(said(reason));
+      const field = reason instanceof ServiceError && document.getElementById(`new-${reason.field}`);
+      if (field) {
+        setRefused({ path: reason.field!, text: said(reason) });
+        field.closest("details")?.setAttribute("open", "");
+        field.focus();
+      } else setProblem(said(reason));
       setSending(false);
     }
   };
@@ -117,7 +125,7 @@ function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
         </div>
       </div>
       <form onSubmit={(event) => void submit(event)}>
-        <Wishes wish={wish} onWish={setWish} marks={wish.marks.map((mark) => asText(mark, model.units))} onMark={() => setWish({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
+        <Wishes wish={wish} parts={parts[wish.kind]} refused={refused} onWish={setWish} marks={wish.marks.map((mark) => asText(mark, model.units))} onMark={() => setWish({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
         <div role="alert">{problem && <p class="notice bad">{problem}</p>}</div>
         <p><button type="submit" class="primary" disabled={sending}>{sending ? "Starting …" : "Start the job"}</button></p>
         <details>
