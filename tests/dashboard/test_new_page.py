@@ -97,7 +97,9 @@ def test_configurations_are_marked_to_be_connected(opened: Any, url: str, client
 def test_what_the_service_refuses_is_said_and_nothing_is_lost(opened: Any, client: TestClient, complaints: list[str]) -> None:
     opened.route(
         "**/v1/jobs",
-        lambda route: route.fulfill(status=429, content_type="application/problem+json", body='{"detail": "too many", "hint": "wait"}'),
+        lambda route: route.fulfill(
+            status=429, content_type="application/problem+json", body='{"detail": "too many", "hint": "wait", "field": "scene"}'
+        ),
     )
     opened.get_by_role("button", name="Start the job").click()
     opened.get_by_text("too many. wait").wait_for()
@@ -167,8 +169,8 @@ def test_an_option_of_each_kind_gets_into_the_request(page: Any, url: str, plana
     ways.get_by_label("Colour").select_option("green")
     ways.get_by_label("Inner").check()
     ways.get_by_label("Depth").fill("2")
-    assert ways.get_by_label("Width").get_attribute("aria-describedby") == "new-options.width-says"
-    assert page.locator("[id='new-options.width-says']").inner_text() == "In m. How wide, as in width."
+    assert ways.get_by_label("Width").get_attribute("aria-describedby") == "option-options.width-says"
+    assert page.locator("[id='option-options.width-says']").inner_text() == "In m. How wide, as in width."
     wished = {"how_often": 5, "width": 0.25, "fast": True, "careful": False, "colour": "green", "inner": {"depth": 2}}
     assert asked()["options"] == wished
     ways.get_by_label("Careful").check()

@@ -101,7 +101,7 @@ function Start({ model, parts, asked }: { model: SceneModel; parts: Parts; asked
       const job = await post<Job>("/v1/jobs", body);
       location.assign(`/jobs/${job.id}`);
     } catch (reason) {
-      const field = reason instanceof ServiceError && document.getElementById(`new-${reason.field}`);
+      const field = reason instanceof ServiceError && document.getElementById(`option-${reason.field}`);
       if (field) {
         setRefused({ path: reason.field!, text: said(reason) });
         field.closest("details")?.setAttribute("open", "");

@@ -34,7 +34,7 @@ function Group({ one, path, ...rest }: FieldProps) {
   const on = rest.given[path] === "true";
   return (
     <fieldset>
-      <legend><label><input id={`new-${path}`} type="checkbox" aria-describedby={`new-${path}-says`} checked={on} onChange={() => rest.onGive(path, on ? "" : "true")} /> {inWords(one.name)}</label></legend>
+      <legend><label><input id={`option-${path}`} type="checkbox" aria-describedby={`option-${path}-says`} checked={on} onChange={() => rest.onGive(path, on ? "" : "true")} /> {inWords(one.name)}</label></legend>
       <Says one={one} path={path} refused={rest.refused} />
       {on && <Options options={one.options} place={path} {...rest} />}
     </fieldset>
@@ -43,7 +43,7 @@ function Group({ one, path, ...rest }: FieldProps) {
 
 function Field({ one, path, given, onGive, refused }: FieldProps) {
   const value = given[path] ?? "";
-  const about = { id: `new-${path}`, "aria-describedby": `new-${path}-says`, "aria-invalid": refused?.path === path };
+  const about = { id: `option-${path}`, "aria-describedby": `option-${path}-says`, "aria-invalid": refused?.path === path };
   return (
     <p class="field">
       <label for={about.id}>{inWords(one.name)}</label>
@@ -65,7 +65,7 @@ function Field({ one, path, given, onGive, refused }: FieldProps) {
 /** What an option means, and why its value was refused. What stands between backticks is code. */
 function Says({ one, path, refused }: Pick<FieldProps, "one" | "path" | "refused">) {
   return (
-    <span class="quiet" id={`new-${path}-says`}>
+    <span class="quiet" id={`option-${path}-says`}>
       {refused?.path === path && <strong class="bad" role="alert">{refused.text}</strong>}
       {one.unit && `In ${one.unit}. `}
       {one.text.split("`").map((part, i) => (i % 2 ? <code key={i}>{part}</code> : part))}
