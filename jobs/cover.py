@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import datetime, timedelta
 from functools import partial
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 from sqlalchemy.orm import Session
@@ -63,6 +63,7 @@ class Cover(Kind):
     subject = "the cover"
     request = CoverRequest
     template = "kinds/cover.html"
+    forms: ClassVar = {"options": ("Cover", CoverOptions)}
     makes_jobs = True
 
     def options(self, body: CoverRequest, scene: Scene, db: Database) -> dict[str, Any]:

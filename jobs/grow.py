@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -42,6 +42,7 @@ class Grow(Growing):
 
     name = "grow"
     request = GrowRequest
+    forms: ClassVar = {"seed": ("First polytope", SeedOptions), "options": ("Growth", GrowthOptions)}
 
     def options(self, body: GrowRequest, scene: Scene, db: Database) -> dict[str, Any]:
         seed = SeedOptions.from_document(body.seed.model_dump(exclude_none=True))

@@ -81,6 +81,8 @@ class Kind:
         subject: what its jobs make, for people: ``the region``.
         request: the model of a request for such a job.
         template: of dashboard/templates, with the kind's part of the job's page.
+        forms: place of options in the request -> their title on the page that starts jobs, and the dataclass that has them; empty where
+            that page starts no such jobs.
         makes_jobs: whether its regions are grown by jobs of their own.
     """
 
@@ -88,6 +90,7 @@ class Kind:
     subject: ClassVar[str] = "the region"
     request: ClassVar[type[JobRequest]]
     template: ClassVar[str] = "kinds/region.html"
+    forms: ClassVar[dict[str, tuple[str, type]]] = {}
     makes_jobs: ClassVar[bool] = False
 
     def options(self, body: Any, scene: Scene, db: Database) -> dict[str, Any]:

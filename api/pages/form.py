@@ -7,19 +7,12 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 
 from api.pages.rendering import page
-from certifier.growth.options import GrowthOptions
 from certifier.options import Takes, table
-from certifier.seeding.options import Method, SeedOptions
-from db.states import JobKind
-from planner.cover.options import CoverOptions
+from certifier.seeding.options import Method
+from jobs.registry import KINDS
 
 router = APIRouter()
 
-PARTS: dict[JobKind, dict[str, tuple[str, type]]] = {
-    JobKind.GROW: {"seed": ("First polytope", SeedOptions), "options": ("Growth", GrowthOptions)},
-    JobKind.COVER: {"options": ("Cover", CoverOptions)},
-}
-"""Kind of a job -> place of options in its request -> their title, and the dataclass that has them."""
 LISTS = (Takes.POINT, Takes.POINTS, Takes.PATHS)
 """The form has no fields for lists of numbers, nor for the method that needs them."""
 
@@ -28,7 +21,8 @@ LISTS = (Takes.POINT, Takes.POINTS, Takes.PATHS)
 def new_job_page(request: Request) -> Response:
     parts = {
         kind: [{"place": place, "title": title, "options": _fields(cls)} for place, (title, cls) in places.items()]
-        for kind, places in PARTS.items()
+        for kind, places in ((kind.name, kind.forms) for kind in KINDS.values())
+        if places
     }
     return page(request, "new.html", {"parts": parts})
 
