@@ -200,7 +200,7 @@ def samples_of(scene: Scene, polytope: Polytope) -> Array:
     """Returns samples of a polytope, (S, n), uniform in q; the same ones for the same polytope."""
     key = scene.hash, polytope.C.tobytes(), polytope.d.tobytes()
     if key not in _drawn:
-        _drawn[key] = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, 0).reshape(-1, scene.n)
+        _drawn[key] = uniform_in_q(polytope, scene, CHAINS, EACH, 0).reshape(-1, scene.n)
         if len(_drawn) > DRAWN:
             _drawn.popitem(last=False)
     return _drawn[key]

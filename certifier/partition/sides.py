@@ -36,7 +36,7 @@ class Side:
         self._order = [factor.index for factor in self._path if factor.index is not None]
         self.own = sorted(self._order)
         self.outside = [j for j in joints if j not in self.own]
-        self._revolute = area.scene.revolute[self.own]
+        self._space = area.scene
 
     def control_matrices(self, lower: Array, upper: Array) -> tuple[Array, Array]:
         """Returns the control matrices of the volume's pose on a cell, (3^k, 4, 4), the first own joint slowest.
@@ -44,13 +44,13 @@ class Side:
         The lower right elements of a factor are the denominator in one own joint. They are returned as well, (k, 3).
         """
         X, den = np.eye(4)[None], np.ones((len(self.own), 3))
+        cosines = [self._space.cosine(end) for end in (lower, upper)]
         for factor in self._path:
             T = factor.terms
             if factor.index is None:
                 X = X @ T[0]
                 continue
-            l, u = lower[factor.index], upper[factor.index]
-            w, v = (1 / np.sqrt(1 + l * l), 1 / np.sqrt(1 + u * u)) if factor.revolute else (1.0, 1.0)
+            l, u, w, v = (values[factor.index] for values in (lower, upper, *cosines))
             ends = [
                 w * w * (T[0] + l * (T[1] + l * T[2])),
                 w * v * (T[0] + (l + u) / 2 * T[1] + l * u * T[2]),
@@ -91,9 +91,7 @@ class Side:
         plane, bound = self.sign * plane[:4], plane[4]
         plane[3] -= self.radius * bound
         slopes = {joint: plane[:, 1 + place] for place, joint in enumerate(self._joints)}
-        l, u = lower[own], upper[own]
-        w, v = (np.where(self._revolute, 1 / np.sqrt(1 + ends * ends), 1.0) for ends in (l, u))
-        ends = np.array([l, u, w, v])
+        ends = np.array([lower, upper, self._space.cosine(lower), self._space.cosine(upper)])[:, own]
         c = bernstein.polynomials(
             X,
             self.volume.vertices,
