@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -129,9 +128,9 @@ def _q_volume(scene: Scene, measured: tuple[float, float]) -> dict[str, Any]:
     slide, whose sides are no angles.
     """
     value, error = measured
-    counts = Counter(joint.unit for joint in sorted(scene.moving, key=lambda joint: joint.unit, reverse=True))
-    units = [f"{unit}^{count}" if count > 1 else unit for unit, count in counts.items()]
-    side = float(np.rad2deg(value ** (1 / scene.n))) if scene.revolute.all() else None
+    each = [joint.unit for joint in scene.moving]
+    units = [f"{unit}^{each.count(unit)}" if each.count(unit) > 1 else unit for unit in ("rad", "m") if unit in each]
+    side = float(np.rad2deg(value ** (1 / scene.n))) if "m" not in each else None
     return {"value": value, "stderr": error, "unit": " ".join(units), "box_side": side}
 
 
@@ -145,15 +144,16 @@ def _joint_ranges(scene: Scene, polytope: Polytope, seed: Array | None) -> dict[
         RegionError: as :func:`certifier.polytopes.polytope.bounds`.
     """
     lower, upper = (scene.to_q(s) for s in bounds(polytope))
+    shown = [joint.shown for joint in scene.moving]
     alone = [None] * scene.n if seed is None else _through(scene, polytope, seed)
     return {
         joint.name: {
-            "lower": float(joint.shown.scale * low),
-            "upper": float(joint.shown.scale * high),
-            "unit": joint.shown.unit,
-            "through_seed": None if ends is None else [float(joint.shown.scale * end) for end in ends],
+            "lower": float(scale * low),
+            "upper": float(scale * high),
+            "unit": unit,
+            "through_seed": None if ends is None else [float(scale * end) for end in ends],
         }
-        for joint, low, high, ends in zip(scene.moving, lower, upper, alone, strict=True)
+        for joint, (unit, scale), low, high, ends in zip(scene.moving, shown, lower, upper, alone, strict=True)
     }
 
 

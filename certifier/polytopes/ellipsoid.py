@@ -8,8 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
+from certifier.coordinates import ConfigurationSpace
 from certifier.errors import RegionError
-from certifier.model import Array, ConfigurationSpace, Polytope
+from certifier.model import Array, Polytope
 from certifier.polytopes.polytope import SCALED, bounds, chebyshev_center
 from certifier.polytopes.sampling import CHAINS, hit_and_run
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from certifier.model import Array, ConfigurationSpace, Polytope
+from certifier.coordinates import ConfigurationSpace
+from certifier.model import Array, Polytope
 from certifier.polytopes.polytope import chebyshev_center
 from certifier.polytopes.sampling import hit_and_run
 
@@ -54,7 +55,7 @@ def _walk(polytope: Polytope, space: ConfigurationSpace, s: Array, rounds: int, 
             most = s[:, i] + (slack[:, up] / column[up]).min(axis=1)
             place = rng.random(len(s))
             begin, end = joint.offset(least), joint.offset(most)
-            new = np.clip(joint.at_offset(begin + (end - begin) * place), least, most)
+            new = np.minimum(np.maximum(joint.at_offset(begin + (end - begin) * place), least), most)
             slack = np.maximum(slack - np.outer(new - s[:, i], column), 0)
             s[:, i] = new
     return s

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from certifier.model import Array, ConfigurationSpace, Polytope
+from certifier.coordinates import ConfigurationSpace
+from certifier.model import Array, Polytope
 from certifier.polytopes import gibbs, simplex
 from certifier.polytopes.polytope import chebyshev_center
 

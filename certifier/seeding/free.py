@@ -150,6 +150,6 @@ def written(clearance: Clearance, q: Array, room: float) -> str:
 
 def _said(scene: Scene, q: Array, found: Array, text: str) -> str:
     moved = int(np.abs(found - q).argmax())
-    joint = scene.moving[moved]
-    by = joint.shown.scale * abs(found[moved] - q[moved])
-    return f"the nearest free configuration found is q = {text}; it moves {joint.name} most, by {by:.2g} {joint.shown.unit}"
+    joint, (unit, scale) = scene.moving[moved], scene.moving[moved].shown
+    by = scale * abs(found[moved] - q[moved])
+    return f"the nearest free configuration found is q = {text}; it moves {joint.name} most, by {by:.2g} {unit}"

@@ -22,7 +22,8 @@ from pydrake.planning import GcsTrajectoryOptimization
 from pydrake.solvers import ClarabelSolver
 from pydrake.trajectories import CompositeTrajectory
 
-from certifier.model import Array, ConfigurationSpace
+from certifier.coordinates import ConfigurationSpace
+from certifier.model import Array
 from planner.trajectory.timing import STILL, length, timed
 
 ORDER = 3

@@ -219,7 +219,7 @@ GROWTH = [
         ),
     ),
     *rows(
-        "certifier/model/scene.py",
+        "certifier/model.py",
         ("unknown_geometry", "", "no geometry is called {name}", "write model/body/geometry", lambda t: slider().geometry("nothing")),
         ("scene_document", "{...}", "{...}", STORED, lambda t: stored(joints=3)),
         ("scene_hash", "hash", "the scene's stored hash does not match its content", STORED, lambda t: stored(padding=0.5)),
@@ -230,9 +230,6 @@ GROWTH = [
             STORED,
             lambda t: stored(schema_version=9),
         ),
-    ),
-    *rows(
-        "certifier/model/polytope.py",
         (
             "polytope_shape",
             "seed.C",

@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from certifier.coordinates import ConfigurationSpace
 from certifier.errors import RegionError
-from certifier.model import ConfigurationSpace, Polytope
+from certifier.model import Polytope
 from certifier.polytopes.gibbs import uniform_in_q
 from certifier.polytopes.sampling import hit_and_run
 

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from pydrake.geometry.optimization import HPolyhedron
 from scipy.optimize import linprog
 
+from certifier.coordinates import ConfigurationSpace
 from certifier.errors import RegionError
-from certifier.model import ConfigurationSpace, Polytope
+from certifier.model import Polytope
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume, volume_bound, volume_in_q
 from certifier.polytopes.polytope import (
     bound_multipliers,

@@ -1,78 +1,20 @@
-"""Joints and their coordinates: positions q, and tangent-space coordinates s about q* (C-IRIS, eq. 4).
+"""The coordinates of joints: positions q, and tangent-space coordinates s about q* (C-IRIS, eq. 4).
 
     s_i = tan((q_i - q*_i) / 2)   of a revolute joint,      s_i = q_i - q*_i   of a prismatic one.
 
-Other modules ask a :class:`ConfigurationSpace`. Only these do this arithmetic themselves: compiled kernels (certifier.motion), ball
-arithmetic (planner.motion.curve), and the verifier, which shares no code with what it checks.
+Only these do this arithmetic themselves: compiled kernels (certifier.motion), ball arithmetic (planner.motion.curve), and the verifier,
+which shares no code with what it checks.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from enum import StrEnum
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 import numpy as np
 from flint import arb, ctx, fmpq
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[Any]
-
-
-class JointKind(StrEnum):
-    REVOLUTE = "revolute"
-    PRISMATIC = "prismatic"
-    WELD = "weld"
-
-
-class Shown(NamedTuple):
-    """How people read a position: in a unit, of which the position has ``scale`` times as many as radians or metres."""
-
-    unit: Literal["deg", "m"]
-    scale: float
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A joint is one edge of the kinematic tree: X_PB(q) = X_PF X_FM(q) X_BM^-1.
-
-    Attributes:
-        name: ``model/joint``.
-        kind: revolute, prismatic or weld.
-        parent: name of the body on the side of the world.
-        child: name of the other body.
-        axis: (3,) unit axis in F (zeros for a weld).
-        X_PF: (4, 4) pose of F, which is fixed on the parent, metres. A weld's own offset is folded into it.
-        X_BM: (4, 4) pose of M, which is fixed on the child, metres.
-        index: position index in q and s; None for a weld.
-        lower: lower limit of q in radians or metres; None for a weld.
-        upper: upper limit of q in radians or metres; None for a weld.
-        own_limits: the limits of the joint itself, in radians, where those above are a window that is narrower, because s stands for less
-            than a whole turn; None on a side without one. None where the limits above are its own.
-    """
-
-    name: str
-    kind: JointKind
-    parent: str
-    child: str
-    axis: Array
-    X_PF: Array
-    X_BM: Array
-    index: int | None = None
-    lower: float | None = None
-    upper: float | None = None
-    own_limits: tuple[float | None, float | None] | None = None
-
-    @property
-    def unit(self) -> Literal["rad", "m"]:
-        """Returns the unit of the joint's position."""
-        return "rad" if self.kind is JointKind.REVOLUTE else "m"
-
-    @property
-    def shown(self) -> Shown:
-        """Returns how people read the joint's position."""
-        return Shown("deg", math.degrees(1.0)) if self.kind is JointKind.REVOLUTE else Shown("m", 1.0)
 
 
 class ConfigurationSpace:
@@ -84,9 +26,6 @@ class ConfigurationSpace:
         q_star: (n,) the positions at which s is 0, radians or metres.
         revolute: (n,) True where the joint is revolute, False where it is prismatic.
     """
-
-    q_star: Array
-    revolute: NDArray[np.bool_]
 
     def __init__(self, q_star: Array, revolute: NDArray[np.bool_]) -> None:
         self.q_star, self.revolute = q_star, revolute
@@ -145,7 +84,9 @@ class ConfigurationSpace:
         NumPy's tangent depends on the processor; the tangent of ball arithmetic does not.
         """
         offset = (q - self.q_star).tolist()
-        return np.array([_tangent(x / 2) if revolute else x for x, revolute in zip(offset, self.revolute, strict=True)])
+        with ctx.workprec(256):
+            found = [float(arb(x / 2).tan().mid()) if revolute else x for x, revolute in zip(offset, self.revolute, strict=True)]
+        return np.array(found)
 
     def outer_s(self, lower: Array, upper: Array) -> tuple[Array, Array]:
         """Returns the largest doubles that are no more than s at ``lower``, and the least that are no less than s at ``upper``, (n,) each.
@@ -158,23 +99,10 @@ class ConfigurationSpace:
         return np.array(least), np.array([_not_less(*joint) for joint in zip(upper.tolist(), q_star, revolute, strict=True)])
 
 
-def _tangent(angle: float) -> float:
-    precision = ctx.prec
-    ctx.prec = 256
-    try:
-        return float(arb(angle).tan().mid())
-    finally:
-        ctx.prec = precision
-
-
 def _not_less(q: float, base: float, revolute: bool) -> float:
     """Returns the least double that is no less than tan((q - base)/2), or than q - base."""
     difference = fmpq(*q.as_integer_ratio()) - fmpq(*base.as_integer_ratio())
-    precision = ctx.prec
-    ctx.prec = 4096  # a difference of doubles is exact
-    try:
+    with ctx.workprec(4096):  # a difference of doubles is exact
         exactly = (arb(difference) / 2).tan() if revolute else arb(difference)
         nearest = float(exactly.mid())
         return nearest if arb(nearest) >= exactly else float(np.nextafter(nearest, np.inf))
-    finally:
-        ctx.prec = precision

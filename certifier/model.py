@@ -1,25 +1,149 @@
-"""The scene: a kinematic tree with convex geometries, and the pairs of them to certify."""
+"""A scene is held here as numbers: joints, bodies, convex geometries and pairs.
+
+A :class:`Scene` is self-contained: nobody needs a robot file, a mesh or Drake to use it. The content hash, the kinematics, the proofs and
+the verifier all refer to it. Drake's parsed doubles are taken as exact numbers.
+
+Monogram notation: X_PF is the pose of frame F measured in frame P, and p_BV is the position of point V in frame B.
+What s is, :mod:`certifier.coordinates` says.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
+import re
 from dataclasses import dataclass, field
+from enum import StrEnum
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from certifier.document import Node
-from certifier.errors import CirisError, SceneError
-from certifier.model.bodies import Geometry, Ignored, Pair
-from certifier.model.joints import Array, ConfigurationSpace, Joint, JointKind
-from certifier.model.polytope import Polytope
+from certifier.coordinates import ConfigurationSpace
+from certifier.document import LARGEST, Node
+from certifier.errors import CirisError, RegionError, SceneError
 from certifier.positions import check_magnitude, without_turns
+
+Array = NDArray[Any]
 
 SCHEMA_VERSION = 1
 _STORED = "the document was changed or is of another version; load the scene from its file again"
+WORLD = "world"
+MAX_NAME, MAX_SENTENCE = 200, 500
+"""A name has at most MAX_NAME characters, and a sentence of free text has at most MAX_SENTENCE."""
+ALPHABET = f"at most {MAX_NAME} ASCII letters, digits, _-./:+@#()[],= and single spaces inside"
+"""This text tells people what a name may consist of (:func:`is_name`)."""
+_NAME = re.compile(r"[\w\-./:+@#()\[\],=]+(?: [\w\-./:+@#()\[\],=]+)*", re.ASCII)
+
+
+def is_name(text: object) -> bool:
+    """Returns whether a joint, a body or a geometry may have this name.
+
+    A name consists of at most 200 ASCII letters, digits, characters of ``_-./:+@#()[],=`` and single spaces inside. Statements print
+    names, so nothing in a name may look like another line or control a terminal.
+    """
+    return isinstance(text, str) and len(text) <= MAX_NAME and _NAME.fullmatch(text) is not None
+
+
+def is_sentence(text: object) -> bool:
+    """Returns whether this may be a reason or a substitution: one line of at most 500 printable characters."""
+    return isinstance(text, str) and len(text) <= MAX_SENTENCE and text.isprintable() and "  " not in text
+
+
+def escaped(text: str) -> str:
+    """Returns the text as one line for people. What is not printable, and the backslash, is written as Python escapes it."""
+    return "".join(c if c.isprintable() and c != "\\" else c.encode("unicode_escape").decode() for c in text)
+
+
+class JointKind(StrEnum):
+    REVOLUTE = "revolute"
+    PRISMATIC = "prismatic"
+    WELD = "weld"
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint is one edge of the kinematic tree: X_PB(q) = X_PF X_FM(q) X_BM^-1.
+
+    Attributes:
+        name: ``model/joint``.
+        kind: revolute, prismatic or weld.
+        parent: name of the body on the side of the world.
+        child: name of the other body.
+        axis: (3,) unit axis in F (zeros for a weld).
+        X_PF: (4, 4) pose of F, which is fixed on the parent, metres. A weld's own offset is folded into it.
+        X_BM: (4, 4) pose of M, which is fixed on the child, metres.
+        index: position index in q and s; None for a weld.
+        lower: lower limit of q in radians or metres; None for a weld.
+        upper: upper limit of q in radians or metres; None for a weld.
+        own_limits: the limits of the joint itself, in radians, where those above are a window that is narrower, because s stands for less
+            than a whole turn; None on a side without one. None where the limits above are its own.
+    """
+
+    name: str
+    kind: JointKind
+    parent: str
+    child: str
+    axis: Array
+    X_PF: Array
+    X_BM: Array
+    index: int | None = None
+    lower: float | None = None
+    upper: float | None = None
+    own_limits: tuple[float | None, float | None] | None = None
+
+    @property
+    def unit(self) -> Literal["rad", "m"]:
+        """Returns the unit of the joint's position."""
+        return "rad" if self.kind is JointKind.REVOLUTE else "m"
+
+    @property
+    def shown(self) -> tuple[Literal["deg", "m"], float]:
+        """Returns the unit in which people read the joint's position, and how many of it are in a radian or a metre."""
+        return ("deg", math.degrees(1.0)) if self.kind is JointKind.REVOLUTE else ("m", 1.0)
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A geometry is a convex body fixed to a link: conv(vertices) + ball(radius), in the frame of its body.
+
+    Attributes:
+        name: ``model/body/geometry``.
+        body: ``model/body``, or ``world``.
+        vertices: (v, 3) metres in the body's frame. A sphere has one vertex, a capsule has two.
+        radius: metres, 0 for a polytope. The scene's padding is *not* included.
+        shape: what the file said, JSON-able: ``{"kind": "box", "size": [x, y, z], "X_BG": 4x4 list}`` and so on.
+        substitution: None when vertices and radius describe the shape exactly, else a sentence that names the conservative
+            replacement (mesh -> hull with V vertices, cylinder -> prism ...).
+        inflation: upper bound in metres on how far the replacement reaches outside the shape, or outside the hull of a mesh.
+    """
+
+    name: str
+    body: str
+    vertices: Array
+    radius: float
+    shape: dict[str, Any]
+    substitution: str | None = None
+    inflation: float = 0.0
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A pair names two geometries that must not touch; a < b in string order."""
+
+    a: str
+    b: str
+
+
+@dataclass(frozen=True)
+class Ignored:
+    """Names a pair of geometries that is not certified, and says why."""
+
+    a: str
+    b: str
+    reason: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,36 +294,9 @@ class Scene(ConfigurationSpace):
     def _content(self) -> dict[str, Any]:
         return {
             "schema_version": SCHEMA_VERSION,
-            "joints": [
-                {
-                    "name": j.name,
-                    "kind": j.kind.value,
-                    "parent": j.parent,
-                    "child": j.child,
-                    "axis": j.axis.tolist(),
-                    "X_PF": j.X_PF.tolist(),
-                    "X_BM": j.X_BM.tolist(),
-                    "index": j.index,
-                    "lower": j.lower,
-                    "upper": j.upper,
-                    # Scenes without windows keep the hash that they had before there were any.
-                    **({} if j.own_limits is None else {"own_limits": list(j.own_limits)}),
-                }
-                for j in self.joints
-            ],
+            "joints": [_plain(joint) for joint in self.joints],
             "bodies": list(self.bodies),
-            "geometries": [
-                {
-                    "name": g.name,
-                    "body": g.body,
-                    "vertices": g.vertices.tolist(),
-                    "radius": g.radius,
-                    "shape": g.shape,
-                    "substitution": g.substitution,
-                    "inflation": g.inflation,
-                }
-                for g in self.geometries
-            ],
+            "geometries": [_plain(geometry) for geometry in self.geometries],
             "pairs": [[p.a, p.b] for p in self.pairs],
             "ignored": [{"pair": [i.a, i.b], "reason": i.reason} for i in self.ignored],
             "q_star": self.q_star.tolist(),
@@ -222,6 +319,18 @@ class Scene(ConfigurationSpace):
         if document.get("hash", scene.hash) != scene.hash:
             raise SceneError("scene_hash", "the scene's stored hash does not match its content", field="hash", hint=_STORED)
         return scene
+
+
+def _plain(part: Joint | Geometry) -> dict[str, Any]:
+    """Returns a part's fields as JSON-able data."""
+    plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in vars(part).items()}
+    if plain.get("own_limits", ()) is None:  # Scenes without windows keep the hash that they had before there were any.
+        del plain["own_limits"]
+    return plain
+
+
+def _size(array: Array) -> str:
+    return " x ".join(map(str, array.shape)) or "a number"
 
 
 def _read(document: Any) -> Scene:
@@ -296,3 +405,129 @@ def _ignored(node: Node) -> Ignored:
 def _texts(node: Node) -> tuple[str, str]:
     first, second = node.two()
     return first.text(), second.text()
+
+
+@dataclass(frozen=True)
+class Polytope:
+    """A polytope is {s : C s <= d}, where C is (m, n) and d is (m,), both finite.
+
+    The code that makes it decides whether the joint limits are among its rows. :meth:`given` checks what comes from users.
+    """
+
+    C: Array
+    d: Array
+
+    @classmethod
+    def given(cls, C: Any, d: Any, n: int | None = None, field: str = "polytope") -> Polytope:
+        """Returns a polytope from what users give: nested lists or arrays of numbers.
+
+        Args:
+            n: number of columns that C has to have; None for any. A C without rows is taken to have that many columns.
+            field: field in which the user gave the polytope, for errors.
+
+        Raises:
+            RegionError: ``polytope_shape`` or ``polytope_not_finite``.
+        """
+        try:
+            rows, offsets = np.array(C, dtype=float), np.array(d, dtype=float)
+        except (TypeError, ValueError):
+            raise RegionError("polytope_shape", "C and d must be lists of numbers, and the rows of C equally long", field=field) from None
+        if rows.size == 0 and n is not None:
+            rows = rows.reshape(0, n)
+        if rows.ndim != 2 or offsets.shape != (len(rows),) or (n is not None and rows.shape[1] != n):
+            hint = f"C must be m x {n or 'n'}, one column a joint in the scene's order, and d must have m numbers"
+            message = f"C is {_size(rows)} and d is {_size(offsets)}"
+            raise RegionError("polytope_shape", message, field=field, hint=hint)
+        if not (np.abs(rows).max(initial=0.0) <= LARGEST and np.abs(offsets).max(initial=0.0) <= LARGEST):
+            raise RegionError("polytope_not_finite", f"C and d must be finite numbers of at most {LARGEST:g}", field=field)
+        return cls(rows, offsets)
+
+    def contains(self, s: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
+        """Returns which of the points s, (..., n), satisfy C s <= d + tolerance."""
+        return np.all(np.asarray(s) @ self.C.T <= self.d + tolerance, axis=-1)
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box contains the polytope and gives it the coordinates u = (s - mid)/half.
+
+    Attributes:
+        mid: (n,) centre.
+        half: (n,) half edges.
+    """
+
+    mid: Array
+    half: Array
+
+    @classmethod
+    def around(cls, lower: Array, upper: Array) -> Box:
+        """Returns the box of these bounds, rounded outwards."""
+        mid = (lower + upper) / 2
+        half = np.maximum(upper - mid, mid - lower)
+        # Of a small box far from 0, the corners are rounded by more than the first of these.
+        far = 8 * np.spacing(np.maximum(np.abs(lower), np.abs(upper)))
+        return cls(mid, np.maximum(np.nextafter(half * (1 + 1e-12), np.inf), half + far))
+
+    @property
+    def lower(self) -> Array:
+        """Returns the least doubles inside the box, (n,)."""
+        return np.nextafter(self.mid - self.half, np.inf)
+
+    @property
+    def upper(self) -> Array:
+        """Returns the largest doubles inside the box, (n,)."""
+        return np.nextafter(self.mid + self.half, -np.inf)
+
+    def to_u(self, s: Array) -> Array:
+        return (s - self.mid) / self.half
+
+
+@dataclass(frozen=True, eq=False)
+class StoredRegion:
+    """A stored region is a certified one as the database keeps it for planners.
+
+    Attributes:
+        guarantee: what its certificate is worth.
+        C: (m, n) and d (m,), the half-spaces {s : C s <= d}, m >= 1, joint limits included.
+        lower: (n,) lower corner of a box that contains the region, in s.
+        upper: (n,) its upper corner.
+    """
+
+    id: str
+    guarantee: str
+    C: Array
+    d: Array
+    lower: Array
+    upper: Array
+
+
+@dataclass(frozen=True)
+class Volume:
+    """A volume is a convex body conv(vertices) + ball(radius), fixed to a link. It contains, and stands for, every geometry that it names.
+
+    Attributes:
+        geometries: names of the geometries.
+        body: body in whose frame the vertices are. It is the geometries' own body, or their bodies are welded to it.
+        vertices: (V, 3) metres.
+        radius: metres; the scene's padding is added to it.
+    """
+
+    geometries: tuple[str, ...]
+    body: str
+    vertices: Array
+    radius: float
+
+    @classmethod
+    def of(cls, geometry: Geometry) -> Volume:
+        """Returns the volume that is the geometry itself."""
+        return cls((geometry.name,), geometry.body, geometry.vertices, geometry.radius)
+
+    def is_geometry_of(self, scene: Scene) -> bool:
+        """Returns whether the volume is exactly the one geometry that it names."""
+        geometry = scene.geometry(self.geometries[0])
+        return (
+            len(self.geometries) == 1
+            and self.body == geometry.body
+            and self.radius == geometry.radius
+            and np.array_equal(self.vertices, geometry.vertices)
+        )

@@ -10,7 +10,8 @@ from flint import arb, ctx
 from hypothesis import given
 from hypothesis import strategies as st
 
-from certifier.model import WORLD, ConfigurationSpace, Joint, JointKind
+from certifier.coordinates import ConfigurationSpace
+from certifier.model import WORLD, Joint, JointKind
 
 DIGITS = 300
 EDGE = math.nextafter(math.pi, 0.0)
@@ -21,9 +22,8 @@ TANGENTS = st.floats(-1e8, 1e8) | st.sampled_from([0.0, 1e-300, math.tan(np.radi
 
 @pytest.fixture(autouse=True)
 def _digits():
-    before, ctx.dps = ctx.dps, DIGITS
-    yield
-    ctx.dps = before
+    with ctx.workdps(DIGITS):
+        yield
 
 
 def twins(center: float) -> ConfigurationSpace:
@@ -114,4 +114,4 @@ def test_arrays_of_any_shape_and_some_of_the_joints():
 @pytest.mark.parametrize(("kind", "unit", "shown", "half"), [("revolute", "rad", "deg", 180.0), ("prismatic", "m", "m", math.pi)])
 def test_units(kind, unit, shown, half):
     joint = Joint("a/j", JointKind(kind), WORLD, "a/b", np.array([0.0, 0.0, 1.0]), np.eye(4), np.eye(4), 0, -1.0, 1.0)
-    assert (joint.unit, joint.shown.unit, math.pi * joint.shown.scale) == (unit, shown, half)
+    assert (joint.unit, joint.shown[0], math.pi * joint.shown[1]) == (unit, shown, half)
