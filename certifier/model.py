@@ -324,8 +324,8 @@ class Scene(ConfigurationSpace):
 def _plain(part: Joint | Geometry) -> dict[str, Any]:
     """Returns a part's fields as JSON-able data."""
     plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in vars(part).items()}
-    if plain.get("own_limits", ()) is None:  # Scenes without windows keep the hash that they had before there were any.
-        del plain["own_limits"]
+    if limits := plain.pop("own_limits", None):  # Scenes without windows keep the hash that they had before there were any.
+        plain["own_limits"] = list(limits)
     return plain
 
 

@@ -43,13 +43,10 @@ def test_joint_limits_in_s_are_the_nearest_doubles_that_leave_nothing_out(limit,
     assume(not revolute or -3.0 < limit - center < 3.0)
     joint = Joint("a/j", kind, WORLD, "a/b", np.array([0.0, 0.0, 1.0]), np.eye(4), np.eye(4), 0, limit, limit)
     scene = Scene("s", (joint,), (WORLD, "a/b"), (), (), (), np.array([center]))
-    precision, ctx.prec = ctx.prec, 3000
-    try:
+    with ctx.workprec(3000):
         exactly = arb(limit) - arb(center)
         exactly = (exactly / 2).tan() if revolute else exactly
         lower, upper = (float(limit[0]) for limit in scene.outer_limits)
         assert arb(lower) <= exactly <= arb(upper)
         assert not arb(math.nextafter(upper, -math.inf)) >= exactly
         assert not arb(math.nextafter(lower, math.inf)) <= exactly
-    finally:
-        ctx.prec = precision
