@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 from flint import arb, ctx
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from certifier.coordinates import ConfigurationSpace
 from certifier.model import WORLD, Joint, JointKind
 
-DIGITS = 300
+DIGITS = 1000
 EDGE = math.nextafter(math.pi, 0.0)
 CENTERS = st.floats(-3.0, 3.0) | st.just(0.0)
 OFFSETS = st.floats(-EDGE, EDGE) | st.sampled_from([-EDGE, EDGE, -np.radians(170), np.radians(170), 0.0])
@@ -65,6 +65,17 @@ def test_there_and_back(center, offset):
     q, space = np.full(2, center + offset), twins(center)
     np.testing.assert_allclose(space.to_q(space.to_s(q)), q, rtol=0, atol=1e-14)
     assert abs(space.offset(space.at_offset(np.full(2, offset))) - offset).max() <= 4 * np.spacing(abs(offset))
+
+
+@given(CENTERS, OFFSETS)
+def test_outer_limits_are_the_nearest_doubles_that_leave_nothing_out(center, offset):
+    limit = center + offset
+    difference = arb(limit) - arb(center)
+    assume(abs(difference) < math.pi)
+    for lower, upper, exactly in zip(*twins(center).outer_s(*np.full((2, 2), limit)), ((difference / 2).tan(), difference), strict=True):
+        assert arb(lower) <= exactly <= arb(upper)
+        assert not arb(math.nextafter(upper, -math.inf)) >= exactly
+        assert not arb(math.nextafter(lower, math.inf)) <= exactly
 
 
 @given(TANGENTS)
