@@ -45,12 +45,11 @@ def uniform_in_q(polytope: Polytope, space: ConfigurationSpace, chains: int, eac
 def _walk(polytope: Polytope, space: ConfigurationSpace, s: Array, rounds: int, rng: np.random.Generator) -> Array:
     """Returns the chains s (k, n) after that many rounds over all axes."""
     s = s.copy()
-    columns, joints = polytope.C.T, [space.of(i) for i in range(s.shape[1])]
+    axes = [(i, space.of(i), column, column > 0, column < 0) for i, column in enumerate(polytope.C.T)]
     for _ in range(rounds):
         # The slack is computed anew in every round, so that rounding does not add up.
-        slack = np.maximum(polytope.d - s @ columns, 0)
-        for i, (column, joint) in enumerate(zip(columns, joints, strict=True)):
-            up, down = column > 0, column < 0
+        slack = np.maximum(polytope.d - s @ polytope.C.T, 0)
+        for i, joint, column, up, down in axes:
             least = s[:, i] + (slack[:, down] / column[down]).max(axis=1)
             most = s[:, i] + (slack[:, up] / column[up]).min(axis=1)
             place = rng.random(len(s))
