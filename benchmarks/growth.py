@@ -215,7 +215,7 @@ def _proposed(name: str) -> dict[str, Any]:
         "seeding_seconds": took["seconds"],
         "share": 1.0,
         "share_stderr": 0.0,
-        "q_volume": volume_in_q(polytope, scene.revolute, volume(polytope, 0), 0)[0],
+        "q_volume": volume_in_q(polytope, scene, volume(polytope, 0), 0)[0],
         "ellipsoid": inscribed_ellipsoid(polytope).volume,
         "faces": len(region.b()),
         "curve": [],

@@ -47,7 +47,7 @@ def test_a_draft_of_a_robot_as_people_ship_it_is_a_scene_with_a_free_seed(ciris:
     assert set(document["ignore"][0]["pair"]) == {"arm/base/foot", "arm/cover/Sphere"}
     scene = load_scene(out)
     assert [j.name for j in scene.moving] == ["arm/turn"]
-    assert "arm/turn: -170 to 170 degrees, a window" in text
+    assert "arm/turn: -170 to 170 deg, a window" in text
     assert yaml.safe_load((out.parent / "seed.yaml").read_text())["q"] == [0.0]
     checked = ciris("scene", "check", out)
     assert checked.status == 0

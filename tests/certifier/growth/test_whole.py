@@ -166,7 +166,7 @@ def test_faces_move_out_stage_by_stage_as_far_as_the_proposal():
     (moved,) = (i for i, row in enumerate(wider.C) if (row != 0).all())
     assert wider.C[moved].tolist() == cut.C[face].tolist()
     assert wider.d[moved] == pytest.approx(FAR * cut.d[face])
-    samples = uniform_in_q(Polytope(PROPOSAL.C, PROPOSAL.d), SCENE.revolute, 100, 10, 0).reshape(-1, 2)
+    samples = uniform_in_q(Polytope(PROPOSAL.C, PROPOSAL.d), SCENE, 100, 10, 0).reshape(-1, 2)
     shares = [candidate.polytope.contains(samples).mean() for candidate in accepted]
     assert shares[0] + GAIN < shares[1] < shares[2] - GAIN < shares[3] == 1.0, "the third stage gained enough for a fourth one"
     assert (widest.C != 0).all(axis=1).sum() == 0
@@ -356,7 +356,7 @@ def test_a_region_of_an_example_is_verified_contains_what_it_has_to_and_is_free(
     # The proposal itself does collide, so that something had to be cut off; and it is the proposal that was cut.
     assert region.manifest["share"]["collision_free"] < 1
     assert 0 < region.manifest["share"]["value"] < 1
-    samples = uniform_in_q(kept, scene.revolute, 50, 10, 1).reshape(-1, scene.n)
+    samples = uniform_in_q(kept, scene, 50, 10, 1).reshape(-1, scene.n)
     assert proposal.contains(samples, 1e-9).all()
     assert not in_collision(scene, samples).any()
 
