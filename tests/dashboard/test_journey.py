@@ -14,14 +14,12 @@ from tests.dashboard.test_new_page import set_joint
 
 
 def submit(page: Any, url: str) -> str:
-    """Starts a job in the form, from a box around the configuration (-20, -12) degrees, and returns its id."""
+    """Starts a job in the form, around the configuration (-20, -12) degrees, and returns its id."""
     page.goto(url)
     page.get_by_role("link", name="Start a job").first.click()
     page.locator(".said", has_text=re.compile("Free here|as proved")).wait_for()
     set_joint(page, "arm/joint1", -20)
     set_joint(page, "arm/joint2", -12)
-    page.get_by_label("First polytope").select_option("box")
-    page.get_by_label("Half its width").fill("0.3")
     page.locator("summary", has_text="Effort").click()
     page.get_by_label("Cells of a pair").fill("64")
     page.get_by_role("button", name="Start the job").click()
