@@ -75,12 +75,12 @@ def test_seeds_that_are_refused(q, code, words):
 @pytest.mark.parametrize("q", [(2.0, 0.2), (-2.0, 2.5), (2.0 + 5e-10, -2.5 - 5e-10)])
 def test_a_seed_on_a_limit_is_moved_inside_by_a_hair(method, q):
     scene = crane()
-    proposal = propose(scene, SeedOptions(method, q=q, contain=((1.9, -2.5),), max_iterations=1))
+    proposal = propose(scene, SeedOptions(method, q=q, contain=((1.9, -2.5),), max_iterations=1, half_width=0.001))
     points = scene.polytope(proposal.C, proposal.d)
     for point, asked in zip((proposal.center, proposal.contain[0]), (q, (1.9, -2.5)), strict=True):
         assert (points.C @ point < points.d).all()
         np.testing.assert_allclose(scene.to_q(point), asked, atol=2e-4)
-    untouched = propose(scene, SeedOptions(method, q=(1.9999, 0.2), max_iterations=1))
+    untouched = propose(scene, SeedOptions(method, q=(1.9999, 0.2), max_iterations=1, half_width=0.001))
     assert np.array_equal(untouched.center, scene.to_s((1.9999, 0.2)))
 
 
@@ -195,9 +195,7 @@ def test_iris_stops_at_the_tolerance():
 def test_what_has_to_be_contained_is(method):
     """Far from the seed, and near to the ball, where IRIS by itself would not go."""
     scene, contain = crane(), ((-1.5, -0.3), (0.2, 0.5))
-    proposal = propose(
-        scene, SeedOptions(method, q=(0.3, 0.2), contain=contain, max_iterations=1, half_width=0.01 if method is Method.BOX else None)
-    )
+    proposal = propose(scene, SeedOptions(method, q=(0.3, 0.2), contain=contain, max_iterations=1, half_width=0.01))
     points = scene.to_s(np.array([(0.3, 0.2), *contain]))
     assert np.allclose(proposal.contain, points[1:])
     assert (proposal.d[:, None] > proposal.C @ points.T).all()
