@@ -294,6 +294,7 @@ def offered(scene: str, home: list[float], away: list[float], region: str) -> di
                 "options": {"paper": paper},
             },
             {**more, "kind": "grow", "seed": {"method": "polytope", **faces}, "options": {"cells": 1000}},
+            {**more, "kind": "grow", "seed": {"method": "box", "q": home, "half_width": 0.1}, "options": {"paper": {}}},
             {**more, "kind": "certify", "polytope": faces, "cells": 100, "random_seed": 1},
             {**more, "kind": "recertify", "region": region, "random_seed": 1},
             {
