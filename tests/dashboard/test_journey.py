@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from typing import Any
 
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
 from certifier.model import Scene
 from tests.dashboard.test_library_page import plan
 from tests.dashboard.test_new_page import set_joint
+from tests.scenes import box_seed
 
 
 def submit(page: Any, url: str) -> str:
@@ -70,7 +72,10 @@ def test_a_visit_from_a_job_to_a_plan(page: Any, url: str, planar: Scene, client
     page.get_by_text("No collision of the scene's pairs, as proved.").wait_for()
 
     # Another job, which is cancelled.
-    other = submit(page, url)
+    seed = box_seed(planar.to_s(np.deg2rad([-20, -12])), 0.3)
+    request = {"kind": "grow", "scene": "planar", "seed": seed, "options": {"cells": 64}}
+    other = client.post("/v1/jobs", json=request).json()["id"]
+    page.goto(f"{url}/jobs/{other}")
     page.get_by_role("button", name="Cancel").click()
     page.locator(".badge.cancelled").wait_for()
     assert client.get(f"/v1/jobs/{other}").json()["state"] == "cancelled"
