@@ -424,7 +424,7 @@ def test_regions_are_delivered_as_they_are_certified_and_time_is_left_for_growin
 def test_a_seed_in_contact_is_refused():
     scene = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (1.5, 0.0, 0.0)))
     with pytest.raises(CirisError):
-        grow(scene, GrowthOptions(seed=box_seed([0.0, 0.0], 0.2), cells=SLICE))
+        grow(scene, GrowthOptions(seed={"q": [0.0, 0.0]}))
 
 
 def test_a_child_that_dies_leaves_the_region_before(monkeypatch):
