@@ -83,6 +83,6 @@ class GrowthOptions:
 
 
 def _without_old(document: dict[str, Any]) -> dict[str, Any]:
-    """Returns the options without those of the papers' algorithm that jobs of version 0.1 name beside the others and do not use."""
+    """Returns the options without those of the papers' algorithm that jobs of earlier versions name beside the others and do not use."""
     unused = {one.name: (None, one.default) for one in table(PaperOptions)} | {"contraction": (None, "whole")}
     return {name: value for name, value in document.items() if name not in unused or value not in unused[name]}

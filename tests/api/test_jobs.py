@@ -294,6 +294,15 @@ def test_a_job_that_asks_for_cells_says_so(client: TestClient, scene: Scene) -> 
     assert (refused.status_code, refused.json()["field"]) == (422, "cells")
 
 
+def test_an_option_that_has_moved_into_a_group_is_refused_with_its_place(client: TestClient, scene: Scene) -> None:
+    problem = client.post("/v1/jobs", json=GROW | {"options": {"pushes": 1, "color": "red"}}).json()
+    said = {error["field"]: error["message"] for error in problem["errors"]}
+    assert said == {
+        "options.pushes": "there is no such field: give options.paper.pushes",
+        "options.color": "there is no such field",
+    }
+
+
 def test_a_job_is_accepted_while_redis_is_down(database: Database, scene: Scene, environment: pytest.MonkeyPatch) -> None:
     environment.setenv("CIRIS_REDIS_URL", "redis+socket:///tmp/there-is-no-queue?virtual_host=0")
     with TestClient(create_app(database), base_url=BASE_URL) as client:

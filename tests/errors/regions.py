@@ -348,7 +348,7 @@ POLYTOPES = [
         ),
         (
             "step_too_large",
-            "max_rounds",
+            "options.paper.max_rounds",
             "with all {n} joints in play the polynomials of {a} and {b} have {terms} terms, {most}",
             PUSH,
             "an arm of many joints",
