@@ -17,7 +17,6 @@ from api.access_log import AccessLog
 from api.announce import Announcer
 from api.cells import OutlinesKept
 from api.children import AT_ONCE, ChildLimiter
-from api.drawing import Maps
 from api.libraries import Libraries
 from api.links import LinksKept
 from api.metrics import Requests
@@ -64,7 +63,6 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.children = ChildLimiter()
     app.state.libraries = Libraries()
     app.state.links = LinksKept()
-    app.state.maps = Maps()
     app.state.outlines = OutlinesKept()
     app.state.room = Room()
     app.state.keyring = Keyring(app.state.database, open_without_keys=settings().loopback)

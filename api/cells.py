@@ -5,10 +5,12 @@ Nothing is checked here. What is shown as certified was verified before it was s
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
+from operator import attrgetter
 from threading import Lock
 from typing import Any
+
+from cachetools import LRUCache, cachedmethod
 
 from api.schemas.cells import CellCounts, Partition, ProofKind, RegionPair
 from api.schemas.scenes import PairInfo
@@ -33,27 +35,20 @@ class OutlinesKept:
     """Keeps the outlines of proof files. A file never changes, and may have a hundred megabytes, which take long to read."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[str, list[ProofOutline]] = OrderedDict()
+        self._kept: LRUCache[str, list[ProofOutline]] = LRUCache(KEPT_NODES, getsizeof=_size)
         self._lock = Lock()
 
+    @cachedmethod(attrgetter("_kept"), key=lambda self, database, digest, scene: digest, lock=attrgetter("_lock"))
     def of(self, database: Database, digest: str, scene: Scene) -> list[ProofOutline]:
         """Returns the outlines of the proofs in the file with this digest."""
-        with self._lock:
-            if digest in self._kept:
-                self._kept.move_to_end(digest)
-                return self._kept[digest]
         with database.read() as session:
             data = proofs.get(session, digest)
-        found = outlines(data, scene)
-        with self._lock:
-            self._kept[digest] = found
-            while len(self._kept) > 1 and sum(map(_nodes, self._kept.values())) > KEPT_NODES:
-                self._kept.popitem(last=False)
-        return found
+        return outlines(data, scene)
 
 
-def _nodes(known: Sequence[ProofOutline]) -> int:
-    return sum(len(one.cells.tree.nodes) for one in known)
+def _size(known: Sequence[ProofOutline]) -> int:
+    """Returns the number of nodes. The outlines of one file are kept however large they are."""
+    return min(KEPT_NODES, sum(len(one.cells.tree.nodes) for one in known))
 
 
 def numbered(scene: Scene, index: int) -> PairInfo:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections import OrderedDict
 from threading import Lock
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from fastapi import Depends, Request
+from cachetools import LRUCache, cached
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
@@ -114,40 +113,19 @@ def contacts(scene: Scene, q: Array) -> list[Contacts]:
     ]
 
 
-class Maps:
-    """Keeps collision maps: a scene never changes, so neither do they."""
-
-    def __init__(self) -> None:
-        self._kept: OrderedDict[tuple[str, bytes], bytes] = OrderedDict()
-        self._lock = Lock()
-
-    def collisions(self, scene: Scene, q: Array) -> NDArray[np.bool_]:
-        """Returns at which of the configurations q, (k, n), some pair is not shown to be apart. A child process computes it."""
-        key = scene.hash, hashlib.sha256(q.tobytes()).digest()
-        with self._lock:
-            bits = self._kept.get(key)
-            if bits is not None:
-                self._kept.move_to_end(key)
-        if bits is None:
-            payload = {"scene": scene.to_document(), "s": scene.to_s(q)}
-            function, memory = "certifier.pair.collisions:answer_in_collision", settings().child_memory_bytes
-            bits = np.packbits(run_in_child(function, payload, timeout_s=TIMEOUT_S, memory_bytes=memory)).tobytes()
-            with self._lock:
-                self._kept[key] = bits
-                if len(self._kept) > KEPT:
-                    self._kept.popitem(last=False)
-        return np.unpackbits(np.frombuffer(bits, dtype=np.uint8), count=len(q)).astype(bool)
+def _pixels(scene: Scene, q: Array) -> tuple[str, bytes]:
+    return scene.hash, hashlib.sha256(q.tobytes()).digest()
 
 
-async def _maps(request: Request) -> Maps:
-    maps: Maps = request.app.state.maps
-    return maps
+@cached(LRUCache(KEPT), key=_pixels, lock=Lock())
+def _collision_map(scene: Scene, q: Array) -> NDArray[np.uint8]:
+    """Returns at which of the configurations q, (k, n), some pair is not shown to be apart, as packed bits. A child process computes it."""
+    payload = {"scene": scene.to_document(), "s": scene.to_s(q)}
+    function, memory = "certifier.pair.collisions:answer_in_collision", settings().child_memory_bytes
+    return np.packbits(run_in_child(function, payload, timeout_s=TIMEOUT_S, memory_bytes=memory))
 
 
-KeptMaps = Annotated[Maps, Depends(_maps)]
-
-
-def sliced(scene_id: str, scene: Scene, library: Library, maps: Maps, body: SliceRequest) -> SliceResponse:
+def sliced(scene_id: str, scene: Scene, library: Library, body: SliceRequest) -> SliceResponse:
     """Returns the slice that a request asks for.
 
     Raises:
@@ -175,7 +153,8 @@ def sliced(scene_id: str, scene: Scene, library: Library, maps: Maps, body: Slic
     certified = np.zeros(len(points), dtype=bool)
     certified[found.point[np.isin(found.region, list(chosen))]] = True
     # What collides is drawn as such, whatever else holds there.
-    signs = np.where(maps.collisions(scene, points), "#", np.where(certified, "o", "."))
+    in_collision = np.unpackbits(_collision_map(scene, points), count=len(points)).astype(bool)
+    signs = np.where(in_collision, "#", np.where(certified, "o", "."))
     described = [
         SliceAxis(joint=scene.moving[axis].name, unit=units(scene)[axis], lower=low, upper=high)
         for axis, low, high in zip(axes, lower.tolist(), upper.tolist(), strict=True)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import dataclass, field
 from functools import partial
 from threading import Lock
 from typing import Annotated
 
+from cachetools import LRUCache
 from fastapi import Depends, Request
 
 from db import regions
@@ -28,16 +28,13 @@ class Libraries:
     """Holds the libraries of scenes. The database is the truth about which regions there are: every question compares the version."""
 
     def __init__(self) -> None:
-        self._shelves: OrderedDict[str, _Shelf] = OrderedDict()
+        self._shelves: LRUCache[str, _Shelf] = LRUCache(MOST)
         self._lock = Lock()
 
     def of(self, database: Database, scene_id: str, n: int) -> Library:
         """Returns the library of a scene with n joints, as of a version that is no older than this call."""
         with self._lock:
             shelf = self._shelves.setdefault(scene_id, _Shelf(Library(n)))
-            self._shelves.move_to_end(scene_id)
-            if len(self._shelves) > MOST:
-                self._shelves.popitem(last=False)
         with shelf.lock:
             while not _is_current(database, scene_id, shelf.library):
                 shelf.library = _changed(database, scene_id, shelf.library)

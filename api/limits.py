@@ -7,9 +7,10 @@ processes a caller may therefore ask k times as often, and k processes can serve
 from __future__ import annotations
 
 import time
-from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
+
+from cachetools import LRUCache
 
 MAX_BUCKETS = 10_000
 BURST_SECONDS = 2.0
@@ -29,15 +30,12 @@ class Buckets:
 
     def __init__(self, rate: float, clock: Callable[[], float] = time.monotonic) -> None:
         self._rate, self._size, self._clock = rate, max(1.0, BURST_SECONDS * rate), clock
-        self._buckets: OrderedDict[str, _Bucket] = OrderedDict()
+        self._buckets: LRUCache[str, _Bucket] = LRUCache(MAX_BUCKETS)
 
     def take(self, name: str) -> float:
         """Takes a token. Returns 0, or the seconds until the next token when the bucket is empty."""
         now = self._clock()
         bucket = self._buckets.setdefault(name, _Bucket(self._size, now))
-        self._buckets.move_to_end(name)
-        if len(self._buckets) > MAX_BUCKETS:
-            self._buckets.popitem(last=False)
         bucket.tokens = min(self._size, bucket.tokens + self._rate * (now - bucket.filled))
         bucket.filled = now
         if bucket.tokens < 1:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
+from threading import Lock
 from typing import Annotated
 
 import numpy as np
+from cachetools import LRUCache
 from fastapi import Depends, Request
 
 from api import graph
@@ -22,14 +23,16 @@ class LinksKept:
     """Holds the overlaps of scenes, as of a version of whose regions all pairs have been compared."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[str, tuple[int, Links]] = OrderedDict()
+        self._kept: LRUCache[str, tuple[int, Links]] = LRUCache(MOST)
+        self._lock = Lock()
 
     def of(self, db: Database, scene_id: str, scene: Scene, library: Library) -> tuple[bool, Links]:
         """Returns whether all pairs of the library's regions have been compared, and their overlaps, with the library's numbers.
 
         Pairs that were not compared yet are compared now, for a few seconds.
         """
-        version, links = self._kept.get(scene_id, (None, None))
+        with self._lock:
+            version, links = self._kept.get(scene_id, (None, None))
         if links is not None and version == library.version:
             return True, links
         complete, known = graph.compared(db, scene_id, library)
@@ -38,9 +41,8 @@ class LinksKept:
         witness = np.array([edge.witness for edge in known]).reshape(-1, scene.n)
         links = Links(ends, witness, np.array([edge.depth for edge in known]), scene.to_q(witness))
         if complete:
-            self._kept[scene_id] = library.version, links
-            if len(self._kept) > MOST:
-                self._kept.popitem(last=False)
+            with self._lock:
+                self._kept[scene_id] = library.version, links
         return complete, links
 
 

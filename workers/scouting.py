@@ -6,6 +6,8 @@ import math
 from functools import lru_cache, partial
 from typing import Any
 
+from cachetools import LRUCache
+
 from certifier.model import Scene
 from certifier.pair.collisions import in_collision
 from db import jobs, overlaps, regions
@@ -20,9 +22,9 @@ from planner.overlap import compare
 from workers.scenes import load_scene
 from workers.transaction import persistently
 
-_libraries: dict[str, Library] = {}
 MOST = 4
 """Number of scenes whose regions are kept, those that were looked at last."""
+_libraries: LRUCache[str, Library] = LRUCache(MOST)
 
 
 def scout(scene: Scene, scene_id: str, job_id: str) -> dict[str, Any]:
@@ -73,11 +75,9 @@ def _known(scene: Scene, scene_id: str) -> Known:
 
 
 def _library(scene: Scene, scene_id: str) -> Library:
-    library = _libraries.pop(scene_id, None) or Library(scene.n)
+    library = _libraries.get(scene_id) or Library(scene.n)
     with database().read() as session:
         if regions.version(session, scene_id) != library.version:
             library = renewed(library, partial(regions.roll, session, scene_id), partial(regions.polytopes, session))
     _libraries[scene_id] = library
-    if len(_libraries) > MOST:
-        del _libraries[next(iter(_libraries))]
     return library

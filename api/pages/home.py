@@ -1,4 +1,4 @@
-"""These are the page with the list of jobs, and the form that starts one."""
+"""This is the page with the list of jobs."""
 
 from __future__ import annotations
 
@@ -31,11 +31,6 @@ def jobs_page(request: Request, db: Db, state: Chosen = "", kind: Chosen = "", s
 @router.get("/live")
 def jobs_live(request: Request, db: Db, state: Chosen = "", kind: Chosen = "", scene: Chosen = "", after: Cursor = None) -> Response:
     return page(request, "jobs_live.html", _home(db, {"state": state, "kind": kind, "scene": scene}, after))
-
-
-@router.get("/new")
-def new_job_page(request: Request) -> Response:
-    return page(request, "new.html", {})
 
 
 def _home(db: Database, chosen: dict[str, str], after: str | None) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from api import checks, drawing
 from api.access import READ, Db
 from api.answers import asked
 from api.children import Children
-from api.drawing import KeptMaps, Maps
 from api.libraries import KeptLibraries, Libraries
 from api.schemas.drawing import ContactsRequest, ContactsResponse, SliceRequest, SliceResponse
 from db import scenes
@@ -30,15 +29,15 @@ def find_contacts(body: ContactsRequest, db: Db) -> ContactsResponse:
 
 
 @router.post("/slice")
-async def slice_space(body: SliceRequest, db: Db, libraries: KeptLibraries, maps: KeptMaps, children: Children) -> SliceResponse:
+async def slice_space(body: SliceRequest, db: Db, libraries: KeptLibraries, children: Children) -> SliceResponse:
     """Returns a slice through configuration space: where the robot collides, where it is free, and what certified regions cover.
 
     Two joints move within their limits and the others stay. What collides is sampled in floating point; the outlines are those of regions
     whose proofs were verified.
     """
-    return await children.run(_slice, db, libraries, maps, body)
+    return await children.run(_slice, db, libraries, body)
 
 
-def _slice(db: Database, libraries: Libraries, maps: Maps, body: SliceRequest) -> SliceResponse:
+def _slice(db: Database, libraries: Libraries, body: SliceRequest) -> SliceResponse:
     scene_id, scene, library = asked(db, libraries, body.scene)
-    return drawing.sliced(scene_id, scene, library, maps, body)
+    return drawing.sliced(scene_id, scene, library, body)

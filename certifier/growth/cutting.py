@@ -7,11 +7,11 @@ the polytope that are uniform in q as few as possible lie beyond. "As few" is re
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from cachetools import LRUCache, cached
 from scipy.optimize import linprog
 
 from certifier.growth.obstacles import lost_together
@@ -192,18 +192,10 @@ def _new(scene: Scene, beyond: Array, joints: list[int], keep: Array, samples: A
     return [_Face(row, float(offset))]
 
 
-_drawn: OrderedDict[tuple[str, bytes, bytes], Array] = OrderedDict()
-"""These samples were drawn last, by scene and polytope; at most DRAWN of them are kept."""
-
-
+@cached(LRUCache(DRAWN), key=lambda scene, polytope: (scene.hash, polytope.C.tobytes(), polytope.d.tobytes()))
 def samples_of(scene: Scene, polytope: Polytope) -> Array:
     """Returns samples of a polytope, (S, n), uniform in q; the same ones for the same polytope."""
-    key = scene.hash, polytope.C.tobytes(), polytope.d.tobytes()
-    if key not in _drawn:
-        _drawn[key] = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, 0).reshape(-1, scene.n)
-        if len(_drawn) > DRAWN:
-            _drawn.popitem(last=False)
-    return _drawn[key]
+    return uniform_in_q(polytope, scene.revolute, CHAINS, EACH, 0).reshape(-1, scene.n)
 
 
 def _face(beyond: Array, keep: Array, samples: Array, scale: Array) -> tuple[Array, float] | None:

@@ -7,8 +7,9 @@ the result which pairs a process was asked for before.
 from __future__ import annotations
 
 import hashlib
-from collections import OrderedDict
 from dataclasses import dataclass
+
+from cachetools import LRUCache
 
 from certifier.model import Array, Volume
 from certifier.partition.area import Area
@@ -33,7 +34,7 @@ class Shared:
     def __init__(self, area: Area) -> None:
         self._area = area
         self._bodies: dict[tuple[object, ...], Bodies] = {}
-        self._tried: OrderedDict[bytes, Tried] = OrderedDict()
+        self._tried: LRUCache[bytes, Tried] = LRUCache(MOST)
 
     def bodies(self, frame: str, volumes: tuple[Volume, Volume]) -> Bodies:
         """Returns two volumes as bodies, the same ones for volumes of the same shape, whatever geometries they stand for."""
@@ -48,6 +49,4 @@ class Shared:
         key = hashlib.blake2b(id(bodies).to_bytes(8, "little") + b"".join(part.tobytes() for part in parts), digest_size=16).digest()
         if key not in self._tried:
             self._tried[key] = Tried(bodies.separate(cell, start))
-            if len(self._tried) > MOST:
-                self._tried.popitem(last=False)
         return self._tried[key]

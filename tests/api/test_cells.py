@@ -378,8 +378,8 @@ def test_the_outlines_of_regions_are_kept_within_bounds(database: Database, regi
     ask(f"regions/{region}/pairs")
     ask(f"regions/{region}/pairs/0/cells")
     assert read == ["file"], "a file is read once"
-    kept = cells.OutlinesKept()
     monkeypatch.setattr(cells, "KEPT_NODES", 1)
+    kept = cells.OutlinesKept()
     with database.read() as session:
         row = regions.get(session, region)
     scene = scenes.load(database, row.scene_id)

@@ -6,7 +6,10 @@ import hashlib
 import re
 from pathlib import Path
 
-DASHBOARD = Path(__file__).parents[2] / "dashboard"
+from api.app import create_app
+from db.session import Database
+from tests.dashboard.schema import DASHBOARD, SCHEMA, document, head
+
 BUILT = DASHBOARD / "static/built"
 REBUILD = "build the dashboard again: cd dashboard && npm ci && npm run build"
 
@@ -18,6 +21,12 @@ def test_the_built_files_are_of_these_sources() -> None:
     for name in sorted(names):
         digest.update(name.encode() + b"\0" + (DASHBOARD / name).read_bytes() + b"\0")
     assert (BUILT / "sources.sha256").read_text().strip() == digest.hexdigest(), REBUILD
+
+
+def test_the_types_are_of_this_api(tmp_path: Path) -> None:
+    first, _, types = SCHEMA.read_text().partition("\n")
+    described = document(create_app(Database(f"sqlite:///{tmp_path / 'ciris.db'}")))
+    assert head(described, types) == f"{first}\n", "write the types again: python -m tests.dashboard.schema"
 
 
 def test_no_built_file_is_left_over_or_missing() -> None:

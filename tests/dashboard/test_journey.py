@@ -22,8 +22,8 @@ def submit(page: Any, url: str) -> str:
     page.locator(".said", has_text=re.compile("Free here|as proved")).wait_for()
     set_joint(page, "arm/joint1", -20)
     set_joint(page, "arm/joint2", -12)
-    page.locator("summary", has_text="Effort").click()
-    page.get_by_label("Cells of a pair").fill("64")
+    page.locator("summary", has_text="More options").click()
+    page.get_by_label("Cells").fill("64")
     page.get_by_role("button", name="Start the job").click()
     page.wait_for_url(f"{url}/jobs/*")
     return str(page.url).rpartition("/")[2]

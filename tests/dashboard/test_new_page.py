@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import io
+import json
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from api.pages import form
 from certifier.model import Scene
+from certifier.options import option
+from db.states import JobKind
 
 REFUSED = "Failed to load resource: the server responded with a status of "
 EXAMPLE = Path(__file__).parents[2] / "examples" / "planar_2dof"
@@ -36,8 +41,10 @@ def set_joint(page: Any, joint: str, degrees: float) -> None:
 
 def test_a_job_is_started_from_the_configuration_that_is_shown(opened: Any, url: str, client: TestClient) -> None:
     set_joint(opened, "arm/joint2", -20)
-    opened.get_by_label("First polytope").select_option("iris_zo")
-    opened.locator("summary", has_text="Effort").click()
+    opened.locator("summary", has_text="More options").press("Enter")
+    opened.get_by_label("Method").select_option("iris_zo")
+    opened.get_by_label("Cells").fill("64")
+    opened.locator("summary", has_text="Deadline").press("Enter")
     opened.get_by_label("Deadline").fill("2")
     opened.get_by_role("button", name="Start the job").press("Enter")
     opened.wait_for_url(f"{url}/jobs/*")
@@ -45,7 +52,7 @@ def test_a_job_is_started_from_the_configuration_that_is_shown(opened: Any, url:
     assert opened.url.endswith(job["id"])
     seed = job["options"]["seed"]
     assert seed["q"] == pytest.approx([0.1, np.deg2rad(-20)])
-    assert seed["method"] == "iris_zo"
+    assert (seed["method"], job["options"]["cells"]) == ("iris_zo", 64)
     assert job["deadline_at"] is not None
 
 
@@ -90,7 +97,9 @@ def test_configurations_are_marked_to_be_connected(opened: Any, url: str, client
 def test_what_the_service_refuses_is_said_and_nothing_is_lost(opened: Any, client: TestClient, complaints: list[str]) -> None:
     opened.route(
         "**/v1/jobs",
-        lambda route: route.fulfill(status=429, content_type="application/problem+json", body='{"detail": "too many", "hint": "wait"}'),
+        lambda route: route.fulfill(
+            status=429, content_type="application/problem+json", body='{"detail": "too many", "hint": "wait", "field": "scene"}'
+        ),
     )
     opened.get_by_role("button", name="Start the job").click()
     opened.get_by_text("too many. wait").wait_for()
@@ -123,6 +132,72 @@ def test_a_scene_that_is_not_there_is_said(page: Any, url: str, planar: Scene, c
     page.locator(".slider").first.wait_for()
 
 
+@dataclass(frozen=True)
+class Inner:
+    depth: int | None = option(None, "How deep.", least=1, greatest=9)
+
+
+@dataclass(frozen=True)
+class Outer:
+    how_often: int = option(3, "How often.", least=0, greatest=2**63 - 1)
+    width: float | None = option(None, "How wide, as in `width`.", above=0, unit="m")
+    fast: bool = option(False, "Whether it is fast.")
+    careful: bool = option(True, "Whether it is careful.")
+    colour: Literal["red", "green"] | None = option(None, "Which colour.", otherwise="`red`")
+    inner: Inner | None = option(None, "Another way.")
+    centre: tuple[float, ...] = option((), "Where.")
+
+
+def test_an_option_of_each_kind_gets_into_the_request(page: Any, url: str, planar: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(form.PARTS, JobKind.GROW, {"seed": ("Seed", Inner), "options": ("Ways", Outer)})
+    page.goto(f"{url}/new?scene=planar&q=0.1,-0.2")
+    page.get_by_text("Free here").wait_for()
+    for summary in page.locator("summary").all():
+        summary.click()
+    ways = page.get_by_role("group", name="Ways")
+
+    def asked() -> dict[str, Any]:
+        return json.loads(page.locator("pre").inner_text())
+
+    assert asked() == {"kind": "grow", "scene": planar.hash[:16], "seed": {"q": [0.1, -0.2]}}, "defaults are not sent"
+    assert ways.get_by_label("Centre").count() == ways.get_by_label("Depth").count() == 0
+    assert ways.get_by_label("How often").get_attribute("max") == str(2**53 - 1)
+    ways.get_by_label("How often").fill("5")
+    ways.get_by_label("Width").fill("0.25")
+    ways.get_by_label("Fast").check()
+    ways.get_by_label("Careful").uncheck()
+    ways.get_by_label("Colour").select_option("green")
+    ways.get_by_label("Inner").check()
+    assert asked()["options"]["inner"] == {}
+    ways.get_by_label("Depth").fill("2")
+    assert ways.get_by_label("Width").get_attribute("aria-describedby") == "option-options.width-says"
+    assert page.locator("[id='option-options.width-says']").inner_text() == "In m. How wide, as in width."
+    wished = {"how_often": 5, "width": 0.25, "fast": True, "careful": False, "colour": "green", "inner": {"depth": 2}}
+    assert asked()["options"] == wished
+    ways.get_by_label("Careful").check()
+    ways.get_by_label("Inner").uncheck()
+    ways.get_by_label("Width").fill("")
+    assert asked()["options"] == {"how_often": 5, "fast": True, "colour": "green"}
+
+
+def test_what_is_wrong_with_an_option_is_said_at_its_field(opened: Any, client: TestClient, complaints: list[str]) -> None:
+    more = opened.locator("details", has_text="More options")
+    more.locator("summary").click()
+    cells, tolerance = opened.get_by_label("Cells"), opened.get_by_role("group", name="First polytope").get_by_label("Tolerance")
+    cells.fill("0")
+    more.locator("summary").click()
+    opened.get_by_role("button", name="Start the job").click()
+    assert cells.is_visible(), "the browser refuses it, and the field is shown"
+    cells.fill("")
+    tolerance.fill("0")
+    more.locator("summary").click()
+    opened.get_by_role("button", name="Start the job").click()
+    more.get_by_text("input should be greater than 0").wait_for()
+    assert tolerance.evaluate("field => field === document.activeElement && field.ariaInvalid") == "true"
+    assert complaints.pop().startswith(f"{REFUSED}422")
+    assert jobs(client) == []
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_nothing_keeps_people_out(browser: Any, url: str, planar: Scene, barriers: Any, scheme: str) -> None:
     context = browser.new_context(viewport={"width": 390, "height": 844}, color_scheme=scheme)
@@ -138,3 +213,18 @@ def test_nothing_keeps_people_out(browser: Any, url: str, planar: Scene, barrier
         assert barriers(page) == []
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     context.close()
+
+
+def test_the_form_says_that_a_box_is_for_the_papers_algorithm(opened: Any, url: str, client: TestClient, complaints: list[str]) -> None:
+    opened.locator("summary", has_text="More options").click()
+    method, start = opened.get_by_label("Method"), opened.get_by_role("button", name="Start the job")
+    method.select_option("box")
+    opened.get_by_label("Half width").fill("0.1")
+    start.click()
+    opened.get_by_text("only the papers' algorithm begins with the method box").wait_for()
+    assert method.get_attribute("aria-invalid") == "true"
+    assert complaints.pop().startswith(f"{REFUSED}422")
+    opened.get_by_label("Paper").check()
+    start.click()
+    opened.wait_for_url(f"{url}/jobs/*")
+    assert jobs(client)[0]["options"]["paper"]["contraction"] == "targeted"

@@ -117,6 +117,14 @@ def test_answers_out_of_order_and_lost_ones_leave_the_last_word_to_the_end(
     complaints.clear()
 
 
+def test_a_configuration_of_which_nothing_is_known_is_not_said_to_be_free(page: Any, url: str, planar: Scene) -> None:
+    answer = {"scene": planar.hash[:16], "contacts": [{"pairs": None, "outside": []}]}
+    page.route("**/v1/planning/contacts", lambda route: route.fulfill(json=answer))
+    page.goto(f"{url}/new?scene=planar&q=0.1,-0.2")
+    page.get_by_text("Not known here: a joint is half a turn away from q*.").wait_for()
+    assert page.get_by_text("Free here").count() == 0
+
+
 def test_whoever_signs_in_again_comes_back_to_the_same_place(browser: Any, url: str, database: Database, planar: Scene) -> None:
     with database.write() as session:
         key = keys.add(session, "reader", Scope.READ)

@@ -12,7 +12,7 @@ from tests.certifier.proofs import files
 
 ROOT = Path(__file__).parents[2]
 THIRD_PARTIES = {
-    "certifier": {"flint", "numba", "numpy", "pydrake", "scipy", "yaml"},
+    "certifier": {"cachetools", "flint", "numba", "numpy", "pydrake", "scipy", "yaml"},
     "certifier.verify": {"flint", "numpy"},
     "db": {"alembic", "cryptography", "numpy", "opentelemetry", "pydantic", "pydantic_settings", "sqlalchemy", "structlog"},
     "planner": {"flint", "numpy", "pydrake", "scipy"},

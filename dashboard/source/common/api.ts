@@ -1,4 +1,5 @@
 // Asks the service. Every answer that is no success becomes a ServiceError that says what, where and what to do.
+import type { Event, EventList, Job } from "./schema";
 
 export class ServiceError extends Error {
   constructor(
@@ -51,13 +52,6 @@ export function said(problem: unknown): string {
   return problem instanceof TypeError ? "The service does not answer." : String(problem);
 }
 
-export interface JobEvent {
-  seq: number;
-  kind: string;
-  data: Record<string, unknown>;
-  created_at: string;
-}
-
 const KINDS = ["job", "iteration", "pairs", "step", "region", "lost", "cover", "child"];
 const POLL_MS = 2000;
 /** A stream that says nothing, not even that it is open, for so long after it was asked for is held back by somebody. */
@@ -69,13 +63,13 @@ const OPEN_MS = 4000;
  *
  * @returns a function that ends it.
  */
-export function follow(job: string, after: number, seen: (event: JobEvent) => void, connected: (is: boolean) => void, ended: () => void): () => void {
+export function follow(job: string, after: number, seen: (event: Event) => void, connected: (is: boolean) => void, ended: () => void): () => void {
   let last = after;
   let stopped = false;
   let source: EventSource | null = null;
   let timer: ReturnType<typeof setTimeout> | undefined;
   let polling = false;
-  const take = (event: JobEvent): void => {
+  const take = (event: Event): void => {
     if (event.seq <= last) return;
     last = event.seq;
     seen(event);
@@ -94,9 +88,9 @@ export function follow(job: string, after: number, seen: (event: JobEvent) => vo
   const poll = async (): Promise<void> => {
     polling = true;
     try {
-      const { events } = await get<{ events: JobEvent[] }>(`/v1/jobs/${job}/events?after=${last}`);
+      const { events } = await get<EventList>(`/v1/jobs/${job}/events?after=${last}`);
       events.forEach(take);
-      const now = await get<{ ended: boolean }>(`/v1/jobs/${job}`);
+      const now = await get<Job>(`/v1/jobs/${job}`);
       connected(true);
       if (now.ended && events.length === 0) return end();
     } catch {
@@ -111,7 +105,7 @@ export function follow(job: string, after: number, seen: (event: JobEvent) => vo
       source?.close();
       void poll();
     }, OPEN_MS);
-    for (const kind of KINDS) source.addEventListener(kind, (message) => take(JSON.parse((message as MessageEvent<string>).data) as JobEvent));
+    for (const kind of KINDS) source.addEventListener(kind, (message) => take(JSON.parse((message as MessageEvent<string>).data) as Event));
     source.addEventListener("end", end);
     source.addEventListener("open", () => {
       clearTimeout(timer);

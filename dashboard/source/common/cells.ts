@@ -1,46 +1,11 @@
 // The cells of a pair's proof: a tree of cuts that comes as a stream in preorder, the lower part of each cut first.
 
+import type { Partition } from "./schema";
+
 export const PLANE = -1;
 export const EMPTY = -2;
 export const OPEN = -3;
 export const FOLDED = -4;
-
-export interface Counts {
-  plane: number;
-  empty: number;
-  open: number;
-}
-
-/** What GET .../pairs/{pair}/cells returns. */
-export interface Partition {
-  pair: { index: number; a: string; b: string };
-  state: string;
-  certified: boolean;
-  iteration: number | null;
-  kind: "partition" | "program";
-  joints: number[];
-  lower: number[];
-  upper: number[];
-  q_star: number[];
-  revolute: boolean[];
-  nodes: number[];
-  cuts: number[];
-  choices: number[];
-  volumes: [string, string][];
-  counts: Counts;
-  folded: Counts[];
-}
-
-/** What the answer says of a pair of a region: GET /v1/regions/{id}/pairs. */
-export interface PairProof {
-  index: number;
-  a: string;
-  b: string;
-  kind: "partition" | "program";
-  cells: number;
-  proved_distance: number | null;
-  shares_with: number[];
-}
 
 export interface Leaf {
   kind: number;

@@ -1,43 +1,8 @@
 // Forward kinematics of the scene's tree, in JavaScript, for drawing only: nothing is certified with it.
 
+import type { DrawnJoint, SceneModel } from "./schema";
+
 export type Matrix = number[]; // 16 numbers, row by row
-
-export interface Joint {
-  name: string;
-  kind: "revolute" | "prismatic" | "weld";
-  parent: string;
-  child: string;
-  axis: number[];
-  X_PF: number[][];
-  X_BM: number[][];
-  index: number | null;
-  lower: number | null;
-  upper: number | null;
-}
-
-export interface GeometryModel {
-  name: string;
-  body: string;
-  radius: number;
-  vertices: number[][];
-  triangles: number[][];
-  substitution: string | null;
-}
-
-/** What GET /v1/scenes/{scene}/model returns. Positions of joints are radians or metres, in position order. */
-export interface SceneModel {
-  scene: string;
-  name: string;
-  joints: Joint[];
-  bodies: string[];
-  q_star: number[];
-  q_lower: number[];
-  q_upper: number[];
-  units: ("rad" | "m")[];
-  padding: number;
-  geometries: GeometryModel[];
-  pairs: [number, number][];
-}
 
 const IDENTITY: Matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
@@ -69,7 +34,7 @@ function turned(axis: number[], angle: number): Matrix {
   ];
 }
 
-function moved(joint: Joint, q: number): Matrix {
+function moved(joint: DrawnJoint, q: number): Matrix {
   if (joint.kind === "revolute") return turned(joint.axis, q);
   if (joint.kind === "weld") return IDENTITY;
   const [x, y, z] = joint.axis as [number, number, number];
@@ -79,7 +44,7 @@ function moved(joint: Joint, q: number): Matrix {
 /** Returns a function from joint positions to the poses of all bodies in the world, X_WB = X_WP X_PF X_FM(q) X_BM^-1. */
 export function poses(model: SceneModel): (q: number[]) => Map<string, Matrix> {
   const above = new Map(model.joints.map((joint) => [joint.child, joint]));
-  const order: { joint: Joint; before: Matrix; after: Matrix }[] = [];
+  const order: { joint: DrawnJoint; before: Matrix; after: Matrix }[] = [];
   const known = new Set(model.bodies.filter((body) => !above.has(body)));
   const add = (body: string): void => {
     if (known.has(body)) return;

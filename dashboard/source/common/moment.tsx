@@ -2,22 +2,16 @@
 // configuration that it was asked for, and for no other.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { post, said } from "./api";
-import type { SceneModel } from "./kinematics";
+import type { ContactsResponse, ContainsResponse, Near, NearestResponse, SceneModel } from "./schema";
 
 export interface Moment {
-  /** Indices of the pairs that touch; undefined while nobody knows. */
-  pairs?: number[];
+  /** Indices of the pairs that touch; null where that is not known, undefined before the answer. */
+  pairs?: number[] | null;
   /** Joints that are outside of their limits, by name. */
   outside: string[];
   regions: string[];
-  nearest: { region: string; distance: number } | null;
+  nearest: Near | null;
   problem: string | null;
-}
-
-/** What POST /v1/planning/contacts says of one configuration. */
-export interface Contacts {
-  pairs: number[];
-  outside: string[];
 }
 
 const AGAIN_MS = 2000;
@@ -26,14 +20,14 @@ const NOTHING: Moment = { outside: [], regions: [], nearest: null, problem: null
 async function ask(scene: string, q: number[]): Promise<Moment> {
   const body = { scene, q: [q] };
   const [touching, containing] = await Promise.all([
-    post<{ contacts: Contacts[] }>("/v1/planning/contacts", body),
-    post<{ regions: number; points: { regions: { region: string }[] }[] }>("/v1/planning/contains", body),
+    post<ContactsResponse>("/v1/planning/contacts", body),
+    post<ContainsResponse>("/v1/planning/contains", body),
   ]);
   const { pairs, outside } = touching.contacts[0]!;
   const regions = containing.points[0]!.regions.map(({ region }) => region);
   let nearest: Moment["nearest"] = null;
   if (regions.length === 0 && containing.regions > 0 && outside.length === 0) {
-    nearest = (await post<{ points: { nearest: Moment["nearest"] }[] }>("/v1/planning/nearest", body)).points[0]!.nearest;
+    nearest = (await post<NearestResponse>("/v1/planning/nearest", body)).points[0]!.nearest;
   }
   return { pairs, outside, regions, nearest, problem: null };
 }
@@ -87,7 +81,7 @@ export function MomentText({ model, moment }: { model: SceneModel; moment: Momen
     <p class="said" role="status">
       {problem ? <span class="bad">{problem}</span> : pairs === undefined ? "…" : outside.length ? (
         <span class="bad">Outside of the limits: {outside.join(", ")}.</span>
-      ) : names.length ? (
+      ) : pairs === null ? "Not known here: a joint is half a turn away from q*." : names.length ? (
         <span class="bad">In collision: {names.slice(0, 3).join("; ")}{names.length > 3 && `; and ${names.length - 3} more pairs`}.</span>
       ) : regions.length ? (
         <span class="good">In {regions.length === 1 ? "a certified region" : `${regions.length} certified regions`}: {regions.slice(0, 4).map((region, i) => <>{i > 0 && ", "}<a href={`/regions/${region}`} key={region}>{region.slice(0, 8)}</a></>)}. No collision of the scene's pairs, as proved.</span>

@@ -1,6 +1,6 @@
 // The cells of a pair: a treemap to look at, and everything that it shows also as a table.
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import type { Partition } from "./cells";
+import type { Partition } from "./schema";
 import { onScheme } from "./colours";
 import { shown } from "./kinematics";
 import { draw, leafAt, rectangleOf, type Rectangle } from "./treemap";

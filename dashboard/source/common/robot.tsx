@@ -1,6 +1,6 @@
 // The robot in 3D as a component: what it holds is drawn by view.ts.
 import { useEffect, useRef, useState } from "preact/hooks";
-import type { SceneModel } from "./kinematics";
+import type { SceneModel } from "./schema";
 import { View } from "./view";
 
 interface Props {

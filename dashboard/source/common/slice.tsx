@@ -1,26 +1,11 @@
 // A slice through configuration space: two joints move, the others stay. It shows what collides, what is free, and the regions over it.
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { post, said } from "./api";
-import { EMPTY, leavesInSlice, OPEN, type Partition } from "./cells";
+import { EMPTY, leavesInSlice, OPEN } from "./cells";
 import { onScheme, token } from "./colours";
 import { shortNames, shown } from "./kinematics";
 import { toQ, toS, type Space } from "./polytope";
-
-interface Axis {
-  joint: string;
-  unit: "rad" | "m";
-  lower: number;
-  upper: number;
-}
-
-/** What POST /v1/planning/slice returns. */
-interface SliceAnswer {
-  x: Axis;
-  y: Axis;
-  size: number;
-  rows: string[];
-  regions: { region: string; polygon: [number, number][] }[];
-}
+import type { Partition, SliceAxis, SliceResponse } from "./schema";
 
 interface Props {
   scene: string;
@@ -46,7 +31,7 @@ const PAD = { left: 52, right: 10, top: 10, bottom: 34 };
 export function Slice(props: Props) {
   const { scene, space, units, q, onPick, regions, strongest = null, cells = null, way } = props;
   const [axes, setAxes] = useState<[number, number]>([0, Math.min(1, space.joints.length - 1)]);
-  const [known, setKnown] = useState<{ asked: string; answer: SliceAnswer } | null>(null);
+  const [known, setKnown] = useState<{ asked: string; answer: SliceResponse } | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
   const [scheme, setScheme] = useState(0);
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -61,7 +46,7 @@ export function Slice(props: Props) {
     const stop = new AbortController();
     const timer = setTimeout(() => {
       const body = { scene, q, x: space.joints[x], y: space.joints[y], size: SIZE, ...(regions && { regions }) };
-      post<SliceAnswer>("/v1/planning/slice", body, stop.signal).then(
+      post<SliceResponse>("/v1/planning/slice", body, stop.signal).then(
         (found) => {
           setKnown({ asked, answer: found });
           setProblem(null);
@@ -162,11 +147,11 @@ function inQ(space: Space, [x, y]: [number, number], corner: [number, number]): 
   return [toQ(space, x, corner[0]), toQ(space, y, corner[1])];
 }
 
-function clamp(value: number, { lower, upper }: Axis): number {
+function clamp(value: number, { lower, upper }: SliceAxis): number {
   return Math.min(Math.max(value, lower), upper);
 }
 
-function summary({ rows, regions }: SliceAnswer): string {
+function summary({ rows, regions }: SliceResponse): string {
   const signs = rows.join("");
   const percent = (sign: string): string => `${Math.round((100 * signs.split(sign).length - 100) / signs.length)} %`;
   const many = regions.length === 1 ? "1 region is" : `${regions.length} regions are`;
@@ -179,7 +164,7 @@ interface DrawnLeaf {
   upper: [number, number];
 }
 
-function draw(canvas: HTMLCanvasElement, answer: SliceAnswer, at: [number, number], strongest: string | null, leaves: DrawnLeaf[], way: [number, number][] | undefined): void {
+function draw(canvas: HTMLCanvasElement, answer: SliceResponse, at: [number, number], strongest: string | null, leaves: DrawnLeaf[], way: [number, number][] | undefined): void {
   const ratio = Math.min(devicePixelRatio, 2);
   const { clientWidth, clientHeight } = canvas;
   canvas.width = clientWidth * ratio;
@@ -244,7 +229,7 @@ function draw(canvas: HTMLCanvasElement, answer: SliceAnswer, at: [number, numbe
 }
 
 /** What collides is grey with strokes through it, so that nobody needs colour to tell it from what is free. */
-function drawMap(c: CanvasRenderingContext2D, answer: SliceAnswer, width: number, height: number): void {
+function drawMap(c: CanvasRenderingContext2D, answer: SliceResponse, width: number, height: number): void {
   c.fillStyle = token("--card");
   c.fillRect(PAD.left, PAD.top, width, height);
   const side = [width / answer.size, height / answer.size] as const;
@@ -273,7 +258,7 @@ function drawMap(c: CanvasRenderingContext2D, answer: SliceAnswer, width: number
   fill("#", c.createPattern(tile, "repeat")!);
 }
 
-function drawScale(c: CanvasRenderingContext2D, { x, y }: SliceAnswer, px: (v: number) => number, py: (v: number) => number, width: number, height: number): void {
+function drawScale(c: CanvasRenderingContext2D, { x, y }: SliceResponse, px: (v: number) => number, py: (v: number) => number, width: number, height: number): void {
   c.strokeStyle = token("--line");
   c.strokeRect(PAD.left, PAD.top, width, height);
   c.fillStyle = token("--quiet");
@@ -291,7 +276,7 @@ function drawScale(c: CanvasRenderingContext2D, { x, y }: SliceAnswer, px: (v: n
   c.restore();
 }
 
-function ticks({ unit, lower, upper }: Axis): number[] {
+function ticks({ unit, lower, upper }: SliceAxis): number[] {
   const scale = unit === "rad" ? Math.PI / 180 : 1;
   const span = (upper - lower) / scale;
   const steps = unit === "rad" ? [1, 2, 5, 10, 15, 30, 45, 60, 90, 180] : [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5];

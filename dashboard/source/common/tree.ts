@@ -1,5 +1,6 @@
 // Where each cell of a partition is, how large, and what it is.
-import { EMPTY, FOLDED, OPEN, PLANE, type Counts, type Partition } from "./cells";
+import { EMPTY, FOLDED, OPEN, PLANE } from "./cells";
+import type { CellCounts, Partition } from "./schema";
 
 export interface Bounds {
   joint: number;
@@ -85,7 +86,7 @@ export class Tree {
     return this.of.nodes[node] === PLANE ? this.of.volumes[this.of.choices[this.place[node]!]!]! : null;
   }
 
-  foldedBelow(node: number): Counts | null {
+  foldedBelow(node: number): CellCounts | null {
     return this.of.nodes[node] === FOLDED ? this.of.folded[this.place[node]!]! : null;
   }
 

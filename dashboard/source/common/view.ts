@@ -3,7 +3,8 @@ import * as three from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { ConvexGeometry } from "three/examples/jsm/geometries/ConvexGeometry.js";
 import { CONTACT, LINKS, onScheme, token } from "./colours";
-import { movingBodies, poses, type GeometryModel, type Matrix, type SceneModel } from "./kinematics";
+import { movingBodies, poses, type Matrix } from "./kinematics";
+import type { DrawnGeometry, SceneModel } from "./schema";
 
 const GHOST_OPACITY = 0.1;
 const MOST_GHOSTS = 300;
@@ -28,7 +29,7 @@ function rounded(vertices: three.Vector3[], radius: number): three.BufferGeometr
 }
 
 /** conv(vertices) + ball(radius), in the frame of its body. */
-function shapeOf({ vertices: rows, triangles, radius }: GeometryModel): three.BufferGeometry {
+function shapeOf({ vertices: rows, triangles, radius }: DrawnGeometry): three.BufferGeometry {
   const vertices = toVectors(rows);
   if (vertices.length === 1) return new three.SphereGeometry(radius, 24, 16).translate(...vertices[0]!.toArray());
   if (vertices.length === 2 && radius > 0) return capsule(vertices[0]!, vertices[1]!, radius);
@@ -43,7 +44,7 @@ function toMatrix4(pose: Matrix): three.Matrix4 {
 }
 
 interface Drawn {
-  geometry: GeometryModel;
+  geometry: DrawnGeometry;
   mesh: three.Mesh<three.BufferGeometry, three.MeshStandardMaterial>;
   colour: string | null; // of a link; null at rest, where the page's own grey is used
 }

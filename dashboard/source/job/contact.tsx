@@ -1,7 +1,8 @@
 // A configuration at which a pair touches, or is nearest, in 3D.
 import type { ComponentType } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
-import { positions, shortNames, shown, type SceneModel } from "../common/kinematics";
+import { positions, shortNames, shown } from "../common/kinematics";
+import type { SceneModel } from "../common/schema";
 import type { Drawable } from "./store";
 
 interface Props {

@@ -1,6 +1,6 @@
 // How much of the proposal the certified region keeps, over time.
+import type { GrowthPoint } from "../common/schema";
 import { duration } from "./outcomes";
-import type { Point } from "./store";
 
 const WIDTH = 600,
   HEIGHT = 170;
@@ -10,7 +10,7 @@ const LEFT = 52,
   BOTTOM = 26;
 const GRID = 4;
 
-type Known = Point & { share: number };
+type Known = GrowthPoint & { share: number };
 
 function percent(share: number): string {
   return `${Number((100 * share).toPrecision(3))} %`;
@@ -22,7 +22,7 @@ function round(value: number): number {
   return [1, 2, 4, 5, 6, 8, 10].map((step) => step * power).find((step) => step >= value * (1 - 1e-9)) ?? value;
 }
 
-export function Growth({ points }: { points: Point[] }) {
+export function Growth({ points }: { points: GrowthPoint[] }) {
   const known = points.filter((point): point is Known => point.share !== null);
   if (known.length === 0) return null;
   const last = known.at(-1)!;

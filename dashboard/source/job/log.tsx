@@ -1,6 +1,6 @@
 // What has happened to the job, in sentences, the newest first.
 import { useState } from "preact/hooks";
-import type { JobEvent } from "../common/api";
+import type { Event } from "../common/schema";
 import { duration, plural } from "./outcomes";
 import type { JobStore } from "./store";
 
@@ -43,7 +43,7 @@ function counted(pairs: { state: string }[]): string {
 }
 
 /** Says in a sentence what has happened. */
-export function sentence({ kind, data }: JobEvent): string {
+export function sentence({ kind, data }: Event): string {
   const text = (name: string): string => String(data[name] ?? "").replaceAll("_", " ");
   /** The part of a sentence that is there only where the event has a value of this name. */
   const where = (name: string, words: string): string => (data[name] ? words : "");

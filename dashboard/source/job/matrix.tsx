@@ -2,9 +2,10 @@
 // many pairs there are; the grid tells assistive technology how many rows and columns it has.
 import { Component } from "preact";
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
+import type { IterationStates, PairInfo } from "../common/schema";
 import { address, go } from "./route";
 import { CERTIFIED, OUTCOMES, atLeast, badness, duration, facts, plural } from "./outcomes";
-import type { Iteration, JobStore, PairName } from "./store";
+import type { JobStore } from "./store";
 
 const HEAD = 32;
 const SPARE = 6;
@@ -87,7 +88,7 @@ export function Matrix({ store, version, memory }: { store: JobStore; version: n
   );
 }
 
-function Legend({ iterations }: { iterations: Iteration[] }) {
+function Legend({ iterations }: { iterations: IterationStates[] }) {
   const there = Object.entries(OUTCOMES).filter(([letter, { glyph }]) => glyph && iterations.some(({ states }) => states.includes(letter)));
   return (
     <p class="legend">
@@ -101,15 +102,15 @@ function Legend({ iterations }: { iterations: Iteration[] }) {
 }
 
 /** The pairs that are to be seen, in order. Outcomes, times and open cells are those of the last iteration. */
-function chosen(store: JobStore, outcome: string, order: Order, search: string): PairName[] {
+function chosen(store: JobStore, outcome: string, order: Order, search: string): PairInfo[] {
   const last = store.last;
-  const letter = (pair: PairName): string => last?.states[pair.index] ?? "-";
+  const letter = (pair: PairInfo): string => last?.states[pair.index] ?? "-";
   const text = search.trim().toLowerCase();
-  const fits = (pair: PairName): boolean =>
+  const fits = (pair: PairInfo): boolean =>
     (outcome === "" || (outcome === "not" ? !CERTIFIED.includes(letter(pair)) : letter(pair) === outcome)) &&
     `${pair.a} ${pair.b}`.toLowerCase().includes(text);
   const found = store.pairs.filter(fits);
-  const value = (pair: PairName): number => {
+  const value = (pair: PairInfo): number => {
     const cell = last && store.cell(last.index, pair.index);
     if (order === "outcome") return badness(letter(pair));
     return -((order === "time" ? cell?.seconds : cell?.open_cells) ?? -1);
@@ -119,7 +120,7 @@ function chosen(store: JobStore, outcome: string, order: Order, search: string):
   return found.sort((a, b) => values.get(a.index)! - values.get(b.index)! || a.index - b.index);
 }
 
-function Grid({ store, version, rows, memory }: { store: JobStore; version: number; rows: PairName[]; memory: Memory }) {
+function Grid({ store, version, rows, memory }: { store: JobStore; version: number; rows: PairInfo[]; memory: Memory }) {
   const box = useRef<HTMLDivElement>(null);
   const [seen, setSeen] = useState({ top: memory.top, left: memory.left, width: 800, height: 500 });
   const [last, setActive] = useState(memory.active);
@@ -154,7 +155,7 @@ function Grid({ store, version, rows, memory }: { store: JobStore; version: numb
     };
   }, []);
 
-  const at = (place: Place): { pair: PairName; iteration: (typeof columns)[number] } | null => {
+  const at = (place: Place): { pair: PairInfo; iteration: (typeof columns)[number] } | null => {
     const pair = rows[place.row],
       iteration = columns[place.column];
     return pair && iteration ? { pair, iteration } : null;
@@ -313,10 +314,10 @@ function Grid({ store, version, rows, memory }: { store: JobStore; version: numb
 }
 
 interface RowProps {
-  pair: PairName;
+  pair: PairInfo;
   row: number;
   top: number;
-  columns: Iteration[];
+  columns: IterationStates[];
   /** The columns that are drawn: from this one to before that one. */
   from: number;
   to: number;

@@ -1,9 +1,10 @@
 // What holds the region back, in words, and the configuration in contact in 3D.
 import { useState } from "preact/hooks";
+import type { Obstacle } from "../common/schema";
 import { Contact } from "./contact";
 import { plural } from "./outcomes";
 import { address } from "./route";
-import type { Drawable, Obstacle } from "./store";
+import type { Drawable } from "./store";
 
 const AT_FIRST = 5;
 

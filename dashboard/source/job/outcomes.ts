@@ -1,5 +1,5 @@
 // What becomes of a pair: the letter of the service, and how people see it. Every outcome has a glyph, so that nobody needs colours.
-import type { PairCell, Iteration } from "./store";
+import type { IterationStates, PairCell } from "../common/schema";
 
 export interface Outcome {
   /** The class that ciris.css colours. */
@@ -53,7 +53,7 @@ export function atLeast(metres: number): string {
 }
 
 /** Says of a cell of the matrix all that is known: outcome, how, how long, what distance is proved, and where it fails. */
-export function facts(letter: string, iteration: Iteration, cell: PairCell | undefined): string[] {
+export function facts(letter: string, iteration: IterationStates, cell: PairCell | undefined): string[] {
   const found = [`${OUTCOMES[letter]!.words} in iteration ${iteration.index}`];
   if (!cell) return found;
   if (cell.stage) found.push(`by ${cell.stage.replaceAll("_", " ")}`);

@@ -1,9 +1,9 @@
 // A pair of a job: what has become of it in each iteration, where it touches, and its cells.
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { ServiceError, get, said } from "../common/api";
-import type { Partition } from "../common/cells";
 import { positions } from "../common/kinematics";
 import { Cells } from "../common/partition";
+import type { Partition } from "../common/schema";
 import { Contact } from "./contact";
 import { OUTCOMES, facts } from "./outcomes";
 import { address, go, type Route } from "./route";

@@ -1,70 +1,13 @@
 // What the page knows of the job. At first it asks for one letter per pair and iteration and for the last iteration's results; after that
 // it follows the events, and asks only for the pairs that they name.
 import { refresh, connected } from "../live";
-import type { SceneModel } from "../common/kinematics";
-import { follow, get, said, type JobEvent } from "../common/api";
-
-export interface PairName {
-  index: number;
-  a: string;
-  b: string;
-}
-
-export interface Iteration {
-  index: number;
-  label: string;
-  state: string;
-  faces: number;
-  /** One letter for each pair: outcomes.ts. */
-  states: string;
-}
-
-export interface PairCell {
-  pair: number;
-  state: string;
-  parts: number;
-  stage: string | null;
-  proved_distance: number | null;
-  seconds: number | null;
-  detail: string | null;
-  worker: string | null;
-  witness_q: number[] | null;
-  open_cells: number | null;
-}
-
-export interface Point {
-  iteration: number;
-  region: string;
-  share: number | null;
-  seconds: number;
-}
-
-export interface Worker {
-  process: string;
-  work: string;
-  iteration: number | null;
-  pairs: number[];
-  until: string | null;
-}
-
-export interface Obstacle {
-  pair: number | null;
-  a: string | null;
-  b: string | null;
-  text: string;
-  q: number[] | null;
-}
+import { follow, get, said } from "../common/api";
+import type { Event, EventList, GrowthCurve, GrowthPoint, HeldWork, IterationStates, JobWorkers, Obstacle, Obstacles, PairCell, PairInfo, PairMatrix, PairStates, SceneModel } from "../common/schema";
 
 /** The robot as it is drawn, once it is there, or why it is not. */
 export interface Drawable {
   model: SceneModel | null;
   problem: string | null;
-}
-
-interface Matrix {
-  pairs: PairName[];
-  cells: PairCell[];
-  next: string | null;
 }
 
 const SYNC_MS = 500;
@@ -89,13 +32,13 @@ function soon(call: () => void, after: number): () => void {
 }
 
 export class JobStore {
-  pairs: PairName[] = [];
-  iterations: Iteration[] = [];
-  /** Iteration -> pair -> its result, for the iterations that somebody has looked at. */
+  pairs: PairInfo[] = [];
+  iterations: IterationStates[] = [];
+  /** IterationStates -> pair -> its result, for the iterations that somebody has looked at. */
   readonly details = new Map<number, Map<number, PairCell>>();
-  events: JobEvent[] = [];
-  growth: Point[] = [];
-  workers: Worker[] = [];
+  events: Event[] = [];
+  growth: GrowthPoint[] = [];
+  workers: HeldWork[] = [];
   obstacles: Obstacle[] | null = null;
   loaded = false;
   problem: string | null = null;
@@ -123,7 +66,7 @@ export class JobStore {
   async start(): Promise<void> {
     await this.attempt(async () => {
       // The events come first: what happens while the rest is asked for is seen twice, and nothing is missed.
-      this.events = (await get<{ events: JobEvent[] }>(`${this.path}/events?before=${2 ** 31 - 1}&limit=${EVENTS}`)).events;
+      this.events = (await get<EventList>(`${this.path}/events?before=${2 ** 31 - 1}&limit=${EVENTS}`)).events;
       const last = Math.max(this.begun - 1, 0),
         first = Math.max(this.begun - AT_FIRST, 0);
       const [{ iterations }, { pairs, cells }] = await Promise.all([
@@ -151,7 +94,7 @@ export class JobStore {
     this.stop();
   }
 
-  get last(): Iteration | undefined {
+  get last(): IterationStates | undefined {
     return this.iterations.at(-1);
   }
 
@@ -171,13 +114,13 @@ export class JobStore {
 
   async earlier(): Promise<void> {
     await this.attempt(async () => {
-      const { events } = await get<{ events: JobEvent[] }>(`${this.path}/events?before=${this.events[0]?.seq ?? 1}&limit=${EVENTS}`);
+      const { events } = await get<EventList>(`${this.path}/events?before=${this.events[0]?.seq ?? 1}&limit=${EVENTS}`);
       this.events = [...events, ...this.events];
     });
   }
 
-  private async states(since: number): Promise<{ iterations: Iteration[] }> {
-    return get<{ iterations: Iteration[] }>(`${this.path}/pairs/states?since=${since}`);
+  private async states(since: number): Promise<PairStates> {
+    return get<PairStates>(`${this.path}/pairs/states?since=${since}`);
   }
 
   private keep(iteration: number, cells: PairCell[]): void {
@@ -205,7 +148,7 @@ export class JobStore {
     this.told();
   }
 
-  private take(event: JobEvent): void {
+  private take(event: Event): void {
     this.events.push(event);
     if (this.events.length > MOST_EVENTS) this.events = this.events.slice(-MOST_EVENTS);
     const { iteration, pairs } = event.data as { iteration?: number; pairs?: ({ index: number } | number)[] };
@@ -227,7 +170,7 @@ export class JobStore {
     this.changed = new Map();
     try {
       const since = Math.min(this.last?.index ?? 0, ...changed.keys());
-      const [{ iterations }, { workers }] = await Promise.all([this.states(since), get<{ workers: Worker[] }>(`${this.path}/workers`)]);
+      const [{ iterations }, { workers }] = await Promise.all([this.states(since), get<JobWorkers>(`${this.path}/workers`)]);
       this.iterations = [...this.iterations.filter((one) => one.index < since), ...iterations];
       this.workers = workers;
       // Of an iteration that has just begun nothing is known but what the events will name.
@@ -244,11 +187,11 @@ export class JobStore {
   }
 
   /** The results of an iteration, from all pages. */
-  private async matrix(iteration: number): Promise<Matrix> {
+  private async matrix(iteration: number): Promise<PairMatrix> {
     const path = `${this.path}/pairs?iteration=${iteration}`,
-      first = await get<Matrix>(path);
+      first = await get<PairMatrix>(path);
     for (let next = first.next; next !== null; ) {
-      const page = await get<Matrix>(`${path}&after=${next}`);
+      const page = await get<PairMatrix>(`${path}&after=${next}`);
       first.cells.push(...page.cells);
       next = page.next;
     }
@@ -263,16 +206,16 @@ export class JobStore {
         .slice(i, i + AT_ONCE)
         .map((pair) => `&pair=${pair}`)
         .join("");
-      for (const cell of (await get<Matrix>(`${this.path}/pairs?iteration=${iteration}${which}`)).cells) known.set(cell.pair, cell);
+      for (const cell of (await get<PairMatrix>(`${this.path}/pairs?iteration=${iteration}${which}`)).cells) known.set(cell.pair, cell);
     }
   }
 
   /** What is around the matrix, and changes more seldom. */
   private async around(): Promise<void> {
     const [{ points }, { obstacles }, { workers }] = await Promise.all([
-      get<{ points: Point[] }>(`${this.path}/growth`),
-      get<{ obstacles: Obstacle[] }>(`${this.path}/obstacles`),
-      get<{ workers: Worker[] }>(`${this.path}/workers`),
+      get<GrowthCurve>(`${this.path}/growth`),
+      get<Obstacles>(`${this.path}/obstacles`),
+      get<JobWorkers>(`${this.path}/workers`),
     ]);
     this.growth = points;
     this.obstacles = obstacles;

@@ -1,7 +1,8 @@
 // Who does what for the job at this moment.
+import type { HeldWork } from "../common/schema";
 import { plural } from "./outcomes";
 import { address } from "./route";
-import type { JobStore, Worker } from "./store";
+import type { JobStore } from "./store";
 
 const WORK: Record<string, string> = {
   seed: "looks for the first polytope",
@@ -33,7 +34,7 @@ export function Workers({ store }: { store: JobStore }) {
   );
 }
 
-function Certifies({ store, worker }: { store: JobStore; worker: Worker }) {
+function Certifies({ store, worker }: { store: JobStore; worker: HeldWork }) {
   const more = worker.pairs.length - NAMED;
   return (
     <>

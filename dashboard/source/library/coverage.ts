@@ -1,7 +1,6 @@
 // How much of the free space the regions cover, estimated from random configurations.
 import { post } from "../common/api";
-import type { SceneModel } from "../common/kinematics";
-import type { Contacts } from "../common/moment";
+import type { ContactsResponse, ContainsResponse, SceneModel } from "../common/schema";
 
 const SAMPLES = 400;
 const AT_ONCE = 100;
@@ -30,13 +29,13 @@ export async function coverage(model: SceneModel): Promise<Coverage> {
   const free: number[][] = [];
   for (let begin = 0; begin < SAMPLES; begin += AT_ONCE) {
     const asked = q.slice(begin, begin + AT_ONCE);
-    const { contacts } = await post<{ contacts: Contacts[] }>("/v1/planning/contacts", { scene: model.scene, q: asked });
+    const { contacts } = await post<ContactsResponse>("/v1/planning/contacts", { scene: model.scene, q: asked });
     contacts.forEach(({ pairs, outside }, i) => {
-      if (pairs.length === 0 && outside.length === 0) free.push(asked[i]!);
+      if (pairs?.length === 0 && outside.length === 0) free.push(asked[i]!);
     });
   }
   if (free.length === 0) return { value: 0, stderr: 0, free: 0, samples: SAMPLES };
-  const { points } = await post<{ points: { inside: boolean }[] }>("/v1/planning/contains", { scene: model.scene, q: free });
+  const { points } = await post<ContainsResponse>("/v1/planning/contains", { scene: model.scene, q: free });
   const value = points.filter(({ inside }) => inside).length / free.length;
   // Where all of them are inside, or none is, one of them more is what nobody knows.
   return { value, stderr: Math.max(Math.sqrt((value * (1 - value)) / free.length), 1 / free.length), free: free.length, samples: SAMPLES };

@@ -1,18 +1,11 @@
 // How the regions of a scene are connected: a node for each region, a line where two overlap.
 import { useMemo } from "preact/hooks";
 import { LINKS } from "../common/colours";
+import type { GraphResponse } from "../common/schema";
 import { layout } from "./layout";
 
-export interface GraphAnswer {
-  complete: boolean;
-  components: number;
-  nodes: { region: string; guarantee: string; component: number }[];
-  edges: { a: string; b: string; depth: number; q: number[] }[];
-  gaps: { a: string; b: string; distance: number; q: number[] }[];
-}
-
 interface Props {
-  graph: GraphAnswer;
+  graph: GraphResponse;
   /** Regions that hold what is looked at, by id. */
   holding: Set<string>;
   /** Regions of a plan, by id. */

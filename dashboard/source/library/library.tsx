@@ -1,15 +1,16 @@
 // A scene and its library of regions: the robot, which regions hold it, how they are connected, slices, and plans.
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { get, said } from "../common/api";
-import { positions, type SceneModel } from "../common/kinematics";
+import { positions } from "../common/kinematics";
 import { MomentText, touchingOf, useMoment } from "../common/moment";
 import type { Space } from "../common/polytope";
 import { Robot } from "../common/robot";
+import type { GraphResponse, PlanResponse, RegionConfigurations, SceneModel } from "../common/schema";
 import { Slice } from "../common/slice";
 import { Sliders } from "../common/sliders";
 import { coverage, type Coverage } from "./coverage";
-import { Graph, type GraphAnswer } from "./graph";
-import { Planning, type Plan } from "./plan";
+import { Graph } from "./graph";
+import { Planning } from "./plan";
 
 const ASK_AGAIN_MS = 1500;
 
@@ -28,17 +29,17 @@ function Library({ model }: { model: SceneModel }) {
   const names = useMemo(() => positions(model), [model]);
   const space: Space = useMemo(() => ({ joints: names, revolute: model.units.map((unit) => unit === "rad"), q_star: model.q_star, q_lower: model.q_lower, q_upper: model.q_upper }), [model]);
   const [q, setQ] = useState(model.q_star.map((value, i) => Math.min(Math.max(value, model.q_lower[i]!), model.q_upper[i]!)));
-  const [graph, setGraph] = useState<GraphAnswer | null>(null);
+  const [graph, setGraph] = useState<GraphResponse | null>(null);
   const [graphProblem, setGraphProblem] = useState<string | null>(null);
   const [covered, setCovered] = useState<Coverage | null>(null);
   const [chosen, setChosen] = useState<string | null>(null);
-  const [plan, setPlan] = useState<Plan | null>(null);
+  const [plan, setPlan] = useState<PlanResponse | null>(null);
   const moment = useMoment(model.scene, q);
 
   useEffect(() => {
     let timer: ReturnType<typeof setTimeout> | undefined;
     const ask = (): void => {
-      get<GraphAnswer>(`/v1/planning/graph?scene=${model.scene}`).then(
+      get<GraphResponse>(`/v1/planning/graph?scene=${model.scene}`).then(
         (found) => {
           setGraph(found);
           if (!found.complete) timer = setTimeout(ask, ASK_AGAIN_MS);
@@ -57,7 +58,7 @@ function Library({ model }: { model: SceneModel }) {
 
   const choose = (region: string): void => {
     setChosen(region);
-    void get<{ center: number[] }>(`/v1/regions/${region}/configurations?samples=0`).then(({ center }) => setQ(center), (reason: unknown) => setGraphProblem(said(reason)));
+    void get<RegionConfigurations>(`/v1/regions/${region}/configurations?samples=0`).then(({ center }) => setQ(center), (reason: unknown) => setGraphProblem(said(reason)));
   };
   const touching = useMemo(() => touchingOf(model, moment), [moment, model]);
   const planned = useMemo(() => new Set(plan?.pieces.map(({ region }) => region) ?? []), [plan]);

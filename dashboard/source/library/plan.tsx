@@ -3,21 +3,7 @@ import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { post, said } from "../common/api";
 import { LINKS } from "../common/colours";
 import { asText, shortNames, shown } from "../common/kinematics";
-
-export interface Plan {
-  found: boolean;
-  complete: boolean;
-  version: number;
-  q: number[][];
-  t: number[];
-  pieces: { begin: number; end: number; region: string; guarantee: string }[];
-  length: number | null;
-  duration: number | null;
-  guarantee: string | null;
-  reason: "start_uncovered" | "goal_uncovered" | "disconnected" | "not_proved" | null;
-  nearest: { region: string; distance: number; q: number[] } | null;
-  gap: { start: string; goal: string; start_regions: number; goal_regions: number; distance: number; q: number[] } | null;
-}
+import type { PlanResponse } from "../common/schema";
 
 interface Props {
   scene: string;
@@ -27,8 +13,8 @@ interface Props {
   upper: number[];
   q: number[];
   onMove: (q: number[]) => void;
-  plan: Plan | null;
-  onPlan: (plan: Plan | null) => void;
+  plan: PlanResponse | null;
+  onPlan: (plan: PlanResponse | null) => void;
 }
 
 const DEGREE = Math.PI / 180;
@@ -55,7 +41,7 @@ export function Planning({ scene, names, units, lower, upper, q, onMove, plan, o
     setProblem(null);
     setAsking(true);
     try {
-      const found = await post<Plan>("/v1/planning/plan", { scene, start, goal });
+      const found = await post<PlanResponse>("/v1/planning/plan", { scene, start, goal });
       onPlan(found);
       if (found.found) onMove(found.q[0]!);
     } catch (reason) {
@@ -89,7 +75,7 @@ export function Planning({ scene, names, units, lower, upper, q, onMove, plan, o
   );
 }
 
-function why(plan: Plan, units: ("rad" | "m")[]): string {
+function why(plan: PlanResponse, units: ("rad" | "m")[]): string {
   const { reason, nearest, gap } = plan;
   if (reason === "start_uncovered" || reason === "goal_uncovered") {
     const end = reason === "start_uncovered" ? "start" : "goal";
@@ -104,14 +90,14 @@ function why(plan: Plan, units: ("rad" | "m")[]): string {
 }
 
 /** The configuration at a time, on the straight line in q between two of the plan's. */
-export function at(plan: Plan, time: number): number[] {
+export function at(plan: PlanResponse, time: number): number[] {
   const next = plan.t.findIndex((t) => t >= time);
   if (next <= 0) return plan.q[next < 0 ? plan.q.length - 1 : 0]!;
   const part = (time - plan.t[next - 1]!) / (plan.t[next]! - plan.t[next - 1]!);
   return plan.q[next - 1]!.map((value, i) => value + part * (plan.q[next]![i]! - value));
 }
 
-function Player({ plan, names, units, onMove }: { plan: Plan; names: string[]; units: ("rad" | "m")[]; onMove: (q: number[]) => void }) {
+function Player({ plan, names, units, onMove }: { plan: PlanResponse; names: string[]; units: ("rad" | "m")[]; onMove: (q: number[]) => void }) {
   const end = plan.t.at(-1)!;
   const [time, setTime] = useState(0);
   const [playing, setPlaying] = useState(false);
@@ -160,7 +146,7 @@ function Player({ plan, names, units, onMove }: { plan: Plan; names: string[]; u
 const CHART = { width: 560, height: 130, pad: 6 };
 const DASHES = ["", "6 3", "2 3", "8 3 2 3", "1 4", "10 4", "4 2"];
 
-function Curves({ plan, names, units, time }: { plan: Plan; names: string[]; units: ("rad" | "m")[]; time: number }) {
+function Curves({ plan, names, units, time }: { plan: PlanResponse; names: string[]; units: ("rad" | "m")[]; time: number }) {
   const end = Math.max(plan.t.at(-1)!, 1e-9);
   const short = shortNames(names);
   const x = (t: number): number => CHART.pad + ((CHART.width - 2 * CHART.pad) * t) / end;

@@ -1,33 +1,28 @@
 // The scene to work on: one that is stored, or one that is uploaded now.
 import { useState } from "preact/hooks";
 import { said, upload } from "../common/api";
+import type { SceneDetail } from "../common/schema";
 
-export interface SceneSummary {
-  id: string;
-  name: string;
-  joints: number;
-  pairs: number;
-  warnings: number;
-}
+export type Scene = Pick<SceneDetail, "id" | "name" | "joints" | "pairs" | "warnings">;
 
 interface Props {
-  scenes: SceneSummary[];
+  scenes: Scene[];
   chosen: string | null;
   onChoose: (id: string) => void;
-  onUpload: (scene: SceneSummary) => void;
+  onUpload: (scene: Scene) => void;
 }
 
 export function ChooseScene({ scenes, chosen, onChoose, onUpload }: Props) {
   const [sending, setSending] = useState<string | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
-  const [added, setAdded] = useState<SceneSummary | null>(null);
+  const [added, setAdded] = useState<SceneDetail | null>(null);
   const send = async (file: File | undefined): Promise<void> => {
     if (!file) return;
     setSending(file.name);
     setProblem(null);
     setAdded(null);
     try {
-      const scene = await upload<SceneSummary>("/v1/scenes", "bundle", file);
+      const scene = await upload<SceneDetail>("/v1/scenes", "bundle", file);
       setAdded(scene);
       onUpload(scene);
     } catch (reason) {

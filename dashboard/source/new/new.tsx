@@ -1,25 +1,27 @@
 // The form that starts a job: a scene, a configuration that the robot shows, and what shall be done.
 import { useEffect, useMemo, useState } from "preact/hooks";
-import { get, post, said } from "../common/api";
-import { asText, positions, type SceneModel } from "../common/kinematics";
-import { MomentText, touchingOf, useMoment, type Contacts } from "../common/moment";
+import { get, post, said, ServiceError } from "../common/api";
+import { asText, positions } from "../common/kinematics";
+import { MomentText, touchingOf, useMoment } from "../common/moment";
 import { Robot } from "../common/robot";
+import type { ContactsResponse, Job, SceneModel, ScenePage } from "../common/schema";
 import { Sliders } from "../common/sliders";
-import { ChooseScene, type SceneSummary } from "./choose";
-import { FIRST, request, type Wish } from "./request";
+import { ChooseScene, type Scene } from "./choose";
+import type { Refused } from "./options";
+import { FIRST, request, type Parts, type Wish } from "./request";
 import { Wishes } from "./wishes";
 
 const TRIES = 100;
 
-export function NewIsland() {
+export function NewIsland({ parts }: { parts: Parts }) {
   const asked = new URLSearchParams(location.search);
-  const [scenes, setScenes] = useState<SceneSummary[] | null>(null);
+  const [scenes, setScenes] = useState<Scene[] | null>(null);
   const [chosen, setChosen] = useState<string | null>(asked.get("scene"));
   const [model, setModel] = useState<SceneModel | null>(null);
   const [problem, setProblem] = useState<string | null>(null);
 
   useEffect(() => {
-    get<{ scenes: SceneSummary[] }>("/v1/scenes?limit=1000").then(
+    get<ScenePage>("/v1/scenes?limit=1000").then(
       (page) => {
         setScenes(page.scenes);
         setChosen((old) => old ?? page.scenes[0]?.id ?? null);
@@ -46,7 +48,7 @@ export function NewIsland() {
 
   if (!scenes) return <p class={problem ? "notice bad" : "empty"}>{problem ?? "Loading the scenes …"}</p>;
   const known = model && !scenes.some(({ id }) => id === model.scene) ? [{ id: model.scene, name: model.name, joints: model.q_star.length, pairs: model.pairs.length, warnings: 0 }, ...scenes] : scenes;
-  const take = (scene: SceneSummary): void => {
+  const take = (scene: Scene): void => {
     setScenes([scene, ...scenes.filter(({ id }) => id !== scene.id)]);
     setChosen(scene.id);
   };
@@ -54,29 +56,30 @@ export function NewIsland() {
     <div class="new">
       <ChooseScene scenes={known} chosen={chosen} onChoose={setChosen} onUpload={take} />
       {problem && <p class="notice bad">{problem}</p>}
-      {model && model.scene === chosen && <Start model={model} asked={asked.get("q")} key={model.scene} />}
+      {model && model.scene === chosen && <Start model={model} parts={parts} asked={asked.get("q")} key={model.scene} />}
     </div>
   );
 }
 
-function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
+function Start({ model, parts, asked }: { model: SceneModel; parts: Parts; asked: string | null }) {
   const names = useMemo(() => positions(model), [model]);
   const [q, setQ] = useState(() => within(model, read(asked, model.q_star.length) ?? model.q_star));
   const [unread] = useState(() => asked !== null && q.join() !== read(asked, model.q_star.length)?.join());
   const [wish, setWish] = useState<Wish>(FIRST);
   const [problem, setProblem] = useState<string | null>(null);
+  const [refused, setRefused] = useState<Refused | null>(null);
   const [sending, setSending] = useState(false);
   const moment = useMoment(model.scene, q);
   const touching = useMemo(() => touchingOf(model, moment), [model, moment]);
-  const body = request(model.scene, q, wish);
+  const body = request(model.scene, q, wish, parts);
 
   useEffect(() => history.replaceState(null, "", `?scene=${model.scene}&q=${q.map((value) => Number(value.toFixed(4))).join(",")}`), [model, q.join()]);
 
   const search = async (): Promise<void> => {
     const drawn = Array.from({ length: TRIES }, () => model.q_lower.map((low, i) => low + (model.q_upper[i]! - low) * Math.random()));
     try {
-      const { contacts } = await post<{ contacts: Contacts[] }>("/v1/planning/contacts", { scene: model.scene, q: drawn });
-      const free = contacts.findIndex(({ pairs, outside }) => pairs.length === 0 && outside.length === 0);
+      const { contacts } = await post<ContactsResponse>("/v1/planning/contacts", { scene: model.scene, q: drawn });
+      const free = contacts.findIndex(({ pairs, outside }) => pairs?.length === 0 && outside.length === 0);
       setProblem(free < 0 ? `None of ${TRIES} random configurations is free.` : null);
       if (free >= 0) setQ(drawn[free]!);
     } catch (reason) {
@@ -88,16 +91,22 @@ function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
     if (wish.kind === "cover" && wish.goal === "connect" && wish.marks.length < 2) return setProblem("Add at least two configurations to connect.");
     setSending(true);
     setProblem(null);
+    setRefused(null);
     try {
-      const { contacts } = await post<{ contacts: Contacts[] }>("/v1/planning/contacts", { scene: model.scene, q: [q] });
-      if (wish.kind === "grow" && contacts[0]!.pairs.length > 0) {
+      const { contacts } = await post<ContactsResponse>("/v1/planning/contacts", { scene: model.scene, q: [q] });
+      if (wish.kind === "grow" && contacts[0]!.pairs?.length) {
         setSending(false);
         return setProblem("The robot is in collision there, so no region can hold the configuration. Move it first.");
       }
-      const job = await post<{ id: string }>("/v1/jobs", body);
+      const job = await post<Job>("/v1/jobs", body);
       location.assign(`/jobs/${job.id}`);
     } catch (reason) {
-      setProblem(said(reason));
+      const field = reason instanceof ServiceError && document.getElementById(`option-${reason.field}`);
+      if (field) {
+        setRefused({ path: reason.field!, text: said(reason) });
+        field.closest("details")?.setAttribute("open", "");
+        field.focus();
+      } else setProblem(said(reason));
       setSending(false);
     }
   };
@@ -116,7 +125,7 @@ function Start({ model, asked }: { model: SceneModel; asked: string | null }) {
         </div>
       </div>
       <form onSubmit={(event) => void submit(event)}>
-        <Wishes wish={wish} onWish={setWish} marks={wish.marks.map((mark) => asText(mark, model.units))} onMark={() => setWish({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
+        <Wishes wish={wish} parts={parts[wish.kind]} refused={refused} onWish={setWish} marks={wish.marks.map((mark) => asText(mark, model.units))} onMark={() => setWish({ ...wish, marks: [...wish.marks, q] })} onGo={(mark) => setQ(wish.marks[mark]!)} />
         <div role="alert">{problem && <p class="notice bad">{problem}</p>}</div>
         <p><button type="submit" class="primary" disabled={sending}>{sending ? "Starting …" : "Start the job"}</button></p>
         <details>

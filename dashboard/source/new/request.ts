@@ -1,41 +1,61 @@
 // What somebody wishes for in the form, and the request that asks for it.
 
 export type Kind = "grow" | "cover";
-export const METHODS = {
-  iris_np2: "IRIS (Drake's IrisNp2)",
-  iris_zo: "IRIS, sampling only (Drake's IrisZo)",
-} as const;
-export type Method = keyof typeof METHODS;
 
-/** Numbers are as they were typed; an empty text leaves the choice to the service. */
+/** An option as the service describes it (api/pages/form.py). A group has options of its own. */
+export interface Option {
+  name: string;
+  takes: "whole" | "real" | "flag" | "choice" | "group";
+  text: string;
+  unit: string;
+  default: number | string | boolean | null;
+  least: number | null;
+  greatest: number | null;
+  choices: string[];
+  options: Option[];
+}
+
+/** The options at a place of the request, such as `seed`. */
+export interface Part {
+  place: string;
+  title: string;
+  options: Option[];
+}
+
+export type Parts = Record<Kind, Part[]>;
+
+/** Values by path, such as `options.cells`, as they were typed. Where there is none, the default holds. */
+export type Given = Record<string, string>;
+
 export interface Wish {
   kind: Kind;
-  method: Method;
   goal: "coverage" | "connect";
-  coverage: string;
-  regions: string;
-  cells: string;
-  stages: string;
+  given: Given;
   minutes: string;
   priority: string;
   /** More configurations: to contain, to begin with, or to connect. */
   marks: number[][];
 }
 
-export const FIRST: Wish = { kind: "grow", method: "iris_np2", goal: "coverage", coverage: "95", regions: "", cells: "", stages: "", minutes: "", priority: "0", marks: [] };
+export const FIRST: Wish = { kind: "grow", goal: "coverage", given: {}, minutes: "", priority: "0", marks: [] };
 
 /** The body of POST /v1/jobs. */
-export function request(scene: string, q: number[], wish: Wish): Record<string, unknown> {
-  const common = { scene, ...given("deadline_seconds", wish.minutes, 60), ...(wish.priority !== "0" && { priority: Number(wish.priority) }) };
-  const effort = { ...given("cells", wish.cells), ...given("stages", wish.stages) };
-  if (wish.kind === "grow") {
-    const seed = { q, ...(wish.method !== "iris_np2" && { method: wish.method }), ...(wish.marks.length && { contain: wish.marks }) };
-    return { kind: "grow", ...common, seed, ...(Object.keys(effort).length && { options: effort }) };
-  }
-  const goal = wish.goal === "coverage" ? { ...given("coverage", wish.coverage, 0.01), ...(wish.marks.length && { seeds: wish.marks }) } : { connect: wish.marks };
-  return { kind: "cover", ...common, options: { ...goal, ...given("regions", wish.regions), ...effort } };
+export function request(scene: string, q: number[], wish: Wish, parts: Parts): Record<string, unknown> {
+  const { kind, goal, marks } = wish;
+  const common = { kind, scene, ...(wish.minutes.trim() && { deadline_seconds: Number((60 * Number(wish.minutes)).toPrecision(12)) }), ...(wish.priority !== "0" && { priority: Number(wish.priority) }) };
+  const { seed, options } = Object.fromEntries(parts[kind].map((part) => [part.place, values(part.options, part.place, wish.given)]));
+  const named = marks.length > 0 && { [kind === "grow" ? "contain" : goal === "connect" ? "connect" : "seeds"]: marks };
+  if (kind === "cover") return { ...common, options: { ...named, ...options } };
+  return { ...common, seed: { q, ...named, ...seed }, ...(Object.keys(options!).length && { options }) };
 }
 
-function given(name: string, text: string, scale = 1): Record<string, number> {
-  return text.trim() === "" ? {} : { [name]: Number((Number(text) * scale).toPrecision(12)) };
+/** The options at a place that somebody has set. */
+function values(options: Option[], place: string, given: Given): Record<string, unknown> {
+  const found: Record<string, unknown> = {};
+  for (const { name, takes, options: own } of options) {
+    const path = `${place}.${name}`;
+    const text = given[path]?.trim();
+    if (text) found[name] = takes === "group" ? values(own, path, given) : takes === "flag" ? text === "true" : takes === "choice" ? text : Number(text);
+  }
+  return found;
 }

@@ -1,9 +1,12 @@
 // The part of the form that says what the job shall do.
-import type { ComponentChildren } from "preact";
-import { METHODS, type Method, type Wish } from "./request";
+import { Options, type Refused } from "./options";
+import type { Part, Wish } from "./request";
 
 interface Props {
   wish: Wish;
+  /** The options of the kind of job, by their places in the request. */
+  parts: Part[];
+  refused: Refused | null;
   onWish: (wish: Wish) => void;
   /** The configurations that were added, in words. */
   marks: string[];
@@ -17,17 +20,11 @@ const MARKS = {
   connect: ["Connect these configurations", "each gets a region; all of them shall end in one component"],
 } as const;
 
-export function Wishes({ wish, onWish, marks, onMark, onGo }: Props) {
+export function Wishes({ wish, parts, refused, onWish, marks, onMark, onGo }: Props) {
   const set = (part: Partial<Wish>): void => onWish({ ...wish, ...part });
   const [title, why] = MARKS[wish.kind === "grow" ? "grow" : wish.goal];
-  const number = (name: keyof Wish, label: string, unit: string, limits: { min: number | string; max?: number; step?: number | string; required?: boolean; placeholder?: string }): ComponentChildren => (
-    <p class="field">
-      <label for={`new-${name}`}>{label}</label>
-      <input id={`new-${name}`} type="number" {...limits} value={wish[name] as string} onInput={(event) => set({ [name]: event.currentTarget.value })} />
-      <span class="quiet">{unit}</span>
-    </p>
-  );
-  const whole = { min: 1, step: 1, placeholder: "default" };
+  const shared = { given: wish.given, onGive: (path: string, value: string) => set({ given: { ...wish.given, [path]: value } }), refused };
+  const goal = (name: string): boolean => wish.kind === "cover" && wish.goal === "coverage" && name === "coverage";
   return (
     <>
       <fieldset class="kinds">
@@ -41,26 +38,16 @@ export function Wishes({ wish, onWish, marks, onMark, onGo }: Props) {
           <span><strong>Cover the scene</strong> with regions, one after another, until a share of it is covered or configurations are connected.</span>
         </label>
       </fieldset>
-      {wish.kind === "grow" ? (
+      {wish.kind === "cover" && (
         <p class="field">
-          <label for="new-method">First polytope</label>
-          <select id="new-method" value={wish.method} onChange={(event) => set({ method: event.currentTarget.value as Method })}>
-            {Object.entries(METHODS).map(([method, words]) => <option value={method} key={method}>{words}</option>)}
+          <label for="new-goal">Goal</label>
+          <select id="new-goal" value={wish.goal} onChange={(event) => set({ goal: event.currentTarget.value as Wish["goal"] })}>
+            <option value="coverage">cover a share of the free configurations</option>
+            <option value="connect">connect configurations</option>
           </select>
         </p>
-      ) : (
-        <>
-          <p class="field">
-            <label for="new-goal">Goal</label>
-            <select id="new-goal" value={wish.goal} onChange={(event) => set({ goal: event.currentTarget.value as Wish["goal"] })}>
-              <option value="coverage">cover a share of the free configurations</option>
-              <option value="connect">connect configurations</option>
-            </select>
-          </p>
-          {wish.goal === "coverage" && number("coverage", "Share to cover", "%", { min: 0.1, max: 100, step: "any", required: true })}
-          {number("regions", "At most", "regions", { ...whole, max: 100_000, placeholder: "1000" })}
-        </>
       )}
+      {parts.map(({ place, options }) => <Options key={place} place={place} options={options.filter(({ name }) => goal(name))} {...shared} />)}
       <div class="marks">
         <p>{title} <span class="quiet">({why})</span></p>
         {marks.length > 0 && (
@@ -75,11 +62,22 @@ export function Wishes({ wish, onWish, marks, onMark, onGo }: Props) {
         )}
         <button type="button" onClick={onMark}>Add this configuration</button>
       </div>
-      <details>
-        <summary>Effort, deadline and priority</summary>
-        {number("minutes", "Deadline", "minutes; the regions so far are kept", { min: 0.01, max: 43200, step: "any", placeholder: "none" })}
-        {number("cells", "Cells of a pair in a stage", "", { ...whole, max: 10_000_000 })}
-        {number("stages", "Stages of a region", "", { ...whole, max: 100 })}
+      <details onInvalidCapture={(event) => void (event.currentTarget.open = true)}>
+        <summary>More options</summary>
+        {parts.map(({ place, title, options }) => (
+          <fieldset key={place}>
+            <legend>{title}</legend>
+            <Options place={place} options={options.filter(({ name }) => !goal(name))} {...shared} />
+          </fieldset>
+        ))}
+      </details>
+      <details onInvalidCapture={(event) => void (event.currentTarget.open = true)}>
+        <summary>Deadline and priority</summary>
+        <p class="field">
+          <label for="new-minutes">Deadline</label>
+          <input id="new-minutes" type="number" min={0.01} max={43200} step="any" placeholder="none" value={wish.minutes} onInput={(event) => set({ minutes: event.currentTarget.value })} />
+          <span class="quiet">minutes; the regions so far are kept</span>
+        </p>
         <p class="field">
           <label for="new-priority">Priority</label>
           <select id="new-priority" value={wish.priority} onChange={(event) => set({ priority: event.currentTarget.value })}>

@@ -1,32 +1,25 @@
 // A region to walk about in: the robot swept through it, sliders that stay inside, the ends of each joint, slices, cells.
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import { get, said } from "../common/api";
-import type { PairProof, Partition } from "../common/cells";
-import { shortNames, type SceneModel } from "../common/kinematics";
+import { shortNames } from "../common/kinematics";
 import { contains, rooms, toQ, toS, type Faces, type Space } from "../common/polytope";
 import { Robot } from "../common/robot";
+import type { Partition, RegionConfigurations, RegionDetail, RegionPair, RegionPairs, SceneModel } from "../common/schema";
 import { Slice } from "../common/slice";
 import { Sliders } from "../common/sliders";
 
-interface RegionDetail {
-  scene: string;
-  guarantee: string;
-  not_covered: { pairs: number; summary: string };
-  manifest: { scene: { name: string }; space: Space; halfspace_normals: number[][]; halfspace_offsets: number[] };
-}
-
-interface Configurations {
-  center: number[];
-  seed: number[] | null;
-  extremes: { joint: string; unit: "rad" | "m"; lower: number[]; upper: number[] }[];
-  samples: number[][];
+/** The keys of a manifest that the page needs. */
+interface Manifest {
+  space: Space;
+  halfspace_normals: number[][];
+  halfspace_offsets: number[];
 }
 
 interface Loaded {
   region: RegionDetail;
   model: SceneModel;
-  configurations: Configurations;
-  pairs: PairProof[];
+  configurations: RegionConfigurations;
+  pairs: RegionPair[];
 }
 
 const SAMPLES = 150;
@@ -36,8 +29,8 @@ const SECONDS_EACH = 0.9;
 async function load(id: string): Promise<Loaded> {
   const [region, configurations, { pairs }] = await Promise.all([
     get<RegionDetail>(`/v1/regions/${id}`),
-    get<Configurations>(`/v1/regions/${id}/configurations?samples=${SAMPLES}`),
-    get<{ pairs: PairProof[] }>(`/v1/regions/${id}/pairs`),
+    get<RegionConfigurations>(`/v1/regions/${id}/configurations?samples=${SAMPLES}`),
+    get<RegionPairs>(`/v1/regions/${id}/pairs`),
   ]);
   return { region, configurations, pairs, model: await get<SceneModel>(`/v1/scenes/${region.scene}/model`) };
 }
@@ -54,8 +47,8 @@ export function RegionIsland({ region }: { region: string }) {
 }
 
 function Explorer({ id, region, model, configurations, pairs }: Loaded & { id: string }) {
-  const { space } = region.manifest;
-  const faces: Faces = useMemo(() => ({ C: region.manifest.halfspace_normals, d: region.manifest.halfspace_offsets }), [region]);
+  const { space, halfspace_normals: C, halfspace_offsets: d } = region.manifest as unknown as Manifest;
+  const faces: Faces = useMemo(() => ({ C, d }), [region]);
   const [q, setQ] = useState(configurations.seed ?? configurations.center);
   const [swept, setSwept] = useState(true);
   const [pair, setPair] = useState<number | null>(null);
