@@ -17,23 +17,40 @@ from ciris.space import numbers
 Straight = Literal["q", "s"]
 
 
+class PaperOptions(TypedDict, total=False):
+    """Options of the papers' algorithm. The service has a default for each."""
+
+    contraction: Literal["targeted", "uniform"]
+    """``targeted`` adds faces where pairs fail; ``uniform`` moves every face inwards by the same amount."""
+    contractions: int
+    """Number of targeted contractions. The largest region counts."""
+    bisection_steps: int
+    """Steps of uniform contraction's bisection, one certification each."""
+    pushes: int
+    """How often the faces are pushed out after the contractions."""
+    max_rounds: int
+    """Most rounds of the polytope step after the pushes."""
+    tolerance: float
+    """Relative growth of the ellipsoid's volume that is still worth a push or a round."""
+    backoff: int
+    """How often a polytope step that fails to certify is halved."""
+
+
 class GrowOptions(TypedDict, total=False):
     """Options of growing a region. The service has a default for each."""
 
     contain: ArrayLike
     """(n,) or (k, n), more configurations that the region must contain, such as where it meets another region."""
     method: Literal["iris_np2", "iris_zo", "limits", "box"]
-    """How the first polytope is found: by Drake's IRIS, from the joint limits, or as a box around q."""
+    """How the first polytope is found: by Drake's IRIS, or with ``paper`` also from the joint limits or as a box around q."""
+    half_width: float
+    """Half the edge length of this box, in s."""
     deadline: float
     """Seconds after which the job ends, with the best region so far."""
-    contraction: Literal["whole", "targeted", "uniform"]
-    """``whole`` keeps the first polytope and certifies it cell by cell; the others shrink it until every pair has one plane."""
     cells: int
-    """For ``whole``: cells of a pair in each stage. Cells still undecided when this budget is spent are removed by new faces."""
-    pushes: int
-    """How often the faces are pushed out after the contractions."""
-    max_rounds: int
-    """Most rounds of the polytope step."""
+    """Cells of a pair in each stage. Cells still undecided when this budget is spent are removed by new faces."""
+    paper: PaperOptions
+    """Grows with the papers' algorithm: it shrinks the first polytope until every pair has one plane. ``{}`` takes its defaults."""
     random_seed: int
     """Seed of every random choice, those of Drake's IRIS too. Another seed gives another region."""
     priority: int
@@ -76,7 +93,7 @@ class CoverOptions(TypedDict, total=False):
 
 
 _IN_JOB = (("deadline", "deadline_seconds"), ("priority", "priority"), ("labels", "labels"))
-_IN_OPTIONS = ("contraction", "cells", "pushes", "max_rounds", "random_seed")
+_IN_OPTIONS = ("cells", "paper", "random_seed")
 
 
 def grow_request(scene: str, q: ArrayLike, options: GrowOptions) -> Document:
@@ -85,8 +102,7 @@ def grow_request(scene: str, q: ArrayLike, options: GrowOptions) -> Document:
     seed: Document = {"q": numbers(q, "q").tolist()}
     if "contain" in given:
         seed["contain"] = np.atleast_2d(numbers(given["contain"], "contain")).tolist()
-    if "method" in given:
-        seed["method"] = given["method"]
+    seed |= {name: given[name] for name in ("method", "half_width") if name in given}
     request = {"kind": "grow", "scene": scene, "seed": seed, "options": {name: given[name] for name in _IN_OPTIONS if name in given}}
     return request | {field: given[name] for name, field in _IN_JOB if name in given}
 

@@ -30,12 +30,14 @@ INTERRUPTED = 130
 
 
 OPTIONS = {
-    "options.max_rounds": "--rounds",
-    "options.pushes": "--pushes",
+    "options.paper.max_rounds": "--rounds",
+    "options.paper.pushes": "--pushes",
+    "options.paper.contraction": "--contraction",
+    "options.paper": "--paper",
     "options.cells": "--cells",
-    "options.contraction": "--contraction",
     "options.random_seed": "--random-seed",
     "seed.method": "--method",
+    "seed.half_width": "--half-width",
     "seed.q": "--q",
     "deadline_seconds": "--deadline",
     "start": "--from",
@@ -260,15 +262,11 @@ def parser() -> argparse.ArgumentParser:
         default=[],
         help="joint positions that the region must contain as well; may be repeated",
     )
-    methods = "iris_np2 (default) and iris_zo: Drake's IRIS; limits: the joint limits; box: a box around the seed"
+    methods = "iris_np2 (default) and iris_zo: Drake's IRIS; with --paper also limits: the joint limits; box: a box around the seed"
     grow.add_argument("--method", help=f"where the proposal comes from, the polytope that growth begins with. {methods}")
+    grow.add_argument("--half-width", type=float, metavar="W", help="for the method box: half its edge length in s, such as 0.1")
     grow.add_argument(
-        "--contraction",
-        choices=["whole", "targeted", "uniform"],
-        help="whole (default) keeps the proposal and certifies it cell by cell; the others shrink it until every pair has one plane",
-    )
-    grow.add_argument(
-        "--cells", type=int, metavar="N", help="for whole: check N cells of a pair in each stage; then faces cut off its undecided cells"
+        "--cells", type=int, metavar="N", help="check N cells of a pair in each stage; then faces cut off its undecided cells"
     )
     grow.add_argument(
         "--deadline",
@@ -282,6 +280,14 @@ def parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         help="a label to find the job by (ciris job ls --label); may be repeated",
+    )
+    grow.add_argument(
+        "--paper",
+        action="store_true",
+        help="grow with the papers' algorithm, which shrinks the proposal until every pair has one plane; the next three imply it",
+    )
+    grow.add_argument(
+        "--contraction", help="how the proposal shrinks: targeted (default) adds faces where pairs fail; uniform moves all faces"
     )
     grow.add_argument(
         "--pushes", type=int, metavar="N", help="number of times that the faces are pushed out again; default: more for smaller arms"

@@ -92,20 +92,12 @@ def grow(args: Namespace) -> int:
 
         check_is_file(args.scene)
     common: dict[str, Any] = {"contain": [configuration(q, "--contain") for q in args.contain]} if args.contain else {}
-    if args.method is not None:
-        common["method"] = args.method
+    common |= {name: value for name, value in (("method", args.method), ("half_width", args.half_width)) if value is not None}
     seeds = [{"q": seed_of(args.scene, q), **common} for q in args.q or [None]]
-    options = {
-        name: value
-        for name, value in (
-            ("contraction", args.contraction),
-            ("cells", args.cells),
-            ("pushes", args.pushes),
-            ("max_rounds", args.rounds),
-            ("random_seed", args.random_seed),
-        )
-        if value is not None
-    }
+    asked = {"contraction": args.contraction, "pushes": args.pushes, "max_rounds": args.rounds}
+    paper = {name: value for name, value in asked.items() if value is not None}
+    given = {"cells": args.cells, "random_seed": args.random_seed, "paper": paper if paper or args.paper else None}
+    options = {name: value for name, value in given.items() if value is not None}
     if args.deadline is not None and not 0 < args.deadline < math.inf:
         raise CirisError("option", f"must be a number of seconds above 0, not {args.deadline:g}", field="--deadline")
     if len(seeds) > 1:

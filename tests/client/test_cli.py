@@ -49,7 +49,16 @@ def test_a_wrong_command_line_is_one_line(ciris: Ciris) -> None:
 
 @pytest.mark.parametrize(
     ("option", "value"),
-    [("--rounds", "-2"), ("--pushes", "-1"), ("--cells", "0"), ("--random-seed", "-5"), ("--deadline", "-1"), ("--method", "nope")],
+    [
+        ("--rounds", "-2"),
+        ("--pushes", "-1"),
+        ("--contraction", "whole"),
+        ("--half-width", "0"),
+        ("--cells", "0"),
+        ("--random-seed", "-5"),
+        ("--deadline", "-1"),
+        ("--method", "nope"),
+    ],
 )
 def test_an_error_names_the_option_that_was_typed(ciris: Ciris, option: str, value: str) -> None:
     done = ciris("grow", PLANAR, "--local", option, value)
@@ -210,7 +219,7 @@ def test_growing_here_says_what_happens(ciris: Ciris) -> None:
 def test_who_interrupts_growing_has_the_best_region_so_far(tmp_path: Path) -> None:
     scene, out = ROOT / "examples" / "ur3e_bin" / "scene.yaml", tmp_path / "so_far.proof"
     growing = subprocess.Popen(
-        command("grow", scene, "--local", "--method", "box", "--cells", "200", "--out", out),
+        command("grow", scene, "--local", "--paper", "--method", "box", "--half-width", "0.001", "--out", out),
         cwd=tmp_path,
         env=surroundings(CIRIS_DATA_DIR=str(tmp_path / "data")),
         stderr=subprocess.PIPE,
