@@ -87,6 +87,12 @@ class Option:
         """Returns the text with what holds where nothing is given."""
         return f"{self.text} Default: {self.otherwise}." if self.otherwise else self.text
 
+    @property
+    def explained(self) -> str:
+        """Returns the same with the default where it is a value."""
+        valued = self.takes in (Takes.WHOLE, Takes.REAL, Takes.CHOICE) and self.default is not None and not self.otherwise
+        return f"{self.text} Default: {self.default}." if valued else self.described
+
 
 def option(default: Any, text: str, **more: Any) -> Any:
     """Returns the field of a dataclass that is an option.

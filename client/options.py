@@ -102,9 +102,7 @@ def _real(text: str) -> float:
 
 def about(one: Option) -> str:
     """Returns the help text of an option."""
-    told = one.described
-    if not one.otherwise and not isinstance(one.default, bool) and isinstance(one.default, int | float | str):
-        told += f" Default: {one.default}."
+    told = one.explained
     if one.takes in (Takes.POINTS, Takes.PATHS, Takes.LABELS):
         told += f" {_FILES if one.takes is Takes.PATHS else ''}May be repeated."
     told = told.replace("`", "").replace("%", "%%").rstrip(".")
