@@ -47,18 +47,6 @@ def test_a_wrong_command_line_is_one_line(ciris: Ciris) -> None:
         assert "--help" in done.error
 
 
-@pytest.mark.parametrize(
-    ("option", "value"),
-    [("--rounds", "-2"), ("--pushes", "-1"), ("--cells", "0"), ("--random-seed", "-5"), ("--deadline", "-1"), ("--method", "nope")],
-)
-def test_an_error_names_the_option_that_was_typed(ciris: Ciris, option: str, value: str) -> None:
-    done = ciris("grow", PLANAR, "--local", option, value)
-    assert done.status == 2
-    assert done.stderr.splitlines()[-1].startswith(f"error: {option}: ")
-    assert "options." not in done.stderr
-    assert "max_rounds" not in done.stderr
-
-
 def test_without_a_service_the_error_says_what_to_do(ciris: Ciris) -> None:
     done = ciris("scene", "ls")
     assert done.status == 2
