@@ -34,7 +34,8 @@ def asked_for(options: Mapping[str, Any], fields: Fields) -> Document:
     asked: Document = {}
     for name, value in options.items():
         if name not in fields:
-            hint = close_matches(name, list(fields)) or f"options: {', '.join(fields)}"
+            groups = [group for group, (_, takes) in fields.items() if not isinstance(takes, str) and name in takes]
+            hint = f"give it in {groups[0]}" if groups else close_matches(name, list(fields)) or f"options: {', '.join(fields)}"
             raise CirisError("unknown_option", f"there is no option {name!r}", field=name, hint=hint)
         if value is not None:
             field, takes = fields[name]

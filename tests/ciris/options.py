@@ -52,13 +52,13 @@ def _kind(kind: str, parts: Sequence[Part]) -> Iterator[str]:
     if kind == "job":
         yield from _typed("JobOptions", "TypedDict", "Options of all jobs.", own)
     else:
-        yield from _typed(f"{kind.capitalize()}Options", "JobOptions", f"Options of jobs of the kind ``{kind}``.", own)
+        yield from _typed(f"{kind.capitalize()}Options", "JobOptions", f"Options of jobs of the kind `{kind}`.", own)
     yield f"{kind.upper()}: Fields = {_fields(own, '' if kind == 'job' else '**JOB, ')}"
 
 
 def _typed(name: str, base: str, about: str, parts: Sequence[Part]) -> Iterator[str]:
     yield f"class {name}({base}, total=False):"
-    yield _quoted(about)
+    yield _quoted(about.replace("`", "``"))
     for part in parts:
         for one in part.options:
             yield f"    {one.python}: {_type(one)}"

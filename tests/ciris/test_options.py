@@ -26,12 +26,13 @@ def test_every_option_has_its_place_in_the_request() -> None:
         assert {field for field, _ in fields.values()} == {part.field(one) for part in parts for one in part.options}
 
 
-def test_names_are_those_that_people_know() -> None:
-    asked = asked_for({"iris_tolerance": 0.1, "tolerance": 0.2, "max_rounds": 1, "deadline": 9, "contain": np.zeros(2)}, options.GROW)
-    assert asked == {
-        "seed": {"tolerance": 0.1, "contain": [[0.0, 0.0]]},
-        "options": {"tolerance": 0.2, "max_rounds": 1},
+def test_names_are_those_of_the_arguments_and_lists_are_in_the_plural() -> None:
+    given = {"iris_random_seed": 1, "random_seed": 2, "deadline": 9, "contain": np.zeros(2), "labels": {"a": "b"}, "cells": None}
+    assert asked_for(given, options.GROW) == {
+        "seed": {"random_seed": 1, "contain": [[0.0, 0.0]]},
+        "options": {"random_seed": 2},
         "deadline_seconds": 9,
+        "labels": {"a": "b"},
     }
     assert asked_for({"seeds": [0.0], "paths": [np.zeros((2, 1))]}, options.COVER) == {
         "options": {"seeds": [[0.0]], "paths": [[[0.0], [0.0]]]}
