@@ -16,6 +16,8 @@ from starlette.exceptions import HTTPException
 
 from api.schemas.patterns import SAID
 from certifier.errors import CirisError
+from certifier.growth.options import GrowthOptions
+from certifier.options import in_group
 from db.disk import lacks_room
 from db.session import UNAVAILABLE
 from db.states import JobKind
@@ -206,7 +208,8 @@ def _field(loc: Sequence[str | int]) -> str:
 
 def _sentence(error: dict[str, Any]) -> str:
     if error["type"] == "extra_forbidden":
-        return "there is no such field"
+        found = in_group(GrowthOptions, str(error["loc"][-1])) if error["loc"][:-1] == ("body", JobKind.GROW, "options") else ""
+        return f"there is no such field: give options.{found}" if found else "there is no such field"
     if error["type"] == "string_pattern_mismatch":
         return SAID[error["ctx"]["pattern"]]
     if error["type"] in _TAGS:

@@ -15,6 +15,7 @@ from api import checks
 from api.access import Caller
 from api.schemas.jobs import CertifyPathRequest, CertifyRequest, CoverRequest, GrowRequest, RecertifyRequest
 from certifier.errors import CirisError
+from certifier.growth.options import GrowthOptions
 from certifier.model import Scene
 from db import clock, jobs, regions, scenes, webhooks
 from db.models import JobRow
@@ -106,7 +107,8 @@ def _options(body: GrowRequest | CertifyRequest | CertifyPathRequest | CoverRequ
     if isinstance(body, CertifyPathRequest):
         return checks.motion(scene, body)
     if isinstance(body, GrowRequest):
-        return {"kind": "grow", "seed": checks.seed(scene, body.seed).to_document(), **body.options.model_dump()}
+        seed = checks.seed(scene, body.seed).to_document()
+        return GrowthOptions.from_document({"kind": "grow", "seed": seed, **body.options.model_dump()}).to_document()
     checks.polytope(scene, body.polytope)
     return {"kind": "certify", "seed": body.polytope.model_dump(exclude_none=True), "cells": body.cells, "random_seed": body.random_seed}
 

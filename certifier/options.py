@@ -147,7 +147,8 @@ def read(cls: type[Options], document: Mapping[str, Any], place: str) -> Options
     known, described = [f.name for f in fields(cls)], {one.name: one for one in table(cls)}  # type: ignore[arg-type]
     for name in document:
         if name not in known:
-            hint = close_matches(name, known) or f"options: {', '.join(sorted(described))}"
+            found = in_group(cls, name)
+            hint = f"give {_within(place, found)}" if found else close_matches(name, known) or f"options: {', '.join(sorted(described))}"
             raise RegionError("unknown_option", f"there is no option {name!r}", field=_within(place, name), hint=hint)
     given = {}
     for name, value in document.items():
@@ -160,6 +161,12 @@ def read(cls: type[Options], document: Mapping[str, Any], place: str) -> Options
 
 def _within(place: str, name: str) -> str:
     return f"{place}.{name}".removeprefix(".")
+
+
+def in_group(cls: type, name: str) -> str:
+    """Returns the path of an option that a group of the dataclass has, as in ``group.name``; "" where none has it."""
+    groups = [one for one in table(cls) if one.takes is Takes.GROUP and one.cls is not None]
+    return next((f"{one.name}.{name}" for one in groups if name in [inner.name for inner in table(one.cls)]), "")
 
 
 def _value(one: Option, value: Any, where: str) -> Any:

@@ -27,17 +27,42 @@ class JobOptions(TypedDict, total=False):
 JOB: Fields = {"deadline": ("deadline_seconds", "real"), "priority": ("priority", "whole"), "labels": ("labels", "labels")}
 
 
+class PaperOptions(TypedDict, total=False):
+    """The papers' algorithm grows the region instead: it shrinks the first polytope until every pair has one plane that moves with the
+    joints, and then pushes the faces out. ``{}`` takes all of its defaults.
+    """
+
+    contraction: Literal["targeted", "uniform"]
+    """``targeted`` adds faces where pairs fail; ``uniform`` moves every face inwards by the same amount. Default: targeted."""
+    contractions: int
+    """Number of targeted contractions. Each begins to cut at another distance; the largest region counts. Default: 2 for arms with at
+    most six joints between two bodies, else 1.
+    """
+    bisection_steps: int
+    """Steps of uniform contraction's bisection, one certification each. Default: 6."""
+    pushes: int
+    """How often the faces are pushed out after the contractions. After a push that fails, the next one is shorter. Default: 10 for arms
+    with at most four joints between two bodies, 2 for at most six, else 0.
+    """
+    max_rounds: int
+    """Most rounds of the polytope step (12) after the pushes. Default: 3 for arms with at most four joints between two bodies, else 0."""
+    tolerance: float
+    """Relative growth of the ellipsoid's volume that is still worth a push or a round. Default: 0.02."""
+    backoff: int
+    """How often a polytope step that fails to certify is halved towards the last certified polytope. Default: 2."""
+
+
 class GrowOptions(JobOptions, total=False):
     """Options of jobs of the kind ``grow``."""
 
     method: Literal["iris_np2", "iris_zo", "limits", "box"]
-    """How the first polytope is found: by Drake's IRIS (``iris_np2``, ``iris_zo``), from the joint limits (``limits``), or as a box
-    around the seed (``box``). Default: ``iris_np2``.
+    """How the first polytope is found: by Drake's IRIS (``iris_np2``, ``iris_zo``), or with the papers' algorithm also from the joint
+    limits (``limits``), or as a box around the seed (``box``). Default: ``iris_np2``.
     """
     contain: ArrayLike
     """(n,) or (k, n). More configurations (joint positions) that the region must contain, such as where it meets another region."""
     half_width: float
-    """Half the edge length of the first polytope, in s; for the method ``box``. Default: 0.001."""
+    """Half the edge length of the first polytope, in s; the method ``box`` needs it. 0.1 is about 11 degrees of a joint."""
     iris_epsilon: float
     """IRIS adds faces until at most this fraction of the volume in s is in collision. Below 0.01, only its last rounds of faces reach
     it. Default: 0.001.
@@ -56,33 +81,16 @@ class GrowOptions(JobOptions, total=False):
     """Seed of IRIS' random choices alone. Another seed gives another proposal. Default: the seed of every random choice."""
     iris_tries: int
     """IRIS makes at most this many proposals, each with its own random seed, and growth takes the best. Default: 2."""
-    contraction: Literal["whole", "targeted", "uniform"]
-    """``whole`` keeps the first polytope, certifies it cell by cell, and cuts off only what cannot be certified. The other two shrink it
-    until every pair has one plane that moves with the joints: ``targeted`` adds faces where pairs fail; ``uniform`` moves every face
-    inwards by the same amount. Default: ``whole`` where IRIS makes the first polytope, else ``targeted``.
-    """
     cells: int
     """Cells of a pair in each stage. Cells still undecided when this budget is spent are removed by new faces. Default: 6000."""
     stages: int
     """Number of stages after which growth ends. Each stage gives a larger region than the one before. Default: it ends when a stage
     gains little.
     """
-    contractions: int
-    """Number of targeted contractions. Each begins to cut at another distance; the largest region counts. Default: 2 for arms with at
-    most six joints between two bodies, else 1.
+    paper: PaperOptions
+    """The papers' algorithm grows the region instead: it shrinks the first polytope until every pair has one plane that moves with the
+    joints, and then pushes the faces out. ``{}`` takes all of its defaults. Default: none.
     """
-    bisection_steps: int
-    """Steps of uniform contraction's bisection, one certification each. Default: 6."""
-    pushes: int
-    """How often the faces are pushed out after the contractions. After a push that fails, the next one is shorter. Default: 10 for arms
-    with at most four joints between two bodies, 2 for at most six, else 0.
-    """
-    max_rounds: int
-    """Most rounds of the polytope step (12) after the pushes. Default: 3 for arms with at most four joints between two bodies, else 0."""
-    tolerance: float
-    """Relative growth of the ellipsoid's volume that is still worth a push or a round. Default: 0.02."""
-    backoff: int
-    """How often a polytope step that fails to certify is halved towards the last certified polytope. Default: 2."""
     random_seed: int
     """Seed of every random choice, those of Drake's IRIS too. Another seed gives another region. Default: 0."""
 
@@ -100,15 +108,20 @@ GROW: Fields = {
     "iris_margin": ("seed.margin", "real"),
     "iris_random_seed": ("seed.random_seed", "whole"),
     "iris_tries": ("seed.tries", "whole"),
-    "contraction": ("options.contraction", "choice"),
     "cells": ("options.cells", "whole"),
     "stages": ("options.stages", "whole"),
-    "contractions": ("options.contractions", "whole"),
-    "bisection_steps": ("options.bisection_steps", "whole"),
-    "pushes": ("options.pushes", "whole"),
-    "max_rounds": ("options.max_rounds", "whole"),
-    "tolerance": ("options.tolerance", "real"),
-    "backoff": ("options.backoff", "whole"),
+    "paper": (
+        "options.paper",
+        {
+            "contraction": ("contraction", "choice"),
+            "contractions": ("contractions", "whole"),
+            "bisection_steps": ("bisection_steps", "whole"),
+            "pushes": ("pushes", "whole"),
+            "max_rounds": ("max_rounds", "whole"),
+            "tolerance": ("tolerance", "real"),
+            "backoff": ("backoff", "whole"),
+        },
+    ),
     "random_seed": ("options.random_seed", "whole"),
 }
 

@@ -11,10 +11,9 @@ from typing import Any
 
 from certifier.errors import CirisError
 from certifier.growth.actions import Failed, Report, Transition
-from certifier.growth.machine import advance, begin
+from certifier.growth.machine import advance, begin, stored_state
 from certifier.growth.options import GrowthOptions
 from certifier.growth.refusal import DEADLINE, refusal
-from certifier.growth.state import GrowthState
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.seeding.proposal import Proposal
@@ -26,14 +25,14 @@ def next_transition(scene: Scene, options: dict[str, Any], state: dict[str, Any]
     """Returns the first transition of a job, which has no state yet, or the transition that follows a report.
 
     Raises:
-        CirisError: as :meth:`GrowthOptions.from_document`, :meth:`GrowthState.from_document` and :func:`begin`.
+        CirisError: as :meth:`GrowthOptions.from_document`, :func:`stored_state` and :func:`begin`.
     """
     parsed = GrowthOptions.from_document(options)
     if state is None:
         return begin(scene, parsed)
     if report is None:
         raise ValueError("a job that has begun advances with a report")
-    return advance(scene, GrowthState.from_document(state, parsed), report)
+    return advance(scene, stored_state(state, parsed), report)
 
 
 def step_report(kind: StepKind, state: StepState, report: dict[str, Any]) -> Report:

@@ -20,6 +20,7 @@ from structlog.contextvars import bound_contextvars
 
 from certifier.errors import CirisError
 from certifier.growth.actions import Candidate
+from certifier.growth.machine import stored_state
 from certifier.growth.obstacles import Obstacle
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
@@ -198,7 +199,7 @@ def _growth(job_id: str) -> GrowthState:
             job = jobs.get(session, job_id)
             growth = jobs.growth(session, job_id)
             assert growth is not None, "a job with a certified polytope has begun to grow"
-            return GrowthState.from_document(growth, GrowthOptions.from_document(job.options))
+            return stored_state(growth, GrowthOptions.from_document(job.options))
 
     return persistently(read)
 

@@ -5,14 +5,13 @@ It is JSON-able, so that a job can be resumed from its database rows alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any
-
-import numpy as np
+from dataclasses import dataclass, field
+from typing import Any, Self
 
 from certifier.errors import CirisError
+from certifier.growth import stored
 from certifier.growth.obstacles import Obstacle
-from certifier.growth.options import NEAR, GrowthOptions
+from certifier.growth.options import GrowthOptions
 from certifier.model import Array, Polytope
 
 
@@ -24,14 +23,12 @@ class Start:
         rows: the proposal's faces, then the joint limits, all scaled to |c| = 1.
         seed: (n,) the seed in s.
         keep: (k, n) points that stay inside, the first of them well inside.
-        given: the proposal is a box or a polytope of the user's; beyond it nothing is known.
         hindrance: the reason to give if no region can be grown; "" where none is known.
     """
 
     rows: Polytope
     seed: Array
     keep: Array
-    given: bool
     hindrance: str = ""
 
 
@@ -48,59 +45,6 @@ class Best:
     polytope: Polytope
     center: Array
     ellipsoid_volume: float
-
-
-@dataclass(frozen=True)
-class Cuts:
-    """The cuts say how far a targeted contraction or a push that is under way has come.
-
-    Attributes:
-        holds: pair index -> iteration whose proof, on a larger polytope, holds on the present one.
-        attempts: pair index -> how often faces were added for it.
-    """
-
-    holds: dict[int, int] = field(default_factory=dict)
-    attempts: dict[int, int] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, eq=False)
-class Bisection:
-    """A bisection is a uniform contraction that is under way, with delta = (1 - scale) times the radius of the largest ball.
-
-    Attributes:
-        center, radius: of the largest ball; center is (n,).
-        steps: certifications left.
-        scale: of the present trial.
-        holds: pair index -> an iteration that certified it, and the scale of that iteration.
-        certified: the largest scale that was certified; None before there is one.
-        failed: the last scale that was not certified; None before there is one.
-    """
-
-    center: Array
-    radius: float
-    steps: int
-    scale: float
-    holds: dict[int, tuple[int, float]] = field(default_factory=dict)
-    certified: float | None = None
-    failed: float | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Round:
-    """A round is a polytope step that is being certified.
-
-    Attributes:
-        base, base_center, target, target_center: the step goes from base to target, row for row, and from one centre to the other.
-        growth: relative growth of the inscribed ellipsoid's volume, if all of the step is certified.
-        halvings: how often the step was halved.
-    """
-
-    base: Polytope
-    base_center: Array
-    target: Polytope
-    target_center: Array
-    growth: float
-    halvings: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,107 +91,29 @@ class GrowthState:
 
     Attributes:
         next: number of the next iteration.
-        suspects: pairs that failed last, to be certified first.
-        contractions, pushes, rounds: how many of each were begun.
-        near: for the contraction under way: a failure nearer than this calls for a shorter range.
-        reach: for the contraction or push under way: how far the faces were pushed out first.
         obstacles: pair index -> what was cut off for it; pairs for which nothing was are left out.
     """
 
     options: GrowthOptions
     next: int = 0
     best: Best | None = None
-    suspects: tuple[int, ...] = ()
     start: Start | None = None
-    contractions: int = 0
-    pushes: int = 0
-    rounds: int = 0
-    near: float = NEAR[0]
-    reach: float = 1.0
     whole: Whole | None = None
-    cuts: Cuts = Cuts()
-    bisection: Bisection | None = None
-    round: Round | None = None
     obstacles: dict[int, Obstacle] = field(default_factory=dict)
 
     def to_document(self) -> dict[str, Any]:
         """Returns the state as JSON-able data, without the options."""
-        return {
-            "next": self.next,
-            "best": None if self.best is None else _document(self.best),
-            "suspects": list(self.suspects),
-            "start": None if self.start is None else _document(self.start),
-            "contractions": self.contractions,
-            "pushes": self.pushes,
-            "rounds": self.rounds,
-            "near": self.near,
-            "reach": self.reach,
-            "whole": None if self.whole is None else _document(self.whole),
-            "cuts": _document(self.cuts),
-            "bisection": None if self.bisection is None else _document(self.bisection),
-            "round": None if self.round is None else _document(self.round),
-            "obstacles": {str(pair): obstacle.to_document() for pair, obstacle in self.obstacles.items()},
-        }
+        return stored.document(self, without="options")
 
     @classmethod
-    def from_document(cls, document: dict[str, Any], options: GrowthOptions) -> GrowthState:
+    def from_document(cls, document: dict[str, Any], options: GrowthOptions) -> Self:
         """Does the inverse of :meth:`to_document`.
 
         Raises:
             CirisError: ``other_version`` when another version of this program stored the state.
         """
         try:
-            cuts = document["cuts"]
-            parts: dict[str, Any] = {
-                "best": _part(Best, document["best"]),
-                "start": _part(Start, document["start"]),
-                "whole": _whole(document["whole"]),
-                "cuts": Cuts(_by_pair(cuts["holds"]), _by_pair(cuts["attempts"])),
-                "bisection": _part(Bisection, document["bisection"]),
-                "round": _part(Round, document["round"]),
-                "obstacles": {pair: Obstacle.from_document(one) for pair, one in _by_pair(document.get("obstacles", {})).items()},
-            }
-            return cls(options, **{**document, **parts, "suspects": tuple(document["suspects"])})
-        except (KeyError, TypeError) as error:
+            return stored.read(cls, document, options=options)
+        except (KeyError, TypeError, AttributeError) as error:
             message = "this job was begun by another version of ciris and cannot go on"
             raise CirisError("other_version", message, field="job", hint="retry it") from error
-
-
-def _whole(document: dict[str, Any] | None) -> Whole | None:
-    if document is None:
-        return None
-    known = {name: _by_pair(document[name]) for name in ("holds", "open_cells", "spent", "cuts")}
-    known["together"] = {pair: tuple(others) for pair, others in _by_pair(document.get("together", {})).items()}
-    return replace(_part(Whole, {**document, **dict.fromkeys(known, None)}), **known)
-
-
-def _document(part: Best | Start | Whole | Cuts | Bisection | Round) -> dict[str, Any]:
-    return {name: _plain(value) for name, value in vars(part).items()}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Polytope):
-        return {"C": value.C.tolist(), "d": value.d.tolist()}
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, dict):
-        return {str(pair): list(held) if isinstance(held, tuple) else held for pair, held in value.items()}
-    return value
-
-
-def _part(kind: type[Any], document: dict[str, Any] | None) -> Any:
-    """Makes a part of the state from its document, in which polytopes are mappings with C and d and arrays are lists."""
-    return None if document is None else kind(**{name: _value(name, value) for name, value in document.items()})
-
-
-def _value(name: str, value: Any) -> Any:
-    if isinstance(value, dict) and name != "holds":
-        return Polytope(np.array(value["C"]), np.array(value["d"]))
-    if isinstance(value, dict):
-        return {pair: (iteration, scale) for pair, (iteration, scale) in _by_pair(value).items()}
-    return np.array(value) if isinstance(value, list) else value
-
-
-def _by_pair(document: dict[str, Any]) -> dict[int, Any]:
-    """Turns the keys of a JSON object, which are text, back into pair indices."""
-    return {int(pair): value for pair, value in document.items()}

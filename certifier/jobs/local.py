@@ -12,9 +12,9 @@ from certifier.errors import CirisError
 from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Step, Transition
 from certifier.growth.machine import advance, begin
 from certifier.growth.options import GrowthOptions
+from certifier.growth.pairs import alike
 from certifier.growth.refusal import DEADLINE, at_deadline, ended_by, refusal
 from certifier.growth.state import Start
-from certifier.growth.trials import alike
 from certifier.jobs.former import Former
 from certifier.jobs.pairs import part_certifier
 from certifier.jobs.parallel import side_by_side

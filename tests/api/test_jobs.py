@@ -65,7 +65,10 @@ REFUSED: list[tuple[dict[str, Any], int, str, str | None]] = [
     (GROW | {"seed": {"method": "polytope", "C": [[1, 2]], "d": [1]}}, 422, "polytope_shape", "seed.C[0]"),
     (GROW | {"seed": {"q": [0.1], "epsilon": 2}}, 422, "invalid_request", "seed.epsilon"),
     (GROW | {"color": "red"}, 422, "invalid_request", "color"),
-    (GROW | {"options": {"max_rounds": -1}}, 422, "invalid_request", "options.max_rounds"),
+    (GROW | {"options": {"max_rounds": 1}}, 422, "invalid_request", "options.max_rounds"),
+    (GROW | {"options": {"paper": {"max_rounds": -1}}}, 422, "invalid_request", "options.paper.max_rounds"),
+    (GROW | {"seed": {"q": [0.1], "method": "limits"}}, 422, "option_value", "seed.method"),
+    (GROW | {"seed": {"q": [0.1], "method": "box"}, "options": {"paper": {}}}, 422, "missing_option", "seed.half_width"),
     (GROW | {"options": {"rounds": 1}}, 422, "invalid_request", "options.rounds"),
     (GROW | {"deadline_seconds": 0}, 422, "invalid_request", "deadline_seconds"),
     (GROW | {"kind": "conquer"}, 422, "invalid_request", "kind"),
@@ -283,7 +286,7 @@ def test_a_job_that_asks_for_cells_says_so(client: TestClient, scene: Scene) -> 
         return GrowthOptions.from_document(client.post("/v1/jobs", json=body).json()["options"])
 
     assert [options(body).by_cells for body in (CERTIFY, CERTIFY | {"cells": 300})] == [False, True]
-    whole = options(GROW | {"options": {"contraction": "whole", "cells": 900}})
+    whole = options(GROW | {"options": {"cells": 900}})
     assert (whole.by_cells, whole.cells) == (True, 900)
     refused = client.post("/v1/jobs", json=CERTIFY | {"cells": 0})
     assert (refused.status_code, refused.json()["field"]) == (422, "cells")

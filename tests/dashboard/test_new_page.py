@@ -36,8 +36,7 @@ def set_joint(page: Any, joint: str, degrees: float) -> None:
 
 def test_a_job_is_started_from_the_configuration_that_is_shown(opened: Any, url: str, client: TestClient) -> None:
     set_joint(opened, "arm/joint2", -20)
-    opened.get_by_label("First polytope").select_option("box")
-    opened.get_by_label("Half its width").fill("0.05")
+    opened.get_by_label("First polytope").select_option("iris_zo")
     opened.locator("summary", has_text="Effort").click()
     opened.get_by_label("Deadline").fill("2")
     opened.get_by_role("button", name="Start the job").press("Enter")
@@ -46,7 +45,7 @@ def test_a_job_is_started_from_the_configuration_that_is_shown(opened: Any, url:
     assert opened.url.endswith(job["id"])
     seed = job["options"]["seed"]
     assert seed["q"] == pytest.approx([0.1, np.deg2rad(-20)])
-    assert (seed["method"], seed["half_width"]) == ("box", 0.05)
+    assert seed["method"] == "iris_zo"
     assert job["deadline_at"] is not None
 
 

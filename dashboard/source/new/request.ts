@@ -4,8 +4,6 @@ export type Kind = "grow" | "cover";
 export const METHODS = {
   iris_np2: "IRIS (Drake's IrisNp2)",
   iris_zo: "IRIS, sampling only (Drake's IrisZo)",
-  limits: "The joint limits",
-  box: "A box around the configuration",
 } as const;
 export type Method = keyof typeof METHODS;
 
@@ -13,7 +11,6 @@ export type Method = keyof typeof METHODS;
 export interface Wish {
   kind: Kind;
   method: Method;
-  halfWidth: string;
   goal: "coverage" | "connect";
   coverage: string;
   regions: string;
@@ -25,14 +22,14 @@ export interface Wish {
   marks: number[][];
 }
 
-export const FIRST: Wish = { kind: "grow", method: "iris_np2", halfWidth: "0.1", goal: "coverage", coverage: "95", regions: "", cells: "", stages: "", minutes: "", priority: "0", marks: [] };
+export const FIRST: Wish = { kind: "grow", method: "iris_np2", goal: "coverage", coverage: "95", regions: "", cells: "", stages: "", minutes: "", priority: "0", marks: [] };
 
 /** The body of POST /v1/jobs. */
 export function request(scene: string, q: number[], wish: Wish): Record<string, unknown> {
   const common = { scene, ...given("deadline_seconds", wish.minutes, 60), ...(wish.priority !== "0" && { priority: Number(wish.priority) }) };
   const effort = { ...given("cells", wish.cells), ...given("stages", wish.stages) };
   if (wish.kind === "grow") {
-    const seed = { q, ...(wish.method !== "iris_np2" && { method: wish.method }), ...(wish.method === "box" && given("half_width", wish.halfWidth)), ...(wish.marks.length && { contain: wish.marks }) };
+    const seed = { q, ...(wish.method !== "iris_np2" && { method: wish.method }), ...(wish.marks.length && { contain: wish.marks }) };
     return { kind: "grow", ...common, seed, ...(Object.keys(effort).length && { options: effort }) };
   }
   const goal = wish.goal === "coverage" ? { ...given("coverage", wish.coverage, 0.01), ...(wish.marks.length && { seeds: wish.marks }) } : { connect: wish.marks };

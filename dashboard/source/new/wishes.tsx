@@ -42,15 +42,12 @@ export function Wishes({ wish, onWish, marks, onMark, onGo }: Props) {
         </label>
       </fieldset>
       {wish.kind === "grow" ? (
-        <>
-          <p class="field">
-            <label for="new-method">First polytope</label>
-            <select id="new-method" value={wish.method} onChange={(event) => set({ method: event.currentTarget.value as Method })}>
-              {Object.entries(METHODS).map(([method, words]) => <option value={method} key={method}>{words}</option>)}
-            </select>
-          </p>
-          {wish.method === "box" && number("halfWidth", "Half its width", "in s; 0.1 is about 11° of a joint near its centre", { min: 0.000001, step: "any", required: true })}
-        </>
+        <p class="field">
+          <label for="new-method">First polytope</label>
+          <select id="new-method" value={wish.method} onChange={(event) => set({ method: event.currentTarget.value as Method })}>
+            {Object.entries(METHODS).map(([method, words]) => <option value={method} key={method}>{words}</option>)}
+          </select>
+        </p>
       ) : (
         <>
           <p class="field">

@@ -44,13 +44,6 @@ def test_the_state_keeps_obstacles(s, faces, contact):
     assert GrowthState.from_document(document, OPTIONS).obstacles == kept
 
 
-def test_a_state_of_an_earlier_version_has_none():
-    document = GrowthState(OPTIONS, next=3).to_document()
-    del document["obstacles"]
-    found = GrowthState.from_document(document, OPTIONS)
-    assert (found.obstacles, found.next) == ({}, 3)
-
-
 def test_the_manifest_names_pairs_and_positions_and_begins_with_the_worst():
     scene = replace(slider(posts=3), q_star=np.array([0.5]))
     found = in_manifest(scene, {0: Obstacle(1, 9), 1: Obstacle(1, 1, 1, 0.1, (0.2,), contact=True), 2: Obstacle(1, 2, 3, 0.3, (0.1,))})

@@ -32,6 +32,7 @@ from certifier.seeding.proposal import Proposal
 from certifier.verify.region import verify_region
 from tests.certifier.scenes import box, planar_arm
 from tests.oracles.original import collision
+from tests.scenes import box_seed
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
@@ -48,7 +49,7 @@ OPEN = 1
 
 
 def options(cells=SLICE, **others):
-    return GrowthOptions(seed={}, contraction="whole", cells=cells, **others)
+    return GrowthOptions(seed={}, cells=cells, **others)
 
 
 def drive(verdict, asked, limit=40, passed=lambda action: 0.0):
@@ -342,8 +343,8 @@ def example(name):
 def test_a_region_of_an_example_is_verified_contains_what_it_has_to_and_is_free(name, half):
     path, scene, q = example(name)
     contain = (np.array(q) + 0.02).tolist()
-    seed = {"method": "box", "q": q, "half_width": half, "contain": [contain]}
-    region = grow(scene, GrowthOptions(seed=seed, contraction="whole", cells=2 * SLICE))
+    seed = box_seed(scene.to_s(q), half, contain=[contain])
+    region = grow(scene, GrowthOptions(seed=seed, cells=2 * SLICE))
     statement = verify_region(region.proof)
     assert set(statement.gaps) == set(scene.pairs)
     assert statement.gap > 0
@@ -364,7 +365,7 @@ def test_a_region_of_an_example_is_verified_contains_what_it_has_to_and_is_free(
 @pytest.mark.parametrize("processes", [1, 2, 3])
 def test_the_same_job_comes_to_the_same_bytes(processes):
     _, scene, q = example("planar_2dof")
-    asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.35}, contraction="whole", cells=SLICE)
+    asked = GrowthOptions(seed=box_seed(scene.to_s(q), 0.35), cells=SLICE)
     first, second = grow(scene, asked), grow(scene, asked, processes=processes)
     assert first.proof == second.proof
     assert first.manifest["halfspace_offsets"] == second.manifest["halfspace_offsets"]
@@ -374,14 +375,14 @@ def test_more_effort_does_not_come_to_less():
     _, scene, q = example("arm_3dof")
     shares = []
     for cells in (2, 10 * SLICE):
-        asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.3}, contraction="whole", cells=cells)
+        asked = GrowthOptions(seed=box_seed(scene.to_s(q), 0.3), cells=cells)
         shares.append(grow(scene, asked).manifest["share"])
     assert 0.9 < shares[0]["value"] <= shares[1]["value"]
 
 
 def test_a_deadline_ends_growth_with_the_best_region_so_far(monkeypatch):
     _, scene, q = example("planar_2dof")
-    asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.5}, contraction="whole", cells=SLICE)
+    asked = GrowthOptions(seed=box_seed(scene.to_s(q), 0.5), cells=SLICE)
     # The clock stands still until a region is reported, and then the deadline is over.
     clock = [0.0]
     monkeypatch.setattr(local, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
@@ -405,7 +406,7 @@ def test_a_deadline_ends_growth_with_the_best_region_so_far(monkeypatch):
 
 def test_regions_are_delivered_as_they_are_certified_and_time_is_left_for_growing(monkeypatch):
     _, scene, q = example("planar_2dof")
-    asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.35}, contraction="whole", cells=SLICE)
+    asked = GrowthOptions(seed=box_seed(scene.to_s(q), 0.35), cells=SLICE)
     monkeypatch.setattr(local, "REST", 0.0)
     delivered = []
     last = grow(scene, asked, deliver=delivered.append)
@@ -423,7 +424,7 @@ def test_regions_are_delivered_as_they_are_certified_and_time_is_left_for_growin
 def test_a_seed_in_contact_is_refused():
     scene = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (1.5, 0.0, 0.0)))
     with pytest.raises(CirisError):
-        grow(scene, GrowthOptions(seed={"method": "box", "q": [0.0, 0.0], "half_width": 0.2}, contraction="whole", cells=SLICE))
+        grow(scene, GrowthOptions(seed=box_seed([0.0, 0.0], 0.2), cells=SLICE))
 
 
 def test_a_child_that_dies_leaves_the_region_before(monkeypatch):
