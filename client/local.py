@@ -77,12 +77,8 @@ def recertify(data: bytes, scene: str, keep: list[list[float]] | None, asked: Do
     loaded = load(scene)
     from certifier.jobs import local
 
-    tell, deadline, seed = (
-        _teller(loaded, screen, watch),
-        _read(JobOptions, asked).deadline_seconds,
-        _read(RecertifyOptions, asked).random_seed,
-    )
-    region = local.recertify(loaded, data, keep, tell, deadline, cores(), seed)
+    deadline, seed = _read(JobOptions, asked).deadline_seconds, _read(RecertifyOptions, asked).random_seed
+    region = local.recertify(loaded, data, keep, _teller(loaded, screen, watch), deadline, cores(), seed)
     screen.clear()
     provenance = region.manifest["provenance"]
     return Grown(region.manifest, region.proof, provenance["seconds"], remark=provenance["reason"])

@@ -21,6 +21,7 @@ from certifier.seeding.options import GIVEN, SeedOptions
 from planner.cover.options import CoverOptions
 
 JOINTS = '"0,0.3,..."'
+_FILES = "The file is npz, JSON, YAML or CSV with q (K x n). "
 SEED = next(one for one in table(SeedOptions) if one.name == "q")
 """Where a region grows around. The command and the Python client take it in ways of their own."""
 
@@ -85,7 +86,7 @@ def _taking(one: Option) -> dict[str, Any]:
         case Takes.WHOLE:
             return {"type": int, "metavar": "N"}
         case Takes.REAL:
-            return {"type": _real, "metavar": {"s": "SECONDS", "m": "METRES", "rad": "RADIANS", "": "X"}[one.unit]}
+            return {"type": _real, "metavar": {"s": "SECONDS", "m": "METRES"}.get(one.unit, one.unit.upper() or "X")}
         case Takes.POINT:
             return {"metavar": JOINTS}
         case Takes.POINTS | Takes.PATHS | Takes.LABELS:
@@ -107,9 +108,6 @@ def about(one: Option) -> str:
         told += f" {_FILES if one.takes is Takes.PATHS else ''}May be repeated."
     told = told.replace("`", "").replace("%", "%%").rstrip(".")
     return f"{told[0].lower()}{told[1:]}" if re.match(r"[A-Z][a-z ]", told) else told
-
-
-_FILES = "The file is npz, JSON, YAML or CSV with q (K x n). "
 
 
 def typed(error: CirisError, parser: argparse.ArgumentParser) -> CirisError:
