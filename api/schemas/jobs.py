@@ -9,13 +9,14 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from api.schemas import patterns
-from api.schemas.common import Document, Offsets, Page, RandomSeed, Real, Request, Rows, SceneName, Vector, Whole
+from api.schemas.common import Document, Labels, Offsets, Page, Request, Rows, SceneName, Vector
 from api.schemas.covers import CoverRequestOptions
 from api.schemas.motions import GivenMotion
 from api.schemas.options import model_of
 from api.schemas.progress import Progress
 from api.schemas.scenes import PairInfo
-from certifier.growth.options import GrowthOptions
+from certifier.growth.options import CertifyOptions, GrowthOptions, RecertifyOptions
+from certifier.jobs.options import JobOptions
 from certifier.model import MAX_NAME
 from certifier.outcome import Outcome, Stage
 from certifier.seeding.options import SeedOptions
@@ -59,20 +60,10 @@ class WebhookRequest(Request):
         return secret
 
 
-LabelName = Annotated[str, Field(min_length=1, max_length=64, pattern=patterns.LABEL_NAME)]
-LabelValue = Annotated[str, Field(max_length=200, pattern=patterns.ANY)]
-Labels = Annotated[dict[LabelName, LabelValue], Field(max_length=20)]
-
-
-class JobRequest(Request):
+class JobRequest(model_of(JobOptions)):  # type: ignore[misc]
     """Holds what the requests for all kinds of job have in common."""
 
     scene: SceneName
-    priority: Whole = Field(0, ge=-3, le=3, description="Each step up doubles the job's share of the work for its API key.")
-    deadline_seconds: Real | None = Field(
-        None, gt=0, le=30 * 86400, description="The job ends this many seconds after its creation, with the regions it has by then."
-    )
-    labels: Labels = Field(default_factory=dict, description="Labels to find the job by, at most 20: name -> value.")
     webhook: WebhookRequest | None = Field(None, description="Whom to tell when the job has ended; nobody by default.")
 
 
@@ -96,7 +87,7 @@ class PolytopeBody(Request):
     center: Vector | None = Field(None, description="(n,), an interior point, in s; the service finds one if none is given.")
 
 
-class CertifyRequest(JobRequest):
+class CertifyRequest(JobRequest, model_of(CertifyOptions)):  # type: ignore[misc]
     """Asks for one outcome for each pair on a given polytope."""
 
     model_config = ConfigDict(
@@ -105,19 +96,9 @@ class CertifyRequest(JobRequest):
 
     kind: Literal["certify"] = Field(description="The kind of the job.")
     polytope: PolytopeBody = Field(description="The polytope to certify.")
-    cells: Annotated[
-        Whole,
-        Field(
-            ge=1,
-            le=10_000_000,
-            description="Number of cells of the polytope that are tried for each pair, each with its own plane. "
-            "With 1, each pair has one plane on all of the polytope.",
-        ),
-    ] = 1
-    random_seed: RandomSeed = 0
 
 
-class RecertifyRequest(JobRequest):
+class RecertifyRequest(JobRequest, model_of(RecertifyOptions)):  # type: ignore[misc]
     """Asks which part of another scene's region still holds in this scene, for instance after this scene has changed.
 
     Proofs of pairs with the same numbers are taken over; the others are made again, cell by cell. What cannot be certified is cut off.
@@ -133,7 +114,6 @@ class RecertifyRequest(JobRequest):
         description="Id of the region, or its first characters. Its scene must have the same joints, limits and q* as `scene`. "
         "The seed that it was grown from, and what it had to contain, stay inside.",
     )
-    random_seed: RandomSeed = 0
 
 
 class CertifyPathRequest(JobRequest, GivenMotion):

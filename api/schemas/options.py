@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, create_model
 
-from api.schemas.common import Real, Request, Rows, Vector, Whole
+from api.schemas.common import Labels, Real, Request, Rows, Vector, Whole
 from certifier.options import Option, Takes, table
 
 
@@ -40,4 +40,4 @@ def _type(one: Option) -> Any:
             return model_of(one.cls)
         case _:
             lists = {Takes.POINT: Vector, Takes.POINTS: Rows, Takes.PATHS: list[Annotated[list[Vector], Field(min_length=2)]]}
-            return {Takes.WHOLE: Whole, Takes.REAL: Real, Takes.FLAG: bool, **lists}[one.takes]
+            return {Takes.WHOLE: Whole, Takes.REAL: Real, Takes.FLAG: bool, Takes.LABELS: Labels, **lists}[one.takes]

@@ -11,6 +11,28 @@ from certifier.options import option, read, table
 from certifier.seeding.options import OF_PAPER
 
 MOST_CELLS = 6000
+MOST_GIVEN = 10_000_000
+"""Nobody may ask for more cells of a pair."""
+
+
+@dataclass(frozen=True)
+class RecertifyOptions:
+    """The options say how a region of a changed scene is certified again."""
+
+    random_seed: int = option(0, "Seed of every random choice.", least=0, greatest=2**63 - 1)
+
+
+@dataclass(frozen=True)
+class CertifyOptions(RecertifyOptions):
+    """The options say how a given polytope is certified."""
+
+    cells: int = option(
+        1,
+        "Number of cells of the polytope that are tried for each pair, each with its own plane. With 1, each pair has one plane on all of "
+        "the polytope.",
+        least=1,
+        greatest=MOST_GIVEN,
+    )
 
 
 @dataclass(frozen=True)
@@ -31,7 +53,7 @@ class GrowthOptions:
         "Cells of a pair in each stage. Cells still undecided when this budget is spent are removed by new faces.",
         otherwise=str(MOST_CELLS),
         least=1,
-        greatest=10_000_000,
+        greatest=MOST_GIVEN,
     )
     stages: int | None = option(
         None,

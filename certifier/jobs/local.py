@@ -269,11 +269,12 @@ def certify(
     cells: int = 1,
     processes: int = 1,
     assemble: bool = False,
+    random_seed: int = 0,
 ) -> Verdict:
     """Certifies every pair on a polytope and the joint limits.
 
     Args:
-        cells: as in :class:`certifier.growth.options.GrowthOptions`.
+        cells, random_seed: as in :class:`certifier.growth.options.CertifyOptions`.
         processes: as for :func:`grow`.
         assemble: make a region of a polytope that is certified, with its proof.
 
@@ -282,7 +283,7 @@ def certify(
     """
     start = time.perf_counter()
     seed = {"C": polytope.C.tolist(), "d": polytope.d.tolist(), "center": None if center is None else center.tolist()}
-    options = GrowthOptions.from_document({"kind": "certify", "seed": seed, "cells": cells})
+    options = GrowthOptions.from_document({"kind": "certify", "seed": seed, "cells": cells, "random_seed": random_seed})
     first = begin(scene, options)
     action = first.action
     assert isinstance(action, Certify)

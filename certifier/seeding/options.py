@@ -31,6 +31,8 @@ OF_PAPER = (Method.LIMITS, Method.BOX)
 _GIVE = {"half_width": "give it in s, such as 0.1: about 11 degrees on each side of a joint near q*"}
 IRIS_SEEDS = 2**31
 """IRIS has this many seeds of its random choices, from 0 on."""
+GIVEN = ("polytope", "C", "d", "center")
+"""The method that takes a given polytope, and its options. Documents have them; nobody types them: there is ``ciris certify``."""
 
 
 @dataclass(frozen=True)
@@ -39,18 +41,18 @@ class SeedOptions:
 
     method: Method | None = option(
         None,
-        "How the first polytope is found: by Drake's IRIS (`iris_np2`, `iris_zo`), or as given (`polytope`). With the papers' algorithm "
-        "also from the joint limits (`limits`), or as a box around the seed (`box`).",
+        "How the first polytope is found: by Drake's IRIS (`iris_np2`, `iris_zo`), or with the papers' algorithm also from the joint "
+        "limits (`limits`), or as a box around the seed (`box`).",
         otherwise="`iris_np2`",
     )
-    q: tuple[float, ...] | None = option(
-        None, "The seed: joint positions in radians or metres, in position order. Every method but `polytope` needs it."
-    )
+    q: tuple[float, ...] | None = option(None, "The seed: joint positions in radians or metres, in position order.")
     contain: tuple[tuple[float, ...], ...] = option(
         (), "More configurations (joint positions) that the region must contain, such as where it meets another region."
     )
     C: tuple[tuple[float, ...], ...] | None = option(
-        None, "(m, n), the first polytope {s : C s <= d}, one row a face, in s; for the method `polytope`. The joint limits are added."
+        None,
+        "(m, n), the first polytope {s : C s <= d}, one row a face, in s; for the method `polytope`, which takes no `q`. The joint limits "
+        "are added.",
     )
     d: tuple[float, ...] | None = option(None, "(m,), the right-hand sides of these faces.")
     center: tuple[float, ...] | None = option(None, "(n,), a point inside that polytope, in s.", otherwise="the centre of its largest ball")
@@ -65,7 +67,7 @@ class SeedOptions:
         above=0,
         below=1,
     )
-    delta: float = option(0.05, "Probability with which IRIS may be wrong about `epsilon`.", argument="iris-delta", above=0, below=1)
+    delta: float = option(0.05, "Probability with which IRIS may be wrong about that fraction.", argument="iris-delta", above=0, below=1)
     max_iterations: int = option(
         3,
         "Largest number of alternations of IRIS between faces and ellipsoid, and again where balls about a hand join the scene.",
@@ -87,7 +89,7 @@ class SeedOptions:
     random_seed: int | None = option(
         None,
         "Seed of IRIS' random choices alone. Another seed gives another proposal.",
-        otherwise="`random_seed` of the options",
+        otherwise="the seed of every random choice",
         argument="iris-random-seed",
         least=0,
         greatest=IRIS_SEEDS - 1,

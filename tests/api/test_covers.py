@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
-from api.schemas.covers import CoverRequestOptions
 from certifier.model import Scene
 from db import jobs, scenes
 from db.models import JobRow
@@ -34,11 +32,6 @@ def with_child(database: Database, cover_id: str) -> JobRow:
         cover = jobs.lock(session, cover_id)
         child, _ = jobs.create(session, kind="grow", scene_id=cover.scene_id, options={"kind": "grow"}, parent_id=cover.id, number=0)
     return child
-
-
-def test_the_request_has_the_options_of_a_cover() -> None:
-    assert set(CoverRequestOptions.model_fields) == {field.name for field in fields(CoverOptions)}
-    assert CoverOptions.from_document(CoverRequestOptions().model_dump()) == CoverOptions()
 
 
 def test_a_cover_is_a_job_with_options_of_its_own(client: TestClient, scene: Scene) -> None:

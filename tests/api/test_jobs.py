@@ -1,7 +1,7 @@
 """Jobs over HTTP: creation, idempotency, refusals, pages, cancel, retry; the queue is real, the workers are not there."""
 
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,14 +9,12 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api.app import create_app
-from api.schemas.jobs import GrowOptions, Seed
 from certifier.growth.machine import begin
 from certifier.growth.options import GrowthOptions
 from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair.result import PairResult
 from certifier.partition.certification import CellCertification
-from certifier.seeding.options import SeedOptions
 from certifier.verify.file import verify_file
 from db import jobs, pairs, scenes
 from db.session import Database
@@ -317,12 +315,6 @@ def test_a_job_is_accepted_while_redis_is_down(database: Database, scene: Scene,
 
 def test_the_service_is_ready_with_its_database_and_its_queue(client: TestClient) -> None:
     assert client.get("/readyz").json() == {"ready": True, "checks": {"database": "ok", "queue": "ok", "disk": "ok"}}
-
-
-def test_the_schema_has_the_options_of_the_certifier() -> None:
-    ours, theirs = GrowOptions().model_dump(), GrowthOptions().to_document()
-    assert ours == {name: value for name, value in theirs.items() if name not in ("kind", "seed")}
-    assert set(Seed.model_fields) == {field.name for field in fields(SeedOptions)}
 
 
 def test_a_region_of_another_scene_is_certified_again_with_its_seed_inside(client: TestClient, database: Database, region: str) -> None:

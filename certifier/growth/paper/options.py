@@ -49,6 +49,7 @@ class PaperOptions:
         "Most rounds of the polytope step (12) after the pushes.",
         otherwise="3 for arms with at most four joints between two bodies, else 0",
         argument="rounds",
+        python="max_rounds",
         least=0,
         greatest=1000,
     )
