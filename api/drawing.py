@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from threading import Lock
-from typing import Literal
 
 import numpy as np
 from cachetools import LRUCache, cached
@@ -37,10 +36,6 @@ KEPT = 64
 """Number of collision maps that an API process keeps, those that were asked for last."""
 
 
-def units(scene: Scene) -> list[Literal["rad", "m"]]:
-    return ["rad" if turns else "m" for turns in scene.revolute]
-
-
 def model(scene_id: str, scene: Scene) -> SceneModel:
     """Returns the scene as it is drawn."""
     index = {geometry.name: i for i, geometry in enumerate(scene.geometries)}
@@ -66,7 +61,7 @@ def model(scene_id: str, scene: Scene) -> SceneModel:
         q_star=scene.q_star.tolist(),
         q_lower=scene.q_lower.tolist(),
         q_upper=scene.q_upper.tolist(),
-        units=units(scene),
+        units=[joint.unit for joint in scene.moving],
         padding=scene.padding,
         geometries=[_drawn(geometry) for geometry in scene.geometries],
         pairs=[(index[pair.a], index[pair.b]) for pair in scene.pairs],
@@ -104,7 +99,7 @@ def contacts(scene: Scene, q: Array) -> list[Contacts]:
     lower, upper = scene.own_limits
     beyond = (q < lower) | (q > upper)
     shifted = scene.in_windows(q)
-    covered = np.abs(np.where(scene.revolute, shifted - scene.q_star, 0.0)).max(axis=1) < np.pi
+    covered = np.all(scene.has_s(shifted), axis=1)
     touching = iter(contacts_at(scene, scene.to_s(shifted[covered])))
     names = [joint.name for joint in scene.moving]
     return [
@@ -156,7 +151,7 @@ def sliced(scene_id: str, scene: Scene, library: Library, body: SliceRequest) ->
     in_collision = np.unpackbits(_collision_map(scene, points), count=len(points)).astype(bool)
     signs = np.where(in_collision, "#", np.where(certified, "o", "."))
     described = [
-        SliceAxis(joint=scene.moving[axis].name, unit=units(scene)[axis], lower=low, upper=high)
+        SliceAxis(joint=scene.moving[axis].name, unit=scene.moving[axis].unit, lower=low, upper=high)
         for axis, low, high in zip(axes, lower.tolist(), upper.tolist(), strict=True)
     ]
     return SliceResponse(

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
 from certifier.errors import CirisError
+from certifier.options import in_group
 from db.disk import lacks_room
 from db.session import UNAVAILABLE
 from jobs.patterns import SAID
@@ -204,9 +205,18 @@ def _field(loc: Sequence[str | int]) -> str:
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".")
 
 
+def _elsewhere(*path: str | int) -> str:
+    """Returns where to give an option that is a member of a group; "" for another field."""
+    if len(path) != 3 or path[0] not in KINDS:
+        return ""
+    _, cls = KINDS[str(path[0])].forms.get(str(path[1]), ("", None))
+    found = "" if cls is None else in_group(cls, str(path[2]))
+    return f": give {path[1]}.{found}" if found else ""
+
+
 def _sentence(error: dict[str, Any]) -> str:
     if error["type"] == "extra_forbidden":
-        return "there is no such field"
+        return f"there is no such field{_elsewhere(*error['loc'][1:])}"
     if error["type"] == "string_pattern_mismatch":
         return SAID[error["ctx"]["pattern"]]
     if error["type"] in _TAGS:

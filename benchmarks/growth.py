@@ -9,9 +9,11 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Collection
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
 from pydrake.common import Parallelism
 from pydrake.geometry.optimization import HPolyhedron, Hyperellipsoid
 from pydrake.multibody.rational import RationalForwardKinematics
@@ -22,6 +24,7 @@ from benchmarks.measure import Progress
 from benchmarks.svg import Panel, draw
 from certifier.errors import CirisError
 from certifier.growth.options import GrowthOptions
+from certifier.growth.paper.options import PaperOptions
 from certifier.jobs.local import grow
 from certifier.jobs.reference import Reference
 from certifier.jobs.share import SampledProposal
@@ -33,12 +36,12 @@ from certifier.seeding.propose import check_seed
 from certifier.verify.region import verify_region
 from client.cores import cores
 
-WAYS: dict[str, dict[str, Any]] = {
-    "whole": {"contraction": "whole"},
-    "targeted": {"contraction": "targeted"},
-    "uniform contraction": {"contraction": "uniform", "pushes": 0, "max_rounds": 0},
+WAYS: dict[str, PaperOptions | None] = {
+    "whole": None,
+    "targeted": PaperOptions(),
+    "uniform contraction": PaperOptions("uniform", pushes=0, max_rounds=0),
 }
-"""Each way to grow has these options of a grow job, with the default seeding."""
+"""The options of the papers' algorithm for each way to grow, with the default seeding; None for ours, which keeps the whole proposal."""
 IRIS = "Drake's IRIS"
 """This way proposes a region, and proves nothing. The share is of this region itself."""
 START_RADIUS = 1e-2
@@ -68,13 +71,13 @@ def growth(names: list[str], against: bool, limit: float, progress: Progress, on
         limit: growing one region of ``ways`` ends after so many seconds with the best so far; Drake and what it is compared with have none.
         only: the ways to measure; None for all.
     """
-    small = {**_seed(catalogue.EXAMPLES[0]), "method": "box"}
-    for options in WAYS.values():  # These first runs load the compiled kernels and do not count.
-        _grown(catalogue.EXAMPLES[0], small, {**options, "pushes": 0, "max_rounds": 0})
+    small = _cube(catalogue.EXAMPLES[0])
+    for paper in WAYS.values():  # These first runs load the compiled kernels and do not count.
+        _grown(catalogue.EXAMPLES[0], small, None if paper is None else replace(paper, pushes=0, max_rounds=0))
     here = {"machine": measure.machine()}
     ways = []
     for name in names:
-        ours = {way: partial(_grown, name, _seed(name), options, limit) for way, options in WAYS.items()}
+        ours = {way: partial(_grown, name, _seed(name), paper, limit) for way, paper in WAYS.items()}
         for way, run in {IRIS: partial(_proposed, name), **ours}.items():
             if only is not None and way not in only:
                 continue
@@ -113,13 +116,11 @@ def _against(name: str, progress: Progress) -> list[dict[str, Any]]:
     ``time_ratios`` are Drake's seconds divided by that, for every run. ``seconds``, ``reached_seconds`` and ``time_ratio`` are medians.
     """
     scene = catalogue.scene(name)
-    center = scene.to_s(catalogue.seed(name))
-    C, d = catalogue.cube(center, HALF_WIDTH)
-    cube = {"method": "polytope", "C": C.tolist(), "d": d.tolist(), "center": center.tolist()}
-    alternation = {"contraction": "targeted", "pushes": 0, "max_rounds": ROUNDS, "tolerance": TOLERANCE}
-    pushes = {"contraction": "targeted", "pushes": PUSHES, "max_rounds": 0}
+    cube = _cube(name)
+    alternation = PaperOptions(pushes=0, max_rounds=ROUNDS, tolerance=TOLERANCE)
+    pushes = PaperOptions(pushes=PUSHES, max_rounds=0)
     sides: dict[str, Callable[[], dict[str, Any]]] = {
-        "Drake's alternation": lambda: _drakes(scene, C, d),
+        "Drake's alternation": lambda: _drakes(scene, np.array(cube["C"]), np.array(cube["d"])),
         "our alternation": lambda: _grown(name, cube, alternation),
         "our pushes": lambda: _grown(name, cube, pushes),
         "targeted, from the seed": lambda: _grown(name, _seed(name), WAYS["targeted"]),
@@ -153,14 +154,21 @@ def _seed(name: str) -> dict[str, Any]:
     return {"q": catalogue.seed(name).tolist()}
 
 
-def _grown(name: str, seed: dict[str, Any], options: dict[str, Any], limit: float | None = None) -> dict[str, Any]:
+def _cube(name: str) -> dict[str, Any]:
+    """Returns the seed of a growth from the cube in s about the seed of an example."""
+    center = catalogue.scene(name).to_s(catalogue.seed(name))
+    C, d = catalogue.cube(center, HALF_WIDTH)
+    return {"method": "polytope", "C": C.tolist(), "d": d.tolist(), "center": center.tolist()}
+
+
+def _grown(name: str, seed: dict[str, Any], paper: PaperOptions | None, limit: float | None = None) -> dict[str, Any]:
     """Grows one region of ours and verifies its proof. If no region could be certified, the row says why.
 
     ``seconds`` are of the clock and ``processor_seconds`` of this process, with the seeding and the proof's first verification.
     """
     spent = _stopwatch()
     try:
-        region = grow(catalogue.scene(name), GrowthOptions(seed=seed, **options), deadline_s=limit, processes=cores())
+        region = grow(catalogue.scene(name), GrowthOptions(seed=seed, paper=paper), deadline_s=limit, processes=cores())
     except CirisError as error:
         return {**spent(), "ellipsoid": 0.0, "faces": 0, "curve": [], "ended": str(error)}
     took, again, manifest = spent(), time.perf_counter(), region.manifest
@@ -215,7 +223,7 @@ def _proposed(name: str) -> dict[str, Any]:
         "seeding_seconds": took["seconds"],
         "share": 1.0,
         "share_stderr": 0.0,
-        "q_volume": volume_in_q(polytope, scene.revolute, volume(polytope, 0), 0)[0],
+        "q_volume": volume_in_q(polytope, scene, volume(polytope, 0), 0)[0],
         "ellipsoid": inscribed_ellipsoid(polytope).volume,
         "faces": len(region.b()),
         "curve": [],

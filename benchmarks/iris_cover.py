@@ -56,7 +56,7 @@ class _Regions:
             common = overlap(self._library, other, number)
             if common is not None:
                 self._edges.append((other, number, common.witness.tolist()))
-        samples = uniform_in_q(polytope, self._scene.revolute, CHAINS, EACH, 0).reshape(-1, self._scene.n)
+        samples = uniform_in_q(polytope, self._scene, CHAINS, EACH, 0).reshape(-1, self._scene.n)
         self.colliding.append(float(in_collision(self._scene, samples).mean()))
 
 

@@ -145,7 +145,7 @@ def _points(library: Library, scene: Scene, count: int, rng: np.random.Generator
     points = np.empty((count, scene.n))
     for region in np.unique(chosen).tolist():
         mine = np.flatnonzero(chosen == region)
-        drawn = uniform_in_q(library.polytope(region), scene.revolute, chains=len(mine), each=1, seed=region)
+        drawn = uniform_in_q(library.polytope(region), scene, chains=len(mine), each=1, seed=region)
         points[mine] = scene.to_q(drawn[:, 0])
     return points
 

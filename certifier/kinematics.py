@@ -29,12 +29,10 @@ class Factor:
     Attributes:
         index: position index; None for a weld, of which only T[0] is set.
         terms: (3, 4, 4) T[0], T[1] and T[2], left and right included.
-        revolute: whether the factor carries the denominator 1 + s^2.
     """
 
     index: int | None
     terms: Array
-    revolute: bool
 
 
 class Kinematics:
@@ -154,11 +152,11 @@ def _factor(joint: Joint, q_star: Array, inverse: bool) -> Factor:
         left, right = joint.X_BM, rigid_inverse(joint.X_PF)
     zero = np.zeros(3)
     if joint.index is None:
-        return Factor(None, np.array([left @ right, np.zeros((4, 4)), np.zeros((4, 4))]), False)
+        return Factor(None, np.array([left @ right, np.zeros((4, 4)), np.zeros((4, 4))]))
     axis = -joint.axis if inverse else joint.axis
     if joint.kind is JointKind.PRISMATIC:
         terms = [_homogeneous(np.eye(3), axis * q_star[joint.index], 1), _homogeneous(np.zeros((3, 3)), axis, 0), np.zeros((4, 4))]
     else:
         R, K = rotation(axis, q_star[joint.index]), skew(axis)
         terms = [_homogeneous(R, zero, 1), _homogeneous(2 * R @ K, zero, 0), _homogeneous(R @ (np.eye(3) + 2 * K @ K), zero, 1)]
-    return Factor(joint.index, np.array([left @ T @ right for T in terms]), joint.kind is JointKind.REVOLUTE)
+    return Factor(joint.index, np.array([left @ T @ right for T in terms]))

@@ -4,23 +4,24 @@ A :class:`Scene` is self-contained: nobody needs a robot file, a mesh or Drake t
 the verifier all refer to it. Drake's parsed doubles are taken as exact numbers.
 
 Monogram notation: X_PF is the pose of frame F measured in frame P, and p_BV is the position of point V in frame B.
-Tangent configuration space (C-IRIS, eq. 4): s_i = tan((q_i - q*_i) / 2) for a revolute joint, s_i = q_i - q*_i for a prismatic one.
+What s is, :mod:`certifier.coordinates` says.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from flint import arb, ctx, fmpq
 from numpy.typing import ArrayLike, NDArray
 
+from certifier.coordinates import ConfigurationSpace
 from certifier.document import LARGEST, Node
 from certifier.errors import CirisError, RegionError, SceneError
 from certifier.positions import check_magnitude, without_turns
@@ -93,6 +94,16 @@ class Joint:
     upper: float | None = None
     own_limits: tuple[float | None, float | None] | None = None
 
+    @property
+    def unit(self) -> Literal["rad", "m"]:
+        """Returns the unit of the joint's position."""
+        return "rad" if self.kind is JointKind.REVOLUTE else "m"
+
+    @property
+    def shown(self) -> tuple[Literal["deg", "m"], float]:
+        """Returns the unit in which people read the joint's position, and how many of it are in a radian or a metre."""
+        return ("deg", math.degrees(1.0)) if self.kind is JointKind.REVOLUTE else ("m", 1.0)
+
 
 @dataclass(frozen=True)
 class Geometry:
@@ -136,8 +147,8 @@ class Ignored:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
-    """A scene is a kinematic tree with convex geometries and the pairs to certify.
+class Scene(ConfigurationSpace):
+    """A scene is the configuration space of a kinematic tree, with convex geometries and the pairs of them to certify.
 
     A scene is equal to itself alone, so that what is derived from it can be kept.
 
@@ -163,6 +174,10 @@ class Scene:
     padding: float = 0.0
     warnings: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
+    revolute: NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "revolute", np.array([j.kind is JointKind.REVOLUTE for j in self.moving], dtype=bool))
 
     @property
     def n(self) -> int:
@@ -173,11 +188,6 @@ class Scene:
     def moving(self) -> tuple[Joint, ...]:
         """Returns the n joints that have a position, in position order."""
         return tuple(sorted((j for j in self.joints if j.index is not None), key=lambda j: j.index or 0))
-
-    @cached_property
-    def revolute(self) -> NDArray[np.bool_]:
-        """Returns, (n,), True where the joint is revolute."""
-        return np.array([j.kind is JointKind.REVOLUTE for j in self.moving], dtype=bool)
 
     @cached_property
     def q_lower(self) -> Array:
@@ -215,19 +225,11 @@ class Scene:
     @cached_property
     def s_lower(self) -> Array:
         # The difference from q* is rounded before the tangent, which may lead beyond the limit as the verifier believes it.
-        return np.maximum(self._limits_in_s(self.q_lower), self.outer_limits[0])
+        return np.maximum(self.nearest_s(self.q_lower), self.outer_limits[0])
 
     @cached_property
     def s_upper(self) -> Array:
-        return np.minimum(self._limits_in_s(self.q_upper), self.outer_limits[1])
-
-    def _limits_in_s(self, limits: Array) -> Array:
-        """Returns the tangent-space coordinates of joint limits, (n,), rounded to nearest, the same on every machine.
-
-        NumPy's tangent depends on the processor; the tangent of ball arithmetic does not.
-        """
-        delta = limits - self.q_star
-        return np.array([_tangent(x / 2) if revolute else x for x, revolute in zip(delta.tolist(), self.revolute, strict=True)])
+        return np.minimum(self.nearest_s(self.q_upper), self.outer_limits[1])
 
     @cached_property
     def outer_limits(self) -> tuple[Array, Array]:
@@ -235,20 +237,7 @@ class Scene:
 
         Code that relies on the joint limits must not round them inwards, because that would leave configurations out.
         """
-        q_star, revolute = self.q_star.tolist(), self.revolute.tolist()
-        lower = [-_not_less(*joint) for joint in zip(q_star, self.q_lower.tolist(), revolute, strict=True)]
-        upper = [_not_less(*joint) for joint in zip(self.q_upper.tolist(), q_star, revolute, strict=True)]
-        return np.array(lower), np.array(upper)
-
-    def to_s(self, q: ArrayLike) -> Array:
-        """Returns the tangent-space coordinates of positions q, (..., n) -> (..., n)."""
-        delta = np.asarray(q, dtype=float) - self.q_star
-        return np.where(self.revolute, np.tan(delta / 2), delta)
-
-    def to_q(self, s: ArrayLike) -> Array:
-        """Returns the joint positions of tangent-space coordinates s, (..., n) -> (..., n)."""
-        s = np.asarray(s, dtype=float)
-        return self.q_star + np.where(self.revolute, 2 * np.arctan(s), s)
+        return self.outer_s(self.q_lower, self.q_upper)
 
     @cached_property
     def joint_above(self) -> dict[str, Joint]:
@@ -305,36 +294,9 @@ class Scene:
     def _content(self) -> dict[str, Any]:
         return {
             "schema_version": SCHEMA_VERSION,
-            "joints": [
-                {
-                    "name": j.name,
-                    "kind": j.kind.value,
-                    "parent": j.parent,
-                    "child": j.child,
-                    "axis": j.axis.tolist(),
-                    "X_PF": j.X_PF.tolist(),
-                    "X_BM": j.X_BM.tolist(),
-                    "index": j.index,
-                    "lower": j.lower,
-                    "upper": j.upper,
-                    # Scenes without windows keep the hash that they had before there were any.
-                    **({} if j.own_limits is None else {"own_limits": list(j.own_limits)}),
-                }
-                for j in self.joints
-            ],
+            "joints": [_plain(joint) for joint in self.joints],
             "bodies": list(self.bodies),
-            "geometries": [
-                {
-                    "name": g.name,
-                    "body": g.body,
-                    "vertices": g.vertices.tolist(),
-                    "radius": g.radius,
-                    "shape": g.shape,
-                    "substitution": g.substitution,
-                    "inflation": g.inflation,
-                }
-                for g in self.geometries
-            ],
+            "geometries": [_plain(geometry) for geometry in self.geometries],
             "pairs": [[p.a, p.b] for p in self.pairs],
             "ignored": [{"pair": [i.a, i.b], "reason": i.reason} for i in self.ignored],
             "q_star": self.q_star.tolist(),
@@ -359,26 +321,12 @@ class Scene:
         return scene
 
 
-def _tangent(angle: float) -> float:
-    precision = ctx.prec
-    ctx.prec = 256
-    try:
-        return float(arb(angle).tan().mid())
-    finally:
-        ctx.prec = precision
-
-
-def _not_less(q: float, base: float, revolute: bool) -> float:
-    """Returns the least double that is no less than tan((q - base)/2), or than q - base."""
-    difference = fmpq(*q.as_integer_ratio()) - fmpq(*base.as_integer_ratio())
-    precision = ctx.prec
-    ctx.prec = 4096  # a difference of doubles is exact
-    try:
-        exactly = (arb(difference) / 2).tan() if revolute else arb(difference)
-        nearest = float(exactly.mid())
-        return nearest if arb(nearest) >= exactly else float(np.nextafter(nearest, np.inf))
-    finally:
-        ctx.prec = precision
+def _plain(part: Joint | Geometry) -> dict[str, Any]:
+    """Returns a part's fields as JSON-able data."""
+    plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in vars(part).items()}
+    if limits := plain.pop("own_limits", None):  # Scenes without windows keep the hash that they had before there were any.
+        plain["own_limits"] = list(limits)
+    return plain
 
 
 def _size(array: Array) -> str:

@@ -38,6 +38,8 @@ class Takes(StrEnum):
     """A list of points."""
     PATHS = "paths"
     """A list of lists of points."""
+    LABELS = "labels"
+    """Texts by name."""
     GROUP = "group"
     """Options of their own, by name."""
 
@@ -48,7 +50,9 @@ class Option:
 
     Attributes:
         name: of the field, and in documents and requests.
-        argument: of the command, without ``--``. With ``_`` for ``-`` it is the name in the Python client.
+        argument: of the command, without ``--``.
+        python: the name in the Python client. It is the argument with ``_`` for ``-``, but that of the field for what is typed once for
+            each item.
         text: what it means, in sentences.
         otherwise: what holds where nothing is given, in words; "" where the default says it.
         default: the value where nothing is given.
@@ -67,6 +71,7 @@ class Option:
     default: Any
     optional: bool
     argument: str
+    python: str
     otherwise: str = ""
     least: float | None = None
     greatest: float | None = None
@@ -82,6 +87,12 @@ class Option:
         """Returns the text with what holds where nothing is given."""
         return f"{self.text} Default: {self.otherwise}." if self.otherwise else self.text
 
+    @property
+    def explained(self) -> str:
+        """Returns the same with the default where it is a value."""
+        valued = self.takes in (Takes.WHOLE, Takes.REAL, Takes.CHOICE) and self.default is not None and not self.otherwise
+        return f"{self.text} Default: {self.default}." if valued else self.described
+
 
 def option(default: Any, text: str, **more: Any) -> Any:
     """Returns the field of a dataclass that is an option.
@@ -90,7 +101,8 @@ def option(default: Any, text: str, **more: Any) -> Any:
         text: what it means, in sentences.
         more: attributes of :class:`Option` that do not follow from the field.
     """
-    return field(default=default, metadata={_KEY: {"text": text, **more}})
+    given: dict[str, Any] = {"default_factory": lambda: {**default}} if isinstance(default, dict) else {"default": default}
+    return field(**given, metadata={_KEY: {"text": text, **more}})
 
 
 @cache
@@ -105,7 +117,10 @@ def _of_field(f: dataclasses.Field[Any], hint: Any) -> Option:
     (kept,) = (member for member in members if member is not type(None))
     takes, choices = _takes(kept)
     said = {"argument": f.name.replace("_", "-"), "choices": choices, "cls": kept if isinstance(kept, type) else None, **f.metadata[_KEY]}
-    return Option(name=f.name, takes=takes, default=f.default, optional=type(None) in members, **said)
+    default = {} if f.default is dataclasses.MISSING else f.default
+    repeated = takes in (Takes.POINTS, Takes.PATHS, Takes.LABELS)
+    said.setdefault("python", f.name if repeated else said["argument"].replace("-", "_"))
+    return Option(name=f.name, takes=takes, default=default, optional=type(None) in members, **said)
 
 
 def _takes(hint: Any) -> tuple[Takes, tuple[str, ...]]:
@@ -117,14 +132,14 @@ def _takes(hint: Any) -> tuple[Takes, tuple[str, ...]]:
         return Takes.GROUP, ()
     number = tuple[float, ...]
     lists: dict[Any, Takes] = {number: Takes.POINT, tuple[number, ...]: Takes.POINTS, tuple[tuple[number, ...], ...]: Takes.PATHS}
-    return {int: Takes.WHOLE, float: Takes.REAL, bool: Takes.FLAG, **lists}[hint], ()
+    return {int: Takes.WHOLE, float: Takes.REAL, bool: Takes.FLAG, dict[str, str]: Takes.LABELS, **lists}[hint], ()
 
 
 def read(cls: type[Options], document: Mapping[str, Any], place: str) -> Options:
     """Returns the options of a document. None stands for the default, as far as the type allows no None.
 
     Args:
-        place: where the document stands, which the fields of errors begin with, as in ``options.cells``.
+        place: where the document stands, which the fields of errors begin with, as in ``options.cells``; "" for a request itself.
 
     Raises:
         RegionError: ``unknown_option``, ``option_value``; the error names the option.
@@ -132,15 +147,26 @@ def read(cls: type[Options], document: Mapping[str, Any], place: str) -> Options
     known, described = [f.name for f in fields(cls)], {one.name: one for one in table(cls)}  # type: ignore[arg-type]
     for name in document:
         if name not in known:
-            hint = close_matches(name, known) or f"options: {', '.join(sorted(described))}"
-            raise RegionError("unknown_option", f"there is no option {name!r}", field=f"{place}.{name}", hint=hint)
+            found = in_group(cls, name)
+            hint = f"give {_within(place, found)}" if found else close_matches(name, known) or f"options: {', '.join(sorted(described))}"
+            raise RegionError("unknown_option", f"there is no option {name!r}", field=_within(place, name), hint=hint)
     given = {}
     for name, value in document.items():
         one = described.get(name)
         if value is None and one is not None:
             continue
-        given[name] = value if one is None else _value(one, value, f"{place}.{name}")
+        given[name] = value if one is None else _value(one, value, _within(place, name))
     return cls(**given)
+
+
+def _within(place: str, name: str) -> str:
+    return f"{place}.{name}".removeprefix(".")
+
+
+def in_group(cls: type, name: str) -> str:
+    """Returns the path of an option that a group of the dataclass has, as in ``group.name``; "" where none has it."""
+    groups = [one for one in table(cls) if one.takes is Takes.GROUP and one.cls is not None]
+    return next((f"{one.name}.{name}" for one in groups if name in [inner.name for inner in table(one.cls)]), "")
 
 
 def _value(one: Option, value: Any, where: str) -> Any:
@@ -156,6 +182,8 @@ def _value(one: Option, value: Any, where: str) -> Any:
             return _number(one, value, where, isinstance(value, int | float) and math.isfinite(value))
         case Takes.FLAG if not isinstance(value, bool):
             raise _refused(one, where, "true or false")
+        case Takes.LABELS if not isinstance(value, Mapping):
+            raise _refused(one, where, "an object of texts")
         case Takes.CHOICE if value not in one.choices:
             raise _refused(one, where, f"one of {', '.join(one.choices)}")
         case Takes.CHOICE:
@@ -184,9 +212,9 @@ def within(one: Option) -> str:
     what = "an integer" if one.takes is Takes.WHOLE else "a number"
     if one.least is not None and one.greatest is not None:
         return f"{what} from {one.least} to {one.greatest}"
-    above = [] if one.above is None else [f"above {one.above:g}"]
-    upper = [] if one.greatest is None else [f"at most {one.greatest:g}"]
-    below = [] if one.below is None else [f"below {one.below:g}"]
+    above = [] if one.above is None else [f"above {one.above:.10g}"]
+    upper = [] if one.greatest is None else [f"at most {one.greatest:.10g}"]
+    below = [] if one.below is None else [f"below {one.below:.10g}"]
     return " ".join([what, " and ".join([*above, *upper, *below])]).strip()
 
 

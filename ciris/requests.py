@@ -3,121 +3,65 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal, TypedDict, get_type_hints
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from certifier.errors import CirisError, RegionError, close_matches
 from ciris.answers import Document
+from ciris.options import GROW, Fields, GrowOptions
 from ciris.space import numbers
 
 Straight = Literal["q", "s"]
 
 
-class GrowOptions(TypedDict, total=False):
-    """Options of growing a region. The service has a default for each."""
-
-    contain: ArrayLike
-    """(n,) or (k, n), more configurations that the region must contain, such as where it meets another region."""
-    method: Literal["iris_np2", "iris_zo", "limits", "box"]
-    """How the first polytope is found: by Drake's IRIS, from the joint limits, or as a box around q."""
-    deadline: float
-    """Seconds after which the job ends, with the best region so far."""
-    contraction: Literal["whole", "targeted", "uniform"]
-    """``whole`` keeps the first polytope and certifies it cell by cell; the others shrink it until every pair has one plane."""
-    cells: int
-    """For ``whole``: cells of a pair in each stage. Cells still undecided when this budget is spent are removed by new faces."""
-    pushes: int
-    """How often the faces are pushed out after the contractions."""
-    max_rounds: int
-    """Most rounds of the polytope step."""
-    random_seed: int
-    """Seed of every random choice, those of Drake's IRIS too. Another seed gives another region."""
-    priority: int
-    """From -3 to 3; each step up doubles the job's share of the work."""
-    labels: Mapping[str, str]
-    """Labels to find the job by: name -> value."""
-
-
-class CoverOptions(TypedDict, total=False):
-    """Options of a cover. The service has a default for each."""
-
-    coverage: float
-    """Goal: this share of the collision-free configurations is in regions. Default: 0.95 where nothing else is asked for."""
-    connected: bool
-    """Goal: all regions of the scene are connected."""
-    connect: ArrayLike
-    """(k, n), k >= 2: goal: these configurations are in one connected component."""
-    paths: Sequence[ArrayLike]
-    """(k, n) each: goal: these motions, straight in q from waypoint to waypoint, are covered."""
-    seeds: ArrayLike
-    """(k, n), configurations that get regions first."""
-    regions: int
-    """Grow at most this many regions."""
-    at_once: int
-    """Number of regions that grow at the same time."""
-    region_seconds: float
-    """Each region ends after so long, with what there is of it."""
-    cells: int
-    """Cells of a pair in each stage of a region. New faces remove the cells that are undecided after that."""
-    stages: int
-    """Number of stages after which the growth of each region ends."""
-    random_seed: int
-    """Seed of every random choice."""
-    deadline: float
-    """Seconds after which the cover ends, with the regions grown so far."""
-    priority: int
-    """From -3 to 3; each step up doubles the job's share of the work."""
-    labels: Mapping[str, str]
-    """Labels to find the job by: name -> value."""
-
-
-_IN_JOB = (("deadline", "deadline_seconds"), ("priority", "priority"), ("labels", "labels"))
-_IN_OPTIONS = ("contraction", "cells", "pushes", "max_rounds", "random_seed")
-
-
 def grow_request(scene: str, q: ArrayLike, options: GrowOptions) -> Document:
     """Returns the request of a job that grows a region around q, (n,)."""
-    given = _known(options, GrowOptions)
-    seed: Document = {"q": numbers(q, "q").tolist()}
-    if "contain" in given:
-        seed["contain"] = np.atleast_2d(numbers(given["contain"], "contain")).tolist()
-    if "method" in given:
-        seed["method"] = given["method"]
-    request = {"kind": "grow", "scene": scene, "seed": seed, "options": {name: given[name] for name in _IN_OPTIONS if name in given}}
-    return request | {field: given[name] for name, field in _IN_JOB if name in given}
+    asked = asked_for(options, GROW)
+    return {"kind": "grow", "scene": scene, **asked, "seed": {"q": numbers(q, "q").tolist(), **asked.get("seed", {})}}
 
 
-def cover_request(scene: str, options: CoverOptions) -> Document:
-    """Returns the request of a job that covers a scene."""
-    given = _known(options, CoverOptions)
-    asked = {name: value for name, value in given.items() if name not in dict(_IN_JOB)}
-    for name in ("connect", "seeds"):
-        if name in given:
-            asked[name] = np.atleast_2d(numbers(given[name], name)).tolist()
-    if "paths" in given:
-        if not isinstance(given["paths"], Iterable) or isinstance(given["paths"], str):
-            raise CirisError("argument", f"{type(given['paths']).__name__} is no paths", field="paths", hint="give a list of (k, n) arrays")
-        asked["paths"] = [numbers(path, f"paths[{i}]").tolist() for i, path in enumerate(given["paths"])]
-    request = {"kind": "cover", "scene": scene, "options": asked}
-    return request | {field: given[name] for name, field in _IN_JOB if name in given}
-
-
-def _known(options: Mapping[str, Any], kind: type) -> Document:
-    """Returns the options that are given; None stands for the service's default.
+def asked_for(options: Mapping[str, Any], fields: Fields) -> Document:
+    """Returns the options that are given as the request has them; None stands for the service's default.
 
     Raises:
-        CirisError: unknown_option.
+        CirisError: unknown_option, argument.
+        RegionError: points.
     """
-    known = list(get_type_hints(kind))
-    for name in options:
-        if name not in known:
-            hint = close_matches(name, known) or f"options: {', '.join(known)}"
+    asked: Document = {}
+    for name, value in options.items():
+        if name not in fields:
+            groups = [group for group, (_, takes) in fields.items() if not isinstance(takes, str) and name in takes]
+            hint = f"give it in {groups[0]}" if groups else close_matches(name, list(fields)) or f"options: {', '.join(fields)}"
             raise CirisError("unknown_option", f"there is no option {name!r}", field=name, hint=hint)
-    return given(**options)
+        if value is not None:
+            field, takes = fields[name]
+            *places, last = field.split(".")
+            inside = asked
+            for place in places:
+                inside = inside.setdefault(place, {})
+            inside[last] = _taken(name, value, takes)
+    return asked
+
+
+def _taken(name: str, value: Any, takes: str | Fields) -> Any:
+    match takes:
+        case "point":
+            return numbers(value, name).tolist()
+        case "points":
+            return np.atleast_2d(numbers(value, name)).tolist()
+        case "paths":
+            if not isinstance(value, Iterable) or isinstance(value, str):
+                raise CirisError("argument", f"{type(value).__name__} is no paths", field=name, hint="give a list of (k, n) arrays")
+            return [numbers(path, f"{name}[{i}]").tolist() for i, path in enumerate(value)]
+        case str():
+            return value
+    if not isinstance(value, Mapping):
+        raise CirisError("argument", f"{type(value).__name__} is no options", field=name, hint="give a dict of options")
+    return asked_for(value, takes)
 
 
 def document(value: Any) -> Any:

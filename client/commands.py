@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from argparse import Namespace
@@ -13,10 +12,13 @@ from certifier.errors import CirisError
 from certifier.outcome import Outcome
 from certifier.verify.decimals import at_most_mm, exactly
 from certifier.verify.uncovered import named
+from ciris.answers import Document
 from client import output, service
 from client.files import ProofFile, check_writable
-from client.inputs import configuration, labels, polytope_file, seed_of
+from client.inputs import configuration, polytope_file, seed_of
+from client.options import CERTIFY, GROW
 from client.output import Screen, print_json
+from client.request import request
 
 OK, NO = 0, 1
 
@@ -91,32 +93,17 @@ def grow(args: Namespace) -> int:
         from client.local import check_is_file
 
         check_is_file(args.scene)
-    common: dict[str, Any] = {"contain": [configuration(q, "--contain") for q in args.contain]} if args.contain else {}
-    if args.method is not None:
-        common["method"] = args.method
-    seeds = [{"q": seed_of(args.scene, q), **common} for q in args.q or [None]]
-    options = {
-        name: value
-        for name, value in (
-            ("contraction", args.contraction),
-            ("cells", args.cells),
-            ("pushes", args.pushes),
-            ("max_rounds", args.rounds),
-            ("random_seed", args.random_seed),
-        )
-        if value is not None
-    }
-    if args.deadline is not None and not 0 < args.deadline < math.inf:
-        raise CirisError("option", f"must be a number of seconds above 0, not {args.deadline:g}", field="--deadline")
-    if len(seeds) > 1:
-        return _grow_many(args, seeds, options, screen)
+    asked = request(args, GROW)
+    requests = [{**asked, "seed": {"q": seed_of(args.scene, q), **asked["seed"]}} for q in getattr(args, "seed.q") or [None]]
+    if len(requests) > 1:
+        return _grow_many(args, requests, screen)
     check_writable(args.out)
-    proof, seed = ProofFile(args.out), seeds[0]
+    proof = ProofFile(args.out)
     if args.local:
         from client import local
 
         try:
-            grown, url = local.grow(args.scene, seed, options, args.deadline, screen, args.watch, proof.write), None
+            grown, url = local.grow(args.scene, requests[0], screen, args.watch, proof.write), None
         except KeyboardInterrupt:
             if proof.path is not None:
                 screen.line(f"the proof of the best region so far: {proof.path} (check it: ciris verify {proof.path})")
@@ -124,7 +111,7 @@ def grow(args: Namespace) -> int:
     else:
         with service.connect(args.url) as client:
             scene = service.known_scene(client, args.scene)
-            grown = service.grow(client, _request(args, scene, seed, options), screen, args.watch)
+            grown = service.grow(client, {"kind": "grow", "scene": scene["id"], **requests[0]}, screen, args.watch)
             url = f"{client.url}/regions/{grown.region}"
     path = proof.write(grown.manifest["scene"]["name"], grown.proof)
     if args.json:
@@ -135,13 +122,7 @@ def grow(args: Namespace) -> int:
     return OK
 
 
-def _request(args: Namespace, scene: dict[str, Any], seed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
-    """Returns the request for a job that grows a region."""
-    request = {"kind": "grow", "scene": scene["id"], "seed": seed, "options": options, "labels": labels(args.label)}
-    return request if args.deadline is None else {**request, "deadline_seconds": args.deadline}
-
-
-def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, Any], screen: Screen) -> int:
+def _grow_many(args: Namespace, requests: list[Document], screen: Screen) -> int:
     """Has the service run one job a seed. The regions stay on the service."""
     if args.local or args.out is not None:
         raise CirisError(
@@ -149,21 +130,20 @@ def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, 
         )
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
-        requests = [_request(args, scene, seed, options) for seed in seeds]
-        jobs = service.grow_many(client, requests, screen, args.watch)
+        jobs = service.grow_many(client, [{"kind": "grow", "scene": scene["id"], **one} for one in requests], screen, args.watch)
         grown = {job["region"]: client.region(job["region"]) for job in jobs if job["region"]}
     if args.json:
         print_json(jobs)
     else:
         rows = [
             (
-                ", ".join(f"{x:g}" for x in seed["q"]),
+                ", ".join(f"{x:g}" for x in one["seed"]["q"]),
                 job["region"] or "none",
                 _size(grown[job["region"]]) if job["region"] else "",
                 output.share(grown[job["region"]]["share"]) if job["region"] else "",
                 job["reason"] or "",
             )
-            for seed, job in zip(seeds, jobs, strict=True)
+            for one, job in zip(requests, jobs, strict=True)
         ]
         output.print_table(("q", "region", "size", "share", "ended"), rows, right="size share")
     return OK if len(grown) == len(jobs) else NO
@@ -172,7 +152,7 @@ def _grow_many(args: Namespace, seeds: list[dict[str, Any]], options: dict[str, 
 def certify(args: Namespace) -> int:
     screen = Screen()
     polytope = polytope_file(args.polytope)
-    drake, cells = _drake(args), 1 if args.cells is None else args.cells
+    drake, asked = _drake(args), request(args, CERTIFY)
     proof: bytes | None
     kept = None
     if args.out is not None:
@@ -181,10 +161,10 @@ def certify(args: Namespace) -> int:
     if args.local:
         from client import local
 
-        document, proof = local.certify(args.scene, polytope, screen, args.watch, drake, cells, kept is not None)
+        document, proof = local.certify(args.scene, polytope, asked, screen, args.watch, drake, kept is not None)
     else:
         with service.connect(args.url) as client:
-            document = service.certify(client, service.known_scene(client, args.scene), polytope, screen, args.watch, cells)
+            document = service.certify(client, service.known_scene(client, args.scene), polytope, asked, screen, args.watch)
             proof = client.proof(document["region"]) if kept is not None and document["region"] else None
     path = None if kept is None or proof is None else kept.write(document["scene"]["name"], proof)
     document = {**document, "proof": None if path is None else str(path)}

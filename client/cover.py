@@ -2,52 +2,30 @@
 
 from __future__ import annotations
 
-import math
 from argparse import Namespace
 from collections.abc import Sequence
 from typing import Any
 
-from certifier.errors import CirisError
 from client import output, service
-from client.inputs import configuration
+from client.options import COVER
 from client.output import Screen, print_json
-from client.paths import path_file
+from client.request import request
 
 OK, NO = 0, 1
 
 
 def cover(args: Namespace) -> int:
     """Starts a cover, waits for its end, and prints its results. Its exit status is 0 where all goals are reached."""
-    options: dict[str, Any] = {
-        "seeds": [configuration(q, "--seed") for q in args.seed],
-        "connect": [configuration(q, "--connect") for q in args.connect],
-        "paths": [_waypoints(path) for path in args.path],
-        "connected": args.connected,
-    }
-    names = ("coverage", "regions", "at_once", "region_seconds", "cells", "stages", "random_seed")
-    options |= {name: value for name in names if (value := getattr(args, name)) is not None}
-    if args.deadline is not None and not 0 < args.deadline < math.inf:
-        raise CirisError("option", f"must be a number of seconds above 0, not {args.deadline:g}", field="--deadline")
-    screen = Screen()
+    asked, screen = request(args, COVER), Screen()
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)
-        request = {"kind": "cover", "scene": scene["id"], "options": options}
-        job = service.run(client, request if args.deadline is None else {**request, "deadline_seconds": args.deadline}, screen)
+        job = service.run(client, {"kind": "cover", "scene": scene["id"], **asked}, screen)
         found = client.cover(job["id"])
     if args.json:
         print_json({"job": job["id"], "scene": scene["name"], **found})
     else:
         _print(found)
     return OK if found["outcome"] == "certified" else NO
-
-
-def _waypoints(path: str) -> list[list[float]]:
-    """Returns the waypoints of a file, which have to be joint positions."""
-    read = path_file(path)
-    if "q" not in read.motion:
-        message = f"{path} has no waypoints in q; a path to cover is straight in q between them"
-        raise CirisError("option", message, field="--path", hint="give waypoints in q")
-    return read.motion["q"].tolist()
 
 
 def _components(sizes: Sequence[int]) -> str:

@@ -6,8 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from certifier.errors import SceneError
+from certifier.errors import CirisError, SceneError
+from certifier.growth.options import CertifyOptions, GrowthOptions, RecertifyOptions
+from certifier.jobs.options import JobOptions
 from certifier.model import Scene
+from certifier.options import Options, read, table
+from ciris.answers import Document
 from client import verdicts
 from client.cores import cores
 from client.follow import Teller
@@ -41,48 +45,51 @@ def check_is_file(scene: str) -> None:
         raise SceneError("scene_not_found", f"{scene!r} is not a scene file", field="SCENE", hint="--local needs the path of a .yaml file")
 
 
-def grow(
-    scene: str,
-    seed: dict[str, Any],
-    options: dict[str, Any],
-    deadline_s: float | None,
-    screen: Screen,
-    watch: bool,
-    keep: Callable[[str, bytes], Path],
-) -> Grown:
+def grow(scene: str, asked: Document, screen: Screen, watch: bool, keep: Callable[[str, bytes], Path]) -> Grown:
     """Grows a region in this process and children of it.
 
     Args:
-        deadline_s: as for :func:`certifier.jobs.local.grow`.
+        asked: the seed and the options of the request.
         keep: writes the proof of a region of the scene with this name; it is called for regions that are certified before the last one too.
     """
     loaded = load(scene)
-    from certifier.growth.options import GrowthOptions
     from certifier.jobs import local
 
-    asked = GrowthOptions.from_document({"kind": "grow", "seed": seed, **options})
+    options = GrowthOptions.from_document({"kind": "grow", "seed": asked["seed"], **asked["options"]})
 
     def deliver(region: Region) -> None:
         screen.line(f"its proof: {keep(loaded.name, region.proof)}")
 
-    region = local.grow(loaded, asked, _teller(loaded, screen, watch), deadline_s, cores(), deliver)
+    region = local.grow(loaded, options, _teller(loaded, screen, watch), _read(JobOptions, asked).deadline_seconds, cores(), deliver)
     screen.clear()
     return Grown(region.manifest, region.proof, region.manifest["provenance"]["seconds"], remark=region.reason)
 
 
-def recertify(data: bytes, scene: str, keep: list[list[float]] | None, deadline_s: float | None, screen: Screen, watch: bool) -> Grown:
+def recertify(data: bytes, scene: str, keep: list[list[float]] | None, asked: Document, screen: Screen, watch: bool) -> Grown:
     """Certifies a region of the scene before it changed again, in this process and children of it.
 
     Args:
         data: the proof file of the region.
-        keep, deadline_s: as for :func:`certifier.jobs.local.recertify`.
+        keep: as for :func:`certifier.jobs.local.recertify`.
+        asked: the options of the request.
     """
     loaded = load(scene)
     from certifier.jobs import local
 
-    region = local.recertify(loaded, data, keep, _teller(loaded, screen, watch), deadline_s, cores())
+    deadline, seed = _read(JobOptions, asked).deadline_seconds, _read(RecertifyOptions, asked).random_seed
+    region = local.recertify(loaded, data, keep, _teller(loaded, screen, watch), deadline, cores(), seed)
     screen.clear()
     return Grown(region.manifest, region.proof, region.manifest["provenance"]["seconds"], remark=region.reason)
+
+
+def _read(cls: type[Options], asked: Document) -> Options:
+    """Returns those options of a request that a dataclass has.
+
+    Raises:
+        RegionError: option_value.
+    """
+    names = {one.name for one in table(cls)}  # type: ignore[arg-type]
+    return read(cls, {name: value for name, value in asked.items() if name in names}, "")
 
 
 def _teller(scene: Scene, screen: Screen, watch: bool) -> Callable[[str, dict[str, Any]], None]:
@@ -92,23 +99,31 @@ def _teller(scene: Scene, screen: Screen, watch: bool) -> Callable[[str, dict[st
 
 
 def certify(
-    scene: str, given: PolytopeFile, screen: Screen, watch: bool, drake: str | None, cells: int, prove: bool = False
+    scene: str, given: PolytopeFile, asked: Document, screen: Screen, watch: bool, drake: str | None, prove: bool = False
 ) -> tuple[dict[str, Any], bytes | None]:
     """Certifies a polytope in this process, and returns the document of ``ciris certify --json``.
 
     The proof comes with it where that is asked for (``prove``) and the polytope is certified.
 
     Args:
+        asked: the options of the request, for our certifier.
         drake: name of the solver with which Drake is asked instead; None asks our certifier.
-        cells: as in :class:`certifier.growth.options.GrowthOptions`, for our certifier.
+
+    Raises:
+        CirisError: option, for a deadline.
     """
+    how = _read(CertifyOptions, asked)
+    if _read(JobOptions, asked).deadline_seconds is not None:
+        raise CirisError(
+            "option", "a polytope is certified here without a deadline", field="--deadline", hint="leave out --deadline or --local"
+        )
     loaded = load(scene)
     given.check_space([joint.name for joint in loaded.moving], loaded.q_star.tolist())
     tell = _teller(loaded, screen, watch)
     if drake is None:
         from certifier.jobs import local
 
-        verdict = local.certify(loaded, given.polytope, given.center, tell, cells, cores(), prove)
+        verdict = local.certify(loaded, given.polytope, given.center, tell, how.cells, cores(), prove, how.random_seed)
     else:
         from certifier.jobs import reference
 

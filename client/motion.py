@@ -16,8 +16,10 @@ from ciris.synchronous.client import Client
 from client import output, service
 from client.files import ProofFile, check_writable
 from client.local import load
+from client.options import JOB
 from client.output import Screen, print_json
 from client.paths import PathFile, named, path_of
+from client.request import refuse_options, request
 
 OK, NO = 0, 1
 
@@ -30,8 +32,8 @@ def certify_path(args: Namespace) -> int:
     """
     if args.job and args.local:
         raise CirisError("option", "a job needs a service", field="--job", hint="leave out --local")
-    if args.deadline is not None and not (args.job and 0 < args.deadline < math.inf):
-        raise CirisError("option", f"must be a number of seconds above 0 for a --job, not {args.deadline:g}", field="--deadline")
+    if not args.job:
+        refuse_options(args, JOB, "job")
     path = path_of(args)
     kept = None
     if args.out is not None:
@@ -69,7 +71,7 @@ def _by_service(args: Namespace, path: PathFile) -> tuple[dict[str, Any], bytes 
         scene = service.known_scene(client, args.scene)["id"]
         asked = {"scene": scene, **path.document(), **{name: getattr(args, name) for name in ("space", "tube", "padding", "clearance")}}
         if args.job:
-            return _by_job(client, {**asked, "kind": "certify-path", "deadline_seconds": args.deadline}, args.out is not None)
+            return _by_job(client, {**asked, "kind": "certify-path", **request(args, JOB)}, args.out is not None)
         document = client.certify_path({**asked, "prove": args.out is not None})
     return document, None if document["proof"] is None else base64.b64decode(document["proof"])
 

@@ -66,8 +66,6 @@ def path_of(args: Namespace) -> PathFile:
 
 def named(field: str | None, args: Namespace) -> str | None:
     """Returns the place of an error in a request about a motion by the option that gave it, as the command's user knows it."""
-    if field == "padding":
-        return "--padding"
     option = FIELD if args.path else "--q"
     return field and re.sub(r"^[qs](?=\[|$)", option, re.sub(r"^(?=bezier|knots|control_points)", f"{option} ", field))
 

@@ -10,11 +10,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from certifier.errors import CirisError
+from ciris.answers import Document
 from ciris.synchronous.client import Client
 from client import output, service
 from client.inputs import configuration
+from client.options import JOB
 from client.output import Screen, print_json
 from client.paths import named, path_of
+from client.request import refuse_options, request
 
 OK, NO = 0, 1
 GROWABLE = {"start_uncovered", "goal_uncovered", "disconnected"}
@@ -39,11 +42,14 @@ def nearest(args: Namespace) -> int:
 def plan(args: Namespace) -> int:
     ends = [_end(args.start, "--from"), _end(args.goal, "--to")]
     limits = [_limit(args.speed, "--speed"), _limit(args.acceleration, "--acceleration")]
+    asked = request(args, JOB)
+    if not args.grow:
+        refuse_options(args, JOB, "grow")
     with service.connect(args.url) as client:
         scene = service.known_scene(client, args.scene)["id"]
         answer = _planned(client, scene, ends, limits)
         if args.grow and answer["reason"] in GROWABLE:
-            _grow_between(client, scene, ends, args.deadline)
+            _grow_between(client, scene, ends, asked)
             answer = _planned(client, scene, ends, limits)
     if args.json:
         print_json(answer)
@@ -116,13 +122,20 @@ def _planned(client: Client, scene: str, ends: Sequence[Any], limits: Sequence[A
     return answer
 
 
-def _grow_between(client: Client, scene: str, ends: Sequence[Any], deadline: float | None) -> None:
-    """Has the service grow regions until both ends are in one component, or until it cannot go on."""
+def _grow_between(client: Client, scene: str, ends: Sequence[Any], asked: Document) -> None:
+    """Has the service grow regions until both ends are in one component, or until it cannot go on.
+
+    Args:
+        asked: what the job is asked for besides.
+    """
     names = [name for name, end in zip(("--from", "--to"), ends, strict=True) if isinstance(end, str)]
     if names:
         raise CirisError("option", "regions grow between configurations, not regions", field=names[0], hint="give joint positions")
-    request: dict[str, Any] = {"kind": "cover", "scene": scene, "options": {"connect": ends}}
-    service.run(client, request if deadline is None else {**request, "deadline_seconds": deadline}, Screen())
+    try:
+        service.run(client, {"kind": "cover", "scene": scene, "options": {"connect": ends}, **asked}, Screen())
+    except CirisError as error:
+        error.field = error.field and error.field.replace("options.connect[0]", "start").replace("options.connect[1]", "goal")
+        raise
 
 
 def _end(text: str, field: str) -> list[float] | str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from argparse import Namespace
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,9 @@ from ciris.answers import Document
 from client import output, service
 from client.files import ProofFile, check_writable
 from client.inputs import configuration
+from client.options import RECERTIFY
 from client.output import Screen, print_json
+from client.request import request
 
 OK, NO = 0, 1
 
@@ -23,11 +24,9 @@ def recertify(args: Namespace) -> int:
     Raises:
         CirisError: why nothing is left of it, or what is wrong with the input.
     """
-    screen, keep = Screen(), [configuration(q) for q in args.q or []]
-    if args.deadline is not None and not 0 < args.deadline < math.inf:
-        raise CirisError("option", f"must be a number of seconds above 0, not {args.deadline:g}", field="--deadline")
+    screen, keep, asked = Screen(), [configuration(q) for q in args.q or []], request(args, RECERTIFY)
     if args.old is not None:
-        return _all(args, screen)
+        return _all(args, asked, screen)
     if args.region is None:
         raise CirisError("option", "no region was named", field="REGION", hint="name one, or name its scene with --from")
     check_writable(args.out)
@@ -35,13 +34,13 @@ def recertify(args: Namespace) -> int:
     if args.local:
         from client import local
 
-        grown = local.recertify(_proof(Path(args.region)), args.scene, keep or None, args.deadline, screen, args.watch)
+        grown = local.recertify(_proof(Path(args.region)), args.scene, keep or None, asked, screen, args.watch)
     else:
         if keep:
             raise CirisError("option", "the service keeps what the region was grown around inside", field="--q", hint="leave it out")
         with service.connect(args.url) as client:
             scene = service.known_scene(client, args.scene)
-            grown = service.grow(client, _request(args, scene, args.region), screen, args.watch)
+            grown = service.grow(client, _request(asked, scene, args.region), screen, args.watch)
             url = f"{client.url}/regions/{grown.region}"
     path = ProofFile(args.out).write(grown.manifest["scene"]["name"], grown.proof)
     if args.json:
@@ -53,12 +52,11 @@ def recertify(args: Namespace) -> int:
     return OK
 
 
-def _request(args: Namespace, scene: Document, region: str) -> Document:
-    request = {"kind": "recertify", "scene": scene["id"], "region": region}
-    return request if args.deadline is None else {**request, "deadline_seconds": args.deadline}
+def _request(asked: Document, scene: Document, region: str) -> Document:
+    return {"kind": "recertify", "scene": scene["id"], "region": region, **asked}
 
 
-def _all(args: Namespace, screen: Screen) -> int:
+def _all(args: Namespace, asked: Document, screen: Screen) -> int:
     """Has the service certify every region of a scene again, one job a region. The new regions stay on the service."""
     if args.local or args.out is not None or args.region is not None or args.q:
         hint = "leave out REGION, --q, --local and --out"
@@ -67,7 +65,7 @@ def _all(args: Namespace, screen: Screen) -> int:
         old = client.scene(args.old)
         scene = service.known_scene(client, args.scene)
         regions = [region["id"] for region in client.regions(scene=old["id"])]
-        jobs = service.grow_many(client, [_request(args, scene, region) for region in regions], screen, args.watch)
+        jobs = service.grow_many(client, [_request(asked, scene, region) for region in regions], screen, args.watch)
         found = [client.region(job["region"])["manifest"]["provenance"] if job["region"] else None for job in jobs]
     if args.json:
         print_json(jobs)

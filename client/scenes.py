@@ -10,7 +10,7 @@ import numpy as np
 
 from certifier.errors import CirisError
 from certifier.kinematics import Kinematics
-from certifier.model import JointKind, Scene
+from certifier.model import Scene
 from certifier.pair.forecast import PairCost, forecast
 from certifier.scene.contacts import touching
 from certifier.scene.draft import draft
@@ -116,9 +116,9 @@ def _configuration(scene: Scene, args: Namespace) -> tuple[np.ndarray, str]:
 def _joints(scene: Scene, q: np.ndarray) -> list[tuple[str, ...]]:
     rows = []
     for i, joint in enumerate(scene.moving):
-        turns = joint.kind is JointKind.REVOLUTE
+        unit, scale = joint.shown
         values = (scene.q_lower[i], scene.q_upper[i], scene.q_star[i], q[i])
-        texts = [f"{np.degrees(x):.2f} deg" if turns else f"{x:.4f} m" for x in values]
+        texts = [f"{scale * x:.{2 if unit == 'deg' else 4}f} {unit}" for x in values]
         rows.append((joint.name, joint.kind.value, *texts, "window" if joint.own_limits is not None else ""))
     return rows
 

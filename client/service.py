@@ -94,8 +94,11 @@ def run(client: Client, request: Document, screen: Screen) -> Document:
     return job
 
 
-def certify(client: Client, scene: Document, given: PolytopeFile, screen: Screen, watch: bool = False, cells: int = 1) -> Document:
+def certify(client: Client, scene: Document, given: PolytopeFile, asked: Document, screen: Screen, watch: bool = False) -> Document:
     """Makes the service certify a polytope, and returns the document of ``ciris certify --json``.
+
+    Args:
+        asked: the options of the request.
 
     Raises:
         CirisError: the polytope was refused, or the job was cancelled.
@@ -104,7 +107,7 @@ def certify(client: Client, scene: Document, given: PolytopeFile, screen: Screen
     body: dict[str, Any] = {"C": given.polytope.C.tolist(), "d": given.polytope.d.tolist()}
     if given.center is not None:
         body["center"] = given.center.tolist()
-    job, _ = client.create_job({"kind": "certify", "scene": scene["id"], "polytope": body, "cells": cells})
+    job, _ = client.create_job({"kind": "certify", "scene": scene["id"], "polytope": body, **asked})
     screen.line(f"job {job['id']}: {client.url}/jobs/{job['id']}")
     job = _wait(client, job["id"], screen, watch)
     if job["outcome"] is None or (job["error"] and job["error"]["code"] not in NEGATIVE):

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import ConfigDict, Field
 
 from certifier.errors import RegionError
 from certifier.growth.actions import Finish
+from certifier.growth.options import CertifyOptions
 from certifier.model import Polytope, Scene
 from certifier.outcome import Outcome
 from certifier.positions import check_magnitude
 from db.session import Database
 from jobs.checks import check_length
-from jobs.fields import Offsets, RandomSeed, Request, Rows, Vector, Whole
+from jobs.fields import Offsets, Request, Rows, Vector, model_of
 from jobs.growing import Growing
 from jobs.request import JobRequest
 
@@ -26,7 +27,7 @@ class PolytopeBody(Request):
     center: Vector | None = Field(None, description="(n,), an interior point, in s; the service finds one if none is given.")
 
 
-class CertifyRequest(JobRequest):
+class CertifyRequest(JobRequest, model_of(CertifyOptions)):  # type: ignore[misc]
     """Asks for one outcome for each pair on a given polytope."""
 
     model_config = ConfigDict(
@@ -35,16 +36,6 @@ class CertifyRequest(JobRequest):
 
     kind: Literal["certify"] = Field(description="The kind of the job.")
     polytope: PolytopeBody = Field(description="The polytope to certify.")
-    cells: Annotated[
-        Whole,
-        Field(
-            ge=1,
-            le=10_000_000,
-            description="Number of cells of the polytope that are tried for each pair, each with its own plane. "
-            "With 1, each pair has one plane on all of the polytope.",
-        ),
-    ] = 1
-    random_seed: RandomSeed = 0
 
 
 class Certify(Growing):

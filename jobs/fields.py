@@ -22,7 +22,9 @@ Whole = Annotated[int, BeforeValidator(_integer)]
 """A whole number. No text and no truth value stands for one."""
 Real = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Vector = Annotated[list[Real], Field(min_length=1, max_length=64)]
-RandomSeed = Annotated[Whole, Field(ge=0, le=2**63 - 1, description="Seed of every random choice.")]
+LabelName = Annotated[str, Field(min_length=1, max_length=64, pattern=patterns.LABEL_NAME)]
+LabelValue = Annotated[str, Field(max_length=200, pattern=patterns.ANY)]
+Labels = Annotated[dict[LabelName, LabelValue], Field(max_length=20)]
 SceneName = Annotated[str, Field(min_length=1, max_length=255, pattern=patterns.SOMETHING, description="The id or the name of a scene.")]
 Rows = Annotated[list[Vector], Field(max_length=2000)]
 Offsets = Annotated[list[Real], Field(max_length=2000)]
@@ -64,4 +66,4 @@ def _type(one: Option) -> Any:
             return model_of(one.cls)
         case _:
             lists = {Takes.POINT: Vector, Takes.POINTS: Rows, Takes.PATHS: list[Annotated[list[Vector], Field(min_length=2)]]}
-            return {Takes.WHOLE: Whole, Takes.REAL: Real, Takes.FLAG: bool, **lists}[one.takes]
+            return {Takes.WHOLE: Whole, Takes.REAL: Real, Takes.FLAG: bool, Takes.LABELS: Labels, **lists}[one.takes]

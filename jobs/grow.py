@@ -51,4 +51,4 @@ class Grow(Growing):
         if seed.q is not None:
             check_length(scene, seed.q, "seed.q", "seed_wrong_length")
             check_limits(scene, seed.q, "seed.q")
-        return {"kind": "grow", "seed": seed.to_document(), **body.options.model_dump()}
+        return GrowthOptions.from_document({"kind": "grow", "seed": seed.to_document(), **body.options.model_dump()}).to_document()

@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session
 from certifier import stored
 from certifier.errors import CirisError
 from certifier.growth.actions import Action, Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Step, Transition
+from certifier.growth.machine import stored_state
 from certifier.growth.options import GrowthOptions
 from certifier.growth.state import GrowthState
 from certifier.jobs import growing
@@ -93,7 +94,7 @@ class Growing(Kind):
 
 
 def _state(document: dict[str, Any] | None) -> GrowthState | None:
-    return None if document is None else stored.value(GrowthState, document)
+    return None if document is None else stored_state(document)
 
 
 @lru_cache(maxsize=8)

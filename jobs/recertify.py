@@ -7,15 +7,16 @@ from typing import Any, Literal
 from pydantic import ConfigDict, Field
 
 from certifier.carry.robot import same_bodies
+from certifier.growth.options import RecertifyOptions
 from certifier.model import MAX_NAME, Scene
 from db import regions, scenes
 from db.session import Database
-from jobs.fields import RandomSeed
+from jobs.fields import model_of
 from jobs.growing import Growing
 from jobs.request import JobRequest
 
 
-class RecertifyRequest(JobRequest):
+class RecertifyRequest(JobRequest, model_of(RecertifyOptions)):  # type: ignore[misc]
     """Asks which part of another scene's region still holds in this scene, for instance after this scene has changed.
 
     Proofs of pairs with the same numbers are taken over; the others are made again, cell by cell. What cannot be certified is cut off.
@@ -31,7 +32,6 @@ class RecertifyRequest(JobRequest):
         description="Id of the region, or its first characters. Its scene must have the same joints, limits and q* as `scene`. "
         "The seed that it was grown from, and what it had to contain, stay inside.",
     )
-    random_seed: RandomSeed = 0
 
 
 class Recertify(Growing):

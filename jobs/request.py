@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from base64 import b64decode
-from typing import Annotated
 
 from pydantic import ConfigDict, Field, field_validator
 
+from certifier.jobs.options import JobOptions
 from jobs import patterns
-from jobs.fields import Real, Request, SceneName, Whole
+from jobs.fields import Request, SceneName, model_of
 
 
 class WebhookRequest(Request):
@@ -38,19 +38,9 @@ class WebhookRequest(Request):
         return secret
 
 
-LabelName = Annotated[str, Field(min_length=1, max_length=64, pattern=patterns.LABEL_NAME)]
-LabelValue = Annotated[str, Field(max_length=200, pattern=patterns.ANY)]
-Labels = Annotated[dict[LabelName, LabelValue], Field(max_length=20)]
-
-
-class JobRequest(Request):
+class JobRequest(model_of(JobOptions)):  # type: ignore[misc]
     """Holds what the requests for all kinds of job have in common."""
 
     kind: str
     scene: SceneName
-    priority: Whole = Field(0, ge=-3, le=3, description="Each step up doubles the job's share of the work for its API key.")
-    deadline_seconds: Real | None = Field(
-        None, gt=0, le=30 * 86400, description="The job ends this many seconds after its creation, with the regions it has by then."
-    )
-    labels: Labels = Field(default_factory=dict, description="Labels to find the job by, at most 20: name -> value.")
     webhook: WebhookRequest | None = Field(None, description="Whom to tell when the job has ended; nobody by default.")

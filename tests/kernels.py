@@ -18,12 +18,12 @@ PLANAR = str(Path(__file__).parents[1] / "examples/planar_2dof/scene.yaml")
 
 
 def compile_kernels(directory: str) -> int:
-    """Has a region grown both ways and a motion certified, in this process alone; returns the exit status."""
+    """Has a region grown in both ways and a motion certified, in this process alone; returns the exit status."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     grow = ["grow", PLANAR, "--local", "--out"]
     motion = ["certify-path", PLANAR, "--local", "--tube", "--q", "0.2,-0.4", "--q=-0.4,0.3"]
-    certified = [*grow, f"{directory}/whole.proof"], [*grow, f"{directory}/targeted.proof", "--contraction", "targeted"], motion
+    certified = [*grow, f"{directory}/whole.proof"], [*grow, f"{directory}/targeted.proof", "--paper"], motion
     said = io.StringIO()
     with redirect_stdout(said), redirect_stderr(said):
         status = max(main(arguments) for arguments in certified)

@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from certifier.model import Geometry, Joint, JointKind, Pair, Scene
+
+
+def box_seed(s: ArrayLike, half_width: float, **more: Any) -> dict[str, Any]:
+    """The seed of a growth that begins with a box in s around s, as a given polytope."""
+    s = np.asarray(s, dtype=float)
+    eye = np.eye(len(s))
+    C, d = np.concatenate([eye, -eye]), np.concatenate([s + half_width, half_width - s])
+    return {"method": "polytope", "C": C.tolist(), "d": d.tolist(), "center": s.tolist(), **more}
 
 
 def slider(name: str = "slider", posts: int = 1) -> Scene:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response, status
 
-from api import drawing, exports
+from api import exports
 from api.access import READ, Admin, Db
 from api.children import Children
 from api.manifests import manifest
@@ -87,15 +87,16 @@ def _configurations(db: Database, region_id: str, samples: int, seed: int) -> Re
     with db.read() as session:
         row = regions.get(session, region_id)
     scene, limits = scenes.load(db, row.scene_id), settings()
-    payload = {"C": row.arrays["C"], "d": row.arrays["d"], "revolute": scene.revolute, "count": samples, "seed": seed}
+    region = {"C": row.arrays["C"], "d": row.arrays["d"], "q_star": scene.q_star, "revolute": scene.revolute}
+    payload = region | {"count": samples, "seed": seed}
     found = run_in_child(
         "certifier.polytopes.tour:answer", payload, timeout_s=limits.verify_timeout_seconds, memory_bytes=limits.child_memory_bytes
     )
-    ends = zip(scene.moving, drawing.units(scene), scene.to_q(found["lower"]).tolist(), scene.to_q(found["upper"]).tolist(), strict=True)
+    ends = zip(scene.moving, scene.to_q(found["lower"]).tolist(), scene.to_q(found["upper"]).tolist(), strict=True)
     return RegionConfigurations(
         center=scene.to_q(row.manifest["inscribed_ellipsoid"]["center"]).tolist(),
         seed=row.manifest["seed"],
-        extremes=[Extreme(joint=joint.name, unit=unit, lower=lower, upper=upper) for joint, unit, lower, upper in ends],
+        extremes=[Extreme(joint=joint.name, unit=joint.unit, lower=lower, upper=upper) for joint, lower, upper in ends],
         samples=scene.to_q(found["samples"]).tolist(),
     )
 

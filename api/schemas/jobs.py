@@ -16,9 +16,9 @@ from certifier.outcome import Outcome, Stage
 from db import traces
 from db.models import EventRow, JobRow
 from db.states import IterationState, JobState, PairState
-from jobs.fields import Request
+from jobs.fields import Labels, Request
 from jobs.registry import KINDS
-from jobs.request import JobRequest, Labels
+from jobs.request import JobRequest
 
 
 def _known(kind: str) -> str:

@@ -35,7 +35,7 @@ class Certify:
 
     Attributes:
         iteration: number of this certification within the job, from 0.
-        label: what it is for: ``given``, ``cells``, ``contract``, ``push`` or ``round``.
+        label: what it is for: ``given`` or ``cells``; ``contract``, ``push`` or ``round`` for the papers' algorithm.
         polytope: its rows include the joint limits.
         center: (n,) interior point; None for the Chebyshev centre.
         pairs: indices into ``scene.pairs`` to certify, those most likely to fail first.

@@ -195,7 +195,7 @@ def _new(scene: Scene, beyond: Array, joints: list[int], keep: Array, samples: A
 @cached(LRUCache(DRAWN), key=lambda scene, polytope: (scene.hash, polytope.C.tobytes(), polytope.d.tobytes()))
 def samples_of(scene: Scene, polytope: Polytope) -> Array:
     """Returns samples of a polytope, (S, n), uniform in q; the same ones for the same polytope."""
-    return uniform_in_q(polytope, scene.revolute, CHAINS, EACH, 0).reshape(-1, scene.n)
+    return uniform_in_q(polytope, scene, CHAINS, EACH, 0).reshape(-1, scene.n)
 
 
 def _face(beyond: Array, keep: Array, samples: Array, scale: Array) -> tuple[Array, float] | None:

@@ -1,37 +1,38 @@
-"""A region is grown by a pure state machine: propose, contract until certified, push the faces out again, alternate (11) with (12).
+"""A region is grown by a pure state machine: propose, certify the proposal and cut off what cannot be certified, move the faces out.
 
-It follows appendix B.4 and Algorithm 1 of C-IRIS. :func:`begin` and :func:`advance` decide what to do next and compute nothing heavy.
-The caller (the service's coordinator, or :mod:`certifier.jobs.local`) carries out the action and reports back.
+:func:`begin` and :func:`advance` decide what to do next and compute nothing heavy. The caller (the service's coordinator, or
+:mod:`certifier.jobs.local`) carries out the action and reports back.
 
-This module says what follows what. Its neighbours know how each phase goes.
+This module says what all ways to grow have in common. :mod:`certifier.growth.whole` decides what follows a certification, or
+:mod:`certifier.growth.paper` where a job asks for the papers' algorithm.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from certifier import stored
 from certifier.errors import RegionError
 from certifier.growth.actions import Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Transition
 from certifier.growth.again import begin_again
 from certifier.growth.options import GrowthOptions
-from certifier.growth.pushes import further, less, next_push
+from certifier.growth.pairs import by_joints
+from certifier.growth.paper import machine as papers
+from certifier.growth.paper.rounds import certify_step
+from certifier.growth.paper.state import PaperState
 from certifier.growth.refusal import ended_by
-from certifier.growth.rounds import after_round, certify_step, next_round
-from certifier.growth.state import Best, Bisection, GrowthState, Start
-from certifier.growth.targeted import contraction_starts, cut, next_contraction
-from certifier.growth.trials import certify
-from certifier.growth.uniform import bisect, shrink
+from certifier.growth.state import Best, GrowthState, Start
 from certifier.growth.whole import after_cells, begin_whole, keeps_more
 from certifier.model import Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.polytopes.polytope import chebyshev_center
 from certifier.positions import check_magnitude
-from certifier.seeding.options import IRIS, IRIS_SEEDS, Method
+from certifier.seeding.options import IRIS_SEEDS
 from certifier.seeding.proposal import Proposal
-from certifier.step.stepped import Stepped
 
 
 def begin(scene: Scene, options: GrowthOptions) -> Transition:
@@ -40,7 +41,7 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
     Raises:
         RegionError: a ``certify`` job without C and d, with the wrong number of columns, or with a number that is too large.
     """
-    state = GrowthState(options)
+    state = GrowthState(options) if options.paper is None else PaperState(options)
     if options.kind == "grow":
         seed = options.seed.get("random_seed")
         return Transition(state, Propose({**options.seed, "random_seed": options.random_seed % IRIS_SEEDS if seed is None else seed}))
@@ -53,7 +54,17 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
     if center is not None:
         check_magnitude(center, "polytope.center")
         center = np.array(center)
-    return certify(scene, state, "given", limited, center, failures=None, cells=options.cells or 1)
+    action = Certify(0, "given", limited, center, by_joints(scene), reuse={}, hard=[], failures=None, cells=options.cells or 1)
+    return Transition(replace(state, next=1), action)
+
+
+def stored_state(document: dict[str, Any]) -> GrowthState:
+    """Returns the state that the document of a transition's state describes.
+
+    Raises:
+        CirisError: as :func:`certifier.stored.value`.
+    """
+    return stored.value(GrowthState if document.get("options", {}).get("paper") is None else PaperState, document)
 
 
 def advance(scene: Scene, state: GrowthState, report: Report) -> Transition:
@@ -75,13 +86,14 @@ def _hindrance(state: GrowthState, report: Report) -> str:
 
 
 def _advanced(scene: Scene, state: GrowthState, report: Report) -> Transition:
-    if isinstance(report, Outcomes):
-        return _certified(scene, state, report)
+    if isinstance(report, Failed):
+        return _failed(state, report)
     if isinstance(report, Proposal):
         return _proposed(scene, state, report)
-    if isinstance(report, Stepped):
-        return certify_step(scene, state, report)
-    return _failed(state, report)
+    if isinstance(report, Outcomes):
+        return _certified(scene, state, report)
+    assert isinstance(state, PaperState), "only the papers' algorithm asks for steps"
+    return certify_step(scene, state, report)
 
 
 def _failed(state: GrowthState, report: Failed) -> Transition:
@@ -94,19 +106,11 @@ def _proposed(scene: Scene, state: GrowthState, proposal: Proposal) -> Transitio
     limited = scene.polytope(proposal.C, proposal.d)
     norms = np.linalg.norm(limited.C, axis=1)
     rows = Polytope(limited.C / norms[:, None], limited.d / norms)
-    method = proposal.info.get("method")
-    given, hindrance = method in (Method.BOX, Method.POLYTOPE), _hindrance(state, proposal)
-    contraction = state.options.contraction or ("whole" if method in IRIS else "targeted")
-    if contraction != "uniform":
-        start = Start(rows, proposal.center, np.concatenate([proposal.center[None], proposal.contain]), given, hindrance)
-        if contraction == "whole":
-            return begin_whole(scene, replace(state, start=start), start)
-        transition = next_contraction(scene, replace(state, start=start), start)
-        assert transition is not None, "before there is a region every contraction is worth it"
-        return transition
-    center, radius = chebyshev_center(rows)
-    start = Start(rows, proposal.center, center[None], given, hindrance)
-    return shrink(scene, replace(state, start=start), start, Bisection(center, radius, state.options.bisection_steps, 1.0))
+    keep = np.concatenate([proposal.center[None], proposal.contain])
+    start = Start(rows, proposal.center, keep, _hindrance(state, proposal))
+    if isinstance(state, PaperState):
+        return papers.begin(scene, replace(state, start=start), start, proposal.info.get("method"))
+    return begin_whole(scene, replace(state, start=start), start)
 
 
 def _certified(scene: Scene, state: GrowthState, report: Outcomes) -> Transition:
@@ -114,72 +118,31 @@ def _certified(scene: Scene, state: GrowthState, report: Outcomes) -> Transition
     if action.label == "given":
         candidate = _candidate(state, report, None) if report.complete else None
         return Transition(state, Finish(combine(list(report.outcomes.values())), "the given polytope, every pair"), candidate)
+    start = state.start
+    assert start is not None, "what is certified comes from a proposal"
     candidate = None
     if report.complete:
         volume = inscribed_ellipsoid(action.polytope).volume
-        if state.best is None or _better(scene, state.start, action, volume, state.best):
+        if state.best is None or _better(scene, state, start, action, volume, state.best):
             candidate = _candidate(state, report, volume)
             center = chebyshev_center(action.polytope)[0] if action.center is None else action.center
             state = replace(state, best=Best(action.iteration, action.polytope, center, volume))
-    assert state.start is not None, "what is certified comes from a proposal"
-    return replace(_after(scene, state, state.start, report, candidate is not None), candidate=candidate)
+    if isinstance(state, PaperState):
+        return replace(papers.after_certification(scene, state, start, report, candidate is not None), candidate=candidate)
+    return replace(after_cells(scene, state, start, report), candidate=candidate)
 
 
-def _better(scene: Scene, start: Start | None, action: Certify, volume: float, best: Best) -> bool:
-    """Returns whether a certified polytope is better than the best so far: by its share of the proposal where it is certified by cells,
-    and else by its inscribed ellipsoid, which is what contractions, pushes and rounds make larger."""
-    if action.label == "cells" and start is not None:
-        return keeps_more(scene, start, action.polytope, best.polytope)
-    return volume > best.ellipsoid_volume
+def _better(scene: Scene, state: GrowthState, start: Start, action: Certify, volume: float, best: Best) -> bool:
+    """Returns whether a certified polytope is better than the best so far, by what the way to grow makes larger.
+
+    That is the share of the proposal, or the inscribed ellipsoid for the papers' algorithm.
+    """
+    if isinstance(state, PaperState):
+        return volume > best.ellipsoid_volume
+    return keeps_more(scene, start, action.polytope, best.polytope)
 
 
 def _candidate(state: GrowthState, report: Outcomes, volume: float | None) -> Candidate:
     action, seed = report.action, None if state.start is None else state.start.seed
     proofs = {**dict.fromkeys(action.pairs, action.iteration), **action.reuse}
     return Candidate(action.iteration, action.polytope, action.center, seed, volume, proofs, action.together, state.obstacles)
-
-
-def _after(scene: Scene, state: GrowthState, start: Start, report: Outcomes, accepted: bool) -> Transition:
-    """Returns what follows a certification: more of the same phase, or else the next phase."""
-    label = report.action.label
-    if label == "cells":
-        return after_cells(scene, state, start, report)
-    if label == "round":
-        return after_round(scene, _suspecting(state, report), start, accepted)
-    if label == "contract" and state.options.contraction == "uniform":
-        state = _suspecting(state, report)
-        return bisect(scene, state, start, report) or _push_or_step(scene, state, start)
-    if label == "contract":
-        return _after_contraction(scene, state, start, report)
-    if report.complete:
-        return _push_or_step(scene, state, start, further(state))
-    return cut(scene, state, start, report) or _push_or_step(scene, state, start, less(state.reach))
-
-
-def _after_contraction(scene: Scene, state: GrowthState, start: Start, report: Outcomes) -> Transition:
-    starts = contraction_starts(scene, state, start)
-    if not report.complete:
-        following = cut(scene, state, start, report)
-        if following is not None:
-            return following
-        if state.best is None and state.contractions >= len(starts):
-            pair = scene.pairs[report.failures[0]]
-            reason = f"not even a small region around the seed can be certified: {pair.a} and {pair.b} are too close there"
-            return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
-    elif state.reach > 1 and not state.cuts.attempts:
-        # The given polytope was pushed out and nothing had to be cut, so its faces go on outwards.
-        return _push_or_step(scene, state, start, further(state))
-    _, near = starts[-1]  # The pushes use that of the last contraction, begun or not.
-    return next_contraction(scene, state, start) or _push_or_step(scene, replace(state, near=near), start)
-
-
-def _push_or_step(scene: Scene, state: GrowthState, start: Start, reach: float | None = None) -> Transition:
-    """Returns the next push, or the alternation when there were enough pushes."""
-    push = next_push(scene, state, start) if reach is None else next_push(scene, state, start, reach)
-    return push or next_round(scene, state, start)
-
-
-def _suspecting(state: GrowthState, report: Outcomes) -> GrowthState:
-    """Returns the state in which the pairs that failed now come first the next time."""
-    failures = report.failures
-    return replace(state, suspects=(*failures, *(i for i in state.suspects if i not in failures)))

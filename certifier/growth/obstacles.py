@@ -11,10 +11,10 @@ from certifier.model import Array, Scene
 
 @dataclass(frozen=True)
 class Obstacle:
-    """Says what was cut off for a pair. It is about the last stage, contraction or push in which something was.
+    """Says what was cut off for a pair in the last stage in which something was.
 
     Attributes:
-        stage: the number of that stage; of contractions and pushes together, where there are no stages.
+        stage: the number of that stage. The papers' algorithm has none and counts what it begins in its place.
         times: in how many rounds something was cut off.
         faces: how many faces were added or moved in; None where only the times are known.
         lost: the shares of the polytope that these faces cut off, by q-volume, as samples say; None where that is not known.

@@ -19,14 +19,14 @@ from certifier.growth.actions import Certify, Finish, Outcomes, Transition
 from certifier.growth.cutting import BARELY, Cut, cut, samples_of
 from certifier.growth.obstacles import Obstacle, joined, lost_together
 from certifier.growth.options import MOST_CELLS
+from certifier.growth.pairs import by_joints, joints_between
 from certifier.growth.state import GrowthState, Start, Whole
-from certifier.growth.targeted import pushed
-from certifier.growth.trials import by_joints, joints_between
 from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.pair.result import Weakness
 from certifier.partition.together import THIN, Together, together
 from certifier.polytopes.proved import ProvedBox
+from certifier.polytopes.pushed import pushed
 
 FIRST = 0.7
 """In the first stage the faces of the proposal lie this part of their distance from the seed."""
@@ -89,7 +89,7 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     if kept == 1 or whole.stage == state.options.stages or (whole.reach > 1 and kept < whole.kept + GAIN):
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
     reach = FAR if whole.reach >= 1 else FARTHEST if whole.passed <= SOON else FARTHER
-    return begin_stage(scene, state, reach, pushed(scene, best.polytope, start.seed, reach, start.rows), kept, whole.passed)
+    return begin_stage(scene, state, reach, pushed(best.polytope, start.seed, reach, start.rows), kept, whole.passed)
 
 
 def begin_stage(scene: Scene, state: GrowthState, reach: float, polytope: Polytope, kept: float = 0.0, passed: float = 0.0) -> Transition:
@@ -108,7 +108,7 @@ def in_words(scene: Scene, s: Array) -> str:
 
 def _copy(scene: Scene, start: Start, scale: float) -> Polytope:
     """Returns the proposal with its faces at this part of their distance from the seed."""
-    return pushed(scene, start.rows, start.seed, scale, scene.polytope([], []))
+    return pushed(start.rows, start.seed, scale, scene.polytope([], []))
 
 
 def _kept(scene: Scene, start: Start, polytope: Polytope) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from certifier.errors import CirisError, RegionError, unreadable
-from certifier.growth.trials import alike
+from certifier.growth.pairs import alike
 from certifier.jobs.parallel import side_by_side
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Pair, Polytope, Scene

@@ -11,8 +11,8 @@ from typing import Any
 from certifier.errors import CirisError
 from certifier.growth.actions import Action, Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Step, Transition
 from certifier.growth.options import GrowthOptions
+from certifier.growth.pairs import alike
 from certifier.growth.state import GrowthState
-from certifier.growth.trials import alike
 from certifier.jobs.driver import drive
 from certifier.jobs.former import Former
 from certifier.jobs.growing import REST, Account, Certified, decided, failure, late, make_region, refused
@@ -273,11 +273,12 @@ def certify(
     cells: int = 1,
     processes: int = 1,
     assemble: bool = False,
+    random_seed: int = 0,
 ) -> Verdict:
     """Certifies every pair on a polytope and the joint limits.
 
     Args:
-        cells: as in :class:`certifier.growth.options.GrowthOptions`.
+        cells, random_seed: as in :class:`certifier.growth.options.CertifyOptions`.
         processes: as for :func:`grow`.
         assemble: make a region of a polytope that is certified, with its proof.
 
@@ -285,7 +286,9 @@ def certify(
         RegionError: the polytope is malformed, empty or unbounded, or ``cells`` is out of range.
     """
     seed = {"C": polytope.C.tolist(), "d": polytope.d.tolist(), "center": None if center is None else center.tolist()}
-    job = _Memory(scene, GrowthOptions.from_document({"kind": "certify", "seed": seed, "cells": cells}), tell, processes)
+    job = _Memory(
+        scene, GrowthOptions.from_document({"kind": "certify", "seed": seed, "cells": cells, "random_seed": random_seed}), tell, processes
+    )
     drive(job)
     if job.error is not None:
         raise job.error

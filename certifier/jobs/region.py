@@ -99,7 +99,7 @@ def certified_region(
         "interior_point": interior.tolist(),
         "inscribed_ellipsoid": {"center": ellipsoid.center.tolist(), "shape": ellipsoid.shape.tolist()},
         "joint_ranges": _joint_ranges(scene, polytope, candidate.seed),
-        "q_volume": _q_volume(scene, volume_in_q(polytope, scene.revolute, in_s, seed=0)),
+        "q_volume": _q_volume(scene, volume_in_q(polytope, scene, in_s, seed=0)),
         "volume": {"ellipsoid": ellipsoid.volume, "polytope": in_s[0], "polytope_stderr": in_s[1]},
         "share": None if proposal is None else proposal.share(polytope),
         "seed": None if candidate.seed is None else scene.to_q(candidate.seed).tolist(),
@@ -135,9 +135,9 @@ def _q_volume(scene: Scene, measured: tuple[float, float]) -> dict[str, Any]:
     slide, whose sides are no angles.
     """
     value, error = measured
-    turning = int(scene.revolute.sum())
-    units = [f"{unit}^{count}" if count > 1 else unit for unit, count in (("rad", turning), ("m", scene.n - turning)) if count]
-    side = float(np.rad2deg(value ** (1 / scene.n))) if turning == scene.n else None
+    each = [joint.unit for joint in scene.moving]
+    units = [f"{unit}^{each.count(unit)}" if each.count(unit) > 1 else unit for unit in ("rad", "m") if unit in each]
+    side = float(np.rad2deg(value ** (1 / scene.n))) if "m" not in each else None
     return {"value": value, "stderr": error, "unit": " ".join(units), "box_side": side}
 
 
@@ -151,16 +151,16 @@ def _joint_ranges(scene: Scene, polytope: Polytope, seed: Array | None) -> dict[
         RegionError: as :func:`certifier.polytopes.polytope.bounds`.
     """
     lower, upper = (scene.to_q(s) for s in bounds(polytope))
-    unit = np.where(scene.revolute, np.rad2deg(1.0), 1.0)
+    shown = [joint.shown for joint in scene.moving]
     alone = [None] * scene.n if seed is None else _through(scene, polytope, seed)
     return {
         joint.name: {
             "lower": float(scale * low),
             "upper": float(scale * high),
-            "unit": "deg" if turns else "m",
+            "unit": unit,
             "through_seed": None if ends is None else [float(scale * end) for end in ends],
         }
-        for joint, low, high, scale, turns, ends in zip(scene.moving, lower, upper, unit, scene.revolute, alone, strict=True)
+        for joint, (unit, scale), low, high, ends in zip(scene.moving, shown, lower, upper, alone, strict=True)
     }
 
 

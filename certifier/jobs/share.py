@@ -38,7 +38,7 @@ class SampledProposal:
         Raises:
             RegionError: as :func:`certifier.polytopes.polytope.chebyshev_center`.
         """
-        s = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, _SEED)
+        s = uniform_in_q(polytope, scene, CHAINS, EACH, _SEED)
         return cls(polytope, s, ~in_collision(scene, s.reshape(-1, scene.n)).reshape(s.shape[:2]))
 
     def share(self, region: Polytope) -> dict[str, Any]:

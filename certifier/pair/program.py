@@ -104,16 +104,19 @@ class Sides:
         if chain not in self._centres:
             space, inside, outside = self.space(chain), list(chain), self.outside(chain)
             cone = self.cone_of(chain, self.faces)
-            revolute = self.kinematics.scene.revolute[inside]
-            s = self.box.mid[inside] + self.box.half[inside] * space.points
             unit = np.zeros(cone.N)
-            unit[: len(s)] = _denominator(s, revolute)
+            unit[: len(space.points)] = self._denominator(inside, space.points)
             functional, grid = space.functional(self._u[:, inside])
             # Towards the centre the denominator counts alike everywhere; these weights make it do so at the start as well.
-            mass = 1 / _denominator(self.box.mid[inside] + self.box.half[inside] * self._u[:, inside], revolute)
+            mass = 1 / self._denominator(inside, self._u[:, inside])
             start = np.concatenate([mass @ functional, *((mass * self._u[:, i]) @ grid for i in outside)])
             self._centres[chain] = cone, Centre(cone, unit, start)
         return self._centres[chain]
+
+    def _denominator(self, joints: list[int], u: Array) -> Array:
+        """Returns prod (1 + s_i^2) over the revolute ones of some joints, (S, k) -> (S,)."""
+        product: Array = np.prod(self.kinematics.scene.of(joints).denominator(self.box.mid[joints] + self.box.half[joints] * u), axis=1)
+        return product
 
     def means(self, chain: tuple[int, ...], x: Array) -> tuple[Array, Array]:
         """Returns the means of s under pseudo-moments x, (R, N) -> (R, n), and the masses x(1), (R,).
@@ -127,12 +130,6 @@ class Sides:
         u[:, inside] = first @ space.points / mass[:, None]
         u[:, outside] = rest.sum(axis=2) / mass[:, None]
         return self.box.mid + self.box.half * u, mass
-
-
-def _denominator(s: Array, revolute: Array) -> Array:
-    """Returns prod (1 + s_i^2) over the revolute joints, (S, k) -> (S,)."""
-    product: Array = np.prod(np.where(revolute, 1 + s**2, 1.0), axis=1)
-    return product
 
 
 def build(sides: Sides, volumes: tuple[Volume, Volume], frame: Frame) -> list[Block]:

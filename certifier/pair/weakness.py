@@ -1,4 +1,4 @@
-"""The weakness of a pair is found here: where its program fails and what would help the targeted contraction (certifier.growth.faces)."""
+"""The weakness of a pair is found here: where its program fails and what would help targeted contraction (certifier.growth.paper)."""
 
 from __future__ import annotations
 

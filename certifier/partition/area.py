@@ -70,7 +70,7 @@ class Area:
         center = chebyshev_center(polytope, tuple(joint.name for joint in scene.moving))[0]
         box = ProvedBox.of(scene, polytope, center) if box is None else box.on(len(polytope.d))
         ground = Ground(polytope.C, polytope.d, box.mid, box.half, box.Y_lower, box.Y_upper)
-        samples = uniform_in_q(polytope, scene.revolute, CHAINS, EACH, seed).reshape(-1, scene.n)
+        samples = uniform_in_q(polytope, scene, CHAINS, EACH, seed).reshape(-1, scene.n)
         norms = np.linalg.norm(polytope.C, axis=1)
         unit = Polytope(polytope.C / norms[:, None], polytope.d / norms)
         return cls(scene, Kinematics.of(scene), polytope, box.lower, box.upper, center, samples, ground, norms, unit, finer)

@@ -6,8 +6,6 @@ import zlib
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from certifier.model import Array
 from certifier.partition.area import Area, Inside
 from certifier.partition.tree import Node
@@ -62,5 +60,4 @@ class Cell:
 
     def turn(self) -> Array:
         """Returns how far every joint turns in the cell, (n,), in radians or metres."""
-        turn: Array = np.where(self.area.scene.revolute, 2 * (np.arctan(self.upper) - np.arctan(self.lower)), self.upper - self.lower)
-        return turn
+        return self.area.scene.turn(self.lower, self.upper)

@@ -25,6 +25,7 @@ def choose_frame(kinematics: Kinematics, volumes: tuple[Volume, Volume], lower: 
         lower, upper: (n,) the root cell.
     """
     a, b = volumes
+    # Slides are sampled as if they turned, too: which frame a proof has depends on these configurations.
     s = np.tan(np.random.default_rng(0).uniform(np.arctan(lower), np.arctan(upper), size=(CONFIGURATIONS, len(lower))))
     joints = {joint.index: joint for joint in kinematics.scene.moving}
     reach = {(j, volume.body): _reach(kinematics, joints[j], volume, s) for j in kinematics.chain(a.body, b.body) for volume in volumes}

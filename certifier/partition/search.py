@@ -187,15 +187,14 @@ class Search:
         return halves
 
     def _middle_of(self, cell: Cell, joint: int) -> float | None:
-        """Returns where to cut a cell, in the middle of its angle; None where doubles do not allow it."""
+        """Returns where to cut a cell, in the middle of its range of q; None where doubles do not allow it."""
         l, u = cell.lower[joint], cell.upper[joint]
-        value = float(np.tan((np.arctan(l) + np.arctan(u)) / 2)) if self._area.scene.revolute[joint] else float((l + u) / 2)
+        value = float(self._area.scene.of(joint).middle(l, u))
         return value if l < value < u else None
 
     def _turn(self, cell: Cell, bodies: Bodies) -> Array:
         """Returns how far every joint turns in the cell, (n,); a slide counts relative to the bodies' extent."""
-        turn: Array = np.where(self._area.scene.revolute, 1.0, 1 / bodies.extent) * cell.turn()
-        return turn
+        return 1 / self._area.scene.scale(bodies.extent) * cell.turn()
 
     def _settle(self, cell: Cell, report: Report) -> tuple[int, Array] | None:
         """Settles a cell, or returns the joint to cut it in and its points."""
@@ -266,7 +265,7 @@ class Search:
         wide = turn * self._area.finer > NARROW / 2
         if found.support is None:
             return found.joint if found.joint in bodies.joints and wide[found.joint] else max(bodies.joints, key=lambda j: float(turn[j]))
-        q = np.where(self._area.scene.revolute, 2 * np.arctan(found.support), found.support / bodies.extent)
+        q = self._area.scene.offset(found.support) / self._area.scene.scale(bodies.extent)
         mean = found.weights @ q / found.weights.sum()
         spread = found.weights @ (q - mean) ** 2
         order = sorted(bodies.joints, key=lambda j: -float(spread[j]) if wide[j] else 1.0)

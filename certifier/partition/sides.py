@@ -36,10 +36,15 @@ class Side:
         self._order = [factor.index for factor in self._path if factor.index is not None]
         self.own = sorted(self._order)
         self.outside = [j for j in joints if j not in self.own]
-        self._revolute = area.scene.revolute[self.own]
+        self._space = area.scene
 
-    def control_matrices(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Returns the control matrices of the volume's pose on a cell, (3^k, 4, 4), the first own joint slowest.
+    def ends(self, lower: Array, upper: Array) -> Array:
+        """Returns the ends of a cell and the cosines of half the angles there, (4, n): the rows l, u, w and v."""
+        bounds = np.array([lower, upper])
+        return np.concatenate([bounds, self._space.cosine(bounds)])
+
+    def control_matrices(self, ends: Array) -> tuple[Array, Array]:
+        """Returns the control matrices of the volume's pose on a cell with these ends, (3^k, 4, 4), the first own joint slowest.
 
         The lower right elements of a factor are the denominator in one own joint. They are returned as well, (k, 3).
         """
@@ -49,15 +54,14 @@ class Side:
             if factor.index is None:
                 X = X @ T[0]
                 continue
-            l, u = lower[factor.index], upper[factor.index]
-            w, v = (1 / np.sqrt(1 + l * l), 1 / np.sqrt(1 + u * u)) if factor.revolute else (1.0, 1.0)
-            ends = [
+            l, u, w, v = ends[:, factor.index]
+            controls = [
                 w * w * (T[0] + l * (T[1] + l * T[2])),
                 w * v * (T[0] + (l + u) / 2 * T[1] + l * u * T[2]),
                 v * v * (T[0] + u * (T[1] + u * T[2])),
             ]
-            den[self.own.index(factor.index)] = [end[3, 3] for end in ends]
-            X = (X[:, None] @ np.array(ends)).reshape(-1, 4, 4)
+            den[self.own.index(factor.index)] = [control[3, 3] for control in controls]
+            X = (X[:, None] @ np.array(controls)).reshape(-1, 4, 4)
         k = len(self.own)
         if self._order != self.own:
             X = X.reshape((3,) * k + (4, 4)).transpose([self._order.index(j) for j in self.own] + [k, k + 1]).reshape(-1, 4, 4)
@@ -87,13 +91,12 @@ class Side:
         mid, half = (lower + upper) / 2, (upper - lower) / 2
         own, outside = self.own, self.outside
         rest = [i for i in range(len(mid)) if i not in own and i not in outside]
-        X, den = self.control_matrices(lower, upper)
+        ends = self.ends(lower, upper)
+        X, den = self.control_matrices(ends)
         plane, bound = self.sign * plane[:4], plane[4]
         plane[3] -= self.radius * bound
         slopes = {joint: plane[:, 1 + place] for place, joint in enumerate(self._joints)}
-        l, u = lower[own], upper[own]
-        w, v = (np.where(self._revolute, 1 / np.sqrt(1 + ends * ends), 1.0) for ends in (l, u))
-        ends = np.array([l, u, w, v])
+        ends = np.ascontiguousarray(ends[:, own])
         c = bernstein.polynomials(
             X,
             self.volume.vertices,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from certifier.coordinates import ConfigurationSpace
 from certifier.errors import RegionError
 from certifier.model import Array, Polytope
 from certifier.polytopes.polytope import SCALED, bounds, chebyshev_center
@@ -154,15 +154,15 @@ def volume(polytope: Polytope, seed: int, rays: int = 200_000, samples: int = 16
 
 
 def volume_in_q(
-    polytope: Polytope, revolute: NDArray[np.bool_], in_s: tuple[float, float], seed: int, samples: int = 16_384
+    polytope: Polytope, space: ConfigurationSpace, in_s: tuple[float, float], seed: int, samples: int = 16_384
 ) -> tuple[float, float]:
     """Returns P's volume in joint positions q and its standard error, by sampling; the same seed gives the same result.
 
-    It is the volume in s times the mean over P of the Jacobian of q = q* + 2 arctan(s), the product of 2 / (1 + s_i^2) over the revolute
-    joints. Hit-and-run in P gives the mean, and its error is taken between independent chains.
+    It is the volume in s times the mean over P of the product of the slopes dq_i/ds_i. Hit-and-run in P gives the mean, and its error is
+    taken between independent chains.
 
     Args:
-        revolute: (n,) True where the joint is revolute.
+        space: the joints.
         in_s: what :func:`volume` returned for P.
         samples: a multiple of ``CHAINS``.
 
@@ -171,7 +171,7 @@ def volume_in_q(
     """
     value, error = in_s
     s = hit_and_run(polytope, inscribed_ellipsoid(polytope).center, samples, seed)
-    scale = np.prod(2 / (1 + s[:, revolute] ** 2), axis=1).reshape(-1, CHAINS).mean(axis=0)
+    scale = np.prod(space.slope(s), axis=1).reshape(-1, CHAINS).mean(axis=0)
     relative = math.hypot(error / value, _standard_error(scale) / scale.mean())
     return float(value * scale.mean()), float(value * scale.mean() * relative)
 

@@ -1,15 +1,14 @@
 """Gibbs sampling draws configurations of a polytope P = {s : C s <= d} that are uniform in the joint positions q, not in s.
 
 Along one axis P is an interval of s_i, and so of q_i, from which q_i is drawn uniformly. This leaves the uniform distribution in q as it
-is (hit-and-run along the coordinate axes, Smith, Operations Research 1984). What is q is known here but for an offset: q_i - q*_i is
-2 arctan(s_i) of a revolute joint and s_i of a prismatic one.
+is (hit-and-run along the coordinate axes, Smith, Operations Research 1984).
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from certifier.coordinates import ConfigurationSpace
 from certifier.model import Array, Polytope
 from certifier.polytopes.polytope import chebyshev_center
 from certifier.polytopes.sampling import hit_and_run
@@ -20,7 +19,7 @@ _THIN = 8
 """Between two samples of a chain lie this many rounds over all axes."""
 
 
-def uniform_in_q(polytope: Polytope, revolute: NDArray[np.bool_], chains: int, each: int, seed: int) -> Array:
+def uniform_in_q(polytope: Polytope, space: ConfigurationSpace, chains: int, each: int, seed: int) -> Array:
     """Returns points of P in s, (chains, each, n), nearly uniform in q; the same seed gives the same points.
 
     The chains are independent of one another but for their starts, which hit-and-run draws. Samples of one chain may still depend on each
@@ -28,7 +27,7 @@ def uniform_in_q(polytope: Polytope, revolute: NDArray[np.bool_], chains: int, e
 
     Args:
         polytope: bounded, for instance by the joint limits.
-        revolute: (n,) True where the joint is revolute.
+        space: the joints.
 
     Raises:
         RegionError: as :func:`certifier.polytopes.polytope.chebyshev_center`.
@@ -36,30 +35,26 @@ def uniform_in_q(polytope: Polytope, revolute: NDArray[np.bool_], chains: int, e
     starts, draws = np.random.SeedSequence(seed).spawn(2)
     s = hit_and_run(polytope, chebyshev_center(polytope)[0], chains, int(starts.generate_state(1)[0]))
     rng = np.random.default_rng(draws)
-    s = _walk(polytope, revolute, s, _FORGET, rng)
+    s = _walk(polytope, space, s, _FORGET, rng)
     found = np.empty((chains, each, s.shape[1]))
     for i in range(each):
-        s = found[:, i] = _walk(polytope, revolute, s, _THIN, rng)
+        s = found[:, i] = _walk(polytope, space, s, _THIN, rng)
     return found
 
 
-def _walk(polytope: Polytope, revolute: NDArray[np.bool_], s: Array, rounds: int, rng: np.random.Generator) -> Array:
+def _walk(polytope: Polytope, space: ConfigurationSpace, s: Array, rounds: int, rng: np.random.Generator) -> Array:
     """Returns the chains s (k, n) after that many rounds over all axes."""
     s = s.copy()
-    columns = polytope.C.T
+    axes = [(i, space.of(i), column, column > 0, column < 0) for i, column in enumerate(polytope.C.T)]
     for _ in range(rounds):
         # The slack is computed anew in every round, so that rounding does not add up.
-        slack = np.maximum(polytope.d - s @ columns, 0)
-        for i, column in enumerate(columns):
-            up, down = column > 0, column < 0
+        slack = np.maximum(polytope.d - s @ polytope.C.T, 0)
+        for i, joint, column, up, down in axes:
             least = s[:, i] + (slack[:, down] / column[down]).max(axis=1)
             most = s[:, i] + (slack[:, up] / column[up]).min(axis=1)
             place = rng.random(len(s))
-            if revolute[i]:
-                begin, end = np.arctan(least), np.arctan(most)
-                new = np.clip(np.tan(begin + (end - begin) * place), least, most)
-            else:
-                new = least + (most - least) * place
+            begin, end = joint.offset(least), joint.offset(most)
+            new = np.minimum(np.maximum(joint.at_offset(begin + (end - begin) * place), least), most)
             slack = np.maximum(slack - np.outer(new - s[:, i], column), 0)
             s[:, i] = new
     return s

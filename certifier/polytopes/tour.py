@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from certifier.coordinates import ConfigurationSpace
 from certifier.model import Array, Polytope
 from certifier.polytopes import gibbs, simplex
 from certifier.polytopes.polytope import chebyshev_center
@@ -30,16 +30,16 @@ def extremes(polytope: Polytope) -> tuple[Array, Array]:
     return points[:n], points[n:]
 
 
-def samples(polytope: Polytope, revolute: NDArray[np.bool_], count: int, seed: int) -> Array:
+def samples(polytope: Polytope, space: ConfigurationSpace, count: int, seed: int) -> Array:
     """Returns ``count`` points of P in s, (count, n), nearly uniform in q; the same seed gives the same points."""
     each = -(-count // CHAINS)
-    drawn: Array = gibbs.uniform_in_q(polytope, revolute, CHAINS, each, seed).swapaxes(0, 1).reshape(-1, polytope.C.shape[1])
+    drawn: Array = gibbs.uniform_in_q(polytope, space, CHAINS, each, seed).swapaxes(0, 1).reshape(-1, polytope.C.shape[1])
     return drawn[:count]
 
 
 def answer(payload: dict[str, Any]) -> dict[str, Any]:
-    """Answers both questions in a child process, for ``C``, ``d``, ``revolute``, ``count`` and ``seed``, in s."""
-    polytope = Polytope(payload["C"], payload["d"])
+    """Answers both questions in a child process, for ``C``, ``d``, ``q_star``, ``revolute``, ``count`` and ``seed``, in s."""
+    polytope, space = Polytope(payload["C"], payload["d"]), ConfigurationSpace(payload["q_star"], payload["revolute"])
     lower, upper = extremes(polytope)
-    drawn = samples(polytope, payload["revolute"], payload["count"], payload["seed"]) if payload["count"] else np.zeros((0, len(lower)))
+    drawn = samples(polytope, space, payload["count"], payload["seed"]) if payload["count"] else np.zeros((0, len(lower)))
     return {"lower": lower, "upper": upper, "samples": drawn}

@@ -251,7 +251,7 @@ def _relative(path: Path, directory: Path) -> str:
 def _joints(scene: Scene) -> str:
     lines = ["# The middle of every joint's range, in radians or metres:"]
     for j in scene.moving:
-        unit, scale = ("degrees", np.degrees(1.0)) if j.kind is JointKind.REVOLUTE else ("m", 1.0)
+        unit, scale = j.shown
         window = ", a window of its turn, which this middle moves" if j.own_limits is not None else ""
         lines.append(f"#   {j.name}: {scale * (j.lower or 0.0):.4g} to {scale * (j.upper or 0.0):.4g} {unit}{window}")
     return "\n".join([*lines, f"q_star: {[round(float(x), 6) for x in scene.q_star]}"]) + "\n"

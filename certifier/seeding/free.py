@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.geometry import QueryObject
 
 from certifier.errors import RegionError
-from certifier.model import Array, JointKind, Pair, Scene
+from certifier.model import Array, Pair, Scene
 from certifier.scene.drake_model import build_diagram, geometry_name
 from certifier.scene.hollow import CONVEX_PARTS, beyond, standing_for
 
@@ -150,6 +150,6 @@ def written(clearance: Clearance, q: Array, room: float) -> str:
 
 def _said(scene: Scene, q: Array, found: Array, text: str) -> str:
     moved = int(np.abs(found - q).argmax())
-    joint, by = scene.moving[moved], abs(found[moved] - q[moved])
-    how = f"{np.degrees(by):.2g} degrees" if joint.kind is JointKind.REVOLUTE else f"{by:.2g} m"
-    return f"the nearest free configuration found is q = {text}; it moves {joint.name} most, by {how}"
+    joint, (unit, scale) = scene.moving[moved], scene.moving[moved].shown
+    by = scale * abs(found[moved] - q[moved])
+    return f"the nearest free configuration found is q = {text}; it moves {joint.name} most, by {by:.2g} {unit}"

@@ -26,9 +26,13 @@ class Method(StrEnum):
     """The given C and d are the polytope."""
 
 
-IRIS = (Method.IRIS_NP2, Method.IRIS_ZO)
+OF_PAPER = (Method.LIMITS, Method.BOX)
+"""Only the papers' algorithm makes a region of these."""
+_GIVE = {"half_width": "give it in s, such as 0.1: about 11 degrees on each side of a joint near q*"}
 IRIS_SEEDS = 2**31
 """IRIS has this many seeds of its random choices, from 0 on."""
+GIVEN = ("polytope", "C", "d", "center")
+"""The method that takes a given polytope, and its options. Documents have them; nobody types them: there is ``ciris certify``."""
 
 
 @dataclass(frozen=True)
@@ -37,22 +41,24 @@ class SeedOptions:
 
     method: Method | None = option(
         None,
-        "How the first polytope is found: by Drake's IRIS (`iris_np2`, `iris_zo`), from the joint limits, as a box around the seed, or as "
-        "given.",
+        "How the first polytope is found: by Drake's IRIS (`iris_np2`, `iris_zo`), or with the papers' algorithm also from the joint "
+        "limits (`limits`), or as a box around the seed (`box`).",
         otherwise="`iris_np2`",
     )
-    q: tuple[float, ...] | None = option(
-        None, "The seed: joint positions in radians or metres, in position order. Every method but `polytope` needs it."
-    )
+    q: tuple[float, ...] | None = option(None, "The seed: joint positions in radians or metres, in position order.")
     contain: tuple[tuple[float, ...], ...] = option(
         (), "More configurations (joint positions) that the region must contain, such as where it meets another region."
     )
     C: tuple[tuple[float, ...], ...] | None = option(
-        None, "(m, n), the first polytope {s : C s <= d}, one row a face, in s; for the method `polytope`. The joint limits are added."
+        None,
+        "(m, n), the first polytope {s : C s <= d}, one row a face, in s; for the method `polytope`, which takes no `q`. The joint limits "
+        "are added.",
     )
     d: tuple[float, ...] | None = option(None, "(m,), the right-hand sides of these faces.")
     center: tuple[float, ...] | None = option(None, "(n,), a point inside that polytope, in s.", otherwise="the centre of its largest ball")
-    half_width: float = option(1e-3, "Half the edge length of the first polytope, in s; for the method `box`.", above=0)
+    half_width: float | None = option(
+        None, "Half the edge length of the first polytope, in s; the method `box` needs it. 0.1 is about 11 degrees of a joint.", above=0
+    )
     epsilon: float = option(
         0.001,
         "IRIS adds faces until at most this fraction of the volume in s is in collision. Below 0.01, only its last rounds of faces reach "
@@ -61,7 +67,7 @@ class SeedOptions:
         above=0,
         below=1,
     )
-    delta: float = option(0.05, "Probability with which IRIS may be wrong about `epsilon`.", argument="iris-delta", above=0, below=1)
+    delta: float = option(0.05, "Probability with which IRIS may be wrong about that fraction.", argument="iris-delta", above=0, below=1)
     max_iterations: int = option(
         3,
         "Largest number of alternations of IRIS between faces and ellipsoid, and again where balls about a hand join the scene.",
@@ -83,7 +89,7 @@ class SeedOptions:
     random_seed: int | None = option(
         None,
         "Seed of IRIS' random choices alone. Another seed gives another proposal.",
-        otherwise="`random_seed` of the options",
+        otherwise="the seed of every random choice",
         argument="iris-random-seed",
         least=0,
         greatest=IRIS_SEEDS - 1,
@@ -109,13 +115,13 @@ class SeedOptions:
         """
         options = read(cls, document, "seed")
         method, given = options.method, {name for name, value in document.items() if value is not None}
-        needed, idle = (("C", "d"), ("q",)) if method is Method.POLYTOPE else (("q",), ("C", "d", "center"))
+        needed = {Method.POLYTOPE: ("C", "d"), Method.BOX: ("q", "half_width")}.get(method or Method.IRIS_NP2, ("q",))
+        idle = {"C", "d", "center", "half_width", "q"} - {*needed} - ({"center"} if method is Method.POLYTOPE else set())
         for name in needed:
             if name not in given:
-                raise _refuse(name, f"the method {method or Method.IRIS_NP2} needs {name}", "missing_option", "give it")
-        for name in idle:
-            if name in given:
-                raise _refuse(name, f"the method {method or Method.IRIS_NP2} has no use for {name}", hint="leave it out")
+                raise _refuse(name, f"the method {method or Method.IRIS_NP2} needs {name}", "missing_option", _GIVE.get(name, "give it"))
+        for name in sorted(idle & given):
+            raise _refuse(name, f"the method {method or Method.IRIS_NP2} has no use for {name}", hint="leave it out")
         for name in ("q", "center"):
             check_magnitude(getattr(options, name) or (), f"seed.{name}")
         for i, row in enumerate(options.contain):

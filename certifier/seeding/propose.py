@@ -65,6 +65,7 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
             C, d = np.zeros((0, scene.n)), np.zeros(0)
             said = {}
         elif method is Method.BOX:
+            assert options.half_width is not None, "a box has a width"
             C, d = _box(scene, np.concatenate([center[None], contain]), options.half_width)
             said = {}
         else:

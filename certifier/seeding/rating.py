@@ -44,10 +44,10 @@ def rated(scene: Scene, polytope: Polytope, keep: Array) -> Rating:
     Raises:
         RegionError: the polytope is empty or unbounded.
     """
-    q_volume, _ = volume_in_q(polytope, scene.revolute, volume(polytope, 0), 0)
+    q_volume, _ = volume_in_q(polytope, scene, volume(polytope, 0), 0)
     return Rating(q_volume, touched(scene, polytope, samples_of(scene, polytope), keep))
 
 
 def samples_of(scene: Scene, polytope: Polytope) -> Array:
     """Returns samples of a polytope, (CHAINS * EACH, n), uniform in q; the same ones for the same polytope."""
-    return uniform_in_q(polytope, scene.revolute, CHAINS, EACH, 0).reshape(-1, scene.n)
+    return uniform_in_q(polytope, scene, CHAINS, EACH, 0).reshape(-1, scene.n)

@@ -206,7 +206,7 @@ def _check_size(scene: Scene, index: int, proof: PairProof) -> None:
     if terms > MOST_TERMS:
         pair, most = scene.pairs[index], f"more than {MOST_TERMS}"
         problem = f"with all {scene.n} joints in play the polynomials of {pair.a} and {pair.b} have {terms} terms, {most}"
-        raise RegionError("step_too_large", problem, field="max_rounds", hint=_PUSH)
+        raise RegionError("step_too_large", problem, field="options.paper.max_rounds", hint=_PUSH)
 
 
 def _within(box: Box, C: Array, d: Array) -> Polytope:

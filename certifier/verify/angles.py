@@ -21,13 +21,9 @@ LARGEST = 1e6
 
 
 def _quarter_turn() -> tuple[float, float]:
-    precision = ctx.prec
-    ctx.prec = 256
-    try:
+    with ctx.workprec(256):
         first = float((arb.pi() / 2 * 2**32).floor().unique_fmpz()) / 2**32
         return first, float((arb.pi() / 2 - arb(first)).mid())
-    finally:
-        ctx.prec = precision
 
 
 P1, P2 = _quarter_turn()

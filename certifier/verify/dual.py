@@ -107,12 +107,8 @@ def verify_dual(proof: DualProof) -> DualStatement:
     check_ground(scene, proof.ground)
     _check_tight(scene, proof.ground)
     check_interior(scene, proof.ground, proof.interior)
-    precision = ctx.prec
-    ctx.prec = PRECISION
-    try:
+    with ctx.workprec(PRECISION):
         return _Check(proof).statement()
-    finally:
-        ctx.prec = precision
 
 
 def _check_tight(scene: Scene, ground: Ground) -> None:

@@ -41,12 +41,8 @@ def exact(x: float) -> fmpq:
 
 def half_tangent(angle: float) -> fmpq:
     """Returns a dyadic tau with |2 atan(tau) - angle| < 2^-100."""
-    precision = ctx.prec
-    ctx.prec = 256
-    try:
+    with ctx.workprec(256):
         return fmpq(((arb(angle) / 2).tan() * arb(2) ** _TAU_BITS).floor().unique_fmpz()) / fmpq(2) ** _TAU_BITS
-    finally:
-        ctx.prec = precision
 
 
 class ExactKinematics:

@@ -12,8 +12,6 @@ is made of two poses in its frame. So what a chain takes is linear in its joints
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
@@ -65,7 +63,7 @@ class Places:
 
     def chain(self, frame: str, body: str) -> Chain:
         """Returns the chain from a body's frame to a body."""
-        with _bits():
+        with ctx.workprec(BITS):
             up, down = self._roots(frame), self._roots(body)
             while up and down and up[-1] == down[-1]:
                 up.pop()
@@ -128,16 +126,6 @@ class Places:
             exact = unit(np.asarray(joint.axis, dtype=float).tobytes())
             self._axes[joint.child] = np.array([float(int(x.p) / int(x.q)) for x in exact])
         return self._axes[joint.child]
-
-
-@contextmanager
-def _bits() -> Iterator[None]:
-    before = ctx.prec
-    ctx.prec = BITS
-    try:
-        yield
-    finally:
-        ctx.prec = before
 
 
 def _rigid(X: Array) -> _Ball:

@@ -48,8 +48,8 @@ class RegionStatement:
         """Returns the statement in plain words."""
         scene = self.scene
         joints = [
-            f"  '{j.name}': {exactly(lower)} to {exactly(upper)} {'rad' if r else 'm'} (centre {exactly(q)})"
-            for j, r, lower, upper, q in zip(scene.moving, scene.revolute, scene.q_lower, scene.q_upper, scene.q_star, strict=True)
+            f"  '{j.name}': {exactly(lower)} to {exactly(upper)} {j.unit} (centre {exactly(q)})"
+            for j, lower, upper, q in zip(scene.moving, scene.q_lower, scene.q_upper, scene.q_star, strict=True)
         ]
         closest = min(self.gaps, key=self.gaps.__getitem__, default=None)
         return [

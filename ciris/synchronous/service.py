@@ -30,9 +30,10 @@ from ciris.answers import (
     Verification,
 )
 from ciris.job import JobData, why_no_region
+from ciris.options import CERTIFY, COVER, JOB, RECERTIFY, CertifyOptions, CoverOptions, GrowOptions, JobOptions, RecertifyOptions
 from ciris.reading import read
 from ciris.region import RegionData, region_fields
-from ciris.requests import CoverOptions, GrowOptions, Straight, cover_request, given, grow_request, named, plain, points, straight
+from ciris.requests import Straight, asked_for, given, grow_request, named, plain, points, straight
 from ciris.scene import Scene, scene_name
 from ciris.space import numbers
 from ciris.synchronous.client import Client
@@ -197,31 +198,28 @@ class Service:
 
     def submit_cover(self, scene: str | Scene, **options: Unpack[CoverOptions]) -> Job:
         """Creates a job that covers a scene, and returns it at once. Its regions are there as soon as each is certified."""
-        return self._job((self.client.create_job(cover_request(scene_name(scene), options)))[0])
+        request = {"kind": "cover", "scene": scene_name(scene), **asked_for(options, COVER)}
+        return self._job((self.client.create_job(request))[0])
 
-    def recertify(self, region: str | Region, scene: str | Scene, deadline: float | None = None) -> Region:
+    def recertify(self, region: str | Region, scene: str | Scene, **options: Unpack[RecertifyOptions]) -> Region:
         """Makes a region of a changed scene from one of the scene before, and waits for it.
 
         Raises:
             CirisError: ``revoked``, where nothing is left of it; ``other_robot``.
         """
-        job = self.submit_recertify(region, scene, deadline)
+        job = self.submit_recertify(region, scene, **options)
         return job.result()
 
-    def submit_recertify(self, region: str | Region, scene: str | Scene, deadline: float | None = None) -> Job:
+    def submit_recertify(self, region: str | Region, scene: str | Scene, **options: Unpack[RecertifyOptions]) -> Job:
         """Creates a job that makes a region of a changed scene from one of the scene before, and returns it at once."""
         old = named(region.id if isinstance(region, Region) else region, "region", "its id or a region")
-        request = {"kind": "recertify", "scene": scene_name(scene), "region": old, **given(deadline_seconds=deadline)}
+        request = {"kind": "recertify", "scene": scene_name(scene), "region": old, **asked_for(options, RECERTIFY)}
         return self._job((self.client.create_job(request))[0])
 
-    def submit_certify(self, scene: str | Scene, C: ArrayLike, d: ArrayLike, cells: int = 1) -> Job:
-        """Creates a job that certifies the polytope {s : C s <= d} within the joint limits, C (m, n), d (m,), and returns it at once.
-
-        Args:
-            cells: number of cells of the polytope that are tried for each pair, each with its own plane.
-        """
+    def submit_certify(self, scene: str | Scene, C: ArrayLike, d: ArrayLike, **options: Unpack[CertifyOptions]) -> Job:
+        """Creates a job that certifies the polytope {s : C s <= d} within the joint limits, C (m, n), d (m,), and returns it at once."""
         polytope = {"C": numbers(C, "C").tolist(), "d": numbers(d, "d").tolist()}
-        request = {"kind": "certify", "scene": scene_name(scene), "polytope": polytope, "cells": cells}
+        request = {"kind": "certify", "scene": scene_name(scene), "polytope": polytope, **asked_for(options, CERTIFY)}
         return self._job((self.client.create_job(request))[0])
 
     def job(self, job_id: str) -> Job:
@@ -357,16 +355,14 @@ class Service:
         tube: bool = False,
         padding: float = 0.0,
         clearance: bool = False,
-        deadline: float | None = None,
+        **options: Unpack[JobOptions],
     ) -> Job:
         """Creates a job that certifies a motion which may take minutes, and returns it at once; its :meth:`Job.motion` waits.
 
-        Args:
-            deadline: seconds after which the job ends, without a verdict then. The others are as of :meth:`certify_path`.
+        The arguments are as of :meth:`certify_path`.
         """
-        motion = {**points(2, q=q, s=s), **given(space=space, deadline_seconds=deadline)}
-        options = {"tube": tube, "padding": float(padding), "clearance": clearance}
-        job, _ = self.client.create_job({"kind": "certify-path", "scene": scene_name(scene), **motion, **options})
+        motion = {**points(2, q=q, s=s), **given(space=space), "tube": tube, "padding": float(padding), "clearance": clearance}
+        job, _ = self.client.create_job({"kind": "certify-path", "scene": scene_name(scene), **motion, **asked_for(options, JOB)})
         return self._job(job)
 
     def graph(self, scene: str | Scene) -> Graph:

@@ -22,6 +22,7 @@ from pydrake.planning import GcsTrajectoryOptimization
 from pydrake.solvers import ClarabelSolver
 from pydrake.trajectories import CompositeTrajectory
 
+from certifier.coordinates import ConfigurationSpace
 from certifier.model import Array
 from planner.trajectory.timing import STILL, length, timed
 
@@ -84,7 +85,7 @@ class _Curve:
     """
 
     def __init__(self, route: dict[str, Any], payload: dict[str, Any]) -> None:
-        self._payload = payload
+        self._payload, self._space = payload, ConfigurationSpace(payload["q_star"], payload["revolute"])
         self._polytopes = [payload["polytopes"][region] for region in route["regions"]]
         self._start, self._goal = payload["start"], payload["goal"]
         first, *between = [s for s in (self._start, *route["via"], self._goal) if s is not None]
@@ -105,8 +106,7 @@ class _Curve:
         """Returns points of the curve, (m, n), in q."""
         assert self._path is not None
         u = np.linspace(0, len(self._polytopes), self._payload["steps"] * len(self._polytopes) + 1)
-        s = self._path.vector_values(u).T
-        return np.array(self._payload["q_star"] + np.where(self._payload["revolute"], 2 * np.arctan(s), s))
+        return self._space.to_q(self._path.vector_values(u).T)
 
     def _found(self) -> CompositeTrajectory | None:
         """Returns the shortest curve in s, with a parameter of 1 in each region; None where there is none."""
@@ -126,7 +126,7 @@ class _Curve:
         chain = []
         for polytope, faces, middle in zip(self._polytopes, self._faces, self._middles, strict=True):
             inside = program.AddRegions([HPolyhedron(polytope["C"][faces], polytope["d"][faces])], [], ORDER, h_min=1.0, h_max=1.0)
-            weight = np.diag(np.where(self._payload["revolute"], 2 / (1 + middle**2), 1.0))  # dq/ds
+            weight = np.diag(self._space.slope(middle))
             inside.AddPathLengthCost(weight)
             inside.AddPathEnergyCost(EVEN * weight)
             chain.append(inside)

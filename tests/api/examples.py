@@ -276,7 +276,7 @@ def offered(scene: str, home: list[float], away: list[float], region: str) -> di
         "tries": 2,
     }
     faces = {"C": [[1, 0], [-1, 0], [0, 1], [0, -1]], "d": [0.3, 0.3, 0.3, 0.3], "center": [0.0, 0.0]}
-    growing = {"contraction": "targeted", "cells": 1000, "contractions": 1, "max_rounds": 2, "pushes": 2, "tolerance": 0.02}
+    paper = {"contraction": "targeted", "contractions": 1, "max_rounds": 2, "pushes": 2, "tolerance": 0.02}
     covering = {
         "seeds": [home],
         "connect": [home, away],
@@ -291,9 +291,10 @@ def offered(scene: str, home: list[float], away: list[float], region: str) -> di
                 **more,
                 "kind": "grow",
                 "seed": {"method": "iris_np2", "q": home, "contain": [away], **iris, "random_seed": 1},
-                "options": growing,
+                "options": {"paper": paper},
             },
-            {**more, "kind": "grow", "seed": {"method": "polytope", "q": home, **faces, "half_width": 0.1}},
+            {**more, "kind": "grow", "seed": {"method": "polytope", **faces}, "options": {"cells": 1000}},
+            {**more, "kind": "grow", "seed": {"method": "box", "q": home, "half_width": 0.1}, "options": {"paper": {}}},
             {**more, "kind": "certify", "polytope": faces, "cells": 100, "random_seed": 1},
             {**more, "kind": "recertify", "region": region, "random_seed": 1},
             {

@@ -27,7 +27,7 @@ from db.states import PairState, StepState
 from db.types import utcnow
 from tests.certifier.scenes import ball, box, planar_arm
 from tests.db.builders import add_iteration
-from tests.scenes import slider
+from tests.scenes import box_seed, slider
 
 Ask = Callable[[str], Any]
 
@@ -59,8 +59,8 @@ def passing() -> Scene:
 
 def grown(client: TestClient, scene: Scene, half_width: float = 0.64, **options: Any) -> dict[str, Any]:
     """A job that has ended: it has grown a region from a box, cell by cell."""
-    seed = {"method": "box", "q": [0.0] * scene.n, "half_width": half_width}
-    request = {"kind": "grow", "scene": scene.name, "seed": seed, "options": {"contraction": "whole", "cells": 100, "stages": 1, **options}}
+    seed = box_seed(np.zeros(scene.n), half_width)
+    request = {"kind": "grow", "scene": scene.name, "seed": seed, "options": {"cells": 100, "stages": 1, **options}}
     job = client.post("/v1/jobs", json=request).json()
     return ended(client, job["id"])
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any
 
 import pytest
@@ -14,7 +13,6 @@ from db import jobs, scenes
 from db.models import JobRow
 from db.session import Database
 from db.settings import settings
-from jobs.cover import CoverRequestOptions
 from planner.cover.machine import advance, begin
 from planner.cover.options import CoverOptions
 from planner.cover.state import Scouted
@@ -35,11 +33,6 @@ def with_child(database: Database, cover_id: str) -> JobRow:
         cover = jobs.lock(session, cover_id)
         child, _ = jobs.create(session, kind="grow", scene_id=cover.scene_id, options={"kind": "grow"}, parent_id=cover.id, number=0)
     return child
-
-
-def test_the_request_has_the_options_of_a_cover() -> None:
-    assert set(CoverRequestOptions.model_fields) == {field.name for field in fields(CoverOptions)}
-    assert CoverOptions.from_document(CoverRequestOptions().model_dump()) == CoverOptions()
 
 
 def test_a_cover_is_a_job_with_options_of_its_own(client: TestClient, scene: Scene) -> None:

@@ -1,7 +1,7 @@
 """Jobs over HTTP: creation, idempotency, refusals, pages, cancel, retry; the queue is real, the workers are not there."""
 
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,11 +15,9 @@ from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair.result import PairResult
 from certifier.partition.certification import CellCertification
-from certifier.seeding.options import SeedOptions
 from certifier.verify.file import verify_file
 from db import jobs, pairs, scenes
 from db.session import Database
-from jobs.grow import GrowOptions, Seed
 from tests.api.conftest import BASE_URL, PROBLEM
 from tests.db.builders import add_iteration
 from tests.scenes import slider
@@ -68,7 +66,10 @@ REFUSED: list[tuple[dict[str, Any], int, str, str | None]] = [
     (GROW | {"seed": {"method": "polytope", "C": [[1, 2]], "d": [1]}}, 422, "polytope_shape", "seed.C[0]"),
     (GROW | {"seed": {"q": [0.1], "epsilon": 2}}, 422, "invalid_request", "seed.epsilon"),
     (GROW | {"color": "red"}, 422, "invalid_request", "color"),
-    (GROW | {"options": {"max_rounds": -1}}, 422, "invalid_request", "options.max_rounds"),
+    (GROW | {"options": {"max_rounds": 1}}, 422, "invalid_request", "options.max_rounds"),
+    (GROW | {"options": {"paper": {"max_rounds": -1}}}, 422, "invalid_request", "options.paper.max_rounds"),
+    (GROW | {"seed": {"q": [0.1], "method": "limits"}}, 422, "option_value", "seed.method"),
+    (GROW | {"seed": {"q": [0.1], "method": "box"}, "options": {"paper": {}}}, 422, "missing_option", "seed.half_width"),
     (GROW | {"options": {"rounds": 1}}, 422, "invalid_request", "options.rounds"),
     (GROW | {"deadline_seconds": 0}, 422, "invalid_request", "deadline_seconds"),
     (GROW | {"kind": "conquer"}, 422, "invalid_request", "kind"),
@@ -282,10 +283,19 @@ def test_a_job_that_asks_for_cells_says_so(client: TestClient, scene: Scene) -> 
         return GrowthOptions.from_document(client.post("/v1/jobs", json=body).json()["options"])
 
     assert [options(body).by_cells for body in (CERTIFY, CERTIFY | {"cells": 300})] == [False, True]
-    whole = options(GROW | {"options": {"contraction": "whole", "cells": 900}})
+    whole = options(GROW | {"options": {"cells": 900}})
     assert (whole.by_cells, whole.cells) == (True, 900)
     refused = client.post("/v1/jobs", json=CERTIFY | {"cells": 0})
     assert (refused.status_code, refused.json()["field"]) == (422, "cells")
+
+
+def test_an_option_that_has_moved_into_a_group_is_refused_with_its_place(client: TestClient, scene: Scene) -> None:
+    problem = client.post("/v1/jobs", json=GROW | {"options": {"pushes": 1, "color": "red"}}).json()
+    said = {error["field"]: error["message"] for error in problem["errors"]}
+    assert said == {
+        "options.pushes": "there is no such field: give options.paper.pushes",
+        "options.color": "there is no such field",
+    }
 
 
 def test_a_job_is_accepted_while_redis_is_down(database: Database, scene: Scene, environment: pytest.MonkeyPatch) -> None:
@@ -302,12 +312,6 @@ def test_a_job_is_accepted_while_redis_is_down(database: Database, scene: Scene,
 
 def test_the_service_is_ready_with_its_database_and_its_queue(client: TestClient) -> None:
     assert client.get("/readyz").json() == {"ready": True, "checks": {"database": "ok", "queue": "ok", "disk": "ok"}}
-
-
-def test_the_schema_has_the_options_of_the_certifier() -> None:
-    ours, theirs = GrowOptions().model_dump(), GrowthOptions().to_document()
-    assert ours == {name: value for name, value in theirs.items() if name not in ("kind", "seed")}
-    assert set(Seed.model_fields) == {field.name for field in fields(SeedOptions)}
 
 
 def test_a_region_of_another_scene_is_certified_again_with_its_seed_inside(client: TestClient, database: Database, region: str) -> None:

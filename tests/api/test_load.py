@@ -89,7 +89,7 @@ def busy_workers(url: str, key: str) -> tuple[str, str]:
         large, small = (client.add_scene(EXAMPLES / name / "scene.yaml") for name in ("iiwa_shelf", "planar_2dof"))
         q = yaml.safe_load((EXAMPLES / "iiwa_shelf" / "seed.yaml").read_text())["q"]
         for random_seed in range(4):
-            options = {"max_rounds": 100, "random_seed": random_seed}
+            options = {"paper": {"max_rounds": 100}, "random_seed": random_seed}
             job, _ = client.create_job({"kind": "grow", "scene": large["id"], "seed": {"q": q}, "options": options})
     return small["id"], job["id"]
 

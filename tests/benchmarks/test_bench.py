@@ -16,6 +16,7 @@ from benchmarks import agreement, catalogue, compare, growth, path, plan, query,
 from benchmarks.compare import Verdict, verdict
 from certifier.carry.robot import same_bodies
 from certifier.errors import CirisError
+from certifier.growth.paper.options import PaperOptions
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD
 from certifier.outcome import Outcome, Stage
@@ -51,7 +52,7 @@ def test_pairs_are_chosen_by_name_and_cost() -> None:
 
 
 def test_a_way_to_grow_is_a_row_with_its_region(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(growth, "WAYS", {"pushes": {"contraction": "targeted", "max_rounds": 0}})
+    monkeypatch.setattr(growth, "WAYS", {"pushes": PaperOptions(max_rounds=0)})
     document = growth.growth(["planar_2dof"], against=False, limit=growth.LIMIT, progress=lambda _: None)
     iris, row = document["ways"]
     assert (iris["scene"], iris["way"], iris["share"]) == ("planar_2dof", growth.IRIS, 1.0)
@@ -67,7 +68,7 @@ def test_a_way_to_grow_is_a_row_with_its_region(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_region_that_cannot_be_grown_is_a_row_that_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(growth, "WAYS", {"nothing": {}})
+    monkeypatch.setattr(growth, "WAYS", {"nothing": None})
     monkeypatch.setattr(catalogue, "seed", lambda _: np.array([9.0, 0.0]))
     document = growth.growth(["planar_2dof"], against=False, limit=growth.LIMIT, progress=lambda _: None)
     assert [row["ellipsoid"] for row in document["ways"]] == [0, 0]

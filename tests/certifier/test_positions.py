@@ -28,13 +28,10 @@ def turning(center: float = 0.0) -> Scene:
 @given(st.floats(-MAGNITUDE, MAGNITUDE), st.floats(-4.0, 4.0))
 def test_whole_turns_are_taken_off_to_the_last_digit(angle: float, center: float) -> None:
     (found,) = turning(center).in_windows([angle]).tolist()
-    precision, ctx.prec = ctx.prec, 200
-    try:
+    with ctx.workprec(200):
         turns = ((arb(angle) - arb(found)) / (2 * arb.pi())).mid()
         whole = round(float(turns))
         off = abs(float((arb(angle) - 2 * arb.pi() * whole - arb(found)).mid()))
-    finally:
-        ctx.prec = precision
     assert off <= math.ulp(found)
     assert abs(found - center) <= math.pi + 1e-9
     assert whole or found == angle, "nothing is done to what is in the window"

@@ -214,11 +214,11 @@ def test_a_job_is_followed_to_its_region(service: Any, region: str) -> None:
 
 
 def test_a_job_is_submitted_cancelled_and_retried(service: Any, scene: Scene, database: Database) -> None:
-    job = service.submit_grow(service.scene("slider"), [0.0], contain=[0.1], method="box", deadline=60, pushes=1, priority=1)
+    job = service.submit_grow(service.scene("slider"), [0.0], contain=[0.1], deadline=60, paper={"pushes": 1}, priority=1)
     assert (job.state, job.ended) == ("queued", False)
     with database.read() as session:
         options = jobs.get(session, job.id).options
-    assert (options["seed"]["contain"], options["seed"]["method"], options["pushes"]) == ([[0.1]], "box", 1)
+    assert (options["seed"]["contain"], options["paper"]["pushes"]) == ([[0.1]], 1)
     assert job.cancel().state in ("cancelling", "cancelled")
     again = service.submit_certify("slider", [[1.0], [-1.0]], [0.1, 0.1], cells=4)
     assert (again.kind, again.refresh().id, service.job(again.id[:8]).id) == ("certify", again.id, again.id)

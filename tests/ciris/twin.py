@@ -23,9 +23,14 @@ RULES = [
 
 
 def twin(source: str) -> str:
-    """Returns the synchronous twin of an asynchronous module, formatted as the project's are."""
+    """Returns the synchronous twin of an asynchronous module."""
     for pattern, replacement in RULES:
         source = re.sub(pattern, replacement, source)
+    return formatted(source)
+
+
+def formatted(source: str) -> str:
+    """Returns a module formatted as the project's are."""
     for command in (["check", "--select", "I,UP", "--fix-only", "--quiet"], ["format"]):
         arguments = ["ruff", *command, "--stdin-filename", str(TWIN / "twin.py"), "-"]
         source = subprocess.run(arguments, input=source, capture_output=True, text=True, check=True, cwd=ROOT).stdout

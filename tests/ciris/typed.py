@@ -13,7 +13,7 @@ import ciris
 def plan() -> None:
     with ciris.connect() as service:
         scene = assert_type(service.add_scene("scene.yaml"), ciris.Scene)
-        region = assert_type(service.grow(scene, q=[0.0, 0.1], deadline=60, method="box"), ciris.Region)
+        region = assert_type(service.grow(scene, q=[0.0, 0.1], deadline=60, method="limits", paper={"pushes": 1}), ciris.Region)
         assert_type(region.C, NDArray[np.float64])
         assert_type(region.contains(np.zeros((3, 2))), NDArray[np.bool_])
         assert_type(region.proof(), bytes)
@@ -39,6 +39,7 @@ def plan() -> None:
                 assert_type(near.q, NDArray[np.float64])
         assert_type(ciris.CirisError("code", "message").field, str | None)
         service.grow("my-cell", q=[0.0, 0.1], method="magic")  # type: ignore[arg-type]
+        service.grow("my-cell", q=[0.0, 0.1], paper={"push": 1})  # type: ignore[typeddict-unknown-key]
         service.grow("my-cell", q=[0.0, 0.1], dead_line=60)  # type: ignore[call-arg]
 
 

@@ -11,10 +11,10 @@ from dataclasses import replace
 import pytest
 
 from benchmarks import __main__ as benchmarks
-from client import cli
+from client.arguments import parser
 from tests.client.mentions import HOLE, Mention, mentions, of_markdown, of_python, of_text, options
 
-PARSER: argparse.ArgumentParser = cli.parser()
+PARSER: argparse.ArgumentParser = parser()
 BENCHMARKS = benchmarks._parser()
 OTHERS = {"--once": "of ./start"}
 """Options of other programs that messages name, and whose they are."""

@@ -47,7 +47,7 @@ def test_a_draft_of_a_robot_as_people_ship_it_is_a_scene_with_a_free_seed(ciris:
     assert set(document["ignore"][0]["pair"]) == {"arm/base/foot", "arm/cover/Sphere"}
     scene = load_scene(out)
     assert [j.name for j in scene.moving] == ["arm/turn"]
-    assert "arm/turn: -170 to 170 degrees, a window" in text
+    assert "arm/turn: -170 to 170 deg, a window" in text
     assert yaml.safe_load((out.parent / "seed.yaml").read_text())["q"] == [0.0]
     checked = ciris("scene", "check", out)
     assert checked.status == 0
@@ -214,8 +214,8 @@ def test_an_angle_that_no_double_tells_from_others_is_refused_without_a_service(
     polytope.write_text('{"C": [[1, 0]], "d": [0.1], "center": [0, 1e300]}')
     for arguments, field in (
         (("scene", "check", scene, "--q", huge), "q[0]"),
-        (("grow", scene, "--local", "--method", "box", "--q", huge), "seed.q[0]"),
-        (("grow", scene, "--local", "--method", "box", "--q", "0,0", "--contain", huge), "seed.contain[0][0]"),
+        (("grow", scene, "--local", "--q", huge), "seed.q[0]"),
+        (("grow", scene, "--local", "--q", "0,0", "--contain", huge), "seed.contain[0][0]"),
         (("certify-path", scene, "--local", "--q", "0,0", "--q", huge), "--q[1][0]"),
         (("certify", scene, "--local", "--polytope", polytope), "polytope.center[1]"),
     ):

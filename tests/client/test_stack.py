@@ -60,7 +60,9 @@ def test_a_polytope_is_certified_and_answers_questions(machine: Machine) -> None
 
 
 def test_a_region_is_grown_and_its_proof_holds_offline(machine: Machine) -> None:
-    done = machine.ciris("grow", PLANAR, "--method", "box", "--pushes", "1", "--rounds", "0", "--json", "--watch")
+    done = machine.ciris(
+        "grow", PLANAR, "--paper", "--method", "box", "--half-width", "0.001", "--pushes", "1", "--rounds", "0", "--json", "--watch"
+    )
     assert done.status == 0, done.stderr
     manifest = done.json
     assert manifest["seconds"] > 0
@@ -73,7 +75,7 @@ def test_a_region_is_grown_and_its_proof_holds_offline(machine: Machine) -> None
 
 def test_several_seeds_grow_at_once_and_each_says_what_became_of_it(machine: Machine) -> None:
     seeds = ("--q", "0.0,0.1", "--q", "-1.2,1.0", "--q", "0.05,-0.05", "--contain", "0.02,0.02")
-    done = machine.ciris("grow", PLANAR, *seeds, "--method", "box", "--pushes", "1", "--rounds", "0")
+    done = machine.ciris("grow", PLANAR, *seeds, "--paper", "--method", "box", "--half-width", "0.001", "--pushes", "1", "--rounds", "0")
     assert done.status == 1
     rows = done.stdout.splitlines()[-3:]
     assert ["none" in row for row in rows] == [False, True, False]

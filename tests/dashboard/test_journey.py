@@ -5,24 +5,24 @@ from __future__ import annotations
 import re
 from typing import Any
 
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
 from certifier.model import Scene
 from tests.dashboard.test_library_page import plan
 from tests.dashboard.test_new_page import set_joint
+from tests.scenes import box_seed
 
 
 def submit(page: Any, url: str) -> str:
-    """Starts a job in the form, from a box around the configuration (-20, -12) degrees, and returns its id."""
+    """Starts a job in the form, around the configuration (-20, -12) degrees, and returns its id."""
     page.goto(url)
     page.get_by_role("link", name="Start a job").first.click()
     page.locator(".said", has_text=re.compile("Free here|as proved")).wait_for()
     set_joint(page, "arm/joint1", -20)
     set_joint(page, "arm/joint2", -12)
     page.locator("summary", has_text="More options").click()
-    page.get_by_label("Method").select_option("box")
-    page.get_by_label("Half width").fill("0.3")
     page.get_by_label("Cells").fill("64")
     page.get_by_role("button", name="Start the job").click()
     page.wait_for_url(f"{url}/jobs/*")
@@ -72,7 +72,10 @@ def test_a_visit_from_a_job_to_a_plan(page: Any, url: str, planar: Scene, client
     page.get_by_text("No collision of the scene's pairs, as proved.").wait_for()
 
     # Another job, which is cancelled.
-    other = submit(page, url)
+    seed = box_seed(planar.to_s(np.deg2rad([-20, -12])), 0.3)
+    request = {"kind": "grow", "scene": "planar", "seed": seed, "options": {"cells": 64}}
+    other = client.post("/v1/jobs", json=request).json()["id"]
+    page.goto(f"{url}/jobs/{other}")
     page.get_by_role("button", name="Cancel").click()
     page.locator(".badge.cancelled").wait_for()
     assert client.get(f"/v1/jobs/{other}").json()["state"] == "cancelled"

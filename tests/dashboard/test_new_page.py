@@ -213,3 +213,18 @@ def test_nothing_keeps_people_out(browser: Any, url: str, planar: Scene, barrier
         assert barriers(page) == []
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     context.close()
+
+
+def test_the_form_says_that_a_box_is_for_the_papers_algorithm(opened: Any, url: str, client: TestClient, complaints: list[str]) -> None:
+    opened.locator("summary", has_text="More options").click()
+    method, start = opened.get_by_label("Method"), opened.get_by_role("button", name="Start the job")
+    method.select_option("box")
+    opened.get_by_label("Half width").fill("0.1")
+    start.click()
+    opened.get_by_text("only the papers' algorithm begins with the method box").wait_for()
+    assert method.get_attribute("aria-invalid") == "true"
+    assert complaints.pop().startswith(f"{REFUSED}422")
+    opened.get_by_label("Paper").check()
+    start.click()
+    opened.wait_for_url(f"{url}/jobs/*")
+    assert jobs(client)[0]["options"]["paper"]["contraction"] == "targeted"

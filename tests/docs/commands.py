@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
-from client.cli import EPILOG, parser
+from client.arguments import EPILOG, parser
 
 PAGE = Path(__file__).parents[2] / "docs" / "commands.md"
 GROUPS = {
@@ -115,8 +115,8 @@ def help_of(action: argparse.Action) -> str:
         SystemExit: it has none.
     """
     if not action.help:
-        raise SystemExit(f"{action.dest}: write a help text in client/cli.py")
-    return action.help
+        raise SystemExit(f"{action.dest}: write a help text in client/arguments")
+    return action.help.replace("%%", "%")
 
 
 def paragraphs(text: str) -> str:

@@ -95,7 +95,6 @@ COMMANDS: list[Row] = [
     ),
     *rows(
         "client/commands.py",
-        ("option", "--deadline", "must be a number of seconds above 0, not {deadline}", "", lambda t: grow(t, "--deadline", "0")),
         (
             "several_seeds",
             "--q",
@@ -279,6 +278,13 @@ COMMANDS: list[Row] = [
             "--local needs the path of a .yaml file",
             lambda t: t.ciris("grow", "planar", "--q", "0,0", "--local"),
         ),
+        (
+            "option",
+            "--deadline",
+            "a polytope is certified here without a deadline",
+            "leave out --deadline or --local",
+            lambda t: good(t, "--local", "--deadline", "9"),
+        ),
     ),
     *rows(
         "client/scenes.py",
@@ -313,7 +319,6 @@ COMMANDS: list[Row] = [
     ),
     *rows(
         "client/recertify.py",
-        ("option", "--deadline", "must be a number of seconds above 0, not {deadline}", "", lambda t: again(t, "x", "--deadline", "0")),
         ("option", "REGION", "no region was named", "name one, or name its scene with --from", lambda t: again(t)),
         (
             "option",

@@ -47,6 +47,10 @@ def from_a_region(t: Trial) -> str:
     return t.ciris("plan", "slider", "--from", region, "--to", "0.9", "--grow", CIRIS_URL=url)
 
 
+def without_grow(t: Trial) -> str:
+    return t.ciris("plan", "slider", "--from", "0", "--to", "0", "--deadline", "9")
+
+
 COVERS: list[Row] = [
     *rows(
         "planner/cover/options.py",
@@ -101,14 +105,8 @@ COVERS: list[Row] = [
         ("option", "--from", "regions grow between configurations, not regions", "give joint positions", from_a_region),
     ),
     *rows(
-        "client/cover.py",
+        "client/request.py",
         ("option", "--path", "{path} has no waypoints in q; a path to cover is straight in q between them", "give waypoints in q", in_s),
-        (
-            "option",
-            "--deadline",
-            "must be a number of seconds above 0, not {deadline}",
-            "",
-            lambda t: t.ciris("cover", "slider", "--deadline", "-1"),
-        ),
+        ("option", "--{argument}", "is an option of --{flag}", "add --{flag}", without_grow),
     ),
 ]

@@ -171,13 +171,6 @@ MOTIONS: list[Row] = [
     *rows(
         "client/motion.py",
         ("option", "--job", "a job needs a service", "leave out --local", lambda t: planned(t, "--q", "0,0", "--local", "--job")),
-        (
-            "option",
-            "--deadline",
-            "must be a number of seconds above 0 for a --job, not {deadline}",
-            "",
-            lambda t: planned(t, "--q", "0,0", "--deadline", "60"),
-        ),
     ),
     *rows(
         "client/paths.py",

@@ -114,6 +114,8 @@ PYTHON: list[Row] = [
             "give a list of (k, n) arrays",
             lambda t: connect(NOBODY).cover("cell", paths=3),  # type: ignore[arg-type]
         ),
+        ("unknown_option", "{name}", "there is no option {name}", "give it in {...}", "a member of a group that stands beside it"),
+        ("argument", "{name}", "{__name__} is no options", "give a dict of options", "a group of options that is no dict"),
     ),
     *rows(
         "ciris/space.py",

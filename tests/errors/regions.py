@@ -28,7 +28,7 @@ from planner.cover.options import MOST_GIVEN, CoverOptions
 from tests.certifier.scenes import planar_arm
 from tests.certifier.seeding.test_propose import crane
 from tests.errors.rows import Row, rows
-from tests.scenes import slider
+from tests.scenes import box_seed, slider
 
 LIMITS = "add the joint limits as rows"
 STORED = "the document was changed or is of another version; load the scene from its file again"
@@ -139,7 +139,8 @@ GROWTH = [
         "certifier/options.py",
         ("unknown_option", "{place}.{name}", "there is no option {name}", "{...}", lambda t: grow(speed=3)),
         ("unknown_option", "{place}.{name}", "there is no option {name}", "options: {...}", lambda t: grow(xyz=3)),
-        ("option_value", "{where}", "{name} must be {what}", "", lambda t: grow(pushes=-1)),
+        ("unknown_option", "{place}.{name}", "there is no option {name}", "give {place}.{found}", lambda t: grow(pushes=3)),
+        ("option_value", "{where}", "{name} must be {what}", "", lambda t: grow(cells=0)),
         ("option_value", "{where}", "{...} must be a list{...}", "", lambda t: seeded(q="0,0")),
         ("option_value", "{where}", "{...} must be a list of numbers", "", lambda t: seeded(q=["0", "0"])),
         (
@@ -155,10 +156,17 @@ GROWTH = [
         ("option_value", "options.kind", "kind must be 'grow', 'certify' or 'recertify'", "", lambda t: grow(kind="shrink")),
         (
             "option_value",
-            "options.contraction",
+            "seed.method",
+            "only the papers' algorithm begins with the method {method}",
+            "ask for that algorithm with the option paper, or choose another method",
+            lambda t: grow(seed={"q": [0.0], "method": "limits"}),
+        ),
+        (
+            "option_value",
+            "options.paper.contraction",
             "uniform contraction does not keep points inside",
             "leave out the points, or contract otherwise",
-            lambda t: grow(contraction="uniform", seed={"q": [0.0], "contain": [[0.1]]}),
+            lambda t: grow(paper={"contraction": "uniform"}, seed={"q": [0.0], "contain": [[0.1]]}),
         ),
     ),
     *rows(
@@ -202,7 +210,7 @@ GROWTH = [
             "",
             "{...}",
             "allow more time",
-            lambda t: local.grow(slider(), grow(seed={"q": [0.0], "method": "limits"}), deadline_s=1e-6),
+            lambda t: local.grow(slider(), grow(seed=box_seed([0.0], 0.1)), deadline_s=1e-6),
         ),
         ("not_grown", "", "{...}", "{...}", "a seed next to contact: tests/certifier/jobs/test_next_to_contact.py"),
         ("not_grown", "", "{...}", "try another seed, or look at the pair named", "bodies that come too close between points to keep"),
@@ -341,7 +349,7 @@ POLYTOPES = [
         ),
         (
             "step_too_large",
-            "max_rounds",
+            "options.paper.max_rounds",
             "with all {n} joints in play the polynomials of {a} and {b} have {terms} terms, {most}",
             PUSH,
             "an arm of many joints",
@@ -390,7 +398,14 @@ SEEDS = [
     ),
     *rows(
         "certifier/seeding/options.py",
-        ("missing_option", "seed.q", "the method {...} needs {name}", "give it", lambda t: seeded(method="box")),
+        ("missing_option", "seed.q", "the method {...} needs {name}", "give it", lambda t: seeded(method="iris_zo")),
+        (
+            "missing_option",
+            "seed.half_width",
+            "the method {...} needs {name}",
+            "give it in s, such as 0.1: about 11 degrees on each side of a joint near q*",
+            lambda t: seeded(q=[0.0], method="box"),
+        ),
         (
             "option_value",
             "seed.center",

@@ -13,6 +13,7 @@ from client.cores import cores
 from tests.oracles.distances import Distances
 from tests.oracles.random_scenes import SAMPLES, ProvedRegion, Result, campaign, random_scene, search
 from tests.oracles.written_scenes import FORMATS, write_scene
+from tests.scenes import box_seed
 
 SCENES, DEADLINE = 30, 60.0
 
@@ -42,7 +43,7 @@ def test_drake_agrees_with_a_small_region_and_not_with_all_that_is_within_the_li
     scene = load_scene(path)
     q = np.empty(scene.n)
     q[distances.order([joint.name for joint in scene.moving])] = seed
-    proof = grow(scene, GrowthOptions(seed={"q": q.tolist(), "method": "box"}, pushes=0, max_rounds=0, contractions=1)).proof
+    proof = grow(scene, GrowthOptions(seed=box_seed(scene.to_s(q), 1e-3), cells=100)).proof
     region, result = ProvedRegion(proof, distances), Result(0, scene.n, 0, 0.0, True, "", margin=verify_region(proof).gap)
     search(result, region, distances, rng, 500)
     assert result.problem == ""

@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from certifier.growth.options import GrowthOptions
+from certifier.growth.paper.options import PaperOptions
 from certifier.jobs.local import grow
 from certifier.model import Polytope
 from certifier.scene import load_scene
@@ -32,12 +33,10 @@ def free_region(name, options, deadline_s=None, processes=1):
     assert collision(path, scene, cube(scene, scene.to_s(q), 8.0), SAMPLES) is not None
 
 
-def test_no_sample_of_a_grown_region_collides_planar():
-    free_region("planar_2dof", {"bisection_steps": 4, "max_rounds": 2})
-
-
-def test_no_sample_of_a_grown_region_collides_three_joints():
-    free_region("arm_3dof", {"bisection_steps": 3, "max_rounds": 1})
+@pytest.mark.parametrize("paper", [None, PaperOptions(max_rounds=1)], ids=["by cells", "paper"])
+@pytest.mark.parametrize("name", ["planar_2dof", "arm_3dof"])
+def test_no_sample_of_a_grown_region_collides(name, paper):
+    free_region(name, {"paper": paper})
 
 
 @pytest.mark.slow

@@ -57,7 +57,7 @@ import sys
 
 class Absent:
     def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] not in {"certifier", "ciris", "client", "flint", "numpy", *sys.stdlib_module_names}:
+        if name.partition(".")[0] not in {"certifier", "ciris", "client", "flint", "numpy", "planner", *sys.stdlib_module_names}:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 sys.meta_path.insert(0, Absent())

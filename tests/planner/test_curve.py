@@ -33,9 +33,7 @@ def sliding(scene: Scene, which: Array) -> Scene:
 
 def beyond(stored: Library, region: int, scene: Scene, space: Space, controls: Array, t: float) -> bool:
     """Whether a point is certainly outside of the region, by Bernstein's polynomials in ball arithmetic of 200 bits."""
-    precision = ctx.prec
-    ctx.prec = 200
-    try:
+    with ctx.workprec(200):
         m, s = len(controls) - 1, []
         for i in range(scene.n):
             x = arb(0)
@@ -47,8 +45,6 @@ def beyond(stored: Library, region: int, scene: Scene, space: Space, controls: A
         polytope = stored.polytope(region)
         values = (sum((arb(x) * y for x, y in zip(c, s, strict=True)), arb(0)) for c in polytope.C.tolist())
         return any(value > arb(d) for value, d in zip(values, polytope.d.tolist(), strict=True))
-    finally:
-        ctx.prec = precision
 
 
 def _weight(m: int, k: int, t: float) -> arb:

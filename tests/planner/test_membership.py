@@ -132,12 +132,9 @@ def test_an_angle_whose_turns_a_double_cannot_hold_is_in_no_region_and_outside_o
 def test_a_turn_away_a_point_is_in_the_regions_that_exact_numbers_say(turns: int, place: float) -> None:
     """The edge of the region is where the double beside it is: what doubles take off must not lead over it."""
     scene, q = arm(1, -2.9, 2.9, own=(None, None)), 2 * np.pi * turns + place
-    precision, ctx.prec = ctx.prec, 200
-    try:
+    with ctx.workprec(200):
         exactly = ((arb(q) - 2 * arb.pi() * turns) / 2).tan()
         edge = float(exactly.mid())
-    finally:
-        ctx.prec = precision
     hair = 4e-15 * (1 + edge**2)
     s = to_s(scene, np.array([[q]]))
     assert locate(library(box("a", [-20.0], [edge + hair])), s).point.size == 1

@@ -111,16 +111,12 @@ def test_a_point_that_stays_and_an_end_on_a_face_are_covered() -> None:
 
 def beyond(stored: Library, region: int, scene: Scene, a: Array, b: Array, t: float) -> bool:
     """Whether the point of the line straight in q at t is certainly outside of the region, by ball arithmetic of 200 bits."""
-    precision = ctx.prec
-    ctx.prec = 200
-    try:
+    with ctx.workprec(200):
         ways = [arb(x) + (arb(y) - arb(x)) * arb(t) - arb(q) for x, y, q in zip(a.tolist(), b.tolist(), scene.q_star.tolist(), strict=True)]
         s = [(way / 2).tan() for way in ways]
         polytope = stored.polytope(region)
         values = (sum((arb(x) * y for x, y in zip(c, s, strict=True)), arb(0)) for c in polytope.C.tolist())
         return any(value > arb(d) for value, d in zip(values, polytope.d.tolist(), strict=True))
-    finally:
-        ctx.prec = precision
 
 
 @settings(max_examples=60)

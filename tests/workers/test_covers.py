@@ -26,6 +26,7 @@ from planner.cover.result import said
 from planner.cover.state import CoverState
 from planner.library import Library, renewed
 from planner.membership import locate
+from tests.workers.options import grow_box
 from tests.workers.service import Service, ended, events_of, eventually, job_of, submit
 from workers.app import send_coordinate
 
@@ -179,6 +180,6 @@ def test_a_cover_that_cannot_go_on_says_why(planar: Scene) -> None:
 
 @pytest.mark.lengthy
 def test_a_grow_job_is_no_part_of_a_cover(planar: Scene) -> None:
-    job_id = submit(planar, {"kind": "grow", "seed": {"method": "box", "q": [0.0, 0.0], "half_width": 0.05}, "cells": 100})
+    job_id = submit(planar, grow_box(planar.to_s([0.0, 0.0]), 0.05, cells=100))
     assert job_of(job_id).parent_id is None
     ended(job_id)

@@ -30,7 +30,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "arm_3dof"
 GROW = {
     "kind": "grow",
     "seed": {"method": "box", "q": yaml.safe_load((EXAMPLE / "seed.yaml").read_text())["q"], "half_width": 0.4},
-    "options": {"pushes": 1, "max_rounds": 1},
+    "options": {"paper": {"pushes": 1, "max_rounds": 1}},
 }
 JOBS, BYTES_A_SECOND = 8, 50_000
 

@@ -9,7 +9,7 @@ import pytest
 
 from certifier.model import Scene
 from tests.services import Queue
-from tests.workers.options import box_around, grow_box
+from tests.workers.options import box_around
 from tests.workers.service import Service, ended, events_of, eventually, job_of, kill_holder, pairs_of, submit
 from workers.app import send_coordinate, send_work
 
@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.usefixtures("service"), pytest.mark.parametrize("servi
 
 
 def test_a_seed_in_collision_fails_the_job_and_says_which_pair(planar: Scene) -> None:
-    job = ended(submit(planar, grow_box([0.74, 0.0], 0.2)))
+    job = ended(submit(planar, {"kind": "grow", "seed": {"q": [0.74, 0.0]}}))
     assert job.state == "failed"
     assert job.error is not None
     assert job.error["code"] == "seed_in_collision"

@@ -35,17 +35,17 @@ BETWEEN_KILLS = (0.1, 0.7)
 """In lengths of an undisturbed job, so that slow machines get on as fast ones do."""
 UNTIL_RESTART = (0.0, 1.0)
 """Seconds."""
-TARGETED = {"pushes": 1, "max_rounds": 1}
-UNIFORM = {"contraction": "uniform", "bisection_steps": 4, "max_rounds": 1}
-WHOLE = {"contraction": "whole", "cells": 600}
+TARGETED = {"paper": {"pushes": 1, "max_rounds": 1}}
+UNIFORM = {"paper": {"contraction": "uniform", "bisection_steps": 4, "max_rounds": 1}}
+BY_CELLS = {"cells": 600}
 JOBS: dict[str, tuple[str, dict[str, Any]]] = {
     "planar, targeted": ("planar_2dof", TARGETED),
     "planar, uniform": ("planar_2dof", UNIFORM),
-    "planar, whole": ("planar_2dof", WHOLE),
+    "planar, by cells": ("planar_2dof", BY_CELLS),
     "arm, targeted": ("arm_3dof", TARGETED),
     "arm, uniform": ("arm_3dof", UNIFORM),
 }
-"""Example, options. All begin with a box that collides, so that certifications fail on the way."""
+"""Example, options. With the papers' algorithm they begin with a box that collides, so that certifications fail on the way."""
 HALF_WIDTH = 0.4
 Answer = TypeVar("Answer")
 
@@ -150,7 +150,7 @@ def _requests(client: Client) -> dict[str, dict[str, Any]]:
         requests[name] = {
             "kind": "grow",
             "scene": scene["id"],
-            "seed": {"method": "box", "q": q, "half_width": HALF_WIDTH},
+            "seed": {"q": q, **({"method": "box", "half_width": HALF_WIDTH} if "paper" in options else {})},
             "options": options,
         }
     return requests

@@ -158,7 +158,7 @@ def test_the_link_to_the_database_is_cut_while_pairs_are_held(arm: tuple[Scene, 
 
 @pytest.mark.parametrize("link", [REDIS, DATABASE])
 def test_a_region_of_cells_is_the_same_though_a_link_is_cut_again_and_again(planar: Scene, site: Site, link: str) -> None:
-    options = grow_box([0.4, 0.3], 0.4, contraction="whole", cells=600)
+    options = grow_box(planar.to_s([0.4, 0.3]), 0.4, cells=600)
     undisturbed = submit(planar, options)
     assert ended(undisturbed).outcome == "certified"
     job_id, cuts = submit(planar, options), 0

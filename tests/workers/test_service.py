@@ -30,9 +30,10 @@ SAME = ("halfspace_normals", "halfspace_offsets", "interior_point", "inscribed_e
 
 
 @pytest.mark.lengthy
-@pytest.mark.parametrize("contraction", ["whole", "targeted", "uniform"])
-def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(planar: Scene, contraction: str) -> None:
-    options = grow_box(SEED, 0.4, contraction=contraction, pushes=1, max_rounds=1, cells=600)
+@pytest.mark.parametrize("paper", [None, {}, {"contraction": "uniform", "bisection_steps": 2}], ids=["by cells", "targeted", "uniform"])
+def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(planar: Scene, paper: dict[str, Any] | None) -> None:
+    more = {"cells": 600} if paper is None else {"paper": {"pushes": 1, "max_rounds": 1, **paper}}
+    options = grow_box(planar.to_s(SEED), 0.4, **more)
     job = ended(submit(planar, options))
     assert (job.state, job.outcome, job.error) == ("succeeded", "certified", None)
     with database().read() as session:
@@ -62,7 +63,7 @@ def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(plana
 
 @pytest.mark.lengthy
 def test_pairs_that_are_certified_as_one_come_to_the_same_region_as_without_the_service() -> None:
-    scene, options = beads(), grow_box(SEED, 0.3, contraction="whole", cells=600)
+    scene, options = beads(), grow_box(SEED, 0.3, cells=600)
     job = ended(submit(scene, options))
     with database().read() as session:
         region = regions.get(session, job.region_id or "")
@@ -81,7 +82,7 @@ def certified_pairs(manifest: dict[str, Any]) -> list[tuple[Any, ...]]:
 @pytest.mark.lengthy
 def test_a_whole_region_is_the_same_when_workers_die_between_its_rounds(planar: Scene, service: Service) -> None:
     """What a dead process had begun is gone on with from where the round before left it."""
-    options = grow_box(SEED, 0.4, contraction="whole", cells=600)
+    options = grow_box(planar.to_s(SEED), 0.4, cells=600)
     job_id = submit(planar, options)
 
     def goes_on() -> PairRow | None:

@@ -37,7 +37,7 @@ from workers.troubles import Troubles
 from workers.turns import coordinate
 
 ELSEWHERE = "elsewhere:1:1"
-WHOLE = grow_box([0.0], 0.9, contraction="whole", cells=600)
+WHOLE = grow_box([0.0], 0.9, cells=600)
 
 
 @pytest.fixture(autouse=True)
@@ -79,7 +79,7 @@ def test_work_is_done_once(job_id: str) -> None:
 def test_a_pair_that_failed_is_expected_to_take_as_long_the_next_time() -> None:
     free = slider()
     cart, post = free.geometries
-    job_id = submit(replace(free, geometries=(cart, replace(post, vertices=np.array([[0.6, 0.0, 0.0]])))), grow_box([0.0], 0.9))
+    job_id = submit(replace(free, geometries=(cart, replace(post, vertices=np.array([[0.6, 0.0, 0.0]])))), grow_box([0.0], 0.9, paper={}))
     for _ in range(2):
         coordinate(job_id)
         work_all()

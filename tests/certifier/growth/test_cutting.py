@@ -26,7 +26,7 @@ def polytope_of(scene, rng, faces=6):
 
 def corner_of(scene, polytope, rng, joints=ALL, count=12):
     """Points of the polytope near one far from 0, told apart in these joints."""
-    samples = uniform_in_q(polytope, scene.revolute, 100, 10, int(rng.integers(2**31))).reshape(-1, scene.n)
+    samples = uniform_in_q(polytope, scene, 100, 10, int(rng.integers(2**31))).reshape(-1, scene.n)
     J = list(joints)
     way = rng.normal(size=len(J))
     return samples[np.argsort(samples[:, J] @ way)[-count:]]
@@ -69,7 +69,7 @@ def test_a_face_lies_in_the_joints_between_the_bodies(seed, joints):
 def test_contacts_along_a_face_take_no_new_face():
     scene = planar_arm(3)
     polytope = scene.polytope(np.array([[1.0, 0.5, -0.3]]) / np.linalg.norm([1.0, 0.5, -0.3]), [0.4])
-    samples = uniform_in_q(polytope, scene.revolute, 1000, 40, 0).reshape(-1, 3)
+    samples = uniform_in_q(polytope, scene, 1000, 40, 0).reshape(-1, 3)
     sheet = samples[np.argsort(polytope.d[0] - samples @ polytope.C[0])[:40]]
     smaller = cut(scene, polytope, np.zeros((1, 3)), [(ALL, sheet, 1.0)], polytope).polytope
     assert len(smaller.d) == len(polytope.d)
@@ -106,7 +106,7 @@ def test_a_contact_on_a_face_is_cut_off_where_it_is_asked_for(seed, share):
     """A search comes to the very face that cut other contacts off. Rounding says which side the contact is on, and it is found again."""
     scene, rng = planar_arm(3), np.random.default_rng(seed)
     polytope = polytope_of(scene, rng)
-    samples = uniform_in_q(polytope, scene.revolute, 20, 10, seed % 2**31).reshape(-1, 3)
+    samples = uniform_in_q(polytope, scene, 20, 10, seed % 2**31).reshape(-1, 3)
     room = polytope.d[0] - samples @ polytope.C[0]
     contact = samples[np.argmin(room)] + (room.min() + share * BARELY) * polytope.C[0]
 
@@ -177,7 +177,7 @@ def test_what_faces_came_to_is_said_corner_by_corner():
     first, *others = found.made
     assert first.faces == 4
     assert first.s.tolist() in points.tolist()
-    samples = uniform_in_q(polytope, scene.revolute, 1000, 20, 3).reshape(-1, 2)
+    samples = uniform_in_q(polytope, scene, 1000, 20, 3).reshape(-1, 2)
     gone = 1 - found.polytope.contains(samples).mean()
     assert first.lost == pytest.approx(gone, abs=0.02)
     assert [(one.faces, one.lost, one.s) for one in others] == [(0, 0, None)] * 2, "there was nothing left to cut off"
@@ -202,7 +202,7 @@ def test_less_volume_is_lost_than_by_planes_tangent_to_the_inscribed_ellipsoid()
         polytope = polytope_of(scene, rng)
         points = corner_of(scene, polytope, rng, count=8)
         smaller = cut(scene, polytope, np.zeros((1, 3)), [(ALL, points, 1.0)], polytope).polytope
-        samples = uniform_in_q(polytope, scene.revolute, 200, 20, 10_000 + seed).reshape(-1, 3)
+        samples = uniform_in_q(polytope, scene, 200, 20, 10_000 + seed).reshape(-1, 3)
         normal, offset = tangent(polytope, points)
         ours.append(1 - smaller.contains(samples).mean())
         theirs.append((samples @ normal >= offset).mean())

@@ -33,6 +33,7 @@ from certifier.seeding.proposal import Proposal
 from certifier.verify.region import verify_region
 from tests.certifier.scenes import box, planar_arm
 from tests.oracles.original import collision
+from tests.scenes import box_seed
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0.0)))
@@ -49,7 +50,7 @@ OPEN = 1
 
 
 def options(cells=SLICE, **others):
-    return GrowthOptions(seed={}, contraction="whole", cells=cells, **others)
+    return GrowthOptions(seed={}, cells=cells, **others)
 
 
 def drive(verdict, asked, limit=40, passed=lambda action: 0.0):
@@ -167,7 +168,7 @@ def test_faces_move_out_stage_by_stage_as_far_as_the_proposal():
     (moved,) = (i for i, row in enumerate(wider.C) if (row != 0).all())
     assert wider.C[moved].tolist() == cut.C[face].tolist()
     assert wider.d[moved] == pytest.approx(FAR * cut.d[face])
-    samples = uniform_in_q(Polytope(PROPOSAL.C, PROPOSAL.d), SCENE.revolute, 100, 10, 0).reshape(-1, 2)
+    samples = uniform_in_q(Polytope(PROPOSAL.C, PROPOSAL.d), SCENE, 100, 10, 0).reshape(-1, 2)
     shares = [candidate.polytope.contains(samples).mean() for candidate in accepted]
     assert shares[0] + GAIN < shares[1] < shares[2] - GAIN < shares[3] == 1.0, "the third stage gained enough for a fourth one"
     assert (widest.C != 0).all(axis=1).sum() == 0
@@ -343,8 +344,8 @@ def example(name):
 def test_a_region_of_an_example_is_verified_contains_what_it_has_to_and_is_free(name, half):
     path, scene, q = example(name)
     contain = (np.array(q) + 0.02).tolist()
-    seed = {"method": "box", "q": q, "half_width": half, "contain": [contain]}
-    region = grow(scene, GrowthOptions(seed=seed, contraction="whole", cells=2 * SLICE))
+    seed = box_seed(scene.to_s(q), half, contain=[contain])
+    region = grow(scene, GrowthOptions(seed=seed, cells=2 * SLICE))
     statement = verify_region(region.proof)
     assert set(statement.gaps) == set(scene.pairs)
     assert statement.gap > 0
@@ -357,7 +358,7 @@ def test_a_region_of_an_example_is_verified_contains_what_it_has_to_and_is_free(
     # The proposal itself does collide, so that something had to be cut off; and it is the proposal that was cut.
     assert region.manifest["share"]["collision_free"] < 1
     assert 0 < region.manifest["share"]["value"] < 1
-    samples = uniform_in_q(kept, scene.revolute, 50, 10, 1).reshape(-1, scene.n)
+    samples = uniform_in_q(kept, scene, 50, 10, 1).reshape(-1, scene.n)
     assert proposal.contains(samples, 1e-9).all()
     assert not in_collision(scene, samples).any()
 
@@ -365,7 +366,7 @@ def test_a_region_of_an_example_is_verified_contains_what_it_has_to_and_is_free(
 @pytest.mark.parametrize("processes", [1, 2, 3])
 def test_the_same_job_comes_to_the_same_bytes(processes):
     _, scene, q = example("planar_2dof")
-    asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.35}, contraction="whole", cells=SLICE)
+    asked = GrowthOptions(seed=box_seed(scene.to_s(q), 0.35), cells=SLICE)
     first, second = grow(scene, asked), grow(scene, asked, processes=processes)
     assert first.proof == second.proof
     assert first.manifest["halfspace_offsets"] == second.manifest["halfspace_offsets"]
@@ -375,14 +376,14 @@ def test_more_effort_does_not_come_to_less():
     _, scene, q = example("arm_3dof")
     shares = []
     for cells in (2, 10 * SLICE):
-        asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.3}, contraction="whole", cells=cells)
+        asked = GrowthOptions(seed=box_seed(scene.to_s(q), 0.3), cells=cells)
         shares.append(grow(scene, asked).manifest["share"])
     assert 0.9 < shares[0]["value"] <= shares[1]["value"]
 
 
 def test_a_deadline_ends_growth_with_the_best_region_so_far(monkeypatch):
     _, scene, q = example("planar_2dof")
-    asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.5}, contraction="whole", cells=SLICE)
+    asked = GrowthOptions(seed=box_seed(scene.to_s(q), 0.5), cells=SLICE)
     # The clock stands still until a region is reported, and then the deadline is over.
     clock = [0.0]
     monkeypatch.setattr(local, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
@@ -406,7 +407,7 @@ def test_a_deadline_ends_growth_with_the_best_region_so_far(monkeypatch):
 
 def test_regions_are_delivered_as_they_are_certified_and_time_is_left_for_growing(monkeypatch):
     _, scene, q = example("planar_2dof")
-    asked = GrowthOptions(seed={"method": "box", "q": q, "half_width": 0.35}, contraction="whole", cells=SLICE)
+    asked = GrowthOptions(seed=box_seed(scene.to_s(q), 0.35), cells=SLICE)
     monkeypatch.setattr(local, "REST", 0.0)
     delivered = []
     last = grow(scene, asked, deliver=delivered.append)
@@ -424,7 +425,7 @@ def test_regions_are_delivered_as_they_are_certified_and_time_is_left_for_growin
 def test_a_seed_in_contact_is_refused():
     scene = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (1.5, 0.0, 0.0)))
     with pytest.raises(CirisError):
-        grow(scene, GrowthOptions(seed={"method": "box", "q": [0.0, 0.0], "half_width": 0.2}, contraction="whole", cells=SLICE))
+        grow(scene, GrowthOptions(seed={"q": [0.0, 0.0]}))
 
 
 def test_a_child_that_dies_leaves_the_region_before(monkeypatch):

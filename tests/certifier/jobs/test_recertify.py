@@ -60,7 +60,7 @@ def named(pairs):
 
 def samples(found: Region, count=100):
     polytope = Polytope(np.array(found.manifest["halfspace_normals"]), np.array(found.manifest["halfspace_offsets"]))
-    return uniform_in_q(polytope, OLD.revolute, count, 10, 0).reshape(-1, OLD.n)
+    return uniform_in_q(polytope, OLD, count, 10, 0).reshape(-1, OLD.n)
 
 
 def links(obstacle):

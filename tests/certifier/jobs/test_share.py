@@ -8,6 +8,7 @@ from scipy.integrate import quad
 from scipy.optimize import linprog
 
 from certifier.growth.options import GrowthOptions
+from certifier.growth.paper.options import PaperOptions
 from certifier.jobs import share as module
 from certifier.jobs.local import grow
 from certifier.jobs.share import CHAINS, EACH, SampledProposal
@@ -108,7 +109,8 @@ def test_a_grown_regions_manifest_tells_the_share_the_proposal_and_the_ranges(ki
     scene = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (1.2, 0.8, 0.0)), limit=1.0, kind=kind)
     if kind is JointKind.PRISMATIC:
         scene = replace(scene, joints=tuple(replace(joint, axis=np.array([0.0, 1.0, 0.0])) for joint in scene.joints))
-    options = GrowthOptions(seed={"q": [0.0, -0.2], "method": "box", "half_width": 0.5}, max_rounds=0, pushes=1)
+    seed = {"q": [0.0, -0.2], "method": "box", "half_width": 0.5}
+    options = GrowthOptions(seed=seed, paper=PaperOptions(max_rounds=0, pushes=1))
     manifest = grow(scene, options).manifest
     proposal = Polytope(*(np.array(manifest["provenance"]["proposal"][name]) for name in ("halfspace_normals", "halfspace_offsets")))
     region = Polytope(*(np.array(manifest[name]) for name in ("halfspace_normals", "halfspace_offsets")))

@@ -10,6 +10,7 @@ import pytest
 from certifier.conic.basis import dimension
 from certifier.errors import ProofError
 from certifier.growth.options import GrowthOptions
+from certifier.growth.paper.options import PaperOptions
 from certifier.jobs.local import grow
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Pair
@@ -104,7 +105,7 @@ def test_growth_cuts_where_planes_at_rest_fail():
     limits = scene.polytope([], [])
     assert any(Certification(scene, limits, np.full(4, 0.3)).certify(i).outcome is not Outcome.CERTIFIED for i in range(4))
     seed = {"method": "polytope", "C": limits.C.tolist(), "d": limits.d.tolist(), "center": [0.3] * 4}
-    region = grow(scene, GrowthOptions(seed=seed, contractions=1, pushes=1, max_rounds=0))
+    region = grow(scene, GrowthOptions(seed=seed, paper=PaperOptions(contractions=1, pushes=1, max_rounds=0)))
     assert verify_region(region.proof).gap > 0
     assert region.manifest["volume"]["ellipsoid"] > 0.01
 

@@ -37,7 +37,7 @@ CELLS = 300
 
 def sampled_gap(scene, polytope, index, count=2000):
     """The least distance of the pair's padded bodies over samples of the polytope, uniform in q."""
-    samples = uniform_in_q(polytope, scene.revolute, count // 20, 20, seed=7).reshape(-1, scene.n)
+    samples = uniform_in_q(polytope, scene, count // 20, 20, seed=7).reshape(-1, scene.n)
     return min(distances_at(replace(scene, pairs=(scene.pairs[index],)), samples).values())
 
 

@@ -22,7 +22,7 @@ def looked_at(name, half):
 
     seed = scene.to_s(catalogue.seed(name))
     polytope = scene.polytope(*catalogue.cube(seed, half))
-    samples = uniform_in_q(polytope, scene.revolute, 40, 25, 1).reshape(-1, scene.n)
+    samples = uniform_in_q(polytope, scene, 40, 25, 1).reshape(-1, scene.n)
     long = [pair for pair in scene.pairs if moving(pair) >= LONG]
     assert 0 < len(long) < len(scene.pairs)
     return scene, polytope, samples, long, seed[None]
@@ -50,6 +50,6 @@ def test_pairs_that_few_joints_move_do_not_count():
     """Most of the limits of arm_3dof's joints collide, and three joints are few."""
     scene = catalogue.scene("arm_3dof")
     limits = scene.polytope([], [])
-    samples = uniform_in_q(limits, scene.revolute, 40, 25, 1).reshape(-1, scene.n)
+    samples = uniform_in_q(limits, scene, 40, 25, 1).reshape(-1, scene.n)
     assert in_collision(scene, samples).any()
     assert touched(scene, limits, samples, np.zeros((0, scene.n))) == 0

@@ -35,7 +35,7 @@ def test_control_matrices_are_the_pose_on_the_cell(seed):
     assert side.own == sorted(kinematics.chain(frame, body))
     lower = rng.uniform(-1.0, 0.0, scene.n)
     upper = lower + rng.uniform(0.1, 1.0, scene.n)
-    (X, den), points = side.control_matrices(lower, upper), rng.normal(size=(4, 3))
+    (X, den), points = side.control_matrices(side.ends(lower, upper)), rng.normal(size=(4, 3))
     assert X[:, 3, 3] == pytest.approx(reduce(np.multiply.outer, den, np.ones(())).ravel() * X[0, 3, 3] / den[:, 0].prod())
     for _ in range(10):
         s, basis = rng.uniform(lower, upper), np.ones(1)

@@ -22,6 +22,7 @@ from certifier.verify.kinematics import ExactKinematics
 from certifier.verify.region import verify_region
 from certifier.verify.volume import check_volume
 from tests.certifier.scenes import beads, box
+from tests.scenes import box_seed
 
 
 def samples(scene, half=0.3, count=500):
@@ -131,8 +132,7 @@ def test_pairs_of_which_one_touches_are_not_certified_as_one():
 
 def test_a_region_has_a_proof_of_every_pair_and_is_free():
     scene = beads()
-    options = {"kind": "grow", "seed": {"method": "box", "q": [0.0, 0.0], "half_width": 1.0}, "contraction": "whole", "cells": 600}
-    region = grow(scene, GrowthOptions.from_document(options))
+    region = grow(scene, GrowthOptions(seed=box_seed([0.0, 0.0], 1.0), cells=600))
     statement = verify_region(region.proof)
     assert set(statement.gaps) == set(scene.pairs)
     assert min(statement.gaps.values()) > 0
@@ -150,8 +150,7 @@ def test_a_region_has_a_proof_of_every_pair_and_is_free():
 
 
 def test_a_region_of_such_pairs_is_certified_again_for_a_changed_scene():
-    options = {"kind": "grow", "seed": {"method": "box", "q": [0.0, 0.0], "half_width": 0.5}, "contraction": "whole", "cells": 600}
-    region = grow(beads(), GrowthOptions.from_document(options))
+    region = grow(beads(), GrowthOptions(seed=box_seed([0.0, 0.0], 0.5), cells=600))
     changed = beads(obstacle=box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.7, 1.4, 0.0)))
     statement = verify_region(recertify(changed, region.proof).proof)
     assert set(statement.gaps) == set(changed.pairs)

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from certifier.growth.targeted import pushed
 from certifier.model import Array, Box, JointKind, Polytope, Scene
 from certifier.partition.area import Area
 from certifier.polytopes.proved import CLEAN, ProvedBox, cleaned
+from certifier.polytopes.pushed import pushed
 from certifier.proof.ground import Ground
 from certifier.verify.pair import check_ground
 from tests.certifier.scenes import planar_arm
@@ -99,7 +99,7 @@ def test_a_box_contains_its_bounds_wherever_it_is(half, middle):
 def test_the_multipliers_of_an_area_are_those_of_the_stage(monkeypatch):
     """A part of the polytope has the stage's box, even where its own linear programs fall short of it."""
     rng, scene = np.random.default_rng(0), scene_of(3, 0.5)
-    polytope = pushed(scene, ill_scaled(rng, scene, 0.3), (scene.s_lower + scene.s_upper) / 4, 1.0, scene.polytope([], []))
+    polytope = pushed(ill_scaled(rng, scene, 0.3), (scene.s_lower + scene.s_upper) / 4, 1.0, scene.polytope([], []))
     box = ProvedBox.of_program(scene, polytope)
     smaller = part(rng, scene, polytope)
     monkeypatch.setattr(ProvedBox, "of", lambda *_: pytest.fail("no other box is claimed"))

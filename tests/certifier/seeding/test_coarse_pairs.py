@@ -25,7 +25,7 @@ def hand():
     scene = catalogue.scene("iiwa_shelf")
     seed = scene.to_s(catalogue.seed("iiwa_shelf"))[None]
     polytope = scene.polytope(*catalogue.cube(seed[0], 0.3))
-    return scene, polytope, seed, uniform_in_q(polytope, scene.revolute, 40, 25, 1).reshape(-1, scene.n)
+    return scene, polytope, seed, uniform_in_q(polytope, scene, 40, 25, 1).reshape(-1, scene.n)
 
 
 def test_drake_sees_the_volumes_that_faces_part(hand):

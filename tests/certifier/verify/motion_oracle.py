@@ -10,8 +10,6 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -27,15 +25,6 @@ TIMES = 24
 """At this many times of each piece bodies are looked at, and at as many ends of intervals at most."""
 STEPS = 12
 _SHRINK = 0.6180339887498949
-
-
-@contextmanager
-def bits(precision: int) -> Iterator[None]:
-    before, ctx.prec = ctx.prec, precision
-    try:
-        yield
-    finally:
-        ctx.prec = before
 
 
 class MotionFile:
@@ -171,7 +160,7 @@ class MotionFile:
         one, other = self._geometries[a], self._geometries[b]
         q = self._position(piece, t) + off
         weights = closest(*(self._placed(geometry, q) for geometry in (one, other))).weights
-        with bits(300):
+        with ctx.workprec(300):
             points = [[_exact(x) for x in row] for row in self.pieces[piece]]
             while len(points) > 1:
                 points = [[x + _exact(t) * (y - x) for x, y in zip(p, r, strict=True)] for p, r in pairwise(points)]

@@ -12,9 +12,8 @@ from certifier.verify.angles import ERROR, LARGEST, cosines_and_sines
 
 @pytest.fixture(autouse=True)
 def _precise():
-    before, ctx.prec = ctx.prec, 200
-    yield
-    ctx.prec = before
+    with ctx.workprec(200):
+        yield
 
 
 def test_they_are_as_exact_as_is_said():

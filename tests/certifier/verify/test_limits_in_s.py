@@ -50,14 +50,11 @@ def claimed(scene: Scene, slope: float, d: float, half: float, hit: float) -> Pa
 def test_a_steep_face_at_a_revolute_joints_limit_hides_no_collision():
     """At q_0 = -2, its limit, the face allows q_1 up to where the obstacle is; the limit rounded inwards said that it allows 0."""
     turn = Joint("turn", JointKind.REVOLUTE, WORLD, "b0", Z, pose(), pose(), 0, -2.0, 2.0)
-    slope, precision, ctx.prec = 2.0**57, ctx.prec, 300
-    try:
-        gains = {}
+    slope, gains = 2.0**57, {}
+    with ctx.workprec(300):
         for k in range(1, 40):
             exactly = ((arb(-2.0) - arb(k / 100)) / 2).tan()
             gains[k / 100] = float(arb(slope) * (arb(float(exactly.mid())) - exactly)), float(exactly.mid())
-    finally:
-        ctx.prec = precision
     q_star, (gain, rounded) = max(gains.items(), key=lambda found: found[1][0])
     assert gain > 2
     scene = slide_beside(turn, q_star, float(int(0.9 * gain)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -24,15 +23,6 @@ from tests.certifier.scenes import box, pose
 
 CASES = 40
 LONG_CASES = 4000
-
-
-@contextmanager
-def bits(precision: int) -> Iterator[None]:
-    before, ctx.prec = ctx.prec, precision
-    try:
-        yield
-    finally:
-        ctx.prec = before
 
 
 def product(A, B):
@@ -127,7 +117,7 @@ def wrong_by(seed: int):
     normal = rng.normal(size=3)
     normal *= rng.uniform(0.51, 1.99) / np.linalg.norm(normal)
     found = [float((R[0].T @ normal) @ vertex + p[0] @ normal) for vertex in v]
-    with bits(600):
+    with ctx.workprec(600):
         x = [arb(exact(value)) for value in motion.controls[0]]
         if space is Space.S:
             x = [2 * s.atan() if turns else s for s, turns in zip(x, scene.revolute, strict=True)]
@@ -181,7 +171,7 @@ def far_body(seed: int):
     chain, none = Places(scene).chain(WORLD, "arm/link"), np.zeros(1, np.int64)
     R, p = poses([chain], none, none, np.zeros((1, 1)), np.ones((1, 1)), np.zeros((1, 1)))
     rows = R[0].T @ np.array([1.0, 0.0, 0.0])
-    with bits(600):
+    with ctx.workprec(600):
         X = world_pose(scene, "arm/link", [arb(0)])
         true = float(sum((X[0][k] * arb(exact(v[0, k])) for k in range(3)), X[0][3]))
     return before, true, float(rows @ v[0] + p[0, 0])

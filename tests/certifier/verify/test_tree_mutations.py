@@ -61,7 +61,7 @@ def proofs():
         proof = PartitionProof.from_bytes(result.proof, scene)
         assert np.count_nonzero(proof.nodes < 0) >= 4, "the tree has cuts to move"
         verify_separation(proof)
-        found.append((proof, uniform_in_q(polytope, scene.revolute, SAMPLES // 20, 20, seed=5).reshape(-1, scene.n)))
+        found.append((proof, uniform_in_q(polytope, scene, SAMPLES // 20, 20, seed=5).reshape(-1, scene.n)))
     assert any(len(set(proof.choices.tolist())) > 1 for proof, _ in found)
     assert any(len(proof.multipliers) for proof, _ in found)
     return found

@@ -9,8 +9,9 @@ import math
 from dataclasses import replace
 
 from certifier.growth.actions import Finish, Outcomes, Transition
-from certifier.growth.state import Bisection, GrowthState, Start
-from certifier.growth.trials import certify
+from certifier.growth.paper.state import Bisection, PaperState
+from certifier.growth.paper.trials import certify
+from certifier.growth.state import Start
 from certifier.model import Scene
 from certifier.outcome import Outcome, combine
 
@@ -18,7 +19,7 @@ SMALLEST_SCALE = 1e-3
 """No trial is smaller than this, relative to the proposal; where this trial fails, growing ends."""
 
 
-def shrink(scene: Scene, state: GrowthState, start: Start, bisection: Bisection) -> Transition:
+def shrink(scene: Scene, state: PaperState, start: Start, bisection: Bisection) -> Transition:
     """Asks to certify the bisection's trial."""
     offsets = start.rows.d - (1 - bisection.scale) * bisection.radius
     reuse = {index: iteration for index, (iteration, scale) in bisection.holds.items() if scale >= bisection.scale}
@@ -26,7 +27,7 @@ def shrink(scene: Scene, state: GrowthState, start: Start, bisection: Bisection)
     return certify(scene, replace(state, bisection=bisection), "contract", trial, bisection.center, reuse=reuse)
 
 
-def bisect(scene: Scene, state: GrowthState, start: Start, report: Outcomes) -> Transition | None:
+def bisect(scene: Scene, state: PaperState, start: Start, report: Outcomes) -> Transition | None:
     """Returns the next trial: its scale lies in the logarithm between one that was certified and one that was not.
 
     Where the smallest trial fails, the job is finished instead.

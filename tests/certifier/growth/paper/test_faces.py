@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from certifier import stored
 from certifier.growth.actions import Certify, Finish, Outcomes, Propose
-from certifier.growth.faces import Failure, contract, measure
-from certifier.growth.machine import advance, begin
+from certifier.growth.machine import advance, begin, stored_state
 from certifier.growth.options import GrowthOptions
-from certifier.growth.state import GrowthState
+from certifier.growth.paper.faces import Failure, contract, measure
+from certifier.growth.paper.options import PaperOptions
 from certifier.model import WORLD, Polytope
 from certifier.outcome import Outcome
 from certifier.pair.result import Weakness
@@ -27,14 +27,15 @@ SCENE = planar_arm(2, box("world/obstacle", WORLD, (0.3, 0.3, 0.3), (0.8, 1.2, 0
 PROPOSAL = Proposal(
     C=np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]), d=np.ones(4), center=np.zeros(2), contain=np.zeros((0, 2)), info={}
 )
-OPTIONS = GrowthOptions(seed={}, contractions=1, pushes=0, max_rounds=0)
+OPTIONS = PaperOptions(contractions=1, pushes=0, max_rounds=0)
 
 
 def grow(disc, radius, options, spread=0.0, limit=300):
     """The accepted polytopes and the end when the pair of both joints fails while the polytope meets the disc nearest to the seed."""
+    options = GrowthOptions(paper=options)
     transition, accepted = begin(SCENE, options), []
     for _ in range(limit):
-        state = stored.value(GrowthState, json.loads(json.dumps(stored.document(transition.state))))
+        state = stored_state(json.loads(json.dumps(stored.document(transition.state))))
         if transition.candidate:
             accepted.append(transition.candidate.polytope)
         if isinstance(transition.action, Finish):

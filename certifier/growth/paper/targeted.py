@@ -1,4 +1,4 @@
-"""Targeted contraction adds faces where pairs fail (:mod:`certifier.growth.faces`) until every pair is certified.
+"""Targeted contraction adds faces where pairs fail (:mod:`certifier.growth.paper.faces`) until every pair is certified.
 
 What was certified stays so, since the polytope only shrinks. The contraction of a proposal is tried a few times, each time with another
 balance between faces and shorter ranges, and the largest region counts.
@@ -8,18 +8,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from certifier.growth.actions import Outcomes, Transition
-from certifier.growth.faces import Failure, contract, measure
 from certifier.growth.obstacles import Obstacle, joined
-from certifier.growth.options import NEAR
-from certifier.growth.state import Cuts, GrowthState, Start
-from certifier.growth.trials import certify, effort, is_worth_it, joints_between
-from certifier.model import Array, Polytope, Scene
+from certifier.growth.pairs import joints_between
+from certifier.growth.paper.faces import Failure, contract, measure
+from certifier.growth.paper.options import NEAR
+from certifier.growth.paper.state import Cuts, PaperState
+from certifier.growth.paper.trials import certify, effort, is_worth_it
+from certifier.growth.state import Start
+from certifier.model import Polytope, Scene
 from certifier.outcome import Outcome
 from certifier.pair.result import Weakness
-from certifier.polytopes.polytope import drop_redundant
+from certifier.polytopes.pushed import pushed
 
 MAX_ATTEMPTS = 60
 """A contraction gives up after faces were added this many times for one pair."""
@@ -29,51 +29,36 @@ FAR = 8.0
 """The faces of a given polytope are pushed out from the seed by this factor before anything is certified."""
 
 
-def next_contraction(scene: Scene, state: GrowthState, start: Start) -> Transition | None:
+def next_contraction(scene: Scene, state: PaperState, start: Start) -> Transition | None:
     """Begins the next contraction of the proposal that may result in a larger region than the best; returns None when there were enough."""
-    starts = contraction_starts(scene, state, start)
+    starts = contraction_starts(scene, state)
     for tried in range(state.contractions, len(starts)):
         reach, near = starts[tried]
         rows = start.rows
-        polytope = rows if reach == 1.0 else pushed(scene, rows, start.seed, reach, scene.polytope([], []))
+        polytope = rows if reach == 1.0 else pushed(rows, start.seed, reach, scene.polytope([], []))
         state = replace(state, contractions=tried + 1, near=near, reach=reach)
         if is_worth_it(state, polytope):
             return trim(scene, replace(state, cuts=Cuts()), start, "contract", polytope)
     return None
 
 
-def contraction_starts(scene: Scene, state: GrowthState, start: Start) -> list[tuple[float, float]]:
+def contraction_starts(scene: Scene, state: PaperState) -> list[tuple[float, float]]:
     """Returns where contractions start: how far the proposal's faces are pushed out first, and one of NEAR.
 
     What IRIS cut off collides, but beyond a given polytope nothing is known. So there the first contraction begins far outside.
     """
     starts = [(1.0, near) for near in NEAR[: effort(scene, state, "contractions")]]
-    return [(FAR, NEAR[0]), *starts] if start.given and effort(scene, state, "pushes") else starts
+    return [(FAR, NEAR[0]), *starts] if state.given and effort(scene, state, "pushes") else starts
 
 
-def pushed(scene: Scene, polytope: Polytope, center: Array, reach: float, within: Polytope) -> Polytope:
-    """Returns a polytope with its faces farther from the centre by the factor ``reach``, within another polytope.
-
-    Args:
-        polytope: its last 2n rows are the joint limits, which do not move.
-        center: (n,) the point that the faces move away from.
-        within: a polytope that the result stays inside; its last 2n rows are the joint limits, and so are the result's.
-    """
-    limits = 2 * scene.n
-    C, d = polytope.C[:-limits], polytope.d[:-limits]
-    moved = Polytope(np.concatenate([C, within.C]), np.concatenate([C @ center + reach * (d - C @ center), within.d]))
-    kept = drop_redundant(moved, fixed=limits)
-    return Polytope(moved.C[kept], moved.d[kept])
-
-
-def trim(scene: Scene, state: GrowthState, start: Start, label: str, polytope: Polytope) -> Transition:
+def trim(scene: Scene, state: PaperState, start: Start, label: str, polytope: Polytope) -> Transition:
     """Asks to certify the polytope that the cuts result in; a pair certified on a larger polytope is certified on this one."""
     cuts, center = state.cuts, measure(polytope, start.keep[0]).center
     hard = sorted(index for index in cuts.attempts if index not in cuts.holds)
     return certify(scene, state, label, polytope, center, reuse=dict(cuts.holds), hard=hard, failures=FAILURES)
 
 
-def cut(scene: Scene, state: GrowthState, start: Start, report: Outcomes) -> Transition | None:
+def cut(scene: Scene, state: PaperState, start: Start, report: Outcomes) -> Transition | None:
     """Adds faces for the pairs that failed and goes on.
 
     Returns:

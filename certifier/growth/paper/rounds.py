@@ -5,15 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 from certifier.growth.actions import Finish, Step, Transition
-from certifier.growth.state import GrowthState, Round, Start
-from certifier.growth.trials import certify, effort
+from certifier.growth.paper.state import PaperState, Round
+from certifier.growth.paper.trials import certify, effort
+from certifier.growth.state import Start
 from certifier.model import Polytope, Scene
 from certifier.outcome import Outcome
 from certifier.polytopes.proved import cleaned
 from certifier.step.stepped import Stepped
 
 
-def next_round(scene: Scene, state: GrowthState, start: Start) -> Transition:
+def next_round(scene: Scene, state: PaperState, start: Start) -> Transition:
     """Returns the next step from the best region, or the end."""
     best, rounds = state.best, state.rounds
     assert best is not None
@@ -22,7 +23,7 @@ def next_round(scene: Scene, state: GrowthState, start: Start) -> Transition:
     return Transition(replace(state, rounds=rounds + 1), Step(best.iteration, best.polytope, start.keep))
 
 
-def certify_step(scene: Scene, state: GrowthState, stepped: Stepped) -> Transition:
+def certify_step(scene: Scene, state: PaperState, stepped: Stepped) -> Transition:
     """Asks to certify the polytope that a step resulted in."""
     assert state.best is not None
     assert state.start is not None, "a step follows a region, which comes from a proposal"
@@ -32,9 +33,9 @@ def certify_step(scene: Scene, state: GrowthState, stepped: Stepped) -> Transiti
     return certify(scene, replace(state, round=round_), "round", target, stepped.center)
 
 
-def after_round(scene: Scene, state: GrowthState, start: Start, accepted: bool) -> Transition:
+def after_round(scene: Scene, state: PaperState, start: Start, accepted: bool) -> Transition:
     """Accepts and goes on, stops when the growth is small, or backs off towards the last certified polytope."""
-    step, options = state.round, state.options
+    step, options = state.round, state.asked
     assert step is not None
     if accepted:
         if step.growth < options.tolerance:

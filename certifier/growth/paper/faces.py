@@ -170,7 +170,6 @@ def _shorter_range(scene: Scene, polytope: Polytope, ellipsoid: Measure, keep: A
 
 def _worst_joint(scene: Scene, polytope: Polytope, failure: Failure) -> int:
     """Returns the joint of the pair that turns far and where a shorter range helps."""
-    lower, upper = bounds(polytope)
-    turn = np.where(scene.revolute, 2 * (np.arctan(upper) - np.arctan(lower)), upper - lower)
+    turn = scene.turn(*bounds(polytope))
     gain = turn * failure.weakness.pull if len(failure.weakness.points) else turn
     return max(failure.joints, key=lambda i: float(gain[i]))

@@ -1,0 +1,54 @@
+"""What the parsers of several commands have in common."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any, NoReturn
+
+from certifier.model import escaped
+
+SCENE = "path of a scene file, or the name or id of a scene that the service knows"
+OF_ONE = "its id, or the first characters of it"
+PROOF = "new file for the proof; default: one in this directory, named after scene and proof"
+WATCH = "print a line for every pair when it is decided"
+
+
+class Parser(argparse.ArgumentParser):
+    """Says in one line what is wrong. The parsed arguments have the parser of their command as ``parser``."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options, allow_abbrev=False)
+        self.set_defaults(parser=self)
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"error: {escaped(message.removeprefix('argument '))} (see {self.prog} --help)\n")
+
+
+def group(parser: argparse.ArgumentParser) -> Any:
+    """Returns where the commands below a command are added."""
+    return parser.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
+
+
+def remote() -> Parser:
+    """Returns the parent of commands that ask a service."""
+    parser = Parser(add_help=False)
+    parser.add_argument("--url", help="URL of the service; default: CIRIS_URL, or the service that `ciris up` runs here")
+    return parser
+
+
+def as_json() -> Parser:
+    """Returns the parent of commands that can print a JSON document."""
+    parser = Parser(add_help=False)
+    parser.add_argument("--json", action="store_true", help="print one JSON document")
+    return parser
+
+
+def dependents() -> Parser:
+    """Returns the parent of commands that delete what others depend on."""
+    parser = Parser(add_help=False)
+    parser.add_argument(
+        "--dependents",
+        action="store_true",
+        help="also delete its dependents; without this option, the command lists them and deletes nothing if there are any",
+    )
+    return parser

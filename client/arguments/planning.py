@@ -1,0 +1,91 @@
+"""Arguments of the commands about motions, and of a planner's questions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from client.arguments.common import SCENE, as_json, remote
+from client.options import JOB, JOINTS, add_options
+
+
+def add(verbs: Any) -> None:
+    """Adds the commands."""
+    motion = verbs.add_parser("certify-path", parents=[remote(), as_json()], help="certify a motion through waypoints or along a spline")
+    motion.add_argument("scene", metavar="SCENE", help=SCENE)
+    motion.add_argument("--q", metavar=JOINTS, action="append", help="a waypoint: joint positions; give it two times or more")
+    motion.add_argument("--path", metavar="FILE", help="npz, JSON, YAML or CSV with waypoints q or s and perhaps times t, or with a spline")
+    motion.add_argument(
+        "--space",
+        choices=["q", "s"],
+        help="coordinates in which the motion is straight, or in which a spline's control points are; default: those given; q for a spline",
+    )
+    motion.add_argument("--tube", action="store_true", help="search for the largest certified tube about the motion")
+    motion.add_argument(
+        "--clearance",
+        action="store_true",
+        help="prove a lower bound of the smallest distance, tight to 10 %% and 0.1 mm, and say where it is",
+    )
+    motion.add_argument(
+        "--padding",
+        type=float,
+        metavar="METRES",
+        default=0.0,
+        help="prove the motion with this much added around every body, beyond the scene's padding; default: 0",
+    )
+    motion.add_argument("--local", action="store_true", help="certify in this process, without a service")
+    motion.add_argument(
+        "--job",
+        action="store_true",
+        help="run it as a job of the service, for a motion that takes minutes; --deadline, --priority and --label need this",
+    )
+    add_options(motion, JOB)
+    motion.add_argument("--out", metavar="FILE", help="new file for the proof; default: none")
+    motion.set_defaults(run="client.motion:certify_path")
+
+    contains = verbs.add_parser("contains", parents=[remote(), as_json()], help="show which certified regions contain a configuration")
+    contains.add_argument("scene", metavar="SCENE", help=SCENE)
+    contains.add_argument("--q", metavar=JOINTS, required=True, action="append", help="joint positions; may be repeated")
+    contains.set_defaults(run="client.commands:contains")
+
+    near = verbs.add_parser(
+        "nearest", parents=[remote(), as_json()], help="show which certified region is nearest to a configuration, and how far it is"
+    )
+    near.add_argument("scene", metavar="SCENE", help=SCENE)
+    near.add_argument("--q", metavar=JOINTS, required=True, action="append", help="joint positions; may be repeated")
+    near.set_defaults(run="client.planning:nearest")
+
+    plan = verbs.add_parser(
+        "plan",
+        parents=[remote(), as_json()],
+        help="plan a trajectory between two configurations through the certified regions",
+        epilog="Example: ciris plan planar-2dof --from 0,0 --to 0.35,-0.2 --speed 1.5",
+    )
+    plan.add_argument("scene", metavar="SCENE", help=SCENE)
+    of_end = "joint positions, or the id of a region for any point of it"
+    plan.add_argument("--from", dest="start", metavar=JOINTS, required=True, help=f"where the motion begins: {of_end}")
+    plan.add_argument("--to", dest="goal", metavar=JOINTS, required=True, help=f"where it ends: {of_end}")
+    plan.add_argument("--speed", help="largest speed in rad/s or m/s, one for all joints or one for each; default 1")
+    plan.add_argument("--acceleration", help="largest acceleration in rad/s² or m/s², one for all joints or one for each; default 2")
+    plan.add_argument(
+        "--grow",
+        action="store_true",
+        help="if there is no trajectory, grow regions until the two ends are connected, and plan again; "
+        "--deadline, --priority and --label need this",
+    )
+    add_options(plan, JOB)
+    plan.set_defaults(run="client.planning:plan")
+
+    path = verbs.add_parser("path", parents=[remote(), as_json()], help="decide whether every point of a path is in certified regions")
+    path.add_argument("scene", metavar="SCENE", help=SCENE)
+    path.add_argument("--q", metavar=JOINTS, action="append", help="a waypoint, joint positions; give two or more")
+    path.add_argument("--path", metavar="FILE", help="npz, JSON, YAML or CSV with waypoints q or s and perhaps times t, or with a spline")
+    path.add_argument(
+        "--space",
+        choices=["q", "s"],
+        help="coordinates in which the motion is straight, or in which a spline's control points are; default: q",
+    )
+    path.set_defaults(run="client.planning:path")
+
+    graph = verbs.add_parser("graph", parents=[remote(), as_json()], help="show which regions of a scene overlap, and where gaps are")
+    graph.add_argument("scene", metavar="SCENE", help=SCENE)
+    graph.set_defaults(run="client.planning:graph")

@@ -1,0 +1,39 @@
+"""Arguments of the commands about scenes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from client.arguments.common import as_json, dependents, group, remote
+
+
+def add(verbs: Any) -> None:
+    """Adds the commands."""
+    scene = group(verbs.add_parser("scene", help="draft, check, add, list, show and delete scenes"))
+    init = scene.add_parser("init", help="write a scene file and a seed for a robot's model", epilog="Nothing is overwritten.")
+    init.add_argument("robot", metavar="ROBOT", help="model file: URDF, SDFormat or MJCF")
+    init.add_argument("--world", metavar="FILE", action="append", default=[], help="model of an obstacle around it; may be repeated")
+    init.add_argument(
+        "--package", metavar="NAME=DIR", action="append", default=[], help="directory of a package that a model names; may be repeated"
+    )
+    init.add_argument(
+        "--out",
+        metavar="FILE",
+        default="scene.yaml",
+        help="the scene file; default: scene.yaml here. The seed goes beside it, into seed.yaml, or NAME.seed.yaml for NAME.yaml",
+    )
+    init.set_defaults(run="client.scenes:scene_init")
+    check = scene.add_parser("check", parents=[as_json()], help="show what ciris reads from a scene file and its models, without a service")
+    check.add_argument("path", metavar="PATH.yaml", help="the scene file")
+    check.add_argument("--q", metavar="Q", help="a configuration to look at; default: the seed beside the file, or else q*")
+    check.set_defaults(run="client.scenes:scene_check")
+    add = scene.add_parser("add", parents=[remote(), as_json()], help="upload a scene file and all files it refers to")
+    add.add_argument("path", metavar="PATH.yaml", help="the scene file")
+    add.set_defaults(run="client.commands:scene_add")
+    scene.add_parser("ls", parents=[remote(), as_json()], help="list scenes, newest first").set_defaults(run="client.commands:scene_ls")
+    show = scene.add_parser("show", parents=[remote(), as_json()], help="show a scene's joints, warnings and pairs")
+    show.add_argument("scene", metavar="ID", help="its id or its name")
+    show.set_defaults(run="client.commands:scene_show")
+    gone = scene.add_parser("rm", parents=[remote(), dependents()], help="delete a scene")
+    gone.add_argument("scene", metavar="ID", help="its id or its name")
+    gone.set_defaults(run="client.removal:scene_rm")

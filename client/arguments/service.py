@@ -1,0 +1,70 @@
+"""Arguments of the commands that run the service and look after it, and of those about this machine."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from client.arguments.common import Parser, as_json, group, remote
+
+
+def _limits(args: argparse.Namespace) -> list[str]:
+    """Returns the words of ``ciris project set``."""
+    given = {"--max-bytes": args.max_bytes, "--keep-days": args.keep_days}
+    return ["set", args.name, *(f"{option}={value}" for option, value in given.items() if value is not None)]
+
+
+def add(verbs: Any) -> None:
+    """Adds the commands."""
+    up = verbs.add_parser("up", help="run the service on this machine until Ctrl-C")
+    up.add_argument("--port", type=int, help="port of the API; default: CIRIS_PORT or 8643, or any free port when that one is taken")
+    up.add_argument("--data", metavar="DIR", help="data directory; default: CIRIS_DATA_DIR")
+    up.set_defaults(run="client.commands:up")
+
+    database = Parser(add_help=False)
+    database.add_argument("--data", metavar="DIR", help="data directory; default: CIRIS_DATA_DIR; not used where CIRIS_DATABASE_URL is set")
+    project = group(verbs.add_parser("project", help="make and list projects and set their limits, in this machine's database"))
+    new = project.add_parser("add", parents=[database], help="make a project; its keys see nothing of other projects")
+    new.add_argument("name", metavar="NAME", help="the new project's name")
+    new.set_defaults(run="client.commands:in_database", module="db.projects", words=lambda args: ["add", args.name])
+    known = project.add_parser("ls", parents=[database, as_json()], help="list the projects with their limits")
+    known.set_defaults(
+        run="client.commands:in_database", module="db.projects", words=lambda args: ["ls", *(["--json"] if args.json else [])]
+    )
+    limits = project.add_parser("set", parents=[database], help="set a project's limits; 0 for none")
+    limits.add_argument("name", metavar="NAME", help="the project's name")
+    limits.add_argument("--max-bytes", metavar="N", help="refuse new scenes and jobs once the project stores N bytes; 0: no limit")
+    limits.add_argument("--keep-days", metavar="DAYS", help="delete a job's data, except its regions, DAYS days after its end; 0: never")
+    limits.set_defaults(run="client.commands:in_database", module="db.projects", words=_limits)
+
+    key = group(verbs.add_parser("key", help="make, list and revoke API keys: in this machine's database, or with --url over HTTP"))
+    over_http = Parser(add_help=False)
+    over_http.add_argument("--url", help="URL of a service; then an admin's key of it manages the keys of its own project")
+    of_project = Parser(add_help=False)
+    of_project.add_argument(
+        "--project", metavar="NAME", help="the project that the key belongs to; default: the project named default; not with --url"
+    )
+    made = key.add_parser("add", parents=[database, over_http, of_project], help="make a key and print it; it is shown only once")
+    made.add_argument("name", metavar="NAME", help="the new key's name")
+    made.add_argument(
+        "--scope", choices=["read", "submit", "admin"], required=True, help="what the key allows; each scope includes those before it"
+    )
+    made.set_defaults(run="client.keys:add")
+    listed = key.add_parser("ls", parents=[database, over_http, as_json()], help="list the keys, without their secrets")
+    listed.set_defaults(run="client.keys:ls")
+    revoked = key.add_parser(
+        "revoke", parents=[database, over_http, of_project], help="revoke a key; the service refuses it within a second"
+    )
+    revoked.add_argument("name", metavar="NAME", help="the key's name")
+    revoked.set_defaults(run="client.keys:revoke")
+
+    bench = verbs.add_parser("bench", help="measure ciris, and Drake beside it if asked; see ciris bench BENCHMARK --help")
+    kinds = ["pairs", "scene", "growth", "path", "agreement", "scaling", "service", "store", "survey", "robots", "query", "plan"]
+    bench.add_argument("benchmark", choices=[*kinds, "cover", "recertify", "fleet", "docs"], help="what to measure")
+    bench.add_argument("arguments", nargs=argparse.REMAINDER, metavar="...", help="the benchmark's own arguments")
+    bench.set_defaults(run="client.bench:bench")
+
+    doctor = verbs.add_parser(
+        "doctor", parents=[remote(), as_json()], help="show what is installed, which solvers work, and what this machine can do"
+    )
+    doctor.set_defaults(run="client.commands:doctor")
