@@ -286,9 +286,8 @@ def certify(
         RegionError: the polytope is malformed, empty or unbounded, or ``cells`` is out of range.
     """
     seed = {"C": polytope.C.tolist(), "d": polytope.d.tolist(), "center": None if center is None else center.tolist()}
-    job = _Memory(
-        scene, GrowthOptions.from_document({"kind": "certify", "seed": seed, "cells": cells, "random_seed": random_seed}), tell, processes
-    )
+    options = GrowthOptions.from_document({"kind": "certify", "seed": seed, "cells": cells, "random_seed": random_seed})
+    job = _Memory(scene, options, tell, processes)
     drive(job)
     if job.error is not None:
         raise job.error

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from certifier import stored
 from certifier.errors import CirisError, RegionError
 from certifier.growth.actions import Finish, Outcomes, Propose
 from certifier.growth.machine import advance, begin, stored_state
