@@ -51,7 +51,7 @@ def begin_again(scene: Scene, state: GrowthState) -> Transition:
     contact = _contact(scene, polytope, keep)
     if contact is not None:
         return Transition(state, contact)
-    start = Start(polytope, keep[0], keep)
+    start = Start(polytope, keep[0], keep, again=True)
     return begin_stage(scene, replace(state, start=start), 1.0, polytope)
 
 

@@ -42,11 +42,16 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
         RegionError: a ``certify`` job without C and d, with the wrong number of columns, or with a number that is too large.
     """
     state = GrowthState(options) if options.paper is None else PaperState(options)
-    if options.kind == "grow":
-        seed = options.seed.get("random_seed")
-        return Transition(state, Propose({**options.seed, "random_seed": options.random_seed % IRIS_SEEDS if seed is None else seed}))
-    if options.kind == "recertify":
-        return begin_again(scene, state)
+    return _FIRST[options.kind](scene, state)
+
+
+def _propose(scene: Scene, state: GrowthState) -> Transition:
+    options, seed = state.options, state.options.seed.get("random_seed")
+    return Transition(state, Propose({**options.seed, "random_seed": options.random_seed % IRIS_SEEDS if seed is None else seed}))
+
+
+def _given(scene: Scene, state: GrowthState) -> Transition:
+    options = state.options
     if "C" not in options.seed or "d" not in options.seed:
         raise RegionError("polytope_missing", "a polytope needs C and d", field="polytope", hint="give both")
     given, center = Polytope.given(options.seed["C"], options.seed["d"], scene.n), options.seed.get("center")
@@ -56,6 +61,10 @@ def begin(scene: Scene, options: GrowthOptions) -> Transition:
         center = np.array(center)
     action = Certify(0, "given", limited, center, by_joints(scene), reuse={}, hard=[], failures=None, cells=options.cells or 1)
     return Transition(replace(state, next=1), action)
+
+
+_FIRST = {"grow": _propose, "certify": _given, "recertify": begin_again}
+"""kind of the job -> what its first transition is"""
 
 
 def stored_state(document: dict[str, Any]) -> GrowthState:

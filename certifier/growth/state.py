@@ -21,12 +21,14 @@ class Start:
         seed: (n,) the seed in s.
         keep: (k, n) points that stay inside, the first of them well inside.
         hindrance: the reason to give if no region can be grown; "" where none is known.
+        again: the proposal is a region of the scene before it changed.
     """
 
     rows: Polytope
     seed: Array
     keep: Array
     hindrance: str = ""
+    again: bool = False
 
 
 @dataclass(frozen=True, eq=False)

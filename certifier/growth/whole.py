@@ -84,7 +84,7 @@ def _next_stage(scene: Scene, state: GrowthState, start: Start) -> Transition:
     assert whole is not None
     assert best is not None
     kept = _kept(scene, start, best.polytope)
-    if state.options.kind == "recertify":
+    if start.again:
         return Transition(state, Finish(Outcome.CERTIFIED, f"certified; {100 * kept:.3g} % of the region is kept"))
     if kept == 1 or whole.stage == state.options.stages or (whole.reach > 1 and kept < whole.kept + GAIN):
         return Transition(state, Finish(Outcome.CERTIFIED, "certified"))
@@ -196,9 +196,14 @@ def _most_loss(state: GrowthState, whole: Whole, pair: int, hard: int) -> float:
 def _effort(state: GrowthState, whole: Whole, pair: int) -> int:
     """Returns how many cells of a pair are looked at before its open cells are cut off."""
     effort = state.options.cells or MOST_CELLS
-    soon = whole.reach < 1 or whole.reach > FAR or state.options.kind == "recertify"
+    soon = whole.reach < 1 or whole.reach > FAR or _again(state)
     early = EARLY_EFFORT if soon else effort
     return min(effort, early, whole.spent.get(pair, 0) if _gone(whole) >= LATE else effort)
+
+
+def _again(state: GrowthState) -> bool:
+    """Returns whether a region is certified again, and not grown."""
+    return state.start is not None and state.start.again
 
 
 def _gone(whole: Whole) -> float:
@@ -218,7 +223,7 @@ def _ended(state: GrowthState, report: Outcomes, reason: str) -> Transition:
     """Ends the growth with the best region so far, or without one."""
     if state.best is not None:
         return Transition(state, Finish(Outcome.CERTIFIED, f"certified; growth ended early: {reason}"))
-    if state.options.kind == "recertify":
+    if _again(state):
         reason = f"{REVOKED}{reason}"
     return Transition(state, Finish(combine(list(report.outcomes.values())), reason))
 
@@ -227,7 +232,7 @@ def _together(scene: Scene, state: GrowthState) -> Together:
     """Returns which pairs are grouped to share one certificate: the same in all stages; none where a region is certified again."""
     if state.whole is not None:
         return state.whole.together
-    if state.start is None or state.options.kind == "recertify":
+    if state.start is None or state.start.again:
         return {}
     return together(scene, samples_of(scene, state.start.rows)[::THIN], state.start.keep)
 
