@@ -14,8 +14,10 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, event
 
+from certifier.errors import CirisError
 from db.models import Base
 from db.session import Database
 from db.settings import settings
@@ -43,8 +45,13 @@ def connection_for_migrations(url: str) -> Iterator[Connection]:
 
 
 def upgrade(url: str, revision: str = "head") -> None:
-    """Migrates up to ``revision``. Nothing happens when the database is there already."""
+    """Migrates up to ``revision``. Nothing happens when the database is there already.
+
+    Raises:
+        CirisError: database_version.
+    """
     with connection_for_migrations(url) as connection:
+        _check(connection)
         command.upgrade(_config(connection), revision)
     _let_it_shrink(url)
 
@@ -59,6 +66,16 @@ def drift(url: str) -> list[Any]:
     """Returns what differs between the database and the models; empty when nothing does."""
     with connection_for_migrations(url) as connection:
         return list(compare_metadata(MigrationContext.configure(connection), Base.metadata))
+
+
+def _check(connection: Connection) -> None:
+    """Refuses a database of a version that this one does not know."""
+    current = MigrationContext.configure(connection).get_current_revision()
+    known = [script.revision for script in ScriptDirectory.from_config(_config(connection)).walk_revisions()]
+    if current is not None and current not in known:
+        problem = f"the database is at revision {current}, and this version knows {min(known)} to {max(known)}"
+        hint = "for a smaller revision, start version 0.1.0 on the database once; for a larger one, install the version that made it"
+        raise CirisError("database_version", problem, field="CIRIS_DATABASE_URL", hint=hint)
 
 
 def _let_it_shrink(url: str) -> None:
