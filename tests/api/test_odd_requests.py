@@ -64,7 +64,7 @@ def test_odd_json_is_the_clients_fault(client: TestClient, scene: Scene, body: s
     [
         ("options.random_seed", lambda value: GROW | {"options": {"random_seed": value}}),
         ("options.cells", lambda value: GROW | {"options": {"cells": value}}),
-        ("options.tolerance", lambda value: GROW | {"options": {"tolerance": value}}),
+        ("options.paper.tolerance", lambda value: GROW | {"options": {"paper": {"tolerance": value}}}),
         ("priority", lambda value: GROW | {"priority": value}),
         ("seed.max_iterations", lambda value: GROW | {"seed": {**GROW["seed"], "max_iterations": value}}),
         ("seed.q[0]", lambda value: GROW | {"seed": {"q": [value]}}),

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from api.schemas.options import model_of
 from certifier.options import read
+from jobs.fields import model_of
 from tests.options import Grouped
 
 MODEL = model_of(Grouped)

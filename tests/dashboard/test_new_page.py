@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from api.pages import form
 from certifier.model import Scene
 from certifier.options import option
-from db.states import JobKind
+from jobs.grow import Grow
 
 REFUSED = "Failed to load resource: the server responded with a status of "
 EXAMPLE = Path(__file__).parents[2] / "examples" / "planar_2dof"
@@ -149,7 +148,7 @@ class Outer:
 
 
 def test_an_option_of_each_kind_gets_into_the_request(page: Any, url: str, planar: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(form.PARTS, JobKind.GROW, {"seed": ("Seed", Inner), "options": ("Ways", Outer)})
+    monkeypatch.setattr(Grow, "forms", {"seed": ("Seed", Inner), "options": ("Ways", Outer)})
     page.goto(f"{url}/new?scene=planar&q=0.1,-0.2")
     page.get_by_text("Free here").wait_for()
     for summary in page.locator("summary").all():

@@ -15,10 +15,10 @@ from db import keys, proofs, scenes
 from db.keys import Scope
 from db.session import Database
 from db.settings import Settings, settings
+from jobs import admission
 from tests.api.test_jobs import CERTIFY, GROW
 from tests.errors.rows import Row, Trial, rows
 from tests.scenes import slider
-from workers import admission
 from workers.addresses import resolve
 from workers.stack import run_stack
 
@@ -455,7 +455,7 @@ WORKERS = [
         ("webhook_address", "webhook.url", "{host} is not a public address", PRIVATE, lambda t: resolve("127.0.0.1", 443, private=False)),
     ),
     *rows(
-        "workers/admission.py",
+        "jobs/admission.py",
         (
             "does_not_fit",
             "scene",

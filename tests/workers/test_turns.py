@@ -18,11 +18,12 @@ from certifier.errors import CirisError
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.pair.forecast import forecast
-from db import jobs, leases, pairs, regions, retention, steps
+from db import jobs, leases, pairs, regions, retention, steps, transaction
 from db.models import IterationRow, JobRow, PairRow, ProofRow, StepRow, SubtreesRow
 from db.session import database
 from db.settings import settings
 from db.types import utcnow
+from jobs import admission
 from jobs.scenes import load_scene
 from tests.db.builders import add_iteration
 from tests.scenes import slider
@@ -30,7 +31,7 @@ from tests.services import Queue
 from tests.workers.options import box_around, grow_box
 from tests.workers.record import check_record
 from tests.workers.service import environment, events_of, job_of, pairs_of, submit
-from workers import admission, sweeper, transaction, turns
+from workers import sweeper, turns
 from workers.app import CONTROL, SOLVE, send_coordinate, waiting
 from workers.solver import Piece, work
 from workers.troubles import Troubles

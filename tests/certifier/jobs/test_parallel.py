@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from certifier.errors import CirisError
-from certifier.growth.trials import alike
+from certifier.growth.pairs import alike
 from certifier.jobs.parallel import side_by_side
 from certifier.outcome import Outcome
 from certifier.pair.result import PairResult, Stage
