@@ -11,9 +11,7 @@ from planner.cover.ground import free_samples
 from planner.cover.look import Look
 from planner.cover.options import CoverOptions
 from tests.certifier.scenes import planar_arm
-from tests.errors.rows import Row, Trial, rows
-
-COVER = {"kind": "cover", "scene": "slider"}
+from tests.errors.trial import Trial, refused
 
 
 def options(**given: Any) -> object:
@@ -37,78 +35,23 @@ def not_a_cover(t: Trial) -> None:
     t.ask("GET", f"/v1/jobs/{job}/cover")
 
 
-def in_s(t: Trial) -> str:
+def in_s(t: Trial) -> None:
     path = t.write(path__json='{"s": [[0.0], [0.1]]}')
-    return t.ciris("cover", "slider", "--path", path)
+    t.ciris("cover", "slider", "--path", path)
 
 
-def from_a_region(t: Trial) -> str:
+def from_a_region(t: Trial) -> None:
     url, region = (t.request.getfixturevalue(name) for name in ("url", "region"))
-    return t.ciris("plan", "slider", "--from", region, "--to", "0.9", "--grow", CIRIS_URL=url)
+    t.ciris("plan", "slider", "--from", region, "--to", "0.9", "--grow", CIRIS_URL=url)
 
 
-COVERS: list[Row] = [
-    *rows(
-        "planner/cover/options.py",
-        (
-            "option_value",
-            "options.connect",
-            "at least two configurations can be connected, and one was given",
-            "give another one, or give it as a seed",
-            lambda t: options(connect=[[0.0]]),
-        ),
-    ),
-    *rows(
-        "planner/cover/ground.py",
-        (
-            "nothing_free",
-            "scene",
-            "of {...} configurations, {total} were found that are free of collisions",
-            "`ciris scene check` says which bodies always touch",
-            nothing_is_free,
-        ),
-    ),
-    *rows(
-        "planner/cover/look.py",
-        (
-            "seed_in_collision",
-            "options.{name}[{i}]",
-            "bodies touch, or are nearer than the padding, at this configuration",
-            "`ciris scene check --q` says which",
-            lambda t: looked(seeds=((0.0, 0.0),)),
-        ),
-        (
-            "path_in_collision",
-            "options.paths[{i}]",
-            "bodies touch, or are nearer than the padding, between waypoints {segment} and {...}",
-            "`ciris certify-path` says which",
-            lambda t: looked(paths=(((-1.5, 0.0), (0.0, 0.0)),)),
-        ),
-    ),
-    *rows("workers/covers.py", ("not_covered", "options", "{...}", "regions that were certified remain", "a cover that cannot go on")),
-    *rows(
-        "api/routers/jobs.py",
-        (
-            "cover_not_found",
-            "job",
-            "the job {id} is no cover, but a {kind} job",
-            "its own page and /v1/jobs/{{id}} describe it",
-            not_a_cover,
-        ),
-    ),
-    *rows(
-        "client/planning.py",
-        ("option", "--from", "regions grow between configurations, not regions", "give joint positions", from_a_region),
-    ),
-    *rows(
-        "client/cover.py",
-        ("option", "--path", "{path} has no waypoints in q; a path to cover is straight in q between them", "give waypoints in q", in_s),
-        (
-            "option",
-            "--deadline",
-            "must be a number of seconds above 0, not {deadline}",
-            "",
-            lambda t: t.ciris("cover", "slider", "--deadline", "-1"),
-        ),
-    ),
+COVERS = [
+    *refused("option_value", "options.connect", lambda t: options(connect=[[0.0]])),
+    *refused("nothing_free", "scene", nothing_is_free),
+    *refused("seed_in_collision", "options.seeds[0]", lambda t: looked(seeds=((0.0, 0.0),))),
+    *refused("path_in_collision", "options.paths[0]", lambda t: looked(paths=(((-1.5, 0.0), (0.0, 0.0)),))),
+    *refused("cover_not_found", "job", not_a_cover),
+    *refused("option", "--from", from_a_region),
+    *refused("option", "--path", in_s),
+    *refused("option", "--deadline", lambda t: t.ciris("cover", "slider", "--deadline", "-1")),
 ]

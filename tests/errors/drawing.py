@@ -6,7 +6,7 @@ from typing import Any
 
 from db import scenes
 from tests.certifier.scenes import planar_arm
-from tests.errors.rows import Trial, rows
+from tests.errors.trial import Trial, refused
 
 
 def sliced(t: Trial, **parts: Any) -> None:
@@ -17,29 +17,8 @@ def sliced(t: Trial, **parts: Any) -> None:
 
 
 DRAWING = [
-    *rows(
-        "api/drawing.py",
-        ("same_joint", "y", "a slice goes through two different joints", "name another joint", lambda t: sliced(t, y="arm/joint1")),
-        (
-            "unknown_joint",
-            "x",
-            "no joint of {name} is called {name}",
-            "there are {names}",
-            lambda t: sliced(t, x="arm/joint9"),
-        ),
-        (
-            "slice_outside_limits",
-            "x_range",
-            "the range is outside of the limits of {name}, {low} to {high}",
-            "choose one within them",
-            lambda t: sliced(t, x_range=[2.0, 3.0]),
-        ),
-        (
-            "region_elsewhere",
-            "regions[0]",
-            "region {name} is not of this scene",
-            "`ciris region ls --scene SCENE` lists them",
-            lambda t: sliced(t, regions=["none"]),
-        ),
-    ),
+    *refused("same_joint", "y", lambda t: sliced(t, y="arm/joint1")),
+    *refused("unknown_joint", "x", lambda t: sliced(t, x="arm/joint9")),
+    *refused("slice_outside_limits", "x_range", lambda t: sliced(t, x_range=[2.0, 3.0])),
+    *refused("region_elsewhere", "regions[0]", lambda t: sliced(t, regions=["none"])),
 ]

@@ -9,8 +9,8 @@ from db import keys, projects, workers
 from db.keys import Scope
 from db.states import WorkerState
 from db.workers import Made, WorkerKind
-from tests.errors.rows import Trial, rows
 from tests.errors.service import database
+from tests.errors.trial import Trial, refused
 
 
 def a_draining_one(t: Trial) -> str:
@@ -30,31 +30,7 @@ def with_a_key_of_others(t: Trial) -> None:
 
 
 WORKERS = [
-    *rows(
-        "db/workers.py",
-        (
-            "worker_not_found",
-            "worker",
-            "there is no worker {worker_id}",
-            "GET /v1/workers lists those that live",
-            lambda t: t.ask("GET", "/v1/workers/nobody"),
-        ),
-        (
-            "worker_draining",
-            "worker",
-            "the worker is ending",
-            "start another one",
-            lambda t: t.ask("POST", f"/v1/workers/{a_draining_one(t)}/resume"),
-        ),
-    ),
-    *rows(
-        "api/routers/workers.py",
-        (
-            "workers_shared",
-            "Authorization",
-            "workers serve all projects; the key {name} belongs to the project {project}",
-            "ask those who run the service: admins of the project default",
-            with_a_key_of_others,
-        ),
-    ),
+    *refused("worker_not_found", "worker", lambda t: t.ask("GET", "/v1/workers/nobody")),
+    *refused("worker_draining", "worker", lambda t: t.ask("POST", f"/v1/workers/{a_draining_one(t)}/resume")),
+    *refused("workers_shared", "Authorization", with_a_key_of_others),
 ]
