@@ -5,7 +5,7 @@ from __future__ import annotations
 import zipfile
 
 from certifier.scene import BundleLimits, load_bundle
-from tests.errors.trial import refused
+from tests.errors.trial import Table
 
 
 def link() -> tuple[zipfile.ZipInfo, str]:
@@ -14,21 +14,15 @@ def link() -> tuple[zipfile.ZipInfo, str]:
     return entry, "/etc/passwd"
 
 
-BUNDLES = [
-    *refused(
-        "bundle_too_large",
-        "bundle",
+BUNDLES: Table = {
+    ("bundle_too_large", "bundle"): [
         lambda t: load_bundle(bytes(9), BundleLimits(bytes=8)),
         lambda t: t.unpack(*((f"{i}.obj", "") for i in range(1001))),
         lambda t: load_bundle(t.pack(), BundleLimits(unpacked_bytes=100)),
-    ),
-    *refused("bundle_file", "", lambda t: t.stranger(run__sh="true")),
-    *refused(
-        "bundle_text", "", lambda t: t.stranger(m__gltf=b"\xff\xfe"), lambda t: t.stranger(m__gltf="{"), lambda t: t.stranger(m__gltf="[]")
-    ),
-    *refused(
-        "bundle_uri",
-        "",
+    ],
+    ("bundle_file", ""): [lambda t: t.stranger(run__sh="true")],
+    ("bundle_text", ""): [lambda t: t.stranger(m__gltf=b"\xff\xfe"), lambda t: t.stranger(m__gltf="{"), lambda t: t.stranger(m__gltf="[]")],
+    ("bundle_uri", ""): [
         lambda t: t.pack(shape='<mesh filename="/m.obj"/>'),
         lambda t: t.pack(shape='<mesh filename="https://example.org/m.obj"/>'),
         lambda t: t.pack(shape='<mesh filename="package://no/m.obj"/>', extra="packages: {here: .}\n"),
@@ -36,10 +30,8 @@ BUNDLES = [
         lambda t: t.stranger(m__xml="<mujoco><compiler meshdir='..'/></mujoco>"),
         lambda t: t.stranger(m__xml="<mujoco><mesh file='a/../m.obj'/></mujoco>"),
         lambda t: t.stranger(arm__urdf="<robot><mesh filename='../m.obj'/></robot>"),
-    ),
-    *refused("bundle_xml", "", lambda t: t.stranger(arm__urdf="<a>" * 60 + "</a>" * 60)),
-    *refused("bundle_zip", "bundle", lambda t: load_bundle(b"not a zip"), lambda t: t.unpack(("a/scene.yaml", ""), ("b/scene.yaml", ""))),
-    *refused(
-        "bundle_path", "bundle", lambda t: t.unpack(link()), lambda t: t.unpack(("../evil", "")), lambda t: t.unpack(("a/" * 40 + "b", ""))
-    ),
-]
+    ],
+    ("bundle_xml", ""): [lambda t: t.stranger(arm__urdf="<a>" * 60 + "</a>" * 60)],
+    ("bundle_zip", "bundle"): [lambda t: load_bundle(b"not a zip"), lambda t: t.unpack(("a/scene.yaml", ""), ("b/scene.yaml", ""))],
+    ("bundle_path", "bundle"): [lambda t: t.unpack(link()), lambda t: t.unpack(("../evil", "")), lambda t: t.unpack(("a/" * 40 + "b", ""))],
+}

@@ -9,7 +9,7 @@ import numpy as np
 
 from ciris import Space, connect
 from tests.client.conftest import PLANAR
-from tests.errors.trial import Trial, refused
+from tests.errors.trial import Table, Trial
 
 EYE = [[1, 0], [0, 1], [-1, 0], [0, -1]]
 
@@ -58,66 +58,56 @@ def one_joint() -> Space:
     return Space(("slide",), np.zeros(1), -np.ones(1), np.ones(1), np.array([False]))
 
 
-COMMANDS = [
-    *refused("option", "--q", lambda t: t.ciris("path", "slider", "--q", "0.1"), lambda t: again(t, "x", "--q", "0,0")),
-    *refused("option", "--deadline", lambda t: grow(t, "--deadline", "0"), lambda t: again(t, "x", "--deadline", "0")),
-    *refused("several_seeds", "--q", lambda t: grow(t, "--q", "0,0", "--q", "0,1")),
-    *refused("option", "--solver", lambda t: good(t, "--solver", "clarabel")),
-    *refused("option", "--cells", lambda t: good(t, "--backend", "drake", "--cells", "2")),
-    *refused("option", "--out", lambda t: good(t, "--backend", "drake", "--out", "x.proof")),
-    *refused("option", "--backend", lambda t: good(t, "--backend", "drake")),
-    *refused(
-        "not_writable",
-        "--out",
+COMMANDS: Table = {
+    ("option", "--q"): [lambda t: t.ciris("path", "slider", "--q", "0.1"), lambda t: again(t, "x", "--q", "0,0")],
+    ("option", "--deadline"): [lambda t: grow(t, "--deadline", "0"), lambda t: again(t, "x", "--deadline", "0")],
+    ("several_seeds", "--q"): [lambda t: grow(t, "--q", "0,0", "--q", "0,1")],
+    ("option", "--solver"): [lambda t: good(t, "--solver", "clarabel")],
+    ("option", "--cells"): [lambda t: good(t, "--backend", "drake", "--cells", "2")],
+    ("option", "--out"): [lambda t: good(t, "--backend", "drake", "--out", "x.proof")],
+    ("option", "--backend"): [lambda t: good(t, "--backend", "drake")],
+    ("not_writable", "--out"): [
         lambda t: grow(t, "--out", "."),
         lambda t: t.ciris("region", "export", "any", "--out", "nowhere/region.json"),
         lambda t: grow(t, "--out", "/proc/any.proof"),
-    ),
-    *refused(
-        "file_exists",
-        "--out",
+    ],
+    ("file_exists", "--out"): [
         lambda t: grow(t, "--out", t.write(a__proof="").name),
         lambda t: t.ciris("scene", "init", "arm.urdf", "--out", t.write(scene__yaml="").name),
-    ),
-    *refused("terminal", "--out", to_a_terminal),
-    *refused("no_service", "", lambda t: t.ciris("scene", "ls")),
-    *refused("api_key", "CIRIS_API_KEY", lambda t: t.ciris("scene", "ls", CIRIS_URL="http://127.0.0.1:9", CIRIS_API_KEY="two words")),
-    *refused(
-        "api_key",
-        "CIRIS_API_KEY_FILE",
-        lambda t: t.ciris("scene", "ls", CIRIS_URL="http://127.0.0.1:9", CIRIS_API_KEY_FILE=str(t.write(key="two words"))),
-    ),
-    *refused(
-        "points",
-        "q",
+    ],
+    ("terminal", "--out"): [to_a_terminal],
+    ("no_service", ""): [lambda t: t.ciris("scene", "ls")],
+    ("api_key", "CIRIS_API_KEY"): [lambda t: t.ciris("scene", "ls", CIRIS_URL="http://127.0.0.1:9", CIRIS_API_KEY="two words")],
+    ("api_key", "CIRIS_API_KEY_FILE"): [
+        lambda t: t.ciris("scene", "ls", CIRIS_URL="http://127.0.0.1:9", CIRIS_API_KEY_FILE=str(t.write(key="two words")))
+    ],
+    ("points", "q"): [
         lambda t: connect("http://127.0.0.1:9").contains("cell"),
         lambda t: connect("http://127.0.0.1:9").contains("cell", 0.5),
-    ),
-    *refused("wrong_length", "q", lambda t: one_joint().to_s([0.1, 0.2])),
-    *refused("unreachable", "", lambda t: t.ciris("scene", "ls", CIRIS_URL="http://127.0.0.1:9")),
-    *refused("not_found", "", lambda t: asked(t, "job", "show", "..")),
-    *refused("job_not_found", "job", lambda t: asked(t, "job", "show", "nothing")),
-    *refused("bad_number", "--q[1]", lambda t: grow(t, "--q", "0,x")),
-    *refused("bad_number", "--q", lambda t: grow(t, "--q", ",")),
-    *refused("seed_missing", "--q", lambda t: t.ciris("grow", t.write(alone__yaml="").name, "--local")),
-    *refused("seed_file", "--q", lambda t: beside_a_seed(t, "q: here")),
-    *refused("polytope_joints", "--polytope", lambda t: good(t, "--local", space={"joints": ["other/a", "other/b"]})),
-    *refused("polytope_q_star", "--polytope", bound),
-    *refused(
-        "polytope_file",
-        "--polytope",
+    ],
+    ("wrong_length", "q"): [lambda t: one_joint().to_s([0.1, 0.2])],
+    ("unreachable", ""): [lambda t: t.ciris("scene", "ls", CIRIS_URL="http://127.0.0.1:9")],
+    ("not_found", ""): [lambda t: asked(t, "job", "show", "..")],
+    ("job_not_found", "job"): [lambda t: asked(t, "job", "show", "nothing")],
+    ("bad_number", "--q[1]"): [lambda t: grow(t, "--q", "0,x")],
+    ("bad_number", "--q"): [lambda t: grow(t, "--q", ",")],
+    ("seed_missing", "--q"): [lambda t: t.ciris("grow", t.write(alone__yaml="").name, "--local")],
+    ("seed_file", "--q"): [lambda t: beside_a_seed(t, "q: here")],
+    ("polytope_joints", "--polytope"): [lambda t: good(t, "--local", space={"joints": ["other/a", "other/b"]})],
+    ("polytope_q_star", "--polytope"): [bound],
+    ("polytope_file", "--polytope"): [
         lambda t: certify(t, file="nothing.npz"),
         lambda t: certify(t, C="x"),
         lambda t: certify(t, file="p.txt"),
         lambda t: certify(t, C=EYE),
-    ),
-    *refused("polytope_shape", "--polytope", lambda t: good(t, center=[0.0])),
-    *refused("scene_not_found", "SCENE", lambda t: t.ciris("grow", "planar", "--q", "0,0", "--local")),
-    *refused("scene_file", "--out", lambda t: t.ciris("scene", "init", "arm.urdf", "--out", "scene.txt")),
-    *refused("bad_option", "--package", lambda t: t.ciris("scene", "init", "arm.urdf", "--package", "x")),
-    *refused("seed_wrong_length", "--q", lambda t: t.ciris("scene", "check", PLANAR, "--q", "0")),
-    *refused("option", "REGION", lambda t: again(t)),
-    *refused("option", "--from", lambda t: again(t, "x", "--from", "planar-2dof")),
-    *refused("no_file", "REGION", lambda t: again(t, "nothing.proof", "--local")),
-    *refused("no_file", "nothing.proof", lambda t: t.ciris("verify", "nothing.proof")),
-]
+    ],
+    ("polytope_shape", "--polytope"): [lambda t: good(t, center=[0.0])],
+    ("scene_not_found", "SCENE"): [lambda t: t.ciris("grow", "planar", "--q", "0,0", "--local")],
+    ("scene_file", "--out"): [lambda t: t.ciris("scene", "init", "arm.urdf", "--out", "scene.txt")],
+    ("bad_option", "--package"): [lambda t: t.ciris("scene", "init", "arm.urdf", "--package", "x")],
+    ("seed_wrong_length", "--q"): [lambda t: t.ciris("scene", "check", PLANAR, "--q", "0")],
+    ("option", "REGION"): [lambda t: again(t)],
+    ("option", "--from"): [lambda t: again(t, "x", "--from", "planar-2dof")],
+    ("no_file", "REGION"): [lambda t: again(t, "nothing.proof", "--local")],
+    ("no_file", "nothing.proof"): [lambda t: t.ciris("verify", "nothing.proof")],
+}

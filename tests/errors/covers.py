@@ -11,7 +11,7 @@ from planner.cover.ground import free_samples
 from planner.cover.look import Look
 from planner.cover.options import CoverOptions
 from tests.certifier.scenes import planar_arm
-from tests.errors.trial import Trial, refused
+from tests.errors.trial import Table, Trial
 
 
 def options(**given: Any) -> object:
@@ -45,13 +45,13 @@ def from_a_region(t: Trial) -> None:
     t.ciris("plan", "slider", "--from", region, "--to", "0.9", "--grow", CIRIS_URL=url)
 
 
-COVERS = [
-    *refused("option_value", "options.connect", lambda t: options(connect=[[0.0]])),
-    *refused("nothing_free", "scene", nothing_is_free),
-    *refused("seed_in_collision", "options.seeds[0]", lambda t: looked(seeds=((0.0, 0.0),))),
-    *refused("path_in_collision", "options.paths[0]", lambda t: looked(paths=(((-1.5, 0.0), (0.0, 0.0)),))),
-    *refused("cover_not_found", "job", not_a_cover),
-    *refused("option", "--from", from_a_region),
-    *refused("option", "--path", in_s),
-    *refused("option", "--deadline", lambda t: t.ciris("cover", "slider", "--deadline", "-1")),
-]
+COVERS: Table = {
+    ("option_value", "options.connect"): [lambda t: options(connect=[[0.0]])],
+    ("nothing_free", "scene"): [nothing_is_free],
+    ("seed_in_collision", "options.seeds[0]"): [lambda t: looked(seeds=((0.0, 0.0),))],
+    ("path_in_collision", "options.paths[0]"): [lambda t: looked(paths=(((-1.5, 0.0), (0.0, 0.0)),))],
+    ("cover_not_found", "job"): [not_a_cover],
+    ("option", "--from"): [from_a_region],
+    ("option", "--path"): [in_s],
+    ("option", "--deadline"): [lambda t: t.ciris("cover", "slider", "--deadline", "-1")],
+}

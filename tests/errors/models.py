@@ -5,7 +5,7 @@ from __future__ import annotations
 from tests.certifier.scene.workshop import BOX, LIMIT
 from tests.errors.scenes import BALL_JOINT, MUJOCO, linked, room
 from tests.errors.scenes import mjcf as body
-from tests.errors.trial import refused
+from tests.errors.trial import Table
 
 LINK = "<link name='more'/><joint name='{}' type='fixed'><parent link='{}'/><child link='{}'/></joint>"
 ZERO_AXIS = "<joint name='j' type='continuous'><parent link='hand'/><child link='l'/><axis xyz='0 0 0'/>"
@@ -22,10 +22,8 @@ def model(text: str) -> dict[str, object]:
     return {"scene": MUJOCO, "files": {"m.xml": f"<mujoco model='m'>{text}</mujoco>"}}
 
 
-MODELS = [
-    *refused(
-        "scene_model",
-        "directives",
+MODELS: Table = {
+    ("scene_model", "directives"): [
         lambda t: t.scene(limit='<limit lower="2" upper="-1" effort="1" velocity="1"/>'),
         lambda t: t.scene(shape='<sphere radius="1,5"/>'),
         lambda t: t.scene(shape='<sphere radius="1e-300"/>'),
@@ -132,14 +130,12 @@ MODELS = [
         lambda t: t.scene(**model("<equality><weld/></equality>")),
         lambda t: t.scene(**model("<tendon><fixed range='0 1'/></tendon>")),
         lambda t: t.scene(**model("<option><flag filterparent='disable'/></option>")),
-    ),
-    *refused(
-        "unsupported_joint",
-        "directives",
+    ],
+    ("unsupported_joint", "directives"): [
         lambda t: t.scene(kind="floating"),
         lambda t: t.scene(kind="planar"),
         lambda t: t.scene(more=BALL_JOINT),
         lambda t: t.scene(kind="Revolute"),
         lambda t: t.scene(kind="xyz"),
-    ),
-]
+    ],
+}

@@ -10,7 +10,7 @@ from certifier.proof.motion import Space
 from db import scenes
 from tests.certifier.motions import swing
 from tests.client.conftest import PLANAR
-from tests.errors.trial import Trial, refused
+from tests.errors.trial import Table, Trial
 from tests.scenes import slider
 from tests.workers.service import eventually
 
@@ -43,39 +43,33 @@ def unproved(t: Trial) -> None:
     t.ask("GET", f"/v1/jobs/{job}/motion/proof")
 
 
-MOTIONS = [
-    *refused("motion_shape", "waypoints", lambda t: given(slider(), [[0.0]], Space.Q), lambda t: given(slider(), [[0.0], ["x"]], Space.Q)),
-    *refused("motion_shape", "scene", lambda t: given(replace(slider(), pairs=()), [[0.0], [0.1]], Space.Q)),
-    *refused("motion_too_long", "waypoints", lambda t: given(slider(), [[0.0]] * (1 << 21), Space.Q)),
-    *refused("outside_limits", "waypoints[1][0]", lambda t: given(slider(), [[0.0], [99.0]], Space.Q)),
-    *refused("padding", "padding", lambda t: padding_of(-1.0)),
-    *refused("motion_shape", "bezier", lambda t: motion_of(slider(), {"bezier": [[[0.0, 0.0], [0.1, 0.1]]]})),
-    *refused("outside_limits", "bezier[0][1][0]", lambda t: motion_of(slider(), {"bezier": [[[0.0], [99.0], [0.0]]]})),
-    *refused(
-        "curve_shape",
-        "bezier",
+MOTIONS: Table = {
+    ("motion_shape", "waypoints"): [lambda t: given(slider(), [[0.0]], Space.Q), lambda t: given(slider(), [[0.0], ["x"]], Space.Q)],
+    ("motion_shape", "scene"): [lambda t: given(replace(slider(), pairs=()), [[0.0], [0.1]], Space.Q)],
+    ("motion_too_long", "waypoints"): [lambda t: given(slider(), [[0.0]] * (1 << 21), Space.Q)],
+    ("outside_limits", "waypoints[1][0]"): [lambda t: given(slider(), [[0.0], [99.0]], Space.Q)],
+    ("padding", "padding"): [lambda t: padding_of(-1.0)],
+    ("motion_shape", "bezier"): [lambda t: motion_of(slider(), {"bezier": [[[0.0, 0.0], [0.1, 0.1]]]})],
+    ("outside_limits", "bezier[0][1][0]"): [lambda t: motion_of(slider(), {"bezier": [[[0.0], [99.0], [0.0]]]})],
+    ("curve_shape", "bezier"): [
         lambda t: curve({"knots": [0.0, 0.0, 1.0, 1.0]}),
         lambda t: curve({"bezier": [[[0.0]]]}),
         lambda t: curve({"bezier": [[0.0]]}),
-    ),
-    *refused("curve_not_continuous", "bezier[1][0]", lambda t: curve({"bezier": [[[0.0], [0.1]], [[0.2], [0.1]]]})),
-    *refused("curve_shape", "knots", lambda t: curve({"knots": [0.0, 1.0], "control_points": [[0.0], [0.1]]})),
-    *refused("knots", "knots[3]", lambda t: curve({"knots": [0.0, 0.0, 1.0, 0.5], "control_points": [[0.0], [0.1]]})),
-    *refused("knots", "knots", lambda t: curve({"knots": [0.0, 0.0, 0.0, 1.0], "control_points": [[0.0], [0.1]]})),
-    *refused(
-        "curve_not_continuous",
-        "knots",
-        lambda t: curve({"knots": [0.0, 0.0, 1.0, 1.0, 2.0, 2.0], "control_points": [[0.0], [0.1], [0.2], [0.3]]}),
-    ),
-    *refused("motion_not_found", "job", not_a_motion),
-    *refused("proof_not_found", "job", unproved),
-    *refused("option", "--job", lambda t: planned(t, "--q", "0,0", "--local", "--job")),
-    *refused("option", "--deadline", lambda t: planned(t, "--q", "0,0", "--deadline", "60")),
-    *refused("option", "--path", lambda t: planned(t, "--local")),
-    *refused("motion_shape", "--q", lambda t: planned(t, "--q", "0,0", "--q", "0")),
-    *refused(
-        "path_file",
-        "--path",
+    ],
+    ("curve_not_continuous", "bezier[1][0]"): [lambda t: curve({"bezier": [[[0.0], [0.1]], [[0.2], [0.1]]]})],
+    ("curve_shape", "knots"): [lambda t: curve({"knots": [0.0, 1.0], "control_points": [[0.0], [0.1]]})],
+    ("knots", "knots[3]"): [lambda t: curve({"knots": [0.0, 0.0, 1.0, 0.5], "control_points": [[0.0], [0.1]]})],
+    ("knots", "knots"): [lambda t: curve({"knots": [0.0, 0.0, 0.0, 1.0], "control_points": [[0.0], [0.1]]})],
+    ("curve_not_continuous", "knots"): [
+        lambda t: curve({"knots": [0.0, 0.0, 1.0, 1.0, 2.0, 2.0], "control_points": [[0.0], [0.1], [0.2], [0.3]]})
+    ],
+    ("motion_not_found", "job"): [not_a_motion],
+    ("proof_not_found", "job"): [unproved],
+    ("option", "--job"): [lambda t: planned(t, "--q", "0,0", "--local", "--job")],
+    ("option", "--deadline"): [lambda t: planned(t, "--q", "0,0", "--deadline", "60")],
+    ("option", "--path"): [lambda t: planned(t, "--local")],
+    ("motion_shape", "--q"): [lambda t: planned(t, "--q", "0,0", "--q", "0")],
+    ("path_file", "--path"): [
         lambda t: from_file(t, "path.txt", "0 0"),
         lambda t: planned(t, "--path", "none.json", "--local"),
         lambda t: from_file(t, "path.json", "["),
@@ -84,5 +78,5 @@ MOTIONS = [
         lambda t: from_file(t, "path.json", '{"knots": [0, 0, 1, 1], "control_points": [[0, 0], [0, 1]], "t": [0, 1]}'),
         lambda t: from_file(t, "path.csv", "0,0\n0,x\n"),
         lambda t: from_file(t, "path.csv", "0,0\n0\n"),
-    ),
-]
+    ],
+}

@@ -15,7 +15,7 @@ import pytest
 from ciris import AsyncService, Space, connect, connect_async
 from ciris.asynchronous import client as asynchronous
 from ciris.synchronous import client as synchronous
-from tests.errors.trial import Trial, refused
+from tests.errors.trial import Table, Trial
 
 NOBODY = "http://127.0.0.1:9"
 
@@ -85,41 +85,33 @@ def damaged_stack(t: Trial) -> None:
     t.ciris("scene", "ls", CIRIS_DATA_DIR=str(t.directory))
 
 
-PYTHON = [
-    *refused(
-        "unreachable",
-        "",
+PYTHON: Table = {
+    ("unreachable", ""): [
         lambda t: waited(),
         lambda t: asynchronously(lambda service: service.client.job_after_all("1f9b2a7c")),
         lambda t: answered(502),
-    ),
-    *refused(
-        "argument",
-        "",
+    ],
+    ("argument", ""): [
         lambda t: connect(NOBODY).grow("cell", [0.0], deadline=float("nan")),
         lambda t: asynchronously(lambda service: service.grow("cell", [0.0], deadline=float("nan"))),
-    ),
-    *refused("closed", "", lambda t: closed(), lambda t: asynchronously(closed_before)),
-    *refused("unknown_option", "haste", lambda t: connect(NOBODY).grow("cell", [0.0], haste=60)),
-    *refused("argument", "scene", lambda t: connect(NOBODY).contains(3, [0.0])),
-    *refused("argument", "timeout", lambda t: connect(NOBODY, timeout=0)),
-    *refused("argument", "paths", lambda t: connect(NOBODY).cover("cell", paths=3)),
-    *refused("points", "q", lambda t: connect(NOBODY).grow("cell", [[0.0], [1.0, 2.0]])),
-    *refused("outside_window", "q", half_turn),
-    *refused("url", "", lambda t: connect("http://127.0.0.1:port"), lambda t: connect("localhost:8643")),
-    *refused("timeout", "", lambda t: answered(200, pause=0.5)),
-    *refused("too_many_requests", "", lambda t: answered(429, **{"retry-after": "86400"})),
-    *refused(
-        "not_ciris",
-        "",
+    ],
+    ("closed", ""): [lambda t: closed(), lambda t: asynchronously(closed_before)],
+    ("unknown_option", "haste"): [lambda t: connect(NOBODY).grow("cell", [0.0], haste=60)],
+    ("argument", "scene"): [lambda t: connect(NOBODY).contains(3, [0.0])],
+    ("argument", "timeout"): [lambda t: connect(NOBODY, timeout=0)],
+    ("argument", "paths"): [lambda t: connect(NOBODY).cover("cell", paths=3)],
+    ("points", "q"): [lambda t: connect(NOBODY).grow("cell", [[0.0], [1.0, 2.0]])],
+    ("outside_window", "q"): [half_turn],
+    ("url", ""): [lambda t: connect("http://127.0.0.1:port"), lambda t: connect("localhost:8643")],
+    ("timeout", ""): [lambda t: answered(200, pause=0.5)],
+    ("too_many_requests", ""): [lambda t: answered(429, **{"retry-after": "86400"})],
+    ("not_ciris", ""): [
         lambda t: answered(200, b"no gzip", **{"content-encoding": "gzip"}),
         lambda t: answered(200, b"{}"),
         lambda t: answered(302, location="http://127.0.0.1:9/"),
         lambda t: answered(404),
         lambda t: answered(200, b"<html>"),
-    ),
-    *refused("no_service", "", damaged_stack),
-    *refused(
-        "api_key", "CIRIS_API_KEY_FILE", lambda t: t.ciris("scene", "ls", CIRIS_URL=NOBODY, CIRIS_API_KEY_FILE=str(t.directory / "none"))
-    ),
-]
+    ],
+    ("no_service", ""): [damaged_stack],
+    ("api_key", "CIRIS_API_KEY_FILE"): [lambda t: t.ciris("scene", "ls", CIRIS_URL=NOBODY, CIRIS_API_KEY_FILE=str(t.directory / "none"))],
+}

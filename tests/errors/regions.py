@@ -26,7 +26,7 @@ from certifier.step.step import step
 from planner.cover.options import MOST_GIVEN, CoverOptions
 from tests.certifier.scenes import planar_arm
 from tests.certifier.seeding.test_propose import crane
-from tests.errors.trial import refused
+from tests.errors.trial import Table
 from tests.scenes import slider
 
 
@@ -58,72 +58,60 @@ def child(function: str, payload: object, timeout_s: float = 60) -> None:
     run_in_child(function, payload, timeout_s=timeout_s, memory_bytes=1 << 30)
 
 
-REGIONS = [
-    *refused(
-        "polytope_missing",
-        "polytope",
+REGIONS: Table = {
+    ("polytope_missing", "polytope"): [
         lambda t: begin(slider(), GrowthOptions.from_document({"kind": "certify", "seed": {}})),
         lambda t: again(),
-    ),
-    *refused("seed_wrong_length", "seed.q", lambda t: again(C=[[1.0]], d=[0.5], q=[[0.0, 0.0]]), lambda t: seeded(q=[0])),
-    *refused("seed_cut_off", "seed.q", lambda t: again(C=[[1.0]], d=[0.1], q=[[0.9]])),
-    *refused(
-        "other_robot",
-        "scene",
+    ],
+    ("seed_wrong_length", "seed.q"): [lambda t: again(C=[[1.0]], d=[0.5], q=[[0.0, 0.0]]), lambda t: seeded(q=[0])],
+    ("seed_cut_off", "seed.q"): [lambda t: again(C=[[1.0]], d=[0.1], q=[[0.9]])],
+    ("other_robot", "scene"): [
         lambda t: same_bodies(slider(), planar_arm(2)),
         lambda t: same_bodies(slider(), replace(slider(), q_star=np.array([0.1]))),
-    ),
-    *refused("number_too_large", "seed.q[1]", lambda t: seeded(q=[0, 1e16])),
-    *refused("number_too_large", "seed.contain[0][1]", lambda t: seeded(q=[0, 0], contain=[[0, float("inf")]])),
-    *refused("number_too_large", "q[0]", lambda t: slider().in_windows([1e7])),
-    *refused("motion_not_finite", "waypoints[1][0]", lambda t: moved(slider(), [[0.0], [float("nan")]], Space.Q)),
-    *refused("motion_not_finite", "bezier[0][1][0]", lambda t: curve({"bezier": [[[0.0], [float("inf")]]]})),
-    *refused("unknown_option", "options.speed", lambda t: grow(speed=3)),
-    *refused("unknown_option", "options.xyz", lambda t: grow(xyz=3)),
-    *refused("option_value", "options.pushes", lambda t: grow(pushes=-1)),
-    *refused("option_value", "seed.q", lambda t: seeded(q="0,0"), lambda t: seeded(q=["0", "0"])),
-    *refused("option_value", "options.seeds", lambda t: CoverOptions.from_document({"seeds": MOST_GIVEN * [[0.0]] + [[0.0]]})),
-    *refused("option_value", "options.kind", lambda t: grow(kind="shrink")),
-    *refused("option_value", "options.contraction", lambda t: grow(contraction="uniform", seed={"q": [0.0], "contain": [[0.1]]})),
-    *refused("other_version", "job", lambda t: GrowthState.from_document({}, grow())),
-    *refused("child_timeout", "", lambda t: child("time:sleep", 60, timeout_s=0.5)),
-    *refused("child_memory", "", lambda t: child("builtins:bytearray", 1 << 40)),
-    *refused("child_died", "", lambda t: child("os:_exit", 3)),
-    *refused("not_grown", "", lambda t: local.grow(slider(), grow(seed={"q": [0.0], "method": "limits"}), deadline_s=1e-6)),
-    *refused("solver_unavailable", "solver", lambda t: Reference(slider(), "abacus")),
-    *refused("unsupported_padding", "padding", lambda t: Reference(crane(padding=0.1))),
-    *refused("unknown_geometry", "", lambda t: slider().geometry("nothing")),
-    *refused("scene_document", "joints", lambda t: stored(joints=3)),
-    *refused("scene_hash", "hash", lambda t: stored(padding=0.5)),
-    *refused("scene_schema", "schema_version", lambda t: stored(schema_version=9)),
-    *refused("polytope_shape", "seed.C", lambda t: given([[1.0, 0.0], [-1.0]], [1.0, 1.0]), lambda t: given([[1.0, 0.0, 0.0]], [1.0])),
-    *refused("polytope_not_finite", "seed.C", lambda t: given([[1.0, float("nan")]], [1.0])),
-    *refused(
-        "polytope_unbounded",
-        "polytope",
+    ],
+    ("number_too_large", "seed.q[1]"): [lambda t: seeded(q=[0, 1e16])],
+    ("number_too_large", "seed.contain[0][1]"): [lambda t: seeded(q=[0, 0], contain=[[0, float("inf")]])],
+    ("number_too_large", "q[0]"): [lambda t: slider().in_windows([1e7])],
+    ("motion_not_finite", "waypoints[1][0]"): [lambda t: moved(slider(), [[0.0], [float("nan")]], Space.Q)],
+    ("motion_not_finite", "bezier[0][1][0]"): [lambda t: curve({"bezier": [[[0.0], [float("inf")]]]})],
+    ("unknown_option", "options.speed"): [lambda t: grow(speed=3)],
+    ("unknown_option", "options.xyz"): [lambda t: grow(xyz=3)],
+    ("option_value", "options.pushes"): [lambda t: grow(pushes=-1)],
+    ("option_value", "seed.q"): [lambda t: seeded(q="0,0"), lambda t: seeded(q=["0", "0"])],
+    ("option_value", "options.seeds"): [lambda t: CoverOptions.from_document({"seeds": MOST_GIVEN * [[0.0]] + [[0.0]]})],
+    ("option_value", "options.kind"): [lambda t: grow(kind="shrink")],
+    ("option_value", "options.contraction"): [lambda t: grow(contraction="uniform", seed={"q": [0.0], "contain": [[0.1]]})],
+    ("other_version", "job"): [lambda t: GrowthState.from_document({}, grow())],
+    ("child_timeout", ""): [lambda t: child("time:sleep", 60, timeout_s=0.5)],
+    ("child_memory", ""): [lambda t: child("builtins:bytearray", 1 << 40)],
+    ("child_died", ""): [lambda t: child("os:_exit", 3)],
+    ("not_grown", ""): [lambda t: local.grow(slider(), grow(seed={"q": [0.0], "method": "limits"}), deadline_s=1e-6)],
+    ("solver_unavailable", "solver"): [lambda t: Reference(slider(), "abacus")],
+    ("unsupported_padding", "padding"): [lambda t: Reference(crane(padding=0.1))],
+    ("unknown_geometry", ""): [lambda t: slider().geometry("nothing")],
+    ("scene_document", "joints"): [lambda t: stored(joints=3)],
+    ("scene_hash", "hash"): [lambda t: stored(padding=0.5)],
+    ("scene_schema", "schema_version"): [lambda t: stored(schema_version=9)],
+    ("polytope_shape", "seed.C"): [lambda t: given([[1.0, 0.0], [-1.0]], [1.0, 1.0]), lambda t: given([[1.0, 0.0, 0.0]], [1.0])],
+    ("polytope_not_finite", "seed.C"): [lambda t: given([[1.0, float("nan")]], [1.0])],
+    ("polytope_unbounded", "polytope"): [
         lambda t: chebyshev_center(polytope([[1, 0]], [1])),
         lambda t: chebyshev_center(polytope([[1, -1], [-1, 1]], [1, 1])),
         lambda t: hit_and_run(polytope([[1]], [1]), [0.0], 1, 0),
-    ),
-    *refused(
-        "polytope_empty",
-        "polytope",
+    ],
+    ("polytope_empty", "polytope"): [
         lambda t: chebyshev_center(polytope([[1], [-1]], [0, 0])),
         lambda t: given([[1.0, 0.0], [-1.0, 0.0]], [-1.0, 0.0]),
-    ),
-    *refused("polytope_without_limits", "polytope", lambda t: bound_multipliers(polytope([[1, 1], [-1, 1], [0, -1]], [1, 1, 1]))),
-    *refused("start_outside", "start", lambda t: hit_and_run(polytope([[1], [-1]], [1, 1]), [2.0], 1, 0)),
-    *refused("point_outside", "contain", lambda t: step(slider(), slider().polytope([], []), {}, contain=np.array([[9.0]]))),
-    *refused(
-        "seed_in_collision", "seed.q", lambda t: seeded(q=[1.5, 1.57]), lambda t: propose(crane(padding=9.0), SeedOptions(q=(0.0, 0.0)))
-    ),
-    *refused("seed_outside_limits", "seed.q[0]", lambda t: seeded(q=[2.1, 0])),
-    *refused(
-        "seed_outside_window",
-        "seed.q[0]",
-        lambda t: propose(t.scene(limit='<limit lower="-6" upper="6" effort="1" velocity="1"/>'), SeedOptions(q=(3.1,))),
-    ),
-    *refused("missing_option", "seed.q", lambda t: seeded(method="box")),
-    *refused("option_value", "seed.center", lambda t: seeded(q=[0, 0], center=[0, 0])),
-    *refused("center_outside", "seed.center", lambda t: given([[1.0, 0.0]], [0.5], center=[0.6, 0.0])),
-]
+    ],
+    ("polytope_without_limits", "polytope"): [lambda t: bound_multipliers(polytope([[1, 1], [-1, 1], [0, -1]], [1, 1, 1]))],
+    ("start_outside", "start"): [lambda t: hit_and_run(polytope([[1], [-1]], [1, 1]), [2.0], 1, 0)],
+    ("point_outside", "contain"): [lambda t: step(slider(), slider().polytope([], []), {}, contain=np.array([[9.0]]))],
+    ("seed_in_collision", "seed.q"): [lambda t: seeded(q=[1.5, 1.57]), lambda t: propose(crane(padding=9.0), SeedOptions(q=(0.0, 0.0)))],
+    ("seed_outside_limits", "seed.q[0]"): [lambda t: seeded(q=[2.1, 0])],
+    ("seed_outside_window", "seed.q[0]"): [
+        lambda t: propose(t.scene(limit='<limit lower="-6" upper="6" effort="1" velocity="1"/>'), SeedOptions(q=(3.1,)))
+    ],
+    ("missing_option", "seed.q"): [lambda t: seeded(method="box")],
+    ("option_value", "seed.center"): [lambda t: seeded(q=[0, 0], center=[0, 0])],
+    ("center_outside", "seed.center"): [lambda t: given([[1.0, 0.0]], [0.5], center=[0.6, 0.0])],
+}

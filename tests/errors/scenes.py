@@ -7,7 +7,7 @@ from pathlib import Path
 from certifier.scene import load_scene
 from certifier.scene.draft import draft
 from tests.certifier.scene.workshop import SCENE
-from tests.errors.trial import Trial, refused
+from tests.errors.trial import Table, Trial
 
 D = "directives: [{add_model: {name: a, file: a.urdf}}]\n"
 WELD = "{{add_weld: {{parent: world, child: a::l, X_PC: {{{}}}}}}}"
@@ -91,10 +91,8 @@ OBJ = {
 }
 
 
-SCENES = [
-    *refused(
-        "scene_model",
-        "directives",
+SCENES: Table = {
+    ("scene_model", "directives"): [
         linked_away,
         lambda t: t.stranger(m__obj=b"v 0\0 0 0", **OBJ),
         lambda t: t.scene(**mesh("v 0 0 \\\n0\n")),
@@ -128,55 +126,43 @@ SCENES = [
         lambda t: drafted(t, t.write(robot__urdf=FAR)),
         lambda t: t.scene(arm="<!DOCTYPE r [<!ENTITY a 'aaa'>]><robot name='r'/>"),
         lambda t: t.scene(arm="<robot"),
-    ),
-    *refused("scene_model", "", lambda t: drafted(t, t.directory), lambda t: drafted(t, t.directory / "no.urdf")),
-    *refused(
-        "scene_package",
-        "",
-        lambda t: drafted(t, t.write(a__urdf="<robot name='a'><link name='l'><mesh filename='package://no/m.obj'/></link></robot>")),
-    ),
-    *refused("unknown_name", "hulls[0]", lambda t: t.scene(extra="hulls: [elsewhere]\n")),
-    *refused("few_parts", "hulls[0]", lambda t: t.scene(extra="hulls: [arm/hand]\n")),
-    *refused("scene_field", "limits.arm/turn", lambda t: t.scene(extra="limits: {turn: [-2, 1]}")),
-    *refused("no_joints", "directives", lambda t: t.scene(extra="fix: {turn: 0}")),
-    *refused("scene_field", "q_star", lambda t: t.scene(extra="q_star: [0, 0]")),
-    *refused(
-        "joint_range",
-        "directives",
+    ],
+    ("scene_model", ""): [lambda t: drafted(t, t.directory), lambda t: drafted(t, t.directory / "no.urdf")],
+    ("scene_package", ""): [
+        lambda t: drafted(t, t.write(a__urdf="<robot name='a'><link name='l'><mesh filename='package://no/m.obj'/></link></robot>"))
+    ],
+    ("unknown_name", "hulls[0]"): [lambda t: t.scene(extra="hulls: [elsewhere]\n")],
+    ("few_parts", "hulls[0]"): [lambda t: t.scene(extra="hulls: [arm/hand]\n")],
+    ("scene_field", "limits.arm/turn"): [lambda t: t.scene(extra="limits: {turn: [-2, 1]}")],
+    ("no_joints", "directives"): [lambda t: t.scene(extra="fix: {turn: 0}")],
+    ("scene_field", "q_star"): [lambda t: t.scene(extra="q_star: [0, 0]")],
+    ("joint_range", "directives"): [
         lambda t: t.scene(limit='<limit lower="1" upper="1" effort="1" velocity="1"/>'),
         lambda t: t.scene(**mjcf("<joint name='j' type='slide'/><geom size='0.1'/>")),
-    ),
-    *refused("joint_range", "q_star", lambda t: t.scene(extra="q_star: [9]")),
-    *refused(
-        "scene_field", "fix.arm/turn", lambda t: t.scene(extra="fix: {turn: 0, arm/turn: 0}"), lambda t: t.scene(extra="fix: {turn: 9}")
-    ),
-    *refused(
-        "unknown_name",
-        "fix.turn",
+    ],
+    ("joint_range", "q_star"): [lambda t: t.scene(extra="q_star: [9]")],
+    ("scene_field", "fix.arm/turn"): [lambda t: t.scene(extra="fix: {turn: 0, arm/turn: 0}"), lambda t: t.scene(extra="fix: {turn: 9}")],
+    ("unknown_name", "fix.turn"): [
         lambda t: t.scene(
             SCENE + "  - add_model: {name: two, file: arm.urdf}\n  - add_weld: {parent: world, child: two::base}\n",
             extra="fix: {turn: 0}",
-        ),
-    ),
-    *refused("unknown_name", "fix.turm", lambda t: t.scene(extra="fix: {turm: 0}")),
-    *refused("unknown_name", "fix.zzz", lambda t: t.scene(extra="fix: {zzz: 0}")),
-    *refused("unsupported_joint", "directives", lambda t: t.scene(more=MIMIC)),
-    *refused("scene_field", "fix", lambda t: t.scene(more=MIMIC, extra="fix: {turn: 0, follow: 1}")),
-    *refused("scene_model_crash", "directives", lambda t: load_scene(t.write(scene__yaml=D, a__urdf="<robot name='a'/>"), timeout_s=1e-6)),
-    *refused(
-        "unknown_name",
-        "ignore[0][0]",
+        )
+    ],
+    ("unknown_name", "fix.turm"): [lambda t: t.scene(extra="fix: {turm: 0}")],
+    ("unknown_name", "fix.zzz"): [lambda t: t.scene(extra="fix: {zzz: 0}")],
+    ("unsupported_joint", "directives"): [lambda t: t.scene(more=MIMIC)],
+    ("scene_field", "fix"): [lambda t: t.scene(more=MIMIC, extra="fix: {turn: 0, follow: 1}")],
+    ("scene_model_crash", "directives"): [lambda t: load_scene(t.write(scene__yaml=D, a__urdf="<robot name='a'/>"), timeout_s=1e-6)],
+    ("unknown_name", "ignore[0][0]"): [
         lambda t: t.scene(extra="ignore: [[arm/hamd, room/walls]]"),
         lambda t: t.scene(extra="ignore: [[zzzzzzz, room/walls]]"),
-    ),
-    *refused("unsupported_shape", "directives", lambda t: t.scene(SCENE.replace("arm.urdf", "arm.sdf"), files={"arm.sdf": MOVING_PLANE})),
-    *refused(
-        "scene_name",
-        "directives",
+    ],
+    ("unsupported_shape", "directives"): [lambda t: t.scene(SCENE.replace("arm.urdf", "arm.sdf"), files={"arm.sdf": MOVING_PLANE})],
+    ("scene_name", "directives"): [
         lambda t: t.scene(more='<link name="a&#9;b"/><joint name="f" type="fixed"><parent link="hand"/><child link="a&#9;b"/></joint>'),
         lambda t: t.scene(
             more='<link name="hand/palm"/><joint name="f" type="fixed"><parent link="hand"/><child link="hand/palm"/></joint>'
         ),
-    ),
-    *refused("floating_body", "directives", lambda t: t.scene(FREE), lambda t: t.scene(FREE, files={"room.sdf": NESTED})),
-]
+    ],
+    ("floating_body", "directives"): [lambda t: t.scene(FREE), lambda t: t.scene(FREE, files={"room.sdf": NESTED})],
+}

@@ -15,7 +15,7 @@ from db.keys import Scope
 from db.session import Database
 from db.settings import Settings, settings
 from tests.api.test_jobs import CERTIFY, GROW
-from tests.errors.trial import Trial, refused
+from tests.errors.trial import Table, Trial
 from tests.scenes import slider
 from workers import admission
 from workers.addresses import resolve
@@ -116,73 +116,61 @@ def certify(t: Trial, **polytope: Any) -> None:
     post(t, CERTIFY | {"polytope": {"C": [[1], [-1]], "d": [0.2, 0.2], **polytope}})
 
 
-SERVICE = [
-    *refused("ambiguous_id", "job", twins),
-    *refused("idempotency_conflict", "Idempotency-Key", lambda t: post(t, CERTIFY, times=2, **{"Idempotency-Key": "k"})),
-    *refused("quota_exceeded", "", too_many),
-    *refused("job_not_retryable", "job", lambda t: t.ask("POST", f"/v1/jobs/{queued(t)}/retry")),
-    *refused("job_not_found", "job", lambda t: t.ask("GET", "/v1/jobs/nope")),
-    *refused("key_name", "name", lambda t: write(t, lambda session: keys.add(session, "a b", Scope.READ)), lambda t: write(t, named_twice)),
-    *refused("key_not_found", "name", lambda t: write(t, lambda session: keys.revoke(session, "nobody"))),
-    *refused(
-        "no_database",
-        "CIRIS_DATABASE_URL",
-        lambda t: keys.check_bind(Settings(host="0.0.0.0", database_url=f"sqlite:///{t.directory}/none.sqlite3")),
-    ),
-    *refused(
-        "no_keys", "CIRIS_HOST", lambda t: keys.check_bind(Settings(host="0.0.0.0", database_url=t.request.getfixturevalue("sqlite_url")))
-    ),
-    *refused("cursor", "after", lambda t: t.ask("GET", "/v1/jobs?after=nope")),
-    *refused("proof_not_found", "proof", lambda t: write(t, lambda session: proofs.get(session, "nothing"))),
-    *refused(
-        "region_not_found",
-        "region",
+SERVICE: Table = {
+    ("ambiguous_id", "job"): [twins],
+    ("idempotency_conflict", "Idempotency-Key"): [lambda t: post(t, CERTIFY, times=2, **{"Idempotency-Key": "k"})],
+    ("quota_exceeded", ""): [too_many],
+    ("job_not_retryable", "job"): [lambda t: t.ask("POST", f"/v1/jobs/{queued(t)}/retry")],
+    ("job_not_found", "job"): [lambda t: t.ask("GET", "/v1/jobs/nope")],
+    ("key_name", "name"): [lambda t: write(t, lambda session: keys.add(session, "a b", Scope.READ)), lambda t: write(t, named_twice)],
+    ("key_not_found", "name"): [lambda t: write(t, lambda session: keys.revoke(session, "nobody"))],
+    ("no_database", "CIRIS_DATABASE_URL"): [
+        lambda t: keys.check_bind(Settings(host="0.0.0.0", database_url=f"sqlite:///{t.directory}/none.sqlite3"))
+    ],
+    ("no_keys", "CIRIS_HOST"): [lambda t: keys.check_bind(Settings(host="0.0.0.0", database_url=t.request.getfixturevalue("sqlite_url")))],
+    ("cursor", "after"): [lambda t: t.ask("GET", "/v1/jobs?after=nope")],
+    ("proof_not_found", "proof"): [lambda t: write(t, lambda session: proofs.get(session, "nothing"))],
+    ("region_not_found", "region"): [
         lambda t: t.ask("GET", "/v1/regions/nope"),
         lambda t: t.ask("DELETE", f"/v1/regions/{t.request.getfixturevalue('region')[:8]}"),
-    ),
-    *refused("region_elsewhere", "goal", elsewhere),
-    *refused("scene_not_found", "scene", lambda t: post(t, GROW | {"scene": "slidr"}), lambda t: post(t, GROW | {"scene": "zzz"})),
-    *refused("webhook_not_found", "job", lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/webhook")),
-    *refused("scope_missing", "Authorization", lambda t: with_key(t, "DELETE", "/v1/regions/nope")),
-    *refused("polytope_shape", "polytope.d", lambda t: certify(t, d=[0.2])),
-    *refused("center_outside", "polytope.center", lambda t: certify(t, center=[0.5])),
-    *refused("webhook_url", "webhook.url", lambda t: hooked(t, "https://user:password@example.org/")),
-    *refused(
-        "webhook_address",
-        "webhook.url",
+    ],
+    ("region_elsewhere", "goal"): [elsewhere],
+    ("scene_not_found", "scene"): [lambda t: post(t, GROW | {"scene": "slidr"}), lambda t: post(t, GROW | {"scene": "zzz"})],
+    ("webhook_not_found", "job"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/webhook")],
+    ("scope_missing", "Authorization"): [lambda t: with_key(t, "DELETE", "/v1/regions/nope")],
+    ("polytope_shape", "polytope.d"): [lambda t: certify(t, d=[0.2])],
+    ("center_outside", "polytope.center"): [lambda t: certify(t, center=[0.5])],
+    ("webhook_url", "webhook.url"): [lambda t: hooked(t, "https://user:password@example.org/")],
+    ("webhook_address", "webhook.url"): [
         lambda t: hooked(t, "http://127.0.0.1/"),
         lambda t: resolve("nobody.invalid", 443, private=False),
         lambda t: resolve("127.0.0.1", 443, private=False),
-    ),
-    *refused("seed_wrong_length", "seed.q", lambda t: post(t, GROW | {"seed": {"q": [0.1, 0.2]}})),
-    *refused("waypoint_outside_limits", "q[1]", outside),
-    *refused("too_many_requests", "", too_often),
-    *refused(
-        "key_needed",
-        "Authorization",
+    ],
+    ("seed_wrong_length", "seed.q"): [lambda t: post(t, GROW | {"seed": {"q": [0.1, 0.2]}})],
+    ("waypoint_outside_limits", "q[1]"): [outside],
+    ("too_many_requests", ""): [too_often],
+    ("key_needed", "Authorization"): [
         lambda t: with_key(t, "GET", "/v1/jobs", key=""),
         lambda t: with_key(t, "GET", "/v1/jobs", key="wrong"),
-    ),
-    *refused("unknown_host", "Host", lambda t: t.ask("GET", "/healthz", headers={"Host": "evil.example"})),
-    *refused("cross_site", "Origin", lambda t: t.ask("POST", "/v1/jobs/x/cancel", headers={"Origin": "https://evil.example"})),
-    *refused("invalid_request", "url", lambda t: t.ask("GET", "/v1/scenes?after=%00")),
-    *refused("too_large", "body", lambda t: t.ask("POST", "/v1/jobs", content=b"", headers={"Content-Length": str(1 << 40)})),
-    *refused("malformed_json", "body", lambda t: t.ask("POST", "/v1/jobs", content="{", headers={"Content-Type": "application/json"})),
-    *refused("invalid_request", "options.speed", lambda t: post(t, GROW | {"options": {"speed": 3}})),
-    *refused("invalid_request", "body", lambda t: t.ask("POST", "/v1/jobs", json=3)),
-    *refused("not_found", "url", lambda t: t.ask("GET", "/v1/nothing")),
-    *refused("method_not_allowed", "method", lambda t: t.ask("PUT", "/v1/jobs")),
-    *refused("pair_not_found", "pair", lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/9/cells")),
-    *refused("cells_not_found", "pair", lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/0/cells")),
-    *refused("proof_not_found", "pair", lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/0/proof?iteration=0")),
-    *refused("bad_name", "name", lambda t: t.ask("GET", "/v1/regions/none/export", params={"name": "two\nlines"})),
-    *refused("does_not_fit", "scene", lambda t: admission.check(forecast(slider()), Settings(pair_memory_bytes=1), None)),
-    *refused("data_directory", "--data", lambda t: run_stack(Settings(data_dir=t.write(file="") / "data"))),
-    *refused(
-        "port_taken",
-        "--port",
+    ],
+    ("unknown_host", "Host"): [lambda t: t.ask("GET", "/healthz", headers={"Host": "evil.example"})],
+    ("cross_site", "Origin"): [lambda t: t.ask("POST", "/v1/jobs/x/cancel", headers={"Origin": "https://evil.example"})],
+    ("invalid_request", "url"): [lambda t: t.ask("GET", "/v1/scenes?after=%00")],
+    ("too_large", "body"): [lambda t: t.ask("POST", "/v1/jobs", content=b"", headers={"Content-Length": str(1 << 40)})],
+    ("malformed_json", "body"): [lambda t: t.ask("POST", "/v1/jobs", content="{", headers={"Content-Type": "application/json"})],
+    ("invalid_request", "options.speed"): [lambda t: post(t, GROW | {"options": {"speed": 3}})],
+    ("invalid_request", "body"): [lambda t: t.ask("POST", "/v1/jobs", json=3)],
+    ("not_found", "url"): [lambda t: t.ask("GET", "/v1/nothing")],
+    ("method_not_allowed", "method"): [lambda t: t.ask("PUT", "/v1/jobs")],
+    ("pair_not_found", "pair"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/9/cells")],
+    ("cells_not_found", "pair"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/0/cells")],
+    ("proof_not_found", "pair"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/pairs/0/proof?iteration=0")],
+    ("bad_name", "name"): [lambda t: t.ask("GET", "/v1/regions/none/export", params={"name": "two\nlines"})],
+    ("does_not_fit", "scene"): [lambda t: admission.check(forecast(slider()), Settings(pair_memory_bytes=1), None)],
+    ("data_directory", "--data"): [lambda t: run_stack(Settings(data_dir=t.write(file="") / "data"))],
+    ("port_taken", "--port"): [
         lambda t: run_stack(Settings(data_dir=t.directory), port=70000),
         lambda t: run_stack(Settings(data_dir=t.directory, host="192.0.2.1")),
-    ),
-    *refused("stack_running", "--data", beside_another_stack),
-]
+    ],
+    ("stack_running", "--data"): [beside_another_stack],
+}

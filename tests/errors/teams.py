@@ -16,7 +16,7 @@ from db.session import Database
 from db.vault import Vault, kept_key
 from tests.db.builders import a_running_job, add_region
 from tests.errors.service import GROW, database, post, queued, write
-from tests.errors.trial import Trial, refused
+from tests.errors.trial import Table, Trial
 
 
 def full(t: Trial) -> None:
@@ -74,27 +74,25 @@ def by_a_few_characters(t: Trial) -> None:
         retention.delete_job(session, a_running_job(session).id[:8], dependents=True)
 
 
-TEAMS = [
-    *refused("project_name", "name", lambda t: write(t, lambda session: projects.add(session, "a b")), lambda t: write(t, named_twice)),
-    *refused("project_not_found", "project", lambda t: write(t, lambda session: keys.add(session, "planner", Scope.READ, "nobody"))),
-    *refused("no_database", "database", lambda t: command_line.check_there(f"sqlite:///{t.directory}/misspelt.sqlite3")),
-    *refused(
-        "scene_not_found",
-        "scene",
+TEAMS: Table = {
+    ("project_name", "name"): [lambda t: write(t, lambda session: projects.add(session, "a b")), lambda t: write(t, named_twice)],
+    ("project_not_found", "project"): [lambda t: write(t, lambda session: keys.add(session, "planner", Scope.READ, "nobody"))],
+    ("no_database", "database"): [lambda t: command_line.check_there(f"sqlite:///{t.directory}/misspelt.sqlite3")],
+    ("scene_not_found", "scene"): [
         lambda t: write(t, lambda session: jobs.create(session, kind="grow", scene_id="0" * 64, options={})),
         by_its_name,
-    ),
-    *refused("job_not_found", "job", by_a_few_characters),
-    *refused("not_ended", "job", lambda t: t.ask("DELETE", f"/v1/jobs/{queued(t)}")),
-    *refused("has_dependents", "dependents", lambda t: t.ask("DELETE", f"/v1/jobs/{a_region_of_a_job(t)}")),
-    *refused("no_secret_key", "webhook.secret", lambda t: Vault("").seal("a", "b")),
-    *refused("secret_key", "CIRIS_SECRET_KEY", lambda t: Vault("short")),
-    *refused("secret_lost", "CIRIS_SECRET_KEY", lambda t: Vault("").open("v1.AAAAAAAAAAAAAAAAAAAAAAAA", "b")),
-    *refused("no_room", "--data", lambda t: kept_key(t.directory / "absent" / "secret.key")),
-    *refused("webhook_waits", "job", resent_too_soon),
-    *refused("storage_quota", "", full),
-    *refused("no_room", "", without_room),
-    *refused("first_key", "name", lambda t: t.ask("POST", "/v1/keys", json={"name": "mine", "scope": "admin"})),
-    *refused("bad_option", "--label", lambda t: t.ciris("job", "ls", "--label", "team")),
-    *refused("bad_option", "--data", lambda t: t.ciris("key", "ls", "--url", "http://127.0.0.1:9", "--data", "here")),
-]
+    ],
+    ("job_not_found", "job"): [by_a_few_characters],
+    ("not_ended", "job"): [lambda t: t.ask("DELETE", f"/v1/jobs/{queued(t)}")],
+    ("has_dependents", "dependents"): [lambda t: t.ask("DELETE", f"/v1/jobs/{a_region_of_a_job(t)}")],
+    ("no_secret_key", "webhook.secret"): [lambda t: Vault("").seal("a", "b")],
+    ("secret_key", "CIRIS_SECRET_KEY"): [lambda t: Vault("short")],
+    ("secret_lost", "CIRIS_SECRET_KEY"): [lambda t: Vault("").open("v1.AAAAAAAAAAAAAAAAAAAAAAAA", "b")],
+    ("no_room", "--data"): [lambda t: kept_key(t.directory / "absent" / "secret.key")],
+    ("webhook_waits", "job"): [resent_too_soon],
+    ("storage_quota", ""): [full],
+    ("no_room", ""): [without_room],
+    ("first_key", "name"): [lambda t: t.ask("POST", "/v1/keys", json={"name": "mine", "scope": "admin"})],
+    ("bad_option", "--label"): [lambda t: t.ciris("job", "ls", "--label", "team")],
+    ("bad_option", "--data"): [lambda t: t.ciris("key", "ls", "--url", "http://127.0.0.1:9", "--data", "here")],
+}

@@ -31,7 +31,7 @@ from tests.errors.trial import Provocation, Trial
 from tests.errors.workers import WORKERS
 
 TABLES = (SCENE_FILES, SCENES, MODELS, BUNDLES, REGIONS, MOTIONS, COVERS, DRAWING, SERVICE, COMMANDS, PYTHON, TEAMS, WORKERS)
-PROVOCATIONS = [provocation for table in TABLES for provocation in table]
+PROVOCATIONS = [Provocation(code, field, act) for table in TABLES for (code, field), acts in table.items() for act in acts]
 PROVOKED: dict[Provocation, list[Site]] = {}
 
 DEMANDS = re.compile(r"\bmust\b|\bat most\b|\bonly\b")

@@ -144,6 +144,8 @@ class Trial:
 
 
 Act = Callable[[Trial], object]
+Table = dict[tuple[str, str], list[Act]]
+"""Maps a code and a field, empty where an error names none, to what users do that is refused like this."""
 
 
 @dataclass(frozen=True)
@@ -163,8 +165,3 @@ class Provocation:
     def __str__(self) -> str:
         code = self.act.__code__
         return f"{Path(code.co_filename).stem}:{code.co_firstlineno}:{self.code}"
-
-
-def refused(code: str, field: str, *acts: Act) -> list[Provocation]:
-    """Returns the provocations of one code and field."""
-    return [Provocation(code, field, act) for act in acts]

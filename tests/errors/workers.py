@@ -10,7 +10,7 @@ from db.keys import Scope
 from db.states import WorkerState
 from db.workers import Made, WorkerKind
 from tests.errors.service import database
-from tests.errors.trial import Trial, refused
+from tests.errors.trial import Table, Trial
 
 
 def a_draining_one(t: Trial) -> str:
@@ -29,8 +29,8 @@ def with_a_key_of_others(t: Trial) -> None:
     t.ask("POST", f"/v1/workers/{worker}/pause", headers={"Authorization": f"Bearer {key}"})
 
 
-WORKERS = [
-    *refused("worker_not_found", "worker", lambda t: t.ask("GET", "/v1/workers/nobody")),
-    *refused("worker_draining", "worker", lambda t: t.ask("POST", f"/v1/workers/{a_draining_one(t)}/resume")),
-    *refused("workers_shared", "Authorization", with_a_key_of_others),
-]
+WORKERS: Table = {
+    ("worker_not_found", "worker"): [lambda t: t.ask("GET", "/v1/workers/nobody")],
+    ("worker_draining", "worker"): [lambda t: t.ask("POST", f"/v1/workers/{a_draining_one(t)}/resume")],
+    ("workers_shared", "Authorization"): [with_a_key_of_others],
+}
