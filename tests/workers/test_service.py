@@ -32,7 +32,7 @@ SAME = ("halfspace_normals", "halfspace_offsets", "interior_point", "inscribed_e
 @pytest.mark.lengthy
 @pytest.mark.parametrize("contraction", ["whole", "targeted", "uniform"])
 def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(planar: Scene, contraction: str) -> None:
-    options = grow_box(SEED, 0.4, contraction=contraction, pushes=1, max_rounds=1, cells=600)
+    options = grow_box(SEED, 0.22, contraction=contraction, pushes=1, max_rounds=1, cells=600)
     job = ended(submit(planar, options))
     assert (job.state, job.outcome, job.error) == ("succeeded", "certified", None)
     with database().read() as session:
