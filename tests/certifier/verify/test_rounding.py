@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from flint import arb, ctx
+from flint import arb
 
 from certifier.errors import ProofError
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
@@ -21,18 +20,10 @@ from certifier.verify.pieces import Pieces
 from certifier.verify.places import Places
 from certifier.verify.scene import check_scene
 from tests.certifier.scenes import box, pose
+from tests.certifier.verify.motion_oracle import bits
 
 CASES = 40
 LONG_CASES = 4000
-
-
-@contextmanager
-def bits(precision: int) -> Iterator[None]:
-    before, ctx.prec = ctx.prec, precision
-    try:
-        yield
-    finally:
-        ctx.prec = before
 
 
 def product(A, B):
