@@ -131,7 +131,7 @@ def test_pairs_of_which_one_touches_are_not_certified_as_one():
 
 def test_a_region_has_a_proof_of_every_pair_and_is_free():
     scene = beads()
-    options = {"kind": "grow", "seed": {"method": "box", "q": [0.0, 0.0], "half_width": 1.0}, "contraction": "whole", "cells": 600}
+    options = {"kind": "grow", "seed": {"method": "box", "q": [0.0, 0.0], "half_width": 0.6}, "contraction": "whole", "cells": 600}
     region = grow(scene, GrowthOptions.from_document(options))
     statement = verify_region(region.proof)
     assert set(statement.gaps) == set(scene.pairs)
