@@ -40,12 +40,12 @@ def beside_a_seed(t: Trial, seed: str) -> None:
 
 def asked(t: Trial, *arguments: str) -> None:
     """Runs a command that asks the service."""
-    t.ciris(*arguments, CIRIS_URL=t.request.getfixturevalue("url"))
+    t.ciris(*arguments, CIRIS_URL=t.need("url"))
 
 
 def to_a_terminal(t: Trial) -> None:
-    region, _ = t.request.getfixturevalue("region"), t.request.getfixturevalue("ciris")
-    t.request.getfixturevalue("monkeypatch").setattr(sys.stdout, "isatty", lambda: True)
+    region, _ = t.need("region"), t.need("ciris")
+    t.need("monkeypatch").setattr(sys.stdout, "isatty", lambda: True)
     asked(t, "region", "export", region, "--format", "npz")
 
 

@@ -29,8 +29,8 @@ def nothing_is_free(_: Trial) -> object:
 
 
 def not_a_cover(t: Trial) -> None:
-    t.request.getfixturevalue("scene")
-    client = t.request.getfixturevalue("client")
+    t.need("scene")
+    client = t.need("client")
     job = client.post("/v1/jobs", json={"kind": "grow", "scene": "slider", "seed": {"q": [0.0]}}).json()["id"]
     t.ask("GET", f"/v1/jobs/{job}/cover")
 
@@ -41,7 +41,7 @@ def in_s(t: Trial) -> None:
 
 
 def from_a_region(t: Trial) -> None:
-    url, region = (t.request.getfixturevalue(name) for name in ("url", "region"))
+    url, region = (t.need(name) for name in ("url", "region"))
     t.ciris("plan", "slider", "--from", region, "--to", "0.9", "--grow", CIRIS_URL=url)
 
 

@@ -25,20 +25,20 @@ def from_file(t: Trial, name: str, content: str) -> None:
 
 
 def not_a_motion(t: Trial) -> None:
-    t.request.getfixturevalue("scene")
-    client = t.request.getfixturevalue("client")
+    t.need("scene")
+    client = t.need("client")
     job = client.post("/v1/jobs", json={"kind": "grow", "scene": "slider", "seed": {"q": [0.0]}}).json()["id"]
     t.ask("GET", f"/v1/jobs/{job}/motion")
 
 
 def unproved(t: Trial) -> None:
     """Asks for the proof of a motion that begins in contact."""
-    database, client = t.request.getfixturevalue("database"), t.request.getfixturevalue("client")
+    database, client = t.need("database"), t.need("client")
     scene = swing(-0.01)
     with database.write() as session:
         scenes.add(session, scene)
     job = client.post("/v1/jobs", json={"kind": "certify-path", "scene": scene.name, "q": [[0.0], [0.5]]}).json()["id"]
-    t.request.getfixturevalue("worker")
+    t.need("worker")
     eventually(lambda: client.get(f"/v1/jobs/{job}").json()["ended"], "the job ends")
     t.ask("GET", f"/v1/jobs/{job}/motion/proof")
 

@@ -1,4 +1,4 @@
-"""Errors of the service: requests that are refused, what is not there, keys, workers."""
+"""Errors of the service: requests that are refused, what is not there, keys, workers, slices."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import fcntl
 import time
 from typing import Any
 
-import pytest
-
 from api.access import KEYS_SECONDS
 from certifier.pair.forecast import forecast
-from db import keys, proofs, scenes
+from db import keys, projects, proofs, scenes, workers
 from db.keys import Scope
-from db.session import Database
 from db.settings import Settings, settings
+from db.states import WorkerState
+from db.workers import Made, WorkerKind
 from tests.api.test_jobs import CERTIFY, GROW
+from tests.certifier.scenes import planar_arm
 from tests.errors.trial import Table, Trial
 from tests.scenes import slider
 from workers import admission
@@ -24,30 +24,24 @@ from workers.stack import run_stack
 SECRET = "whsec_AAECAwQFBgcICQoLDA0ODxAREhMUFRYXGBkaGxwdHh8="
 
 
-def database(t: Trial) -> Database:
-    found: Database = t.request.getfixturevalue("database")
-    return found
-
-
 def post(t: Trial, job: dict[str, Any], times: int = 1, **headers: str) -> None:
     """Asks for a job on the slider so often."""
-    t.request.getfixturevalue("scene")
+    t.need("scene")
     for _ in range(times - 1):
-        t.request.getfixturevalue("client").post("/v1/jobs", json=GROW, headers=headers)
+        t.need("client").post("/v1/jobs", json=GROW, headers=headers)
     t.ask("POST", "/v1/jobs", json=job, headers=headers)
 
 
 def queued(t: Trial) -> str:
     """Returns the id of a job that nobody works on."""
-    t.request.getfixturevalue("scene")
-    job: str = t.request.getfixturevalue("client").post("/v1/jobs", json=GROW).json()["id"]
-    return job
+    t.need("scene")
+    return str(t.need("client").post("/v1/jobs", json=GROW).json()["id"])
 
 
 def elsewhere(t: Trial) -> None:
     """Asks for a trajectory to a region of another scene."""
-    region = t.request.getfixturevalue("region")
-    with database(t).write() as session:
+    region = t.need("region")
+    with t.need("database").write() as session:
         other = scenes.add(session, slider(posts=1)).id
     t.ask("POST", "/v1/planning/plan", json={"scene": other, "start": [0.1], "goal": region})
 
@@ -55,28 +49,27 @@ def elsewhere(t: Trial) -> None:
 def twins(t: Trial) -> None:
     """Asks for one of two jobs by what their ids have in common."""
     first = queued(t)
-    patch: pytest.MonkeyPatch = t.request.getfixturevalue("monkeypatch")
-    patch.setattr("db.jobs.uuid4", lambda: first[:-1] + ("0" if first[-1] != "0" else "1"))
+    t.need("monkeypatch").setattr("db.jobs.uuid4", lambda: first[:-1] + ("0" if first[-1] != "0" else "1"))
     queued(t)
     t.ask("GET", f"/v1/jobs/{first[:4]}")
 
 
 def outside(t: Trial) -> None:
     """Asks for a path, straight in s, to where the slider cannot go."""
-    t.request.getfixturevalue("scene")
+    t.need("scene")
     t.ask("POST", "/v1/planning/path", json={"scene": "slider", "q": [[0.0], [5.0]], "space": "s"})
 
 
 def too_many(t: Trial) -> None:
-    t.request.getfixturevalue("environment").setenv("CIRIS_MAX_JOBS_PER_KEY", "1")
+    t.need("environment").setenv("CIRIS_MAX_JOBS_PER_KEY", "1")
     settings.cache_clear()
     post(t, GROW, times=2)
 
 
 def too_often(t: Trial) -> None:
-    t.request.getfixturevalue("environment").setenv("CIRIS_REQUESTS_PER_SECOND", "1")
+    t.need("environment").setenv("CIRIS_REQUESTS_PER_SECOND", "1")
     settings.cache_clear()
-    client = t.request.getfixturevalue("client")
+    client = t.need("client")
     for _ in range(3):
         client.get("/v1/jobs")
     t.ask("GET", "/v1/jobs")
@@ -84,8 +77,8 @@ def too_often(t: Trial) -> None:
 
 def with_key(t: Trial, method: str, path: str, key: str | None = None, scope: Scope = Scope.READ) -> None:
     """Sends a request to a service that has a key, with it, with another one (``key``), or without (an empty one)."""
-    t.request.getfixturevalue("client")
-    with database(t).write() as session:
+    t.need("client")
+    with t.need("database").write() as session:
         made = keys.add(session, "planner", scope)
     time.sleep(KEYS_SECONDS)
     given = made if key is None else key
@@ -93,7 +86,7 @@ def with_key(t: Trial, method: str, path: str, key: str | None = None, scope: Sc
 
 
 def write(t: Trial, change: Any) -> None:
-    with database(t).write() as session:
+    with t.need("database").write() as session:
         change(session)
 
 
@@ -116,7 +109,37 @@ def certify(t: Trial, **polytope: Any) -> None:
     post(t, CERTIFY | {"polytope": {"C": [[1], [-1]], "d": [0.2, 0.2], **polytope}})
 
 
+def sliced(t: Trial, **parts: Any) -> None:
+    t.need("client")
+    with t.need("database").write() as session:
+        scenes.add(session, planar_arm(limit=1.2))
+    t.ask("POST", "/v1/planning/slice", json={"scene": "planar", "q": [0.0, 0.0], "x": "arm/joint1", "y": "arm/joint2"} | parts)
+
+
+def a_draining_one(t: Trial) -> str:
+    with t.need("database").write() as session:
+        workers.tell(session, Made("there:1:2", WorkerKind.SOLVE, "1", 2, 2, 2**32), WorkerState.DRAINING)
+        session.flush()
+        return workers.page(session).rows[0].id
+
+
+def with_a_key_of_others(t: Trial) -> None:
+    worker = a_draining_one(t)
+    with t.need("database").write() as session:
+        projects.add(session, "others")
+        key = keys.add(session, "boss", Scope.ADMIN, "others")
+    time.sleep(KEYS_SECONDS)
+    t.ask("POST", f"/v1/workers/{worker}/pause", headers={"Authorization": f"Bearer {key}"})
+
+
 SERVICE: Table = {
+    ("same_joint", "y"): [lambda t: sliced(t, y="arm/joint1")],
+    ("unknown_joint", "x"): [lambda t: sliced(t, x="arm/joint9")],
+    ("slice_outside_limits", "x_range"): [lambda t: sliced(t, x_range=[2.0, 3.0])],
+    ("region_elsewhere", "regions[0]"): [lambda t: sliced(t, regions=["none"])],
+    ("worker_not_found", "worker"): [lambda t: t.ask("GET", "/v1/workers/nobody")],
+    ("worker_draining", "worker"): [lambda t: t.ask("POST", f"/v1/workers/{a_draining_one(t)}/resume")],
+    ("workers_shared", "Authorization"): [with_a_key_of_others],
     ("ambiguous_id", "job"): [twins],
     ("idempotency_conflict", "Idempotency-Key"): [lambda t: post(t, CERTIFY, times=2, **{"Idempotency-Key": "k"})],
     ("quota_exceeded", ""): [too_many],
@@ -127,12 +150,12 @@ SERVICE: Table = {
     ("no_database", "CIRIS_DATABASE_URL"): [
         lambda t: keys.check_bind(Settings(host="0.0.0.0", database_url=f"sqlite:///{t.directory}/none.sqlite3"))
     ],
-    ("no_keys", "CIRIS_HOST"): [lambda t: keys.check_bind(Settings(host="0.0.0.0", database_url=t.request.getfixturevalue("sqlite_url")))],
+    ("no_keys", "CIRIS_HOST"): [lambda t: keys.check_bind(Settings(host="0.0.0.0", database_url=t.need("sqlite_url")))],
     ("cursor", "after"): [lambda t: t.ask("GET", "/v1/jobs?after=nope")],
     ("proof_not_found", "proof"): [lambda t: write(t, lambda session: proofs.get(session, "nothing"))],
     ("region_not_found", "region"): [
         lambda t: t.ask("GET", "/v1/regions/nope"),
-        lambda t: t.ask("DELETE", f"/v1/regions/{t.request.getfixturevalue('region')[:8]}"),
+        lambda t: t.ask("DELETE", f"/v1/regions/{t.need('region')[:8]}"),
     ],
     ("region_elsewhere", "goal"): [elsewhere],
     ("scene_not_found", "scene"): [lambda t: post(t, GROW | {"scene": "slidr"}), lambda t: post(t, GROW | {"scene": "zzz"})],

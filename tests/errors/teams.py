@@ -5,41 +5,38 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from fastapi.testclient import TestClient
 from sqlalchemy import update
 
 from db import command_line, jobs, keys, projects, retention
 from db.disk import Disk
 from db.keys import Scope
 from db.models import JobRow
-from db.session import Database
 from db.vault import Vault, kept_key
 from tests.db.builders import a_running_job, add_region
-from tests.errors.service import GROW, database, post, queued, write
+from tests.errors.service import GROW, post, queued, write
 from tests.errors.trial import Table, Trial
 
 
 def full(t: Trial) -> None:
     """Asks for a job in a project that has no room."""
-    t.request.getfixturevalue("scene")
-    with database(t).write() as session:
+    t.need("scene")
+    with t.need("database").write() as session:
         projects.get(session, "default").max_bytes = 1
     post(t, GROW)
 
 
 def without_room(t: Trial) -> None:
     """Asks for a job while the disk is nearly full."""
-    patch: pytest.MonkeyPatch = t.request.getfixturevalue("monkeypatch")
-    t.request.getfixturevalue("scene")
+    patch: pytest.MonkeyPatch = t.need("monkeypatch")
+    t.need("scene")
     patch.setattr("db.disk.RESERVE_BYTES", 2**80)
     patch.setattr("db.disk.LOOK_SECONDS", 0)
-    database(t).disk = Disk(t.directory)
+    t.need("database").disk = Disk(t.directory)
     post(t, GROW)
 
 
 def a_region_of_a_job(t: Trial) -> str:
-    db: Database = database(t)
-    client: TestClient = t.request.getfixturevalue("client")
+    db, client = t.need("database"), t.need("client")
     with db.write() as session:
         job = a_running_job(session)
         add_region(session, job)
@@ -51,10 +48,9 @@ def a_region_of_a_job(t: Trial) -> str:
 
 
 def resent_too_soon(t: Trial) -> None:
-    t.request.getfixturevalue("scene")
-    client: TestClient = t.request.getfixturevalue("client")
+    t.need("scene")
     hook = {"url": "https://example.org/", "secret": "whsec_" + "A" * 32}
-    job = client.post("/v1/jobs", json=GROW | {"webhook": hook}).json()["id"]
+    job = t.need("client").post("/v1/jobs", json=GROW | {"webhook": hook}).json()["id"]
     t.ask("POST", f"/v1/jobs/{job}/webhook/resend")
 
 
@@ -64,13 +60,13 @@ def named_twice(session: Any) -> None:
 
 
 def by_its_name(t: Trial) -> None:
-    with database(t).write() as session:
+    with t.need("database").write() as session:
         a_running_job(session)
         retention.delete_scene(session, "slider", dependents=True)
 
 
 def by_a_few_characters(t: Trial) -> None:
-    with database(t).write() as session:
+    with t.need("database").write() as session:
         retention.delete_job(session, a_running_job(session).id[:8], dependents=True)
 
 

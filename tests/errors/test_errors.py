@@ -16,7 +16,6 @@ from tests.docs.errors import PAGE, codes, page
 from tests.errors.bundles import BUNDLES
 from tests.errors.commands import COMMANDS
 from tests.errors.covers import COVERS
-from tests.errors.drawing import DRAWING
 from tests.errors.elsewhere import PROOF_FILES, TESTED, UNTESTED
 from tests.errors.models import MODELS
 from tests.errors.motions import MOTIONS
@@ -28,9 +27,8 @@ from tests.errors.service import SERVICE
 from tests.errors.sites import HOLE, ROOT, Site, sites
 from tests.errors.teams import TEAMS
 from tests.errors.trial import Provocation, Trial
-from tests.errors.workers import WORKERS
 
-TABLES = (SCENE_FILES, SCENES, MODELS, BUNDLES, REGIONS, MOTIONS, COVERS, DRAWING, SERVICE, COMMANDS, PYTHON, TEAMS, WORKERS)
+TABLES = (SCENE_FILES, SCENES, MODELS, BUNDLES, REGIONS, MOTIONS, COVERS, SERVICE, COMMANDS, PYTHON, TEAMS)
 PROVOCATIONS = [Provocation(code, field, act) for table in TABLES for (code, field), acts in table.items() for act in acts]
 PROVOKED: dict[Provocation, list[Site]] = {}
 

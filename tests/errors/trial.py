@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fastapi.testclient import TestClient
 
 from api.app import create_app
 from certifier.errors import CirisError
@@ -23,7 +22,6 @@ from certifier.scene import load_bundle, pack_bundle
 from certifier.scene.parse import parse
 from db.session import Database
 from tests.certifier.scene.workshop import write
-from tests.client.conftest import Ciris
 from tests.errors.sites import ROOT, Site, sites
 
 
@@ -85,6 +83,10 @@ class Trial:
 
         return noted
 
+    def need(self, fixture: str) -> Any:
+        """Returns what a fixture gives."""
+        return self.request.getfixturevalue(fixture)
+
     def write(self, **files: str | bytes) -> Path:
         """Writes files, ``__`` standing for a dot, and returns the path of the first."""
         paths = [self.directory / name.replace("__", ".") for name in files]
@@ -125,15 +127,13 @@ class Trial:
 
     def ask(self, method: str, path: str, **options: Any) -> None:
         """Sends a request and raises the problem that it is answered with."""
-        client: TestClient = self.request.getfixturevalue("client")
-        problem = client.request(method, path, **options).json()
+        problem = self.need("client").request(method, path, **options).json()
         _check_documented(method, path, problem)
         raise CirisError(problem["code"], problem["detail"], field=problem["field"], hint=problem["hint"])
 
     def say(self, *arguments: object, **variables: str) -> str:
         """Runs a command that fails, and returns its last line."""
-        run: Ciris = self.request.getfixturevalue("ciris")
-        done = run(*arguments, **variables)
+        done = self.need("ciris")(*arguments, **variables)
         assert done.status in (1, 2)
         return done.stderr.splitlines()[-1]
 
