@@ -38,9 +38,10 @@ NOT_HTTP = {ROOMS[room] for room in ("ciris", "client", "workers", "certifier/pr
 LEAD = """\
 # Error codes
 
-Every error has a code, for programs. Codes are stable; messages, fields and hints may change. The
-API answers with the HTTP status in the table. A job that an error ended has the code in `error`.
-Do not edit this page by hand: `python -m tests.docs.errors` makes it from the source.
+Every error has a code, for programs. Codes are stable; messages, fields and hints may change. When
+the API answers a request with an error, the HTTP status is that of the table. A job that an error
+ended has the code in `error`. Do not edit this page by hand: `python -m tests.docs.errors` makes it
+from the source.
 
 | code | HTTP status | it comes from |
 |---|---|---|
