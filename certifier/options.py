@@ -176,10 +176,8 @@ def _value(one: Option, value: Any, where: str) -> Any:
                 raise _refused(one, where, "an object of options")
             assert one.cls is not None
             return read(one.cls, value, where)
-        case Takes.WHOLE:
-            return _number(one, value, where, isinstance(value, int))
-        case Takes.REAL:
-            return _number(one, value, where, isinstance(value, int | float) and math.isfinite(value))
+        case Takes.WHOLE | Takes.REAL if not fits(one, value):
+            raise _refused(one, where, within(one))
         case Takes.FLAG if not isinstance(value, bool):
             raise _refused(one, where, "true or false")
         case Takes.LABELS if not isinstance(value, Mapping):
@@ -193,8 +191,10 @@ def _value(one: Option, value: Any, where: str) -> Any:
     return value
 
 
-def _number(one: Option, value: Any, where: str, right: bool) -> Any:
-    inside = (
+def fits(one: Option, value: Any) -> bool:
+    """Returns whether a value is a number that an option takes."""
+    right = isinstance(value, int) if one.takes is Takes.WHOLE else isinstance(value, int | float) and math.isfinite(value)
+    return (
         right
         and not isinstance(value, bool)
         and (one.least is None or one.least <= value)
@@ -202,9 +202,6 @@ def _number(one: Option, value: Any, where: str, right: bool) -> Any:
         and (one.above is None or one.above < value)
         and (one.below is None or value < one.below)
     )
-    if not inside:
-        raise _refused(one, where, within(one))
-    return value
 
 
 def within(one: Option) -> str:

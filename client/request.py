@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from certifier.errors import CirisError
-from certifier.options import Option, Takes
+from certifier.options import Option, Takes, fits, within
 from ciris.answers import Document
 from client.inputs import configuration, labels
 from client.options import Part
@@ -72,6 +72,8 @@ def _value(one: Option, value: Any) -> Any:
             return [_waypoints(path) for path in value]
         case Takes.LABELS:
             return labels(value)
+        case Takes.WHOLE | Takes.REAL if not fits(one, value):
+            raise CirisError("option_value", f"must be {within(one)}", field=argument)
     return value
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections.abc import Iterator
@@ -19,13 +20,16 @@ from certifier.model import Scene
 from certifier.outcome import Outcome, Stage
 from certifier.pair.certification import Certification
 from certifier.pair.result import PairResult
-from db import jobs, pairs, regions, scenes
+from db import jobs, leases, pairs, regions, scenes, workers
 from db import session as storage
+from db import work as claims
 from db.session import Database
 from db.settings import settings
+from db.states import WorkerState
 from db.types import utcnow
+from db.workers import Made, WorkerKind
 from tests.certifier.scenes import accepted, cube, planar_arm
-from tests.db.builders import add_iteration
+from tests.db.builders import a_running_job, add_iteration
 from tests.scenes import slider
 from tests.services import Queue
 from tests.workers.service import SECRET_KEY
@@ -135,6 +139,25 @@ def certified() -> Region:
 def region(database: Database, scene: Scene, certified: Region) -> str:
     """The id of a stored region, made by a job that has succeeded."""
     return store_region(database, certified)
+
+
+@pytest.fixture
+def running(database: Database, scene: Scene) -> str:
+    """The id of a job that runs."""
+    with database.write() as session:
+        job, _ = jobs.create(session, kind="grow", scene_id=scene.hash[:16], options={"seed": {"q": [0.0]}})
+        jobs.start(session, job)
+        return job.id
+
+
+@pytest.fixture
+def busy(database: Database) -> str:
+    """The id of a job of which a worker certifies a pair; this process's parent stands for the worker."""
+    with database.write() as session:
+        workers.tell(session, Made(leases._name(os.getppid()), WorkerKind.SOLVE, "1.2", 4, 8, 2**34), WorkerState.RUNNING)
+        job = a_running_job(session)
+        assert claims.claim(session, job.id, lease_seconds=60, batch_seconds=0.5) is not None
+        return job.id
 
 
 @pytest.fixture

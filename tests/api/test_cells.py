@@ -57,7 +57,7 @@ def passing() -> Scene:
     return replace(scene, geometries=(*scene.geometries, tip), pairs=(*scene.pairs, Pair(tip.name, block.name)))
 
 
-def grown(client: TestClient, scene: Scene, half_width: float = 0.64, **options: Any) -> dict[str, Any]:
+def grown(client: TestClient, scene: Scene, half_width: float = 0.45, **options: Any) -> dict[str, Any]:
     """A job that has ended: it has grown a region from a box, cell by cell."""
     seed = box_seed(np.zeros(scene.n), half_width)
     request = {"kind": "grow", "scene": scene.name, "seed": seed, "options": {"cells": 100, "stages": 1, **options}}

@@ -103,6 +103,16 @@ def random_tree(seed, kinds=(JointKind.REVOLUTE, JointKind.PRISMATIC, JointKind.
     return Scene("tree", tuple(joints), tuple(names), (), (), (), rng.uniform(-0.5, 0.5, position))
 
 
+def crowded(count=1000):
+    """The arm of one link, with so many balls welded to the link and to the world each."""
+    scene = planar_arm(1)
+    places = [(body, f"{body}/{i}") for body in ("arm/link1", WORLD) for i in range(count)]
+    welds = tuple(Joint(f"{name}/weld", JointKind.WELD, body, name, np.zeros(3), pose(), pose()) for body, name in places)
+    balls = tuple(ball(f"{name}/ball", name, 0.1) for _, name in places)
+    bodies = (*scene.bodies, *(name for _, name in places))
+    return replace(scene, joints=(*scene.joints, *welds), bodies=bodies, geometries=(*scene.geometries, *balls))
+
+
 def cube(scene, center, half):
     """The polytope |s - center|_inf <= half with the joint limits."""
     eye = np.eye(scene.n)

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 import ciris
-from tests.api.conftest import certified, client, database, environment, planar, planar_region, region, scene, url, worker
+from tests.api.conftest import certified, client, database, environment, planar, planar_region, region, running, scene, url, worker
 
-__all__ = ["certified", "client", "database", "environment", "planar", "planar_region", "region", "scene", "url", "worker"]
+__all__ = ["certified", "client", "database", "environment", "planar", "planar_region", "region", "running", "scene", "url", "worker"]
 
 
 class Awaited:

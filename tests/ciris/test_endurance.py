@@ -50,15 +50,6 @@ def port() -> int:
     return found
 
 
-@pytest.fixture
-def running(database: Database, scene: Any) -> str:
-    """The id of a job that runs."""
-    with database.write() as session:
-        job, _ = jobs.create(session, kind="grow", scene_id=scene.hash[:16], options={"seed": {"q": [0.0]}})
-        jobs.start(session, job)
-        return job.id
-
-
 def end(database: Database, job_id: str) -> None:
     with database.write() as session:
         jobs.finish(session, jobs.lock(session, job_id), JobState.SUCCEEDED, outcome="inconclusive", reason="the deadline was reached")

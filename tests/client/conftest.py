@@ -16,9 +16,9 @@ import pytest
 from certifier.model import Scene
 from certifier.scene import load_scene
 from client.cli import main
-from tests.api.conftest import certified, client, database, environment, region, scene, url, worker
+from tests.api.conftest import busy, certified, client, database, environment, region, scene, url, worker
 
-__all__ = ["certified", "client", "database", "environment", "region", "scene", "url", "worker"]
+__all__ = ["busy", "certified", "client", "database", "environment", "region", "scene", "url", "worker"]
 
 ROOT = Path(__file__).parents[2]
 PLANAR = ROOT / "examples" / "planar_2dof" / "scene.yaml"

@@ -155,8 +155,10 @@ def test_an_error_in_a_group_names_the_member() -> None:
     made = argparse.ArgumentParser(allow_abbrev=False)
     add_options(made, GROUPED)
     with pytest.raises(RegionError) as caught:
-        read(Grouped, asked("--old-way", "--rounds", "10")["options"], "options")
+        read(Grouped, {"old_way": {"max_rounds": 10}}, "options")
     assert str(typed(caught.value, made)) == "--rounds: must be an integer from 0 to 9"
+    with pytest.raises(CirisError, match=r"^--rounds: must be an integer from 0 to 9$"):
+        asked("--old-way", "--rounds", "10")
 
 
 def test_options_of_a_job_need_one() -> None:

@@ -2,26 +2,8 @@
 
 from __future__ import annotations
 
-import os
-
-import pytest
-
-from db import leases, work, workers
-from db.session import Database
-from db.states import WorkerState
-from db.workers import Made, WorkerKind
+from db import leases
 from tests.client.conftest import Ciris
-from tests.db.builders import a_running_job
-
-
-@pytest.fixture
-def busy(database: Database) -> str:
-    """The id of a job of which a worker certifies a pair; this process's parent stands for the worker."""
-    with database.write() as session:
-        workers.tell(session, Made(leases._name(os.getppid()), WorkerKind.SOLVE, "1.2", 4, 8, 2**34), WorkerState.RUNNING)
-        job = a_running_job(session)
-        assert work.claim(session, job.id, lease_seconds=60, batch_seconds=0.5) is not None
-        return job.id
 
 
 def test_workers_are_listed_with_what_they_do(ciris: Ciris, url: str, busy: str) -> None:

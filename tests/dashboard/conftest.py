@@ -12,11 +12,12 @@ from typing import Any
 
 import pytest
 
-from tests.api.conftest import certified, client, database, environment, planar, planar_region, region, scene, url, worker
+from tests.api.conftest import busy, certified, client, database, environment, planar, planar_region, region, running, scene, url, worker
 
 __all__ = [
     "barriers",
     "browser",
+    "busy",
     "certified",
     "client",
     "database",
@@ -25,6 +26,7 @@ __all__ = [
     "planar",
     "planar_region",
     "region",
+    "running",
     "scene",
     "url",
     "worker",

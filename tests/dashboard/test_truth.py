@@ -7,21 +7,11 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import pytest
-
 from certifier.model import Scene
 from db import jobs, keys
 from db.keys import Scope
 from db.session import Database
 from db.states import JobState
-
-
-@pytest.fixture
-def running(database: Database, scene: Scene) -> str:
-    with database.write() as session:
-        job, _ = jobs.create(session, kind="grow", scene_id=scene.hash[:16], options={"seed": {"q": [0.0]}})
-        jobs.start(session, job)
-        return job.id
 
 
 def end(database: Database, job_id: str) -> None:

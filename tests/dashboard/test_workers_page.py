@@ -6,26 +6,14 @@ import os
 import time
 from typing import Any
 
-import pytest
 from fastapi.testclient import TestClient
 
 from api.access import KEYS_SECONDS
-from db import keys, leases, projects, work, workers
+from db import keys, leases, projects, workers
 from db.keys import Scope
 from db.session import Database
 from db.states import WorkerState
 from db.workers import Made, WorkerKind
-from tests.db.builders import a_running_job
-
-
-@pytest.fixture
-def busy(database: Database) -> str:
-    """The id of a job of which a worker certifies a pair; this process's parent stands for the worker."""
-    with database.write() as session:
-        workers.tell(session, Made(leases._name(os.getppid()), WorkerKind.SOLVE, "1.2", 4, 8, 2**34), WorkerState.RUNNING)
-        job = a_running_job(session)
-        assert work.claim(session, job.id, lease_seconds=60, batch_seconds=0.5) is not None
-        return job.id
 
 
 def test_the_page_shows_what_workers_do_and_pauses_them(page: Any, url: str, busy: str, database: Database, barriers: Any) -> None:

@@ -11,9 +11,7 @@ from planner.cover.ground import free_samples
 from planner.cover.look import Look
 from planner.cover.options import CoverOptions
 from tests.certifier.scenes import planar_arm
-from tests.errors.rows import Row, Trial, rows
-
-COVER = {"kind": "cover", "scene": "slider"}
+from tests.errors.trial import Table, Trial
 
 
 def options(**given: Any) -> object:
@@ -31,82 +29,29 @@ def nothing_is_free(_: Trial) -> object:
 
 
 def not_a_cover(t: Trial) -> None:
-    t.request.getfixturevalue("scene")
-    client = t.request.getfixturevalue("client")
+    t.need("scene")
+    client = t.need("client")
     job = client.post("/v1/jobs", json={"kind": "grow", "scene": "slider", "seed": {"q": [0.0]}}).json()["id"]
     t.ask("GET", f"/v1/jobs/{job}/cover")
 
 
-def in_s(t: Trial) -> str:
+def in_s(t: Trial) -> None:
     path = t.write(path__json='{"s": [[0.0], [0.1]]}')
-    return t.ciris("cover", "slider", "--path", path)
+    t.ciris("cover", "slider", "--path", path)
 
 
-def from_a_region(t: Trial) -> str:
-    url, region = (t.request.getfixturevalue(name) for name in ("url", "region"))
-    return t.ciris("plan", "slider", "--from", region, "--to", "0.9", "--grow", CIRIS_URL=url)
+def from_a_region(t: Trial) -> None:
+    url, region = (t.need(name) for name in ("url", "region"))
+    t.ciris("plan", "slider", "--from", region, "--to", "0.9", "--grow", CIRIS_URL=url)
 
 
-def without_grow(t: Trial) -> str:
-    return t.ciris("plan", "slider", "--from", "0", "--to", "0", "--deadline", "9")
-
-
-COVERS: list[Row] = [
-    *rows(
-        "planner/cover/options.py",
-        (
-            "option_value",
-            "options.connect",
-            "at least two configurations can be connected, and one was given",
-            "give another one, or give it as a seed",
-            lambda t: options(connect=[[0.0]]),
-        ),
-    ),
-    *rows(
-        "planner/cover/ground.py",
-        (
-            "nothing_free",
-            "scene",
-            "of {...} configurations, {total} were found that are free of collisions",
-            "`ciris scene check` says which bodies always touch",
-            nothing_is_free,
-        ),
-    ),
-    *rows(
-        "planner/cover/look.py",
-        (
-            "seed_in_collision",
-            "options.{name}[{i}]",
-            "bodies touch, or are nearer than the padding, at this configuration",
-            "`ciris scene check --q` says which",
-            lambda t: looked(seeds=((0.0, 0.0),)),
-        ),
-        (
-            "path_in_collision",
-            "options.paths[{i}]",
-            "bodies touch, or are nearer than the padding, between waypoints {segment} and {...}",
-            "`ciris certify-path` says which",
-            lambda t: looked(paths=(((-1.5, 0.0), (0.0, 0.0)),)),
-        ),
-    ),
-    *rows("workers/covers.py", ("not_covered", "options", "{...}", "regions that were certified remain", "a cover that cannot go on")),
-    *rows(
-        "api/routers/jobs.py",
-        (
-            "cover_not_found",
-            "job",
-            "the job {id} is no cover, but a {kind} job",
-            "its own page and /v1/jobs/{{id}} describe it",
-            not_a_cover,
-        ),
-    ),
-    *rows(
-        "client/planning.py",
-        ("option", "--from", "regions grow between configurations, not regions", "give joint positions", from_a_region),
-    ),
-    *rows(
-        "client/request.py",
-        ("option", "--path", "{path} has no waypoints in q; a path to cover is straight in q between them", "give waypoints in q", in_s),
-        ("option", "--{argument}", "is an option of --{flag}", "add --{flag}", without_grow),
-    ),
-]
+COVERS: Table = {
+    ("option_value", "options.connect"): [lambda t: options(connect=[[0.0]])],
+    ("nothing_free", "scene"): [nothing_is_free],
+    ("seed_in_collision", "options.seeds[0]"): [lambda t: looked(seeds=((0.0, 0.0),))],
+    ("path_in_collision", "options.paths[0]"): [lambda t: looked(paths=(((-1.5, 0.0), (0.0, 0.0)),))],
+    ("cover_not_found", "job"): [not_a_cover],
+    ("option", "--from"): [from_a_region],
+    ("option", "--path"): [in_s],
+    ("option_value", "--deadline"): [lambda t: t.ciris("cover", "slider", "--deadline", "-1")],
+}

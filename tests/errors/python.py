@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 import time
+from collections.abc import Callable, Coroutine
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 import numpy as np
 import pytest
 
-from ciris import Space, connect
+from ciris import AsyncService, Space, connect, connect_async
 from ciris.asynchronous import client as asynchronous
 from ciris.synchronous import client as synchronous
-from tests.errors.rows import Provoke, Row, Trial, rows
+from tests.errors.trial import Table, Trial
 
 NOBODY = "http://127.0.0.1:9"
-TELLS = "`ciris job show {...}`, or `obstacles` of the job in Python, tells more"
-ADDRESS = "write it as http://HOST:PORT"
 
 
 def answered(status: int, body: bytes = b"", pause: float = 0.0, **headers: str) -> None:
@@ -55,174 +55,66 @@ def closed() -> None:
 def waited() -> None:
     """Waits for a job of a service that has gone, with less patience than people have."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (synchronous, asynchronous):
-            patch.setattr(module, "ABSENCE_S", 0.1)
+        patch.setattr(synchronous, "ABSENCE_S", 0.1)
         connect(NOBODY).client.job_after_all("1f9b2a7c")
+
+
+def asynchronously(ask: Callable[[AsyncService], Coroutine[Any, Any, object]]) -> None:
+    """Asks a service that is not there, with the client that does not block."""
+
+    async def asked() -> None:
+        async with connect_async(NOBODY) as service:
+            await ask(service)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(asynchronous, "ABSENCE_S", 0.1)
+        asyncio.run(asked())
+
+
+async def closed_before(service: AsyncService) -> None:
+    await service.aclose()
+    await service.scenes()
 
 
 def half_turn(t: Trial) -> None:
     Space(("hinge",), np.zeros(1), -np.ones(1), np.ones(1), np.array([True])).to_s([3.5])
 
 
-def damaged_stack(t: Trial) -> str:
+def damaged_stack(t: Trial) -> None:
     t.write(stack__json="{")
-    return t.ciris("scene", "ls", CIRIS_DATA_DIR=str(t.directory))
+    t.ciris("scene", "ls", CIRIS_DATA_DIR=str(t.directory))
 
 
-CLIENT: list[tuple[str, str, str, str, Provoke | str]] = [
-    (
-        "unreachable",
-        "",
-        "{message}; the job {job_id} goes on",
-        "wait for it again with job({job_id}) of the service, or with `ciris job follow {...}`",
+PYTHON: Table = {
+    ("unreachable", ""): [
         lambda t: waited(),
-    ),
-    (
-        "argument",
-        "",
-        "the request holds something that cannot be sent, such as a number that is not finite or a name of many pages",
-        "give texts, finite numbers, and lists of them",
+        lambda t: asynchronously(lambda service: service.client.job_after_all("1f9b2a7c")),
+        lambda t: answered(502),
+    ],
+    ("argument", ""): [
         lambda t: connect(NOBODY).grow("cell", [0.0], deadline=float("nan")),
-    ),
-    ("closed", "", "the connections to the service are closed", "connect again", lambda t: closed()),
-]
-"""Of the client in both kinds."""
-
-PYTHON: list[Row] = [
-    *(row for twin in ("asynchronous", "synchronous") for row in rows(f"ciris/{twin}/client.py", *CLIENT)),
-    *rows(
-        "ciris/requests.py",
-        (
-            "unknown_option",
-            "{name}",
-            "there is no option {name}",
-            "options: {...}",
-            lambda t: connect(NOBODY).grow("cell", [0.0], haste=60),  # type: ignore[call-arg]
-        ),
-        (
-            "argument",
-            "{field}",
-            "{__name__} is no {field}",
-            "give {what}",
-            lambda t: connect(NOBODY).contains(3, [0.0]),  # type: ignore[arg-type]
-        ),
-        ("argument", "timeout", "{timeout} is no timeout", "give seconds, a number above 0", lambda t: connect(NOBODY, timeout=0)),
-        (
-            "argument",
-            "paths",
-            "{__name__} is no paths",
-            "give a list of (k, n) arrays",
-            lambda t: connect(NOBODY).cover("cell", paths=3),  # type: ignore[arg-type]
-        ),
-        ("unknown_option", "{name}", "there is no option {name}", "give it in {...}", "a member of a group that stands beside it"),
-        ("argument", "{name}", "{__name__} is no options", "give a dict of options", "a group of options that is no dict"),
-    ),
-    *rows(
-        "ciris/space.py",
-        (
-            "points",
-            "{field}",
-            "these are not finite numbers, as many in every row",
-            "give real numbers, such as joint positions",
-            lambda t: connect(NOBODY).grow("cell", [[0.0], [1.0, 2.0]]),  # type: ignore[list-item]
-        ),
-        (
-            "outside_window",
-            "q",
-            "{...} is {value} rad, which is half a turn or more from q* = {centre} rad",
-            "its limits are {...} and {...} rad",
-            half_turn,
-        ),
-    ),
-    *rows(
-        "ciris/problems.py",
-        ("url", "", "{url} is no address", ADDRESS, lambda t: connect("http://127.0.0.1:port")),
-        ("url", "", "{url} is no address of a service", ADDRESS, lambda t: connect("localhost:8643")),
-        (
-            "timeout",
-            "",
-            "the service at {url} has not answered in time",
-            "ask for less, or connect with a longer timeout",
-            lambda t: answered(200, pause=0.5),
-        ),
-        (
-            "unreachable",
-            "",
-            "{url} answered {status}: who answers there cannot reach the service now",
-            "try again soon",
-            lambda t: answered(502),
-        ),
-        (
-            "too_many_requests",
-            "",
-            "{url} answered that it was asked too often",
-            "ask less often, or try again later",
-            lambda t: answered(429, **{"retry-after": "86400"}),
-        ),
-        (
-            "not_ciris",
-            "",
-            "{url} answered with what cannot be decoded",
-            "is that the address of a ciris service?",
-            lambda t: answered(200, b"no gzip", **{"content-encoding": "gzip"}),
-        ),
-        (
-            "not_ciris",
-            "",
-            "the answer lacks {name}",
-            "is it a ciris service of this version that answers?",
-            lambda t: answered(200, b"{}"),
-        ),
-        (
-            "not_ciris",
-            "",
-            "{url} sends you on to {...}",
-            "give the address that it leads to",
-            lambda t: answered(302, location="http://127.0.0.1:9/"),
-        ),
-        ("not_ciris", "", "{url} answered {status}", "is that the address of a ciris service?", lambda t: answered(404)),
-        (
-            "not_ciris",
-            "",
-            "{url} answered {status_code} with something that is not a JSON object",
-            "is that the address of a ciris service?",
-            lambda t: answered(200, b"<html>"),
-        ),
-    ),
-    *rows(
-        "ciris/find.py",
-        (
-            "no_service",
-            "",
-            "{...} does not say where the service is",
-            "start it again with `ciris up`, or name its address",
-            damaged_stack,
-        ),
-        (
-            "api_key",
-            "CIRIS_API_KEY_FILE",
-            "{value}: {...}",
-            "name the file that holds the key",
-            lambda t: t.ciris("scene", "ls", CIRIS_URL=NOBODY, CIRIS_API_KEY_FILE=str(t.directory / "none")),
-        ),
-    ),
-    *rows(
-        "ciris/job.py",
-        (
-            "no_region",
-            "",
-            "a job that certifies a motion has no region",
-            "`motion` of the job returns its verdict",
-            "`result` of a job of the kind certify-path",
-        ),
-        (
-            "no_region",
-            "",
-            "the job has ended without a region; its outcome is {...}",
-            TELLS,
-            "`result` of a job that certified a polytope, and found it refuted",
-        ),
-        ("job_{...}", "", "{...}", TELLS, "a job that was cancelled while `ciris grow` followed it"),
-        ("job_{...}", "", "the job is {...}", TELLS, "a job that ended without a word"),
-    ),
-]
+        lambda t: asynchronously(lambda service: service.grow("cell", [0.0], deadline=float("nan"))),
+    ],
+    ("closed", ""): [lambda t: closed(), lambda t: asynchronously(closed_before)],
+    ("unknown_option", "haste"): [lambda t: connect(NOBODY).grow("cell", [0.0], haste=60)],
+    ("unknown_option", "xyz"): [lambda t: connect(NOBODY).grow("cell", [0.0], xyz=1)],
+    ("unknown_option", "pushes"): [lambda t: connect(NOBODY).grow("cell", [0.0], pushes=1)],
+    ("argument", "paper"): [lambda t: connect(NOBODY).grow("cell", [0.0], paper=3)],
+    ("argument", "scene"): [lambda t: connect(NOBODY).contains(3, [0.0])],
+    ("argument", "timeout"): [lambda t: connect(NOBODY, timeout=0)],
+    ("argument", "paths"): [lambda t: connect(NOBODY).cover("cell", paths=3)],
+    ("points", "q"): [lambda t: connect(NOBODY).grow("cell", [[0.0], [1.0, 2.0]])],
+    ("outside_window", "q"): [half_turn],
+    ("url", ""): [lambda t: connect("http://127.0.0.1:port"), lambda t: connect("localhost:8643")],
+    ("timeout", ""): [lambda t: answered(200, pause=0.5)],
+    ("too_many_requests", ""): [lambda t: answered(429, **{"retry-after": "86400"})],
+    ("not_ciris", ""): [
+        lambda t: answered(200, b"no gzip", **{"content-encoding": "gzip"}),
+        lambda t: answered(200, b"{}"),
+        lambda t: answered(302, location="http://127.0.0.1:9/"),
+        lambda t: answered(404),
+        lambda t: answered(200, b"<html>"),
+    ],
+    ("no_service", ""): [damaged_stack],
+    ("api_key", "CIRIS_API_KEY_FILE"): [lambda t: t.ciris("scene", "ls", CIRIS_URL=NOBODY, CIRIS_API_KEY_FILE=str(t.directory / "none"))],
+}

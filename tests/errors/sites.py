@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import ast
 import itertools
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from certifier.errors import CirisError
+
 ROOT = Path(__file__).parents[2]
-ROOMS = ("certifier", "planner", "db", "workers", "api", "ciris", "client")
+ROOMS = ("certifier", "planner", "db", "jobs", "workers", "api", "ciris", "client")
 ERRORS = ("CirisError", "SceneError", "RegionError", "ProofError")
 MAKERS = {
     ("certifier/document.py", "refuse"): 0,
@@ -24,6 +27,7 @@ MAKERS = {
 }
 """Functions that make an error of a message that their callers give: where they are, and which argument it is. Their callers count."""
 OPAQUE = "..."
+HOLE = re.compile(r"\{[\w.]+\}")
 
 
 @dataclass(frozen=True, order=True)
@@ -32,10 +36,27 @@ class Site:
 
     module: str
     line: int
+    function: str
     message: str
     code: str | None = None
     where: str | None = None
     hint: str | None = None
+
+    @property
+    def words(self) -> int:
+        """The length of what the message and the hint always say."""
+        return len(HOLE.sub("", self.message + (self.hint or "")))
+
+    def makes(self, error: CirisError) -> bool:
+        """Says whether an error reads as those of this place do; what stands before the message names a file and a line."""
+        pairs = ((self.code, error.code), (self.where, error.field or ""), (self.hint, error.hint))
+        rest = all(template is None or _pattern(template).fullmatch(text) for template, text in pairs)
+        return rest and _pattern(self.message, "(.* )?").fullmatch(error.message) is not None
+
+
+@cache
+def _pattern(template: str, before: str = "") -> re.Pattern[str]:
+    return re.compile(before + ".*".join(map(re.escape, HOLE.split(template))), re.DOTALL)
 
 
 @cache
@@ -83,11 +104,11 @@ def _said(module: str, call: ast.Call, makers: dict[str, int], names: dict[str, 
         code, message = call.args
         parts = [code, keywords.get("field", ast.Constant("")), keywords.get("hint", ast.Constant(""))]
         for texts in itertools.product(_texts(message, names), *(_texts(part, names) for part in parts)):
-            yield Site(module, call.lineno, texts[0], *(None if text == f"{{{OPAQUE}}}" else text for text in texts[1:]))
+            yield Site(module, call.lineno, around, texts[0], *(None if text == f"{{{OPAQUE}}}" else text for text in texts[1:]))
     elif called in makers and len(call.args) > makers[called]:
         hints = _texts(keywords["hint"], names) if "hint" in keywords else [None]
         for message_text, hint in itertools.product(_texts(call.args[makers[called]], names), hints):
-            yield Site(module, call.lineno, message_text, hint=None if hint == f"{{{OPAQUE}}}" else hint)
+            yield Site(module, call.lineno, around, message_text, hint=None if hint == f"{{{OPAQUE}}}" else hint)
 
 
 def _texts(value: ast.expr, names: dict[str, list[ast.expr]]) -> list[str]:

@@ -93,6 +93,12 @@ class Service:
         self._workers[name].kill()
         self._workers[name].wait()
 
+    def dismiss(self, name: str) -> None:
+        """Kills a worker, if it was started, for good."""
+        if name in self._workers:
+            self.kill(name)
+            del self._workers[name]
+
     def start_again(self) -> None:
         """Starts what ended by itself, as a supervisor does: a worker that finds a child dead as it reconnects to Redis ends."""
         for name, worker in list(self._workers.items()):

@@ -37,8 +37,8 @@ NUMBERS = count(1)
 
 
 def cover(scene: Scene, seconds: float | None = None, **options: Any) -> str:
-    """Commits a cover of the scene with a padding of its own, so that the regions of other tests do not count."""
-    document = CoverOptions.from_document(options).to_document()
+    """Commits a cover of the scene with a padding of its own, so that the regions of other tests do not count. Its regions grow quickly."""
+    document = CoverOptions.from_document({"cells": 600, "stages": 1, **options}).to_document()
     deadline = None if seconds is None else utcnow() + timedelta(seconds=seconds)
     with database().write() as session:
         row = scenes.add(session, replace(scene, padding=scene.padding + 1e-6 * next(NUMBERS)))

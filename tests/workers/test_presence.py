@@ -6,7 +6,6 @@ import os
 import signal
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,9 +16,8 @@ from db.leases import _name
 from db.models import WorkerRow
 from db.session import database
 from db.states import WorkerState
-from tests.services import Queue
 from tests.workers.options import box_around
-from tests.workers.service import Service, ended, events_of, eventually, job_of, pairs_of, running_service, submit
+from tests.workers.service import Service, ended, events_of, eventually, job_of, pairs_of, submit
 from workers.app import SOLVE, celery_app, send_work, waiting
 
 pytestmark = pytest.mark.lengthy
@@ -29,13 +27,13 @@ LINGER_SECONDS = 3.0
 
 
 @pytest.fixture
-def crew(own_queue: Queue, database_url: str, tmp_path: Path) -> Iterator[Service]:
-    """A control worker and a solve worker with two processes, which may be paused and killed."""
-    own_queue.flush()
-    with running_service(database_url, own_queue.url, tmp_path) as running:
-        for name in ("control", "solve"):
-            seen(running, name)
-        yield running
+def crew(service: Service) -> Iterator[Service]:
+    """A control worker and a solve worker with two processes, which may be killed; those that follow find others in their place."""
+    for name in ("control", "solve"):
+        seen(service, name)
+    yield service
+    service.dismiss("solve-2")
+    service.start_again()
 
 
 def row_of(crew: Service, name: str) -> WorkerRow | None:
@@ -110,6 +108,7 @@ def test_what_a_paused_worker_leaves_the_others_do(crew: Service, planar: Scene)
     job = submit(planar, box_around(np.zeros(2), 0.1))
     assert ended(job).outcome == "certified"
     assert {row.parent for row in pairs_of(job)} == {_name(crew.pid("solve-2"))}
+    ask(crew, "solve", WorkerState.RUNNING)
 
 
 def test_a_drained_worker_finishes_what_it_holds_and_ends_well(crew: Service, arm: tuple[Scene, np.ndarray]) -> None:

@@ -33,7 +33,7 @@ SAME = ("halfspace_normals", "halfspace_offsets", "interior_point", "inscribed_e
 @pytest.mark.parametrize("paper", [None, {}, {"contraction": "uniform", "bisection_steps": 2}], ids=["by cells", "targeted", "uniform"])
 def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(planar: Scene, paper: dict[str, Any] | None) -> None:
     more = {"cells": 600} if paper is None else {"paper": {"pushes": 1, "max_rounds": 1, **paper}}
-    options = grow_box(planar.to_s(SEED), 0.4, **more)
+    options = grow_box(planar.to_s(SEED), 0.22, **more)
     job = ended(submit(planar, options))
     assert (job.state, job.outcome, job.error) == ("succeeded", "certified", None)
     with database().read() as session:

@@ -76,7 +76,7 @@ def gone(pids: dict[str, int]) -> bool:
     return all(_started(pid) is None for pid in pids.values())
 
 
-def test_what_dies_is_started_again_and_a_stop_leaves_nothing(stack: Stack) -> None:
+def test_what_dies_is_started_again_what_is_drained_is_not_and_a_stop_leaves_nothing(stack: Stack) -> None:
     second = subprocess.run([*COMMAND, "--data", str(stack.data)], cwd=ROOT, capture_output=True, text=True, check=False)
     assert second.returncode == 2
     assert second.stderr.splitlines()[-1].startswith("error: --data: a stack with the data directory")
@@ -88,14 +88,6 @@ def test_what_dies_is_started_again_and_a_stop_leaves_nothing(stack: Stack) -> N
     eventually(lambda: not set(stack.description["pids"].values()) & {before["queue"], before["api"]}, "both are started again")
     eventually(stack.ready, "the API reaches the queue again")
 
-    after = stack.description["pids"]
-    stack.process.send_signal(signal.SIGTERM)
-    assert stack.process.wait(30) == 0
-    assert gone(after)
-    assert not (stack.data / "stack.json").exists()
-
-
-def test_a_worker_that_was_drained_is_not_started_again(stack: Stack) -> None:
     def ask(path: str, method: str = "GET") -> Any:
         with urllib.request.urlopen(urllib.request.Request(f"{stack.description['url']}{path}", method=method), timeout=20) as answer:
             return json.load(answer)
@@ -103,25 +95,34 @@ def test_a_worker_that_was_drained_is_not_started_again(stack: Stack) -> None:
     def solver() -> str | None:
         return next((worker["id"] for worker in ask("/v1/workers")["workers"] if worker["kind"] == "solve"), None)
 
-    before = stack.description["pids"]
+    after = stack.description["pids"]
     ask(f"/v1/workers/{eventually(solver, 'the worker says that it lives')}/drain", "POST")
-    eventually(lambda: gone({"solve": before["solve"]}), "it ends")
+    eventually(lambda: gone({"solve": after["solve"]}), "it ends")
     time.sleep(3)
-    assert stack.description["pids"] == before
+    assert stack.description["pids"] == after
     assert solver() is None
-    assert not gone({"control": before["control"]})
+    assert not gone({"control": after["control"]})
+
+    stack.process.send_signal(signal.SIGTERM)
+    assert stack.process.wait(30) == 0
+    assert gone(after)
+    assert not (stack.data / "stack.json").exists()
 
 
-def test_an_address_of_ipv6_is_served(tmp_path: Path) -> None:
-    stack = Stack(tmp_path / "data", CIRIS_HOST="::1")
+@pytest.fixture
+def stack_on_ipv6(tmp_path: Path) -> Iterator[Stack]:
+    running = Stack(tmp_path / "data", CIRIS_HOST="::1")
     try:
-        assert stack.description["url"].startswith("http://[::1]:")
-        eventually(stack.ready, "the service is ready")
+        yield running
     finally:
-        stack.close()
+        running.close()
 
 
-def test_the_processes_of_the_api_share_the_port_and_count_together(stack: Stack) -> None:
+def test_the_processes_of_the_api_share_a_port_of_ipv6_and_count_together(stack_on_ipv6: Stack) -> None:
+    stack = stack_on_ipv6
+    assert stack.description["url"].startswith("http://[::1]:")
+    eventually(stack.ready, "the service is ready")
+
     def ask(path: str) -> str:
         with urllib.request.urlopen(f"{stack.description['url']}{path}", timeout=10) as answer:
             return str(answer.read().decode())

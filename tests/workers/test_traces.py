@@ -30,6 +30,7 @@ pytestmark = pytest.mark.lengthy
 
 EXAMPLE = ROOT / "examples" / "planar_2dof"
 TRACE, CALLER = "0af7651916cd43dd8448eb211c80319c", "b7ad6b7169203331"
+NOT_SAMPLED = "1af7651916cd43dd8448eb211c80319c"
 
 
 class Collector(ThreadingHTTPServer):
@@ -118,11 +119,14 @@ def attributes(span: Span) -> dict[str, Any]:
     return {field.key: getattr(field.value, field.value.WhichOneof("value")) for field in span.attributes}
 
 
-def test_one_trace_has_the_way_from_the_request_to_the_proof(
+def test_one_trace_has_the_way_from_the_request_to_the_proof_and_a_caller_who_does_not_sample_has_none(
     database_url: str, own_queue: Queue, tmp_path: Path, collector: Collector
 ) -> None:
     with traced_service(database_url, own_queue, tmp_path, collector.url) as (service, client):
-        made = post(client, a_job(client), traceparent=f"00-{TRACE}-{CALLER}-01")
+        request = a_job(client)
+        other = post(client, request, traceparent=f"00-{NOT_SAMPLED}-{CALLER}-00")
+        assert ended(client, other["id"])["outcome"] == "certified"
+        made = post(client, request, traceparent=f"00-{TRACE}-{CALLER}-01")
         assert made["trace"] == TRACE
         job = ended(client, made["id"])
         assert job["outcome"] == "certified"
@@ -131,6 +135,7 @@ def test_one_trace_has_the_way_from_the_request_to_the_proof(
         )
         os.kill(service.pid("solve"), signal.SIGQUIT)
         eventually(lambda: ("ciris-solve", "accept") in collector.names(), "the region's proof")
+    assert NOT_SAMPLED not in {span.trace_id.hex() for _, span in collector.spans}
     ours = [(name, span) for name, span in collector.spans if span.trace_id.hex() == TRACE]
     assert ("ciris-api", "POST /v1/jobs") in {(name, span.name) for name, span in ours}
     request = next(span for _, span in ours if span.name == "POST /v1/jobs")
@@ -153,14 +158,6 @@ def test_one_trace_has_the_way_from_the_request_to_the_proof(
     ]
     assert {line["process"] for line in lines if line.get("trace") == TRACE} >= {"api"}
     assert not {span.name for _, span in collector.spans} & {"GET /healthz"}
-
-
-def test_a_caller_who_does_not_sample_is_not_traced(database_url: str, own_queue: Queue, tmp_path: Path, collector: Collector) -> None:
-    with traced_service(database_url, own_queue, tmp_path, collector.url) as (_, client):
-        made = post(client, a_job(client), traceparent=f"00-{TRACE}-{CALLER}-00")
-        assert ended(client, made["id"])["outcome"] == "certified"
-        time.sleep(1.0)
-    assert TRACE not in {span.trace_id.hex() for _, span in collector.spans}
 
 
 def test_a_collector_that_is_away_disturbs_nothing(database_url: str, own_queue: Queue, tmp_path: Path) -> None:

@@ -58,8 +58,9 @@ def test_what_drake_cannot_take_is_an_error() -> None:
     with pytest.raises(CirisError, match="no padding"):
         Reference(planar_arm(2, padding=0.01))
     rounded = Geometry("world/obstacle", WORLD, box("", WORLD, (0.1, 0.1, 0.1), (1.5, 1.0, 0.0)).vertices, 0.05, {"kind": "rounded"})
-    with pytest.raises(CirisError, match="can round at most two"):
+    with pytest.raises(CirisError, match="can round at most two") as caught:
         Reference(planar_arm(2, obstacle=rounded))
+    assert caught.value.code == "unsupported_shape"
 
 
 @pytest.mark.parametrize("d", [[-1.0, -1.0, -1.0, -1.0], [1.0, 1.0, -1.0, 1.0]])

@@ -117,7 +117,7 @@ def test_a_grown_regions_manifest_tells_the_share_the_proposal_and_the_ranges(ki
     assert proposal.contains(scene.to_s([[0.0, -0.2], [0.45, 0.2]])).all()
     assert not proposal.contains(scene.to_s([[0.0, 0.9], [1.1, 0.0]])).any()
 
-    q = np.random.default_rng(0).uniform(-1, 1, (200_000, 2))
+    q = np.random.default_rng(0).uniform(-1, 1, (40_000, 2))
     s = scene.to_s(q)
     proposed = proposal.contains(s)
     free = proposed & ~module.in_collision(scene, s)

@@ -284,8 +284,9 @@ def test_a_mesh_that_no_model_names_is_not_taken(tmp_path):
     strict = StrictReader(read_scene_file(path))
     strict.check(read_scene_file(path).resolved_directives, path.name)
     assert len(strict.taken(tmp_path / "t.obj").points) == 4
-    with pytest.raises(SceneError, match=r"Drake has taken another mesh than the models name: other\.obj"):
+    with pytest.raises(SceneError, match=r"Drake has taken another mesh than the models name: other\.obj") as caught:
         strict.taken(tmp_path / "other.obj")
+    assert caught.value.code == "scene_model"
 
 
 def test_urdf_in_sdformat_is_refused(tmp_path):

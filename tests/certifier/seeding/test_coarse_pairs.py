@@ -70,7 +70,7 @@ def test_nothing_joins_where_growth_parts_the_geometries_themselves(name):
 def test_a_proposal_keeps_clear_of_what_growth_will_part(monkeypatch):
     """Where IRIS knows the balls, they touch in less of its polytope, and of what is likely to be kept there is no less."""
     scene, q = catalogue.scene("iiwa_shelf"), tuple(catalogue.seed("iiwa_shelf"))
-    points, options = scene.to_s(q)[None], SeedOptions(Method.IRIS_NP2, q=q)
+    points, options = scene.to_s(q)[None], SeedOptions(Method.IRIS_NP2, q=q, max_iterations=1)
 
     def rating():
         C, d, _ = iris.iris(scene, points, options)

@@ -10,14 +10,14 @@ import pytest
 
 from certifier.errors import ProofError
 from certifier.jobs.region import certified_region
-from certifier.model import WORLD, Ignored, Joint, JointKind, Volume
+from certifier.model import Ignored, Volume
 from certifier.pair.certification import Certification
 from certifier.proof.ground import Ground
 from certifier.proof.pair import PairProof, Side
 from certifier.verify.pair import PairCheck, verify_pair
 from certifier.verify.region import verify_region
 from certifier.verify.uncovered import unlisted
-from tests.certifier.scenes import accepted, ball, cube, planar_arm, pose
+from tests.certifier.scenes import accepted, crowded, cube, planar_arm
 
 
 def test_a_plane_without_a_normal_on_an_empty_polytope_is_refused():
@@ -69,15 +69,9 @@ def statement(scene) -> list[str]:
 
 def test_what_a_scene_leaves_out_is_named_in_a_line_however_much_it_is():
     """Two times 1000 bodies that move against each other make a million of two each; twenty are named."""
-    scene = planar_arm(1)
-    held = ("arm/link1", WORLD)
-    bodies = tuple(f"{body}/{i}" for body in held for i in range(1000))
-    pairs = [(body, f"{body}/{i}") for body in held for i in range(1000)]
-    welds = tuple(Joint(f"{name}/weld", JointKind.WELD, body, name, np.zeros(3), pose(), pose()) for body, name in pairs)
-    balls = tuple(ball(f"{body}/ball", body, 0.1, (0.0, 0.0, 0.0)) for body in bodies)
-    crowded = replace(scene, joints=(*scene.joints, *welds), bodies=(*scene.bodies, *bodies), geometries=(*scene.geometries, *balls))
+    scene = crowded()
     started = time.process_time()
-    words = unlisted(crowded)
+    words = unlisted(scene)
     assert words.count(" of ") == 20
     assert words.endswith(", and more")
     assert time.process_time() - started < 2.0

@@ -7,14 +7,13 @@ import json
 import time
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from certifier.model import WORLD, Ignored, Joint, JointKind, Scene
+from certifier.model import Ignored, Scene
 from certifier.scene import load_scene
 from certifier.verify.uncovered import LISTED, document, named, not_covered
 from tests.certifier.scene.workshop import EXAMPLES
-from tests.certifier.scenes import ball, planar_arm, pose
+from tests.certifier.scenes import crowded, planar_arm
 
 
 def moving(scene: Scene) -> set[frozenset[str]]:
@@ -66,15 +65,9 @@ def test_the_reasons_are_told_apart_and_summed_up() -> None:
 
 
 def test_a_million_pairs_are_counted_and_a_thousand_listed() -> None:
-    scene = planar_arm(1)
-    held = ("arm/link1", WORLD)
-    bodies = tuple(f"{body}/{i}" for body in held for i in range(1000))
-    pairs = [(body, f"{body}/{i}") for body in held for i in range(1000)]
-    welds = tuple(Joint(f"{name}/weld", JointKind.WELD, body, name, np.zeros(3), pose(), pose()) for body, name in pairs)
-    balls = tuple(ball(f"{body}/ball", body, 0.1, (0.0, 0.0, 0.0)) for body in bodies)
-    crowded = replace(scene, joints=(*scene.joints, *welds), bodies=(*scene.bodies, *bodies), geometries=(*scene.geometries, *balls))
+    scene, full = planar_arm(1), crowded()
     started = time.process_time()
-    said = document(crowded)
+    said = document(full)
     assert time.process_time() - started < 2.0
     assert said["pairs"] == len(moving(scene)) + 1000 * 1000 + 1000 * (len(scene.geometries)) - len(scene.pairs)
     assert len(said["bodies"]) == LISTED
