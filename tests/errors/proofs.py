@@ -171,7 +171,7 @@ PROOFS: list[Row] = [
     ),
     *proofs(
         "certifier/verify/places.py",
-        ("proof_too_large", "the fixed poses of the model are too large to be told to 2^-200 m"),
+        ("proof_too_large", "the fixed poses of the model are too large to be computed to 2^-200 m"),
     ),
     *proofs(
         "certifier/verify/motion.py",
