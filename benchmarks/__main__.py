@@ -134,7 +134,7 @@ def _parser() -> ArgumentParser:
     )
     moved = kinds.add_parser("path", parents=[as_json], help="certify random motions, beside dense sampling of them")
     moved.add_argument("scenes", nargs="*", metavar="SCENE", default=list(path.SCENES), help=f"default: all; {', '.join(path.SCENES)}")
-    moved.add_argument("--motions", type=_count, default=20, metavar="N", help="so many motions of each length; default 20")
+    moved.add_argument("--motions", type=_count, default=20, metavar="N", help="how many motions of each length; default 20")
     kinds.add_parser("agreement", parents=[as_json], help="compare verdicts on hundreds of pairs with Drake's")
     kinds.add_parser("scaling", parents=[against], help="measure how the cost grows with obstacles, joints and faces")
     covered = kinds.add_parser("cover", parents=[as_json], help="measure how much regions cover over the seconds")
@@ -154,7 +154,7 @@ def _parser() -> ArgumentParser:
     surveyed = kinds.add_parser("survey", parents=[as_json], help="certify every pair of every scene on every region")
     surveyed.add_argument("scenes", nargs="*", metavar="SCENE", default=list(catalogue.SCENES), help="default: all")
     surveyed.add_argument("--most", type=float, default=5.0, metavar="SECONDS", help="leave pairs with a longer forecast out; default 5")
-    by_cells = "certify cell by cell, with so many cells of a pair, and 20 times as many where it stays open"
+    by_cells = "certify cell by cell: at most N cells for a pair, and 20 N if it is still undecided"
     surveyed.add_argument("--cells", type=_count, default=1, metavar="N", help=by_cells)
     served = kinds.add_parser("service", parents=[as_json], help="measure the service beside --local")
     served.add_argument("scenes", nargs="*", default=["iiwa_shelf"], metavar="EXAMPLE", help="default iiwa_shelf")
@@ -166,10 +166,10 @@ def _parser() -> ArgumentParser:
     many = kinds.add_parser("fleet", parents=[as_json], help="measure how many pieces of work many workers get from one database")
     many.add_argument("--postgresql", metavar="URL", help="in this empty PostgreSQL database; default: in SQLite")
     many.add_argument("--workers", type=_count, default=100, metavar="N", help="default 100")
-    many.add_argument("--pieces", type=_count, default=100_000, metavar="N", help="so many are open at the beginning; default 100000")
-    many.add_argument("--seconds", type=float, default=1.0, metavar="S", help="a worker holds a piece for so long; default 1")
-    many.add_argument("--limit", type=float, default=60.0, metavar="S", help="measure for so long; default 60")
-    many.add_argument("--processes", type=_count, default=2, metavar="N", help="have the workers in so many processes; default 2")
+    many.add_argument("--pieces", type=_count, default=100_000, metavar="N", help="undecided pieces at the beginning; default 100000")
+    many.add_argument("--seconds", type=float, default=1.0, metavar="S", help="how long a worker holds a piece; default 1")
+    many.add_argument("--limit", type=float, default=60.0, metavar="S", help="how long to measure; default 60")
+    many.add_argument("--processes", type=_count, default=2, metavar="N", help="how many processes run the workers; default 2")
     shipped = kinds.add_parser("robots", parents=[as_json], help="take robots as people ship them from model files to a verified region")
     shipped.add_argument(
         "robots", nargs="*", metavar="ROBOT", default=list(models.ROBOTS), help=f"default: all; {', '.join(models.ROBOTS)}"
@@ -186,7 +186,7 @@ def _parser() -> ArgumentParser:
     )
     planned.add_argument("--url", help="the service that has the regions, where no --regions are given; default: the one that is found")
     planned.add_argument("--free", action="store_true", help="plan between any free configurations, in regions or not")
-    planned.add_argument("--queries", type=_count, default=plan.QUERIES, metavar="N", help=f"so many trajectories; default {plan.QUERIES}")
+    planned.add_argument("--queries", type=_count, default=plan.QUERIES, metavar="N", help=f"how many trajectories; default {plan.QUERIES}")
     changed = kinds.add_parser("recertify", parents=[as_json], help="certify regions again whose scenes have changed, and grow them anew")
     changed.add_argument(
         "scenes", nargs="*", metavar="EXAMPLE", default=list(recertify.SCENES), help=f"default: {', '.join(recertify.SCENES)}"

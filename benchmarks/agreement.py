@@ -3,7 +3,7 @@
 Drake chooses the frame of a pair in its own way. Our frame may be another one of equal cost. Where naming the two bodies in the other
 order makes it Drake's frame, we do so, and the two programs are the same. Where the frames still differ, the verdict says so.
 
-Every answer of ours is checked from the bytes of its proof.
+The verifier checks each of our answers from the bytes of its proof.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def campaign(questions: Iterable[Question], progress: Progress) -> dict[str, Any
     """Asks both sides everything, and returns the document of ``ciris bench agreement``.
 
     Raises:
-        ProofError: a proof of ours does not hold.
+        ProofError: one of our proofs does not hold.
     """
     findings = []
     for question in questions:

@@ -91,7 +91,7 @@ def whole_scene(name: str, kind: str, match: str = "", count: int | None = None)
 
 
 def compare(benchmark: str, tasks: list[Task], against: bool, repeat: int, progress: Progress) -> dict[str, Any]:
-    """Measures all tasks. Of ``repeat`` runs of ours the fastest counts.
+    """Measures all tasks. The fastest of our ``repeat`` runs counts.
 
     A first run that does not count loads the compiled kernels.
     """

@@ -1,4 +1,4 @@
-"""This module measures how regions come to cover a scene: the service's certified ones, and Drake's IRIS regions without certificates.
+"""This module measures how fast regions cover a scene: the service's certified ones, and Drake's IRIS regions without certificates.
 
 Each case is a cover of an example, with its goals and its deadline. The service runs separately, with a data directory that may be kept.
 IRIS goes by the same rules for its seeds, in as many processes and for as long; its regions count as they are proposed.
@@ -113,7 +113,7 @@ def _certified(
 def covered(
     client: Client, case: Case, options: dict[str, Any], seconds: float, progress: Progress
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Has a service cover the example. Returns what it has come to, and the looks at the scene on the way."""
+    """Lets a service cover the example. Returns the final state of the cover, and the looks at the scene on the way."""
     scene = client.add_scene(catalogue.FILES[case.example])
     request = {"kind": "cover", "scene": scene["id"], "options": options, "deadline_seconds": seconds}
     job, _ = client.create_job(request)
@@ -126,7 +126,7 @@ def covered(
 
 
 def table(way: str, run: dict[str, Any]) -> list[tuple[str, ...]]:
-    """Returns the rows of a table about one way: coverage over the seconds, and how the regions hang together."""
+    """Returns the rows of a table about one way: coverage over the seconds, and how the regions are connected."""
     return [
         (
             way,

@@ -36,11 +36,11 @@ def fleet(
     """Measures a fleet on SQLite, or on an empty PostgreSQL database if its URL is given. Returns the document of ``ciris bench fleet``.
 
     Args:
-        workers: so many hold a piece each.
-        pieces: so many are open in one job at the beginning.
-        seconds: so long a piece is held.
-        limit: the fleet is measured for so long, or until the pieces are done.
-        processes: so many processes have the workers as threads.
+        workers: how many workers hold one piece each.
+        pieces: how many undecided pieces one job has at the beginning.
+        seconds: how long a worker holds a piece.
+        limit: seconds after which measuring ends, unless the pieces are done before.
+        processes: how many processes run the workers, as threads.
     """
     with ExitStack() as stack:
         url = postgresql or f"sqlite:///{Path(stack.enter_context(tempfile.TemporaryDirectory())) / 'fleet.sqlite3'}"
@@ -91,7 +91,7 @@ def _open(served: Database, job_id: str) -> int:
 
 
 def _workers(url: str, count: int, seconds: float, over: Any, spent: Any) -> None:
-    """Has so many workers at work in this process until it is over. Puts the seconds of processor time that they took."""
+    """Runs ``count`` workers in this process until it is over. Puts the seconds of processor time that they took."""
     os.environ["CIRIS_DATABASE_URL"] = url
     sys.setswitchinterval(1e-4)  # who holds a lock of the database must not wait long for the interpreter
     database()  # before the workers, which share it

@@ -49,7 +49,7 @@ START_RADIUS = 1e-2
 PICTURED = ("whole", "targeted")
 """The picture shows these ways."""
 LIMIT = 300.0
-"""Growing ends after so many seconds with the best region so far, unless the user says otherwise."""
+"""Growing ends after this many seconds with the best region so far, unless the user says otherwise."""
 AGAINST = ("planar_2dof", "arm_3dof")
 """On these examples Drake's alternation ends within minutes."""
 HALF_WIDTH, ROUNDS, TOLERANCE = 0.05, 10, 1e-3
@@ -68,7 +68,7 @@ def growth(names: list[str], against: bool, limit: float, progress: Progress, on
     Every row names its machine, because a document may be put together from several measurements: see :func:`merged`.
 
     Args:
-        limit: growing one region of ``ways`` ends after so many seconds with the best so far; Drake and what it is compared with have none.
+        limit: seconds after which growing one region of ``ways`` ends with the best so far; Drake and its counterpart have no limit.
         only: the ways to measure; None for all.
     """
     small = _cube(catalogue.EXAMPLES[0])
@@ -141,7 +141,7 @@ def _against(name: str, progress: Progress) -> list[dict[str, Any]]:
 
 
 def _median(runs: list[dict[str, Any]]) -> dict[str, Any]:
-    """Makes one row of several runs that came to the same region."""
+    """Makes one row of several runs that gave the same region."""
     ratios = [row["time_ratio"] for row in runs if row["time_ratio"]]
     medians = {
         name: statistics.median(row[name] for row in runs) if runs[0][name] else None
@@ -162,7 +162,7 @@ def _cube(name: str) -> dict[str, Any]:
 
 
 def _grown(name: str, seed: dict[str, Any], paper: PaperOptions | None, limit: float | None = None) -> dict[str, Any]:
-    """Grows one region of ours and verifies its proof. If no region could be certified, the row says why.
+    """Grows one of our regions and verifies its proof. If no region could be certified, the row says why.
 
     ``seconds`` are of the clock and ``processor_seconds`` of this process, with the seeding and the proof's first verification.
     """

@@ -33,7 +33,7 @@ from planner.library import Library
 from planner.overlap import beside, overlap
 
 CHAINS, EACH = 100, 10
-"""What collides of a region is told from so many samples of so many chains."""
+"""The colliding part of a region is estimated from CHAINS chains with EACH samples."""
 
 
 class _Regions:
@@ -111,7 +111,7 @@ def cover(scene: Scene, options: dict[str, Any], processes: int, seconds: float,
 
 
 def point(seconds: float, known: dict[str, Any]) -> dict[str, Any]:
-    """Returns what is kept of a look at the scene, so many seconds after the beginning."""
+    """Returns what is kept of a look at the scene, with the seconds since the beginning."""
     names = ("regions", "components", "largest", "connect", "begun")
     coverage = {name: known["coverage"][key] for name, key in (("coverage", "value"), ("stderr", "stderr"))}
     return {"seconds": seconds, **coverage, **{name: known[name] for name in names}}

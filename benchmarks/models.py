@@ -17,7 +17,7 @@ _QUARTER = 1.5708
 _ROOM = {"table": ((1.8, 1.8, 0.05), (0.0, 0.0, -0.05)), "crate": ((0.3, 0.3, 0.4), (0.65, 0.4, 0.2))}
 """The size of each box around a robot, and its centre, metres. The robot stands on the table, with a gap."""
 _SECTORS, _RINGS = 5, 3
-"""A link of the shell arm is a tube in so many parts round and along."""
+"""A link of the shell arm is a tube, divided into _SECTORS parts around its axis and _RINGS parts along it."""
 
 
 @dataclass(frozen=True)

@@ -34,11 +34,11 @@ APART = 0.9
 LENGTHS = (1.0, 0.3)
 """A motion goes from one free configuration to another, drawn within the joint limits, or this part of the way."""
 SPANS = 4
-"""A cubic spline of so many spans goes from one free configuration to another,"""
+"""A cubic spline with this many spans goes from one free configuration to another,"""
 AROUND = 0.1
 """with control points off the straight line by this part of the joints' ranges, normally distributed."""
 SAMPLES = 1001
-"""A motion is sampled at so many times."""
+"""A motion is sampled at this number of times."""
 MILLIMETRE = 1e-3
 
 

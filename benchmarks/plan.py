@@ -40,7 +40,7 @@ TIMEOUT_S, MEMORY = 60.0, 16 << 30
 RRT_SECONDS = 20.0
 """RRT-Connect gives up after so long."""
 DENSE = 20
-"""Whether a path collides is asked of so many configurations for each that RRT-Connect looks at."""
+"""The check whether a path collides takes this many configurations for each one that RRT-Connect looks at."""
 
 
 def trajectories(name: str, files: list[Path], url: str | None, queries: int, progress: Progress, free: bool = False) -> dict[str, Any]:

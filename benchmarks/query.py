@@ -26,17 +26,17 @@ from planner.overlap import beside, overlap
 
 JOINTS, REGIONS, POINTS = 7, 10_000, 1000
 FACES = (50, 600)
-"""Every region has between so many and so many faces, joint limits included."""
+"""The smallest and the largest number of faces of a region, joint limits included."""
 SIZES = (1.0, 1.5)
 """Half-widths of the boxes, as multiples of 0.3 to 1.2; centres are within 1.5 of 0 on every axis."""
 REPEAT = 9
-"""A figure is the median of so many runs."""
+"""A figure is the median of this many runs."""
 PLAIN, EACH = 5, 50
-"""The plain product is measured on so many of the points, and every other question is asked so often."""
+"""The plain product is measured on PLAIN of the points, and every other question is asked EACH times."""
 
 
 def query(regions: int, progress: Progress, sizes: Sequence[float] = SIZES) -> dict[str, Any]:
-    """Measures questions about so many regions of each size. Returns the document of ``ciris bench query``."""
+    """Measures questions about the given number of regions of each size. Returns the document of ``ciris bench query``."""
     rows = [_measured(regions, size) for size in sizes]
     for row in rows:
         progress(_line(row))

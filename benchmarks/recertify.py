@@ -28,9 +28,9 @@ from client.cores import cores
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SCENES = ("arm_3dof", "ur3e_bin")
 LIMIT = 60.0
-"""Growing ends after so many seconds, of the first region and of the one that is grown anew."""
+"""Growing ends after this many seconds, both for the first region and for the one that is grown anew."""
 SAMPLES = 100_000
-"""Drake looks at so many configurations of every region."""
+"""Drake checks this many configurations of every region."""
 POST = """<?xml version="1.0"?>
 <sdf version="1.7"><model name="post"><link name="body"><collision name="box">
 <geometry><box><size>0.2 0.2 0.4</size></box></geometry></collision></link></model></sdf>
@@ -65,7 +65,7 @@ def changes(names: list[str], limit: float, progress: Progress) -> dict[str, Any
     """Measures every change of the examples and returns the document of ``ciris bench recertify``.
 
     Args:
-        limit: growing ends after so many seconds.
+        limit: seconds after which growing ends.
     """
     rows = []
     for name in names:
@@ -93,7 +93,7 @@ def _row(name: str, change: str, first: Region, q: list[float], limit: float, pr
 
 
 def _again(path: Path, scene: Scene, again: Region, seconds: float) -> dict[str, Any]:
-    """Returns what became of a region: how much is kept, whether it verifies, and whether Drake finds a contact in it."""
+    """Returns the result of certifying a region again: how much is kept, whether it verifies, and whether Drake finds a contact in it."""
     from tests.oracles.original import collision  # the benchmarks are in a checkout, where the tests are
 
     said = again.manifest["provenance"]["recertified"]

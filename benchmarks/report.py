@@ -15,7 +15,7 @@ from benchmarks.catalogue import ROOT
 PAGE, FIGURES = ROOT / "docs/benchmarks.md", ROOT / "docs/benchmarks"
 
 COVER_ROWS = 16
-"""A cover is told in about so many rows."""
+"""The table of a cover has about this many rows."""
 LINE = 100
 """A line of docs has at most this many characters, unless it is a line of a table."""
 
@@ -301,7 +301,7 @@ def _plan(document: Document) -> list[str]:
 
 
 def _cover(document: Document) -> list[str]:
-    """Returns a table of the coverage over the seconds, with as many rows as one reads, and what the regions have come to."""
+    """Returns a short table of the coverage over the seconds, and sentences about the regions at the end."""
     header = ["way", "seconds", "covered %", "regions", "components", "% of it in the largest", "component of each to connect"]
     rows, said = [], []
     for way, run in document["runs"].items():

@@ -19,7 +19,7 @@ STRIDE = 0.5
 RESOLUTION = 0.05
 """A straight line is looked at in steps of at most this length in q, in radians and metres: 2.9 degrees where one joint turns."""
 SHORTCUTS = 200
-"""So many shortcuts between random points of the path are tried."""
+"""This many shortcuts between random points of the path are tried."""
 
 
 @dataclass(frozen=True, eq=False)

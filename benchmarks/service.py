@@ -48,7 +48,7 @@ def beside_local(names: list[str], postgresql: str | None, processes: int, turns
         postgresql: the URL of an empty database; None to measure SQLite alone.
 
     Raises:
-        CirisError: the service does not start, a command fails, or two ways come to different regions.
+        CirisError: the service does not start, a command fails, or two ways give different regions.
     """
     rows: list[dict[str, Any]] = []
     with ExitStack() as stack:
@@ -67,7 +67,7 @@ def beside_local(names: list[str], postgresql: str | None, processes: int, turns
                     rows.append(row)
                     volumes.add(row["ellipsoid"])
                     if len(volumes) > 1:
-                        raise CirisError("regions_differ", f"the runs came to different regions of {name}")
+                        raise CirisError("regions_differ", f"the runs gave different regions of {name}")
     more = [row for name in names for row in _more(name, [row for row in rows if row["scene"] == name])]
     return {"benchmark": "service", "machine": measure.machine(), "processes": processes, "rows": rows, "more": more}
 

@@ -63,7 +63,7 @@ def store(postgresql: str | None, counts: Sequence[int], progress: Progress) -> 
 
 
 def _measured(database: Database, count: int) -> Iterator[dict[str, Any]]:
-    """Measures a job with so many pairs, of which first none and then half are settled."""
+    """Measures a job with ``count`` pairs: first none of them is settled, then half."""
     job_id, insert_seconds = begin(database, count, 1.0)
     yield {"settled": 0, "insert_seconds": insert_seconds, **_milliseconds(database)}
     settled = REPEAT
@@ -75,7 +75,7 @@ def _measured(database: Database, count: int) -> Iterator[dict[str, Any]]:
 
 
 def begin(database: Database, count: int, seconds: float) -> tuple[str, float]:
-    """Makes a running job with so many pairs of so many seconds. Returns its id and the seconds to insert the pairs.
+    """Makes a running job with ``count`` pairs that take ``seconds`` each. Returns its id and the seconds to insert the pairs.
 
     The state of its growth names every pair, as it does when proofs of earlier iterations hold.
     """

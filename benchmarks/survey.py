@@ -1,6 +1,6 @@
 """The survey certifies every pair of every scene on every region, with our certifier alone: by the program (11), or cell by cell.
 
-It shows the outcomes, what is left undecided, and what a pair costs by its size.
+It shows the outcomes, the undecided pairs, and the cost of a pair by its size.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from certifier.proof.pair import PairProof
 DECIDED = (Outcome.CERTIFIED, Outcome.REFUTED, Outcome.NOT_CERTIFIABLE, Outcome.TOO_CLOSE)
 
 AGAIN = 20
-"""A pair that is open after its cells is certified again with so many times as many."""
+"""A pair that is undecided after its cells is certified again with this many times as many cells."""
 
 SizeClass = tuple[int, tuple[int, int], tuple[int, int]]
 """A size class is the number of joints that the plane moves with, the numbers of vertices of A and B, and the dimensions N of their
@@ -42,7 +42,7 @@ def survey(names: Iterable[str], most: float, progress: Progress, cells: int = 1
 
     Args:
         most: seconds; pairs with a longer forecast of the program (11) are left out, and counted.
-        cells: so many cells of a pair are looked at, and AGAIN times as many where it is open after them; 1 for the program (11). Only
+        cells: the most cells of a pair to look at, and AGAIN times as many if it is then undecided; 1 for the program (11). Only
             its times are compared with the forecast.
     """
     counts, undecided = [], []

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 WIDTH, HEIGHT = 300, 260
 LEFT, RIGHT, TOP, BOTTOM = 52, 12, 34, 30
 COLUMNS = 3
-"""So many panels stand side by side at most."""
+"""At most this many panels stand side by side."""
 COLOURS = ("#1f5fa8", "#c4501b", "#3d8a3d", "#7a4fa0")
 
 Point = tuple[float, float]

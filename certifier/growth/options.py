@@ -28,8 +28,7 @@ class CertifyOptions(RecertifyOptions):
 
     cells: int = option(
         1,
-        "Number of cells of the polytope that are tried for each pair, each with its own plane. With 1, each pair has one plane on all of "
-        "the polytope.",
+        "Most cells of the polytope for each pair, each with its own plane. With 1, each pair has one plane on all of the polytope.",
         least=1,
         greatest=MOST_GIVEN,
     )
@@ -50,27 +49,27 @@ class GrowthOptions:
     seed: dict[str, Any] = field(default_factory=dict)
     cells: int | None = option(
         None,
-        "Cells of a pair in each stage. Cells still undecided when this budget is spent are removed by new faces.",
+        "Most cells of a pair in each stage. After that, new faces cut off the cells that are still undecided.",
         otherwise=str(MOST_CELLS),
         least=1,
         greatest=MOST_GIVEN,
     )
     stages: int | None = option(
         None,
-        "Number of stages after which growth ends. Each stage gives a larger region than the one before.",
+        "Growth ends after this many stages. Each stage gives a larger region than the one before.",
         otherwise="it ends when a stage gains little",
         least=1,
         greatest=100,
     )
     paper: PaperOptions | None = option(
         None,
-        "The papers' algorithm grows the region instead: it shrinks the first polytope until every pair has one plane that moves with the "
-        "joints, and then pushes the faces out. `{}` takes all of its defaults.",
+        "Grow with the papers' algorithm instead: it shrinks the first polytope until every pair has one plane that moves with the joints, "
+        "and then pushes the faces out. `{}` takes all of its defaults.",
         otherwise="none",
     )
     random_seed: int = option(
         0,
-        "Seed of every random choice, those of Drake's IRIS too. Another seed gives another region.",
+        "Seed of every random choice, also in Drake's IRIS. Another seed gives another region.",
         least=0,
         greatest=2**63 - 1,
     )

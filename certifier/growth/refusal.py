@@ -8,7 +8,7 @@ from certifier.seeding.proposal import NO_ROOM, TOO_LONG, mend
 
 DEADLINE = "the deadline was reached"
 """The reason of a growth that had no time left."""
-THIN = "what is left around the seed is too thin to go on with"
+THIN = "the remaining polytope around the seed is too thin to continue"
 """The reason of a growth that reached a polytope whose interior is too small for doubles. Users did not give that polytope."""
 
 

@@ -59,8 +59,8 @@ def _substituted(scene: Scene) -> list[str]:
 def _hollow(scene: Scene) -> list[str]:
     """Returns a finding about every hull that reaches notably beyond what it stands for."""
     return [
-        f"{g.name}: the hull reaches at least {1000 * distance:.3g} mm beyond {standing_for(g)}, which is not convex, and closes what is "
-        f"open there: {CONVEX_PARTS}, where that matters"
+        f"{g.name}: the hull reaches at least {1000 * distance:.3g} mm beyond {standing_for(g)}, which is not convex, and closes its "
+        f"openings: {CONVEX_PARTS}, where that matters"
         for g in scene.geometries
         if (distance := beyond(scene, g.name))
     ]

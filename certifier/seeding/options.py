@@ -41,8 +41,8 @@ class SeedOptions:
 
     method: Method | None = option(
         None,
-        "How the first polytope is found: by Drake's IRIS (`iris_np2`, `iris_zo`), or with the papers' algorithm also from the joint "
-        "limits (`limits`), or as a box around the seed (`box`).",
+        "Source of the first polytope: Drake's IRIS (`iris_np2`, `iris_zo`). With the papers' algorithm, also the joint limits (`limits`) "
+        "or a box around the seed (`box`).",
         otherwise="`iris_np2`",
     )
     q: tuple[float, ...] | None = option(None, "The seed: joint positions in radians or metres, in position order.")
@@ -61,23 +61,22 @@ class SeedOptions:
     )
     epsilon: float = option(
         0.001,
-        "IRIS adds faces until at most this fraction of the volume in s is in collision. Below 0.01, only its last rounds of faces reach "
-        "it.",
+        "IRIS adds faces until at most this fraction of the volume in s is in collision. Values below 0.01 apply only to the last round.",
         argument="iris-epsilon",
         above=0,
         below=1,
     )
-    delta: float = option(0.05, "Probability with which IRIS may be wrong about that fraction.", argument="iris-delta", above=0, below=1)
+    delta: float = option(0.05, "Probability that a larger fraction than that is in collision.", argument="iris-delta", above=0, below=1)
     max_iterations: int = option(
         3,
-        "Largest number of alternations of IRIS between faces and ellipsoid, and again where balls about a hand join the scene.",
+        "Most alternations of IRIS between faces and ellipsoid. If balls around a hand join the scene, IRIS repeats them.",
         argument="iris-iterations",
         least=1,
         greatest=1000,
     )
     max_iterations_separating_planes: int = option(
         20,
-        "Number of rounds in which IRIS adds faces, within each alternation.",
+        "Most rounds of new faces within each alternation of IRIS.",
         argument="iris-face-rounds",
         least=1,
         greatest=1000,
@@ -85,10 +84,10 @@ class SeedOptions:
     tolerance: float = option(
         0.02, "IRIS ends when the ellipsoid's volume grows by less than this fraction.", argument="iris-tolerance", above=0
     )
-    margin: float = option(0.01, "Distance in s that IRIS' faces keep from the collisions found.", argument="iris-margin", above=0)
+    margin: float = option(0.01, "Distance in s between IRIS' faces and the collisions that it finds.", argument="iris-margin", above=0)
     random_seed: int | None = option(
         None,
-        "Seed of IRIS' random choices alone. Another seed gives another proposal.",
+        "Seed of the random choices of IRIS only. Another seed gives another proposal.",
         otherwise="the seed of every random choice",
         argument="iris-random-seed",
         least=0,

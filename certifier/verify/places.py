@@ -146,5 +146,5 @@ def _doubles(matrix: arb_mat) -> Array:
     """
     entries = matrix.entries()
     if not all(x.rad() < _SMALL for x in entries):
-        raise ProofError("proof_too_large", "the fixed poses of the model are too large to be told to 2^-200 m")
+        raise ProofError("proof_too_large", "the fixed poses of the model are too large to be computed to 2^-200 m")
     return np.array([float(x.mid()) for x in entries])

@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 from certifier.model import escaped
 
 SCENE = "path of a scene file, or the name or id of a scene that the service knows"
-OF_ONE = "its id, or the first characters of it"
+OF_ONE = "the id, or its first characters"
 PROOF = "new file for the proof; default: one in this directory, named after scene and proof"
 WATCH = "print a line for every pair when it is decided"
 

@@ -25,11 +25,11 @@ class CoverOptions:
 
     seeds: tuple[Q, ...] = option((), "Configurations (joint positions) that get regions first.", argument="seed", most=MOST_GIVEN)
     connect: tuple[Q, ...] = option(
-        (), "Configurations that each get a region, and that shall end in one connected component.", most=MOST_GIVEN
+        (), "Goal: each of these configurations is in a region, and all of them are in one connected component.", most=MOST_GIVEN
     )
     paths: tuple[tuple[Q, ...], ...] = option(
         (),
-        "Demonstrations: the motions, straight in joint positions from waypoint to waypoint, that shall be covered.",
+        "Goal: regions cover these motions, which are straight in joint positions from waypoint to waypoint.",
         argument="path",
         most=MOST_GIVEN,
     )
@@ -45,7 +45,7 @@ class CoverOptions:
     at_once: int = option(2, "Number of regions that grow at the same time.", least=1, greatest=64)
     region_seconds: float | None = option(
         None,
-        "A region ends after so long, with what there is of it.",
+        "The growth of a region ends after this many seconds, with the region so far.",
         otherwise="no limit",
         unit="s",
         above=0,
@@ -53,13 +53,13 @@ class CoverOptions:
     )
     cells: int = option(
         6000,
-        "Cells of a pair in each stage of a region. New faces remove the cells that are undecided after that.",
+        "Most cells of a pair in each stage of a region. After that, new faces cut off the cells that are still undecided.",
         least=1,
         greatest=10_000_000,
     )
     stages: int | None = option(
         None,
-        "Each region ends after this many stages. One stage gives the first regions sooner, and less coverage in the end.",
+        "The growth of a region ends after this many stages. One stage gives the first regions sooner, but less coverage in the end.",
         otherwise=f"{STAGES} for robots with more than {MOST_JOINTS} joints; else a region ends when a stage gains little",
         least=1,
         greatest=100,

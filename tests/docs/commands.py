@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 import textwrap
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,8 +20,8 @@ GROUPS = {
     "Motions and planning": ("plan", "path", "certify-path", "contains", "nearest", "graph"),
     "Proofs and measurements": ("verify", "clearance", "bench"),
 }
-COMMON = ("url", "json")
-"""These options of ``ciris scene ls`` are described once, for all commands that have them in the same words."""
+MANY = 4
+"""Arguments that this number of commands have in the same words are described once."""
 LEAD = """\
 # Commands
 
@@ -36,14 +37,14 @@ def page() -> str:
     grouped = [verb for group in GROUPS.values() for verb in group]
     if sorted(grouped) != sorted(verbs):
         raise SystemExit(f"GROUPS of {Path(__file__).name} and the commands differ: {sorted({*grouped} ^ {*verbs})}")
-    shared = {action.dest: action for action in leaf(top, "scene", "ls")._actions if action.dest in COMMON}
+    shared = common([command for verb in grouped for _, command in leaves(*verbs[verb])])
     parts = [LEAD, index(top)]
     for title, members in GROUPS.items():
         parts.append(f"## {title}\n")
         for verb in members:
             parts += [section(command, about, shared) for about, command in leaves(*verbs[verb])]
-    rows = [f"| `{written(action)}` | {help_of(action)} |" for action in shared.values()]
-    parts.append("\n".join(["## Options of many commands\n", "| option | what it is |", "|---|---|", *rows, ""]))
+    rows = [f"| `{name}` | {escaped(text)} |" for name, text in shared.items()]
+    parts.append("\n".join(["## Arguments of many commands\n", "| argument | what it is |", "|---|---|", *rows, ""]))
     parts.append(f"## Exit status and output\n\n{paragraphs(EPILOG)}")
     return "\n".join(parts)
 
@@ -54,6 +55,12 @@ def index(top: argparse.ArgumentParser) -> str:
     found = [one for group in GROUPS.values() for verb in group for one in leaves(*verbs[verb])]
     rows = [f"| [`{command.prog}`](#{command.prog.replace(' ', '-')}) | {escaped(about)} |" for about, command in found]
     return "\n".join(["| command | what it does |", "|---|---|", *rows, ""])
+
+
+def common(among: list[argparse.ArgumentParser]) -> dict[str, str]:
+    """Returns the arguments that MANY commands have in the same words: as they are typed, with their help texts."""
+    found = Counter((written(action), help_of(action)) for command in among for action in command._actions if action.dest != "help")
+    return dict(argument for argument, count in found.items() if count >= MANY)
 
 
 def commands(of: argparse.ArgumentParser) -> Iterator[tuple[str, tuple[str, argparse.ArgumentParser]]]:
@@ -76,27 +83,24 @@ def leaf(top: argparse.ArgumentParser, *names: str) -> argparse.ArgumentParser:
     return top
 
 
-def section(command: argparse.ArgumentParser, about: str, shared: dict[str, argparse.Action]) -> str:
-    """Returns what the page says about one command, without the ``shared`` options."""
-
-    def common(action: argparse.Action) -> bool:
-        return action.dest in shared and action.help == shared[action.dest].help
-
-    arguments = [action for action in command._actions if action.dest != "help" and not common(action)]
+def section(command: argparse.ArgumentParser, about: str, shared: dict[str, str]) -> str:
+    """Returns what the page says about one command. Of the ``shared`` arguments it has the names."""
+    arguments = [action for action in command._actions if action.dest != "help"]
     positional = [action for action in arguments if not action.option_strings]
     options = [action for action in arguments if action.option_strings]
-    others = [f"[`--{action.dest}`](#options-of-many-commands)" for action in command._actions if common(action)]
+    own = [action for action in (*positional, *options) if shared.get(written(action)) != help_of(action)]
+    others = [f"`{written(action).split()[0]}`" for action in (*positional, *options) if action not in own]
     needed = [*map(written, positional), *(written(option) for option in options if option.required)]
     rest = ["[OPTIONS]"] if any(not option.required for option in options) else []
     lines = [f"### `{command.prog}`\n", f"    {' '.join([command.prog, *needed, *rest])}\n", f"{sentence(about)}\n"]
     if command.epilog:
         lines.append(paragraphs(re.sub(r"(Example: )(ciris .*?)(\. |$)", r"\1`\2`\3", command.epilog)))
-    if arguments:
+    if own:
         lines += ["| argument | what it is |", "|---|---|"]
-        lines += [f"| `{escaped(written(action))}` | {escaped(help_of(action))} |" for action in [*positional, *options]]
+        lines += [f"| `{escaped(written(action))}` | {escaped(help_of(action))} |" for action in own]
         lines.append("")
     if others:
-        lines.append(f"Also {' and '.join(others)}.\n")
+        lines.append(paragraphs(f"{'Also' if own else 'It takes'} [{', '.join(others)}](#arguments-of-many-commands)"))
     return "\n".join(lines)
 
 

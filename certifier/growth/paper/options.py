@@ -31,15 +31,15 @@ class PaperOptions:
     )
     contractions: int | None = option(
         None,
-        "Number of targeted contractions. Each begins to cut at another distance; the largest region counts.",
+        "Number of targeted contractions. Each begins to cut at another distance. The largest region is the result.",
         otherwise="2 for arms with at most six joints between two bodies, else 1",
         least=1,
         greatest=len(NEAR),
     )
-    bisection_steps: int = option(6, "Steps of uniform contraction's bisection, one certification each.", least=0, greatest=60)
+    bisection_steps: int = option(6, "Steps of the bisection in uniform contraction, with one certification each.", least=0, greatest=60)
     pushes: int | None = option(
         None,
-        "How often the faces are pushed out after the contractions. After a push that fails, the next one is shorter.",
+        "How often to push the faces out after the contractions. After a push that fails, the next one is shorter.",
         otherwise="10 for arms with at most four joints between two bodies, 2 for at most six, else 0",
         least=0,
         greatest=1000,
@@ -53,7 +53,7 @@ class PaperOptions:
         least=0,
         greatest=1000,
     )
-    tolerance: float = option(0.02, "Relative growth of the ellipsoid's volume that is still worth a push or a round.", above=0, below=10)
+    tolerance: float = option(0.02, "Pushes and rounds end when the ellipsoid's volume grows by less than this part.", above=0, below=10)
     backoff: int = option(
-        2, "How often a polytope step that fails to certify is halved towards the last certified polytope.", least=0, greatest=20
+        2, "How often to halve a polytope step that cannot be certified, towards the last certified polytope.", least=0, greatest=20
     )
