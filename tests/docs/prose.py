@@ -1,12 +1,8 @@
-"""``python -m tests.docs.prose [FILE ...]`` lists words that readers have to read twice, with what to write instead (prose.toml).
-
-Files that have some still are counted in prose.json. ``--write`` writes the counts as they are; they may only fall.
-"""
+"""``python -m tests.docs.prose [FILE ...]`` lists words that readers have to read twice, with what to write instead (prose.toml)."""
 
 from __future__ import annotations
 
 import ast
-import json
 import re
 import sys
 import tomllib
@@ -15,9 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-COUNTS = Path(__file__).with_name("prose.json")
 PATTERNS = tomllib.loads(Path(__file__).with_name("prose.toml").read_text())["pattern"]
-PACKAGES = ("certifier", "db", "planner", "workers", "api", "ciris", "client", "dashboard", "benchmarks")
+PACKAGES = ("certifier", "db", "jobs", "planner", "workers", "api", "ciris", "client", "dashboard", "benchmarks")
 NOT_READ = {"docs/trials.md"}
 """A log, which readers do not need."""
 
@@ -77,16 +72,12 @@ def files() -> list[Path]:
     return sorted(path for path in (*prose, *pages, *programs) if path.relative_to(ROOT).as_posix() not in NOT_READ)
 
 
-def counts() -> dict[str, int]:
-    """Returns how many words are found in each file, of those that have some."""
-    found = {path.relative_to(ROOT).as_posix(): len(findings(path)) for path in files()}
-    return {name: number for name, number in found.items() if number}
+def said(paths: list[Path]) -> Iterator[str]:
+    """Yields a line for each finding."""
+    for path in paths:
+        for one in findings(path):
+            yield f"{path.relative_to(ROOT)}:{one.line}: {one.words}: write {one.write}"
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] == ["--write"]:
-        COUNTS.write_text(json.dumps(counts(), indent=1) + "\n")
-    else:
-        for path in [ROOT / name for name in sys.argv[1:]] or files():
-            for one in findings(path):
-                print(f"{path.relative_to(ROOT)}:{one.line}: {one.words}: write {one.write}")
+    print("\n".join(said([ROOT / name for name in sys.argv[1:]] or files())))
