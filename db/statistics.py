@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from db import clock, jobs, work, workers
 from db.models import IterationRow, JobRow, PairRow, RegionRow, StepRow, WebhookRow
 from db.settings import settings
-from db.states import JobState, PairState, WebhookState
+from db.states import ACCEPT, JobState, PairState, WebhookState
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def collect(session: Session) -> Statistics:
         jobs={state: states.get(state, 0) for state in JobState},
         pairs={state: counted.get(state, 0) for state in PairState},
         pair_seconds={state: seconds.get(state) or 0.0 for state in PairState},
-        step_seconds={kind: total or 0.0 for kind, total in sorted(steps.items())},
+        step_seconds={kind: total or 0.0 for kind, total in sorted(({ACCEPT: 0.0} | steps).items())},
         webhooks={state: webhooks.get(state, 0) for state in WebhookState},
         regions=session.scalar(select(func.count()).select_from(RegionRow)) or 0,
         decisions_due=len(jobs.awaiting_coordination(session, now)),

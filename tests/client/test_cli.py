@@ -198,7 +198,7 @@ def test_growing_here_says_what_happens(ciris: Ciris) -> None:
 def test_who_interrupts_growing_has_the_best_region_so_far(tmp_path: Path) -> None:
     scene, out = ROOT / "examples" / "ur3e_bin" / "scene.yaml", tmp_path / "so_far.proof"
     growing = subprocess.Popen(
-        command("grow", scene, "--local", "--method", "box", "--cells", "200", "--out", out),
+        command("grow", scene, "--local", "--cells", "200", "--out", out),
         cwd=tmp_path,
         env=surroundings(CIRIS_DATA_DIR=str(tmp_path / "data")),
         stderr=subprocess.PIPE,

@@ -213,9 +213,9 @@ def test_an_angle_that_no_double_tells_from_others_is_refused_without_a_service(
     polytope = tmp_path / "polytope.json"
     polytope.write_text('{"C": [[1, 0]], "d": [0.1], "center": [0, 1e300]}')
     for arguments, field in (
-        (("scene", "check", scene, "--q", huge), "q[0]"),
-        (("grow", scene, "--local", "--q", huge), "seed.q[0]"),
-        (("grow", scene, "--local", "--q", "0,0", "--contain", huge), "seed.contain[0][0]"),
+        (("scene", "check", scene, "--q", huge), "--q[0]"),
+        (("grow", scene, "--local", "--q", huge), "--q[0]"),
+        (("grow", scene, "--local", "--q", "0,0", "--contain", huge), "--contain[0][0]"),
         (("certify-path", scene, "--local", "--q", "0,0", "--q", huge), "--q[1][0]"),
         (("certify", scene, "--local", "--polytope", polytope), "polytope.center[1]"),
     ):

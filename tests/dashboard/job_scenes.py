@@ -94,12 +94,11 @@ def large_job(database: Database, scene: Scene, iterations: int, leaves: int) ->
     """A running job whose last iteration has open pairs; the first pair of all has so many ``leaves`` there."""
     job_id = new_job(database, scene)
     states = [PairState.CERTIFIED] * 17 + [PairState.TOO_CLOSE, PairState.INCONCLUSIVE, PairState.REFUTED]
-    arrays = {name: np.asarray(values) for name, values in SLIDE.items()}
-    row: dict[str, Any] = {"job_id": job_id, "faces": 2, "arrays": arrays, "reuse": {}, "hard": [], "failures": None}
     with database.write() as session:
         for index in range(iterations):
-            session.add(IterationRow(**row, index=index, label=f"stage {index}", cells=64, state=IterationState.FAILED))
-            session.flush()
+            job = jobs.lock(session, job_id)
+            add_iteration(session, job, index=index, label=f"stage {index}", **SLIDE, pairs=[], cells=64)
+            session.get_one(IterationRow, (job_id, index)).state = IterationState.FAILED
             done = [
                 {
                     "job_id": job_id, "iteration": index, "pair_index": i, "part": 0, "a": pair.a, "b": pair.b, "forecast_seconds": 1.0,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from sqlalchemy import func, select
 
 from certifier.outcome import Outcome, Stage
 from certifier.pair.result import PairResult
+from certifier.polytopes.proved import ProvedBox
 from db import jobs, leases, pairs, subtrees
 from db.models import ProofRow, SubtreesRow
 from db.session import Database
@@ -15,7 +17,7 @@ from tests.db.builders import a_running_job, add_iteration, all_pairs
 CERTIFIED = PairResult(Outcome.CERTIFIED, Stage.CELLS, margin=0.01, proof=b"proof")
 
 
-BOX = {"mid": [0.0], "half": [1.0], "Y_lower": [[0.0, 0.0, 0.0, 1.0]], "Y_upper": [[0.0, 0.0, 1.0, 0.0]]}
+BOX = ProvedBox(np.zeros(1), np.ones(1), np.array([[0.0, 0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, 1.0, 0.0]]))
 """The root cell of all partitions, with multipliers of the faces and the limits."""
 
 

@@ -12,15 +12,16 @@ from tests.certifier.proofs import files
 
 ROOT = Path(__file__).parents[2]
 THIRD_PARTIES = {
-    "certifier": {"cachetools", "flint", "numba", "numpy", "pydrake", "scipy", "yaml"},
+    "certifier": {"cachetools", "cattrs", "flint", "numba", "numpy", "pydrake", "scipy", "yaml"},
     "certifier.verify": {"flint", "numpy"},
     "db": {"alembic", "cryptography", "numpy", "opentelemetry", "pydantic", "pydantic_settings", "sqlalchemy", "structlog"},
+    "jobs": {"cachetools", "numpy", "pydantic", "pydantic_core", "sqlalchemy"},
     "planner": {"flint", "numpy", "pydrake", "scipy"},
     "ciris": {"httpx2", "numpy"},
     "client": {"flint", "httpx2", "numpy", "pydrake", "yaml"},
     "dashboard": set(),
 }
-ROOMS = ["certifier", "db", "planner", "workers", "api", "ciris", "client", "dashboard"]
+ROOMS = ["certifier", "db", "jobs", "planner", "workers", "api", "ciris", "client", "dashboard"]
 
 
 @pytest.fixture(scope="module")

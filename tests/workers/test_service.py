@@ -15,7 +15,7 @@ from certifier.jobs.local import grow
 from certifier.model import Scene
 from certifier.verify.region import verify_region
 from db import jobs, pairs, proofs, regions
-from db.models import PairRow, SubtreesRow
+from db.models import IterationRow, PairRow, SubtreesRow
 from db.session import database
 from db.settings import settings
 from tests.certifier.scenes import beads
@@ -43,7 +43,7 @@ def test_a_region_grows_as_it_does_without_the_service_and_its_proof_holds(plana
     statement = verify_region(proof)
     alone = grow(planar, GrowthOptions.from_document(options)).manifest
     assert (region.arrays["C"].tolist(), region.arrays["d"].tolist()) == (alone["halfspace_normals"], alone["halfspace_offsets"])
-    assert region.manifest["share"] == region.share == alone["share"]
+    assert region.manifest["share"] == region.summary["share"] == alone["share"]
     assert certified_pairs(region.manifest) == certified_pairs(alone)
     assert region.manifest["joint_ranges"] == alone["joint_ranges"]
     assert region.manifest["provenance"]["proposal"] == alone["provenance"]["proposal"]
@@ -87,7 +87,8 @@ def test_a_whole_region_is_the_same_when_workers_die_between_its_rounds(planar: 
 
     def goes_on() -> PairRow | None:
         with database().read() as session:
-            begun = {row.index for row in pairs.iterations(session, job_id) if row.begun is not None}
+            rows = session.scalars(select(IterationRow).where(IterationRow.job_id == job_id))
+            begun = {row.index for row in rows if row.action["begun"] is not None}
         return next((row for row in pairs_of(job_id) if row.state == "running" and row.iteration in begun), None)
 
     killed = eventually(goes_on, "a pair is gone on with")

@@ -148,10 +148,10 @@ def upgrade() -> None:
     )
     with op.batch_alter_table("jobs", schema=None) as batch_op:
         batch_op.create_index(batch_op.f("ix_jobs_key_id"), ["key_id"], unique=False)
-        batch_op.create_index(batch_op.f("ix_jobs_project_bytes"), ["project", "bytes"], unique=False)
         batch_op.create_index(batch_op.f("ix_jobs_project_created_at_id"), ["project", "created_at", "id"], unique=False)
         batch_op.create_index(batch_op.f("ix_jobs_scene_id"), ["scene_id"], unique=False)
         batch_op.create_index(batch_op.f("ix_jobs_state"), ["state"], unique=False)
+        batch_op.create_index(batch_op.f("ix_jobs_project_bytes"), ["project", "bytes"], unique=False)
 
     op.create_table(
         "scene_names",
