@@ -8,6 +8,7 @@ COPY pyproject.toml README.md ./
 COPY certifier certifier
 COPY db db
 COPY planner planner
+COPY jobs jobs
 COPY workers workers
 COPY dashboard dashboard
 COPY api api

@@ -10,9 +10,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.rooms import ROOMS
+
 ROOT = Path(__file__).parents[2]
 PATTERNS = tomllib.loads(Path(__file__).with_name("prose.toml").read_text())["pattern"]
-PACKAGES = ("certifier", "db", "jobs", "planner", "workers", "api", "ciris", "client", "dashboard", "benchmarks")
 NOT_READ = {"docs/trials.md"}
 """A log, which readers do not need."""
 
@@ -68,7 +69,7 @@ def files() -> list[Path]:
     """Returns the files that users and developers read."""
     prose = [*(ROOT / "docs").glob("*.md"), *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"))]
     pages = [*(ROOT / "dashboard/templates").rglob("*.html"), *(ROOT / "dashboard/source").rglob("*.ts*")]
-    programs = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py")]
+    programs = [path for package in (*ROOMS, "benchmarks") for path in (ROOT / package).rglob("*.py")]
     return sorted(path for path in (*prose, *pages, *programs) if path.relative_to(ROOT).as_posix() not in NOT_READ)
 
 

@@ -11,9 +11,9 @@ from functools import cache
 from pathlib import Path
 
 from certifier.errors import CirisError
+from tests.rooms import ROOMS
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("certifier", "planner", "db", "jobs", "workers", "api", "ciris", "client")
 ERRORS = ("CirisError", "SceneError", "RegionError", "ProofError")
 MAKERS = {
     ("certifier/document.py", "refuse"): 0,

@@ -9,6 +9,7 @@ import grimp
 import pytest
 
 from tests.certifier.proofs import files
+from tests.rooms import ROOMS
 
 ROOT = Path(__file__).parents[2]
 THIRD_PARTIES = {
@@ -21,7 +22,6 @@ THIRD_PARTIES = {
     "client": {"flint", "httpx2", "numpy", "pydrake", "yaml"},
     "dashboard": set(),
 }
-ROOMS = ["certifier", "db", "jobs", "planner", "workers", "api", "ciris", "client", "dashboard"]
 
 
 @pytest.fixture(scope="module")

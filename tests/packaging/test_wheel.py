@@ -6,8 +6,9 @@ import sys
 import zipfile
 from pathlib import Path
 
+from tests.rooms import ROOMS
+
 ROOT = Path(__file__).parents[2]
-ROOMS = ["certifier", "db", "planner", "workers", "api", "ciris", "client", "dashboard"]
 WORKSHOP = ["node_modules", "source", "build.mjs", "*.json", ".npmrc"]
 """What the dashboard's scripts are built from and with; a wheel has them built."""
 
