@@ -200,18 +200,27 @@ def _field(loc: Sequence[str | int]) -> str:
     Where a field may be of several types, pydantic names the one it has tried, as in ``("body", "start", "list[float]", 0)``.
     """
     parts = [part for part in loc[1:] if isinstance(part, int) or not _TYPE.match(part)]
-    if loc[0] == "body" and parts and parts[0] in KINDS:
-        del parts[0]
+    at = _kind_at(parts)
+    if loc[0] == "body" and at is not None:
+        del parts[at]
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".")
 
 
 def _elsewhere(*path: str | int) -> str:
     """Returns where to give an option that is a member of a group; "" for another field."""
-    if len(path) != 3 or path[0] not in KINDS:
+    at = _kind_at(path)
+    if at is None or len(path) != at + 3:
         return ""
-    _, cls = KINDS[str(path[0])].forms.get(str(path[1]), ("", None))
-    found = "" if cls is None else in_group(cls, str(path[2]))
-    return f": give {path[1]}.{found}" if found else ""
+    kind, place, name = (str(part) for part in path[at:])
+    _, cls = KINDS[kind].forms.get(place, ("", None))
+    found = "" if cls is None else in_group(cls, name)
+    return f": give {place}.{found}" if found else ""
+
+
+def _kind_at(path: Sequence[str | int]) -> int | None:
+    """Returns where pydantic names the kind of a job in a path, alone or in ``jobs`` of a batch; None where it does not."""
+    at = 2 if len(path) > 2 and path[0] == "jobs" and isinstance(path[1], int) else 0
+    return at if len(path) > at and path[at] in KINDS else None
 
 
 def _sentence(error: dict[str, Any]) -> str:

@@ -29,7 +29,7 @@ JOB: Fields = {"deadline": ("deadline_seconds", "real"), "priority": ("priority"
 
 class PaperOptions(TypedDict, total=False):
     """Grow with the papers' algorithm instead: it shrinks the first polytope until every pair has one plane that moves with the joints,
-    and then pushes the faces out. ``{}`` takes all of its defaults.
+    and then pushes the faces out.
     """
 
     contraction: Literal["targeted", "uniform"]
@@ -89,7 +89,7 @@ class GrowOptions(JobOptions, total=False):
     """
     paper: PaperOptions
     """Grow with the papers' algorithm instead: it shrinks the first polytope until every pair has one plane that moves with the joints,
-    and then pushes the faces out. ``{}`` takes all of its defaults. Default: none.
+    and then pushes the faces out.
     """
     random_seed: int
     """Seed of every random choice, also in Drake's IRIS. Another seed gives another region. Default: 0."""

@@ -18,7 +18,7 @@ from client.files import ProofFile, check_writable
 from client.inputs import configuration, polytope_file, seed_of
 from client.options import CERTIFY, GROW
 from client.output import Screen, print_json
-from client.request import request
+from client.request import refuse_of_service, request
 
 OK, NO = 0, 1
 
@@ -93,6 +93,7 @@ def grow(args: Namespace) -> int:
         from client.local import check_is_file
 
         check_is_file(args.scene)
+        refuse_of_service(args)
     asked = request(args, GROW)
     requests = [{**asked, "seed": {"q": seed_of(args.scene, q), **asked["seed"]}} for q in getattr(args, "seed.q") or [None]]
     if len(requests) > 1:
@@ -161,6 +162,7 @@ def certify(args: Namespace) -> int:
     if args.local:
         from client import local
 
+        refuse_of_service(args)
         document, proof = local.certify(args.scene, polytope, asked, screen, args.watch, drake, kept is not None)
     else:
         with service.connect(args.url) as client:

@@ -113,10 +113,11 @@ def about(one: Option) -> str:
 def typed(error: CirisError, parser: argparse.ArgumentParser) -> CirisError:
     """Returns the error with the argument that was typed in the place of the field that it fills."""
     arguments = {action.dest: action.option_strings[-1] for action in parser._actions if action.option_strings}
-    matches = [field for field in arguments if re.match(rf"{re.escape(field)}(?![\w.])", error.field or "")]
+    named = "labels" if (error.field or "").startswith("labels.") else error.field or ""
+    matches = [field for field in arguments if re.match(rf"{re.escape(field)}(?![\w.])", named)]
     if not matches:
         return error
     field = max(matches, key=len)
-    place = (error.field or "").removeprefix(field)
+    place = named.removeprefix(field)
     message = error.message.removeprefix(f"{field.rpartition('.')[2]}{place} ")
     return type(error)(error.code, message, field=f"{arguments[field]}{place}", hint=error.hint)

@@ -8,12 +8,13 @@ from typing import Any
 
 from certifier.errors import CirisError, unreadable
 from ciris.answers import Document
+from ciris.synchronous.client import Client
 from client import output, service
 from client.files import ProofFile, check_writable
 from client.inputs import configuration
 from client.options import RECERTIFY
 from client.output import Screen, print_json
-from client.request import request
+from client.request import refuse_of_service, request
 
 OK, NO = 0, 1
 
@@ -34,6 +35,7 @@ def recertify(args: Namespace) -> int:
     if args.local:
         from client import local
 
+        refuse_of_service(args)
         grown = local.recertify(_proof(Path(args.region)), args.scene, keep or None, asked, screen, args.watch)
     else:
         if keep:
@@ -62,7 +64,7 @@ def _all(args: Namespace, asked: Document, screen: Screen) -> int:
         hint = "leave out REGION, --q, --local and --out"
         raise CirisError("option", "all regions of a scene need a service, which keeps the new regions", field="--from", hint=hint)
     with service.connect(args.url) as client:
-        old = client.scene(args.old)
+        old = _old(client, args.old)
         scene = service.known_scene(client, args.scene)
         regions = [region["id"] for region in client.regions(scene=old["id"])]
         jobs = service.grow_many(client, [_request(asked, scene, region) for region in regions], screen, args.watch)
@@ -76,6 +78,15 @@ def _all(args: Namespace, asked: Document, screen: Screen) -> int:
         ]
         output.print_table(("was", "region", "kept", "ended"), rows, right="kept")
     return OK if all(found) else NO
+
+
+def _old(client: Client, name: str) -> Document:
+    """Returns the scene that ``--from`` names."""
+    try:
+        return client.scene(name)
+    except CirisError as error:
+        error.field = "--from" if error.field == "scene" else error.field
+        raise
 
 
 def _proof(path: Path) -> bytes:

@@ -10,7 +10,7 @@ from certifier.errors import CirisError
 from certifier.options import Option, Takes, fits, within
 from ciris.answers import Document
 from client.inputs import configuration, labels
-from client.options import Part
+from client.options import JOB, Part
 from client.paths import path_file
 
 
@@ -45,6 +45,17 @@ def refuse_options(args: Namespace, parts: tuple[Part, ...], flag: str) -> None:
     """
     for _, one, _ in _given(args, parts):
         raise _belongs(one, flag)
+
+
+def refuse_of_service(args: Namespace) -> None:
+    """Refuses, with ``--local``, options that only jobs of a service have.
+
+    Raises:
+        CirisError: option, for the first of them that was given.
+    """
+    for _, one, _ in _given(args, JOB):
+        if one.name != "deadline_seconds":
+            raise CirisError("option", "is only for jobs of the service", field=f"--{one.argument}", hint="leave out it or --local")
 
 
 def _belongs(one: Option, flag: str) -> CirisError:

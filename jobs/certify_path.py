@@ -22,7 +22,7 @@ from db.session import Database, database
 from db.transaction import Afterwards, persistently
 from jobs import obstacles
 from jobs.curves import BEZIER, CONTROL_POINTS, KNOTS, Bezier, ControlPoints, Knots, one_curve
-from jobs.fields import Real, Request, Vector
+from jobs.fields import Flag, Real, Request, Vector
 from jobs.kind import Done, Held, Kind, Turn, in_child, report_of
 from jobs.request import JobRequest
 from workers.app import send_work
@@ -47,14 +47,14 @@ class GivenMotion(Request):
         description="In which coordinates the motion is straight; without it, in those given. Of `bezier` and `control_points`, which ones "
         "they are; without it, joint positions.",
     )
-    tube: bool = Field(False, description="Whether to look for the largest certified tube about the motion.")
+    tube: Flag = Field(False, description="Whether to look for the largest certified tube about the motion.")
     padding: Real = Field(
         0.0,
         ge=0,
         description="Metres that are added around every body, beyond the scene's padding. So the bodies of a pair have to be twice this "
         "farther apart.",
     )
-    clearance: bool = Field(False, description="Whether to look for a proof of nearly the least distance: `clearance` of the answer.")
+    clearance: Flag = Field(False, description="Whether to look for a proof of nearly the least distance: `clearance` of the answer.")
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:

@@ -11,15 +11,19 @@ from certifier.options import Option, Takes, table
 from jobs import patterns
 
 
-def _integer(value: object) -> object:
+def integer(value: object) -> object:
     """Refuses texts and truth for a whole number. Pydantic's own strictness would refuse 7.0 too, which is one in JSON."""
     if isinstance(value, bool | str):
         raise PydanticKnownError("int_type")
     return value
 
 
-Whole = Annotated[int, BeforeValidator(_integer)]
-"""A whole number. No text and no truth value stands for one."""
+def whole(least: float | None, greatest: float | None) -> Any:
+    """Returns the type of a whole number within bounds. No text and no truth value stands for one."""
+    return Annotated[int, Field(ge=least, le=greatest), BeforeValidator(integer)]
+
+
+Flag = Annotated[bool, Field(strict=True)]
 Real = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Vector = Annotated[list[Real], Field(min_length=1, max_length=64)]
 LabelName = Annotated[str, Field(min_length=1, max_length=64, pattern=patterns.LABEL_NAME)]
@@ -49,11 +53,7 @@ def model_of(cls: type) -> type[Request]:
 
 def _annotated(one: Option) -> Any:
     values = _type(one)
-    bounds: dict[str, Any] = {}
-    if one.takes in (Takes.WHOLE, Takes.REAL):
-        bounds = {"ge": one.least, "gt": one.above, "le": one.greatest, "lt": one.below}
-    elif one.most is not None:
-        bounds = {"max_length": one.most}
+    bounds: dict[str, Any] = {} if one.most is None else {"max_length": one.most}
     return Annotated[values | None if one.optional else values, Field(description=one.described, **bounds)]
 
 
@@ -65,5 +65,11 @@ def _type(one: Option) -> Any:
             assert one.cls is not None
             return model_of(one.cls)
         case _:
-            lists = {Takes.POINT: Vector, Takes.POINTS: Rows, Takes.PATHS: list[Annotated[list[Vector], Field(min_length=2)]]}
-            return {Takes.WHOLE: Whole, Takes.REAL: Real, Takes.FLAG: bool, Takes.LABELS: Labels, **lists}[one.takes]
+            path = Annotated[list[Vector], Field(min_length=2, max_length=one.most)]
+            lists = {Takes.POINT: Vector if one.most is None else list[Real], Takes.POINTS: Rows, Takes.PATHS: list[path]}
+            numbers = {Takes.WHOLE: whole(one.least, one.greatest), Takes.REAL: Annotated[Real, _bounds(one)]}
+            return {**numbers, Takes.FLAG: Flag, Takes.LABELS: Labels, **lists}[one.takes]
+
+
+def _bounds(one: Option) -> Any:
+    return Field(ge=one.least, gt=one.above, le=one.greatest, lt=one.below)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from api.schemas.planning import REGION, SCENE, Q, RegionId
 from certifier.model import JointKind
-from jobs.fields import Real, Request, SceneName, Vector, Whole
+from jobs.fields import Real, Request, SceneName, Vector, integer
 
 MAX_CONTACTS, MAX_SIZE, MAX_REGIONS, MAX_SAMPLES = 100, 200, 200, 500
 
@@ -105,7 +105,9 @@ class SliceRequest(Request):
     q: Vector = Field(description="(n,), where the other joints stay, in radians or metres.", examples=[[0.4, 0.3]])
     x: str = Field(max_length=200, description="Name of the joint of the horizontal axis.", examples=["arm/shoulder"])
     y: str = Field(max_length=200, description="Name of the joint of the vertical axis.", examples=["arm/elbow"])
-    size: Whole = Field(100, ge=8, le=MAX_SIZE, description="Number of squares of the slice in each direction.")
+    size: Annotated[int, Field(ge=8, le=MAX_SIZE), BeforeValidator(integer)] = Field(
+        100, description="Number of squares of the slice in each direction."
+    )
     regions: list[str] | None = Field(
         None,
         max_length=MAX_REGIONS,

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from certifier.outcome import Guarantee, Outcome
 from jobs.certify_path import GivenMotion
-from jobs.fields import SceneName
+from jobs.fields import Flag, SceneName
 from planner.motion.space import Space
 
 
@@ -22,7 +22,7 @@ class MotionRequest(GivenMotion):
     )
 
     scene: SceneName
-    prove: bool = Field(False, description="Whether to answer with the proof file as well.")
+    prove: Flag = Field(False, description="Whether to answer with the proof file as well.")
 
 
 class SceneReference(BaseModel):

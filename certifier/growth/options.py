@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from certifier.errors import RegionError
 from certifier.growth.paper.options import PaperOptions
-from certifier.options import option, read, table
+from certifier.options import option, read
 from certifier.seeding.options import OF_PAPER
 
 MOST_CELLS = 6000
@@ -64,8 +64,7 @@ class GrowthOptions:
     paper: PaperOptions | None = option(
         None,
         "Grow with the papers' algorithm instead: it shrinks the first polytope until every pair has one plane that moves with the joints, "
-        "and then pushes the faces out. `{}` takes all of its defaults.",
-        otherwise="none",
+        "and then pushes the faces out.",
     )
     random_seed: int = option(
         0,
@@ -90,20 +89,18 @@ class GrowthOptions:
         Raises:
             RegionError: an option is unknown or out of range, or does not go with another one; the error names it.
         """
-        options = read(cls, _without_old(document), "options")
+        options = read(cls, document, "options")
         if options.kind not in ("grow", "certify", "recertify"):
             raise RegionError("option_value", "kind must be 'grow', 'certify' or 'recertify'", field="options.kind")
         method, paper = options.seed.get("method"), options.paper
         if paper is None and method in OF_PAPER:
-            hint = "ask for that algorithm with the option paper, or choose another method"
+            hint = "add --paper (`paper` in requests), or choose another method"
             raise RegionError("option_value", f"only the papers' algorithm begins with the method {method}", field="seed.method", hint=hint)
+        for name in ("cells", "stages"):
+            if paper is not None and getattr(options, name) is not None:
+                problem = f"the papers' algorithm has no use for {name}"
+                raise RegionError("option_value", problem, field=f"options.{name}", hint="leave it out")
         if paper is not None and paper.contraction == "uniform" and options.seed.get("contain"):
             message, hint = "uniform contraction does not keep points inside", "leave out the points, or contract otherwise"
             raise RegionError("option_value", message, field="options.paper.contraction", hint=hint)
         return options
-
-
-def _without_old(document: dict[str, Any]) -> dict[str, Any]:
-    """Returns the options without those of the papers' algorithm that jobs of earlier versions name beside the others and do not use."""
-    unused = {one.name: (None, one.default) for one in table(PaperOptions)} | {"contraction": (None, "whole")}
-    return {name: value for name, value in document.items() if name not in unused or value not in unused[name]}

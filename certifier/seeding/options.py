@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Any
 
 from certifier.errors import RegionError
-from certifier.options import option, read
+from certifier.options import option, read, table
 from certifier.positions import check_magnitude
 
 
@@ -26,6 +26,7 @@ class Method(StrEnum):
     """The given C and d are the polytope."""
 
 
+IRIS = (Method.IRIS_NP2, Method.IRIS_ZO)
 OF_PAPER = (Method.LIMITS, Method.BOX)
 """Only the papers' algorithm makes a region of these."""
 _GIVE = {"half_width": "give it in s, such as 0.1: about 11 degrees on each side of a joint near q*"}
@@ -54,7 +55,7 @@ class SeedOptions:
         "(m, n), the first polytope {s : C s <= d}, one row a face, in s; for the method `polytope`, which takes no `q`. The joint limits "
         "are added.",
     )
-    d: tuple[float, ...] | None = option(None, "(m,), the right-hand sides of these faces.")
+    d: tuple[float, ...] | None = option(None, "(m,), the right-hand sides of these faces.", most=2000)
     center: tuple[float, ...] | None = option(None, "(n,), a point inside that polytope, in s.", otherwise="the centre of its largest ball")
     half_width: float | None = option(
         None, "Half the edge length of the first polytope, in s; the method `box` needs it. 0.1 is about 11 degrees of a joint.", above=0
@@ -121,6 +122,10 @@ class SeedOptions:
                 raise _refuse(name, f"the method {method or Method.IRIS_NP2} needs {name}", "missing_option", _GIVE.get(name, "give it"))
         for name in sorted(idle & given):
             raise _refuse(name, f"the method {method or Method.IRIS_NP2} has no use for {name}", hint="leave it out")
+        if method is not None and method not in IRIS:
+            for one in table(SeedOptions):
+                if one.argument.startswith("iris-") and one.name != "random_seed" and getattr(options, one.name) != one.default:
+                    raise _refuse(one.name, f"the method {method} has no use for {one.name}", hint="leave it out")
         for name in ("q", "center"):
             check_magnitude(getattr(options, name) or (), f"seed.{name}")
         for i, row in enumerate(options.contain):

@@ -33,7 +33,7 @@ def check_seed(scene: Scene, q: ArrayLike, field: str = "seed.q") -> Nearest:
     if q.shape != (scene.n,):
         names = ", ".join(joint.name for joint in scene.moving)
         raise RegionError(
-            "seed_wrong_length", f"the seed has {q.size} numbers, the scene {scene.n} joints", field=field, hint=f"in order: {names}"
+            "seed_wrong_length", f"it has {q.size} numbers, the scene {scene.n} joints", field=field, hint=f"in order: {names}"
         )
     check_limits(scene, q, field)
     return check_free(scene, q, field)

@@ -82,6 +82,8 @@ REGIONS: Table = {
     ("option_value", "seed.q"): [lambda t: seeded(q="0,0"), lambda t: seeded(q=["0", "0"])],
     ("option_value", "options.seeds"): [lambda t: CoverOptions.from_document({"seeds": MOST_GIVEN * [[0.0]] + [[0.0]]})],
     ("option_value", "seed.method"): [lambda t: grow(seed={"q": [0.0], "method": "limits"})],
+    ("option_value", "options.stages"): [lambda t: grow(paper={}, stages=2)],
+    ("option_value", "seed.tries"): [lambda t: SeedOptions.from_document({"q": [0.0], "method": "limits", "tries": 3})],
     ("option_value", "options.kind"): [lambda t: grow(kind="shrink")],
     ("option_value", "options.paper.contraction"): [
         lambda t: grow(paper={"contraction": "uniform"}, seed={"q": [0.0], "contain": [[0.1]]})

@@ -55,24 +55,18 @@ def test_bad_options_are_named(document, field):
     assert refusal.value.field == field
 
 
-OLD = {"contraction": None, "contractions": None, "bisection_steps": 6, "pushes": None, "max_rounds": None, "tolerance": 0.02, "backoff": 2}
-
-
-@pytest.mark.parametrize("contraction", [None, "whole"])
-def test_a_job_of_an_older_version_can_be_retried(contraction):
-    document = {"kind": "grow", "seed": {"q": [0.0]}, "cells": 300, "stages": None, **OLD, "contraction": contraction, "random_seed": 3}
-    assert GrowthOptions.from_document(document) == GrowthOptions(seed={"q": [0.0]}, cells=300, random_seed=3)
-
-
 @pytest.mark.parametrize(("name", "value"), [("contraction", "targeted"), ("pushes", 0), ("max_rounds", 2), ("tolerance", 0.1)])
-def test_the_refusal_of_an_older_option_says_where_it_is_now(name, value):
+def test_an_option_of_the_papers_algorithm_at_another_place_is_refused_with_its_own(name, value):
     with pytest.raises(RegionError) as refusal:
-        GrowthOptions.from_document({"seed": {"q": [0.0]}, **OLD, name: value})
-    assert (refusal.value.code, refusal.value.field, refusal.value.hint) == (
-        "unknown_option",
-        f"options.{name}",
-        f"give options.paper.{name}",
-    )
+        GrowthOptions.from_document({"seed": {"q": [0.0]}, name: value})
+    place = (refusal.value.code, refusal.value.field, refusal.value.hint)
+    assert place == ("unknown_option", f"options.{name}", f"give options.paper.{name}")
+
+
+@pytest.mark.parametrize("name", ["cells", "stages"])
+def test_an_option_of_no_use_to_the_papers_algorithm_is_refused(name):
+    with pytest.raises(RegionError, match=f"no use for {name}"):
+        GrowthOptions.from_document({"seed": {"q": [0.0]}, "paper": {}, name: 3})
 
 
 @pytest.mark.parametrize("options", [GrowthOptions(), GrowthOptions(paper=PaperOptions())])
