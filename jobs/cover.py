@@ -86,7 +86,7 @@ class Cover(Kind):
 
     def report(self, session: Session, job: JobRow, state: dict[str, Any] | None) -> Report | CirisError | None:
         known = state or {}
-        if known["closing"] is None and self._is_over(job):
+        if known["closing"] is None and super().is_late(session, job, utcnow()):
             return Late()
         action = job.action or {}
         if action["kind"] == Watch.kind:
@@ -163,9 +163,6 @@ class Cover(Kind):
         known = jobs.growth(session, job.id)
         # A cover of an earlier version may have ended with a state that does not name its options.
         return {} if known is None else said(stored.value(CoverState, {"options": job.options, **known})) or {}
-
-    def _is_over(self, job: JobRow) -> bool:
-        return job.deadline_at is not None and job.deadline_at <= utcnow()
 
 
 def _begin(session: Session, job: JobRow, options: CoverOptions, number: int, task: Task, afterwards: Afterwards) -> None:

@@ -64,7 +64,7 @@ class Growing(Kind):
         action, report = decision.action, turn.report
         if isinstance(report, Outcomes):
             pairs.forget_weaknesses(session, job.id, report.action.iteration)
-        if error := growing.failure(_state(turn.state), report):
+        if isinstance(report, Failed) and (error := growing.failure(_state(turn.state), report)):
             job.error = error.to_document()
         jobs.next_turn(job, _waiting_for(action))
         jobs.keep_growth(session, job, stored.document(decision.state))

@@ -46,9 +46,9 @@ def late(state: GrowthState | None, certified: bool) -> Finish:
     return Finish(Outcome.INCONCLUSIVE, at_deadline("" if state is None or state.start is None else state.start.hindrance))
 
 
-def failure(state: GrowthState | None, report: object) -> CirisError | None:
-    """Returns what has ended a growth in words about what users gave; None where the report is no failure, or a region remains."""
-    if not isinstance(report, Failed) or (state is not None and state.best is not None):
+def failure(state: GrowthState | None, report: Failed) -> CirisError | None:
+    """Returns what has ended a growth in words about what users gave; None where a region remains."""
+    if state is not None and state.best is not None:
         return None
     return report.error if state is None or state.start is None else ended_by(report.error, state.start.hindrance)
 

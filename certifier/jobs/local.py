@@ -110,7 +110,8 @@ class _Memory:
         return _Turn(None if self.action is None else self._carry_out(self.action))
 
     def decide(self, turn: _Turn) -> Transition:
-        self.error = failure(self.state, turn.report) or self.error
+        if isinstance(turn.report, Failed):
+            self.error = failure(self.state, turn.report) or self.error
         return decided(self.scene, self.options, self.state, turn.report)
 
     def save(self, turn: _Turn, decision: Transition | CirisError) -> bool:

@@ -9,7 +9,6 @@ from certifier.model import escaped
 
 SCENE = "path of a scene file, or the name or id of a scene that the service knows"
 OF_ONE = "the id, or its first characters"
-PROOF = "new file for the proof; default: one in this directory, named after scene and proof"
 WATCH = "print a line for every pair when it is decided"
 
 
@@ -52,3 +51,15 @@ def dependents() -> Parser:
         help="also delete its dependents; without this option, the command lists them and deletes nothing if there are any",
     )
     return parser
+
+
+def add_proving(parser: argparse.ArgumentParser, verb: str, out: str) -> None:
+    """Adds the arguments of a command that proves something, in a service or in this process.
+
+    Args:
+        verb: what the command does.
+        out: help text of ``--out``.
+    """
+    parser.add_argument("--out", metavar="FILE", help=out)
+    parser.add_argument("--watch", action="store_true", help=WATCH)
+    parser.add_argument("--local", action="store_true", help=f"{verb} in this process, without a service")

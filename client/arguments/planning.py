@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from typing import Any
 
 from client.arguments.common import SCENE, as_json, remote
@@ -12,13 +13,7 @@ def add(verbs: Any) -> None:
     """Adds the commands."""
     motion = verbs.add_parser("certify-path", parents=[remote(), as_json()], help="certify a motion through waypoints or along a spline")
     motion.add_argument("scene", metavar="SCENE", help=SCENE)
-    motion.add_argument("--q", metavar=JOINTS, action="append", help="a waypoint: joint positions; give it two times or more")
-    motion.add_argument("--path", metavar="FILE", help="npz, JSON, YAML or CSV with waypoints q or s and perhaps times t, or with a spline")
-    motion.add_argument(
-        "--space",
-        choices=["q", "s"],
-        help="coordinates in which the motion is straight, or in which a spline's control points are; default: those given; q for a spline",
-    )
+    _add_curve(motion, "those given; q for a spline")
     motion.add_argument("--tube", action="store_true", help="search for the largest certified tube about the motion")
     motion.add_argument(
         "--clearance",
@@ -42,17 +37,14 @@ def add(verbs: Any) -> None:
     motion.add_argument("--out", metavar="FILE", help="new file for the proof; default: none")
     motion.set_defaults(run="client.motion:certify_path")
 
-    contains = verbs.add_parser("contains", parents=[remote(), as_json()], help="show which certified regions contain a configuration")
-    contains.add_argument("scene", metavar="SCENE", help=SCENE)
-    contains.add_argument("--q", metavar=JOINTS, required=True, action="append", help="joint positions; may be repeated")
-    contains.set_defaults(run="client.commands:contains")
-
-    near = verbs.add_parser(
-        "nearest", parents=[remote(), as_json()], help="show which certified region is nearest to a configuration, and how far it is"
-    )
-    near.add_argument("scene", metavar="SCENE", help=SCENE)
-    near.add_argument("--q", metavar=JOINTS, required=True, action="append", help="joint positions; may be repeated")
-    near.set_defaults(run="client.planning:nearest")
+    for verb, run, help_text in (
+        ("contains", "client.commands:contains", "show which certified regions contain a configuration"),
+        ("nearest", "client.planning:nearest", "show which certified region is nearest to a configuration, and how far it is"),
+    ):
+        about_points = verbs.add_parser(verb, parents=[remote(), as_json()], help=help_text)
+        about_points.add_argument("scene", metavar="SCENE", help=SCENE)
+        about_points.add_argument("--q", metavar=JOINTS, required=True, action="append", help="joint positions; may be repeated")
+        about_points.set_defaults(run=run)
 
     plan = verbs.add_parser(
         "plan",
@@ -77,15 +69,24 @@ def add(verbs: Any) -> None:
 
     path = verbs.add_parser("path", parents=[remote(), as_json()], help="decide whether every point of a path is in certified regions")
     path.add_argument("scene", metavar="SCENE", help=SCENE)
-    path.add_argument("--q", metavar=JOINTS, action="append", help="a waypoint, joint positions; give two or more")
-    path.add_argument("--path", metavar="FILE", help="npz, JSON, YAML or CSV with waypoints q or s and perhaps times t, or with a spline")
-    path.add_argument(
-        "--space",
-        choices=["q", "s"],
-        help="coordinates in which the motion is straight, or in which a spline's control points are; default: q",
-    )
+    _add_curve(path, "q")
     path.set_defaults(run="client.planning:path")
 
     graph = verbs.add_parser("graph", parents=[remote(), as_json()], help="show which regions of a scene overlap, and where gaps are")
     graph.add_argument("scene", metavar="SCENE", help=SCENE)
     graph.set_defaults(run="client.planning:graph")
+
+
+def _add_curve(parser: argparse.ArgumentParser, space: str) -> None:
+    """Adds the arguments that give a motion.
+
+    Args:
+        space: the default of ``--space``, in words.
+    """
+    parser.add_argument("--q", metavar=JOINTS, action="append", help="a waypoint: joint positions; give it two times or more")
+    parser.add_argument("--path", metavar="FILE", help="npz, JSON, YAML or CSV with waypoints q or s and perhaps times t, or with a spline")
+    parser.add_argument(
+        "--space",
+        choices=["q", "s"],
+        help=f"coordinates in which the motion is straight, or in which a spline's control points are; default: {space}",
+    )

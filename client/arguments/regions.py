@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from client.arguments.common import OF_ONE, PROOF, SCENE, WATCH, as_json, group, remote
+from client.arguments.common import OF_ONE, SCENE, add_proving, as_json, group, remote
 from client.options import CERTIFY, COVER, GROW, JOINTS, RECERTIFY, SEED, about, add_options
+
+PROOF = "new file for the proof; default: one in this directory, named after scene and proof"
 
 
 def add(verbs: Any) -> None:
@@ -21,9 +23,7 @@ def add(verbs: Any) -> None:
         "may be repeated: the service then grows one region for each seed, all at the same time",
     )
     add_options(grow, GROW)
-    grow.add_argument("--out", metavar="FILE", help=PROOF)
-    grow.add_argument("--watch", action="store_true", help=WATCH)
-    grow.add_argument("--local", action="store_true", help="grow in this process, without a service")
+    add_proving(grow, "grow", PROOF)
     grow.set_defaults(run="client.commands:grow")
 
     again = verbs.add_parser(
@@ -40,9 +40,7 @@ def add(verbs: Any) -> None:
         "default: the interior point that the proof names. The service keeps the seed inside",
     )
     add_options(again, RECERTIFY)
-    again.add_argument("--out", metavar="FILE", help=PROOF)
-    again.add_argument("--watch", action="store_true", help=WATCH)
-    again.add_argument("--local", action="store_true", help="certify in this process, without a service")
+    add_proving(again, "certify", PROOF)
     again.set_defaults(run="client.recertify:recertify")
 
     cover = verbs.add_parser(
@@ -65,9 +63,7 @@ def add(verbs: Any) -> None:
         help="npz, JSON or YAML with C (m x n), d (m) and optionally center (n), in s; ciris adds the joint limits",
     )
     add_options(certify, CERTIFY)
-    certify.add_argument("--watch", action="store_true", help=WATCH)
-    certify.add_argument("--local", action="store_true", help="certify in this process, without a service")
-    certify.add_argument("--out", metavar="FILE", help="new file for the proof, if the polytope is certified; default: none")
+    add_proving(certify, "certify", "new file for the proof, if the polytope is certified; default: none")
     certify.add_argument("--backend", choices=["ciris", "drake"], default="ciris", help="drake asks Drake's own program, as a cross-check")
     certify.add_argument("--solver", metavar="NAME", help="solver that Drake uses: clarabel (default), scs, csdp or mosek")
     certify.set_defaults(run="client.commands:certify")

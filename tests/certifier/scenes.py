@@ -104,7 +104,7 @@ def random_tree(seed, kinds=(JointKind.REVOLUTE, JointKind.PRISMATIC, JointKind.
 
 
 def crowded(count=1000):
-    """The arm of one link, with so many balls welded to the link and to the world each."""
+    """Returns the arm of one link, with ``count`` balls welded to the link and ``count`` balls welded to the world."""
     scene = planar_arm(1)
     places = [(body, f"{body}/{i}") for body in ("arm/link1", WORLD) for i in range(count)]
     welds = tuple(Joint(f"{name}/weld", JointKind.WELD, body, name, np.zeros(3), pose(), pose()) for body, name in places)

@@ -365,7 +365,7 @@ def test_a_region_of_an_example_is_verified_contains_what_it_has_to_and_is_free(
 
 @cache
 def three_stages():
-    """A scene, options that come to a region in three stages, and the region."""
+    """Returns a scene, options, and the region that they give. The region grows in three stages."""
     _, scene, q = example("planar_2dof")
     asked = GrowthOptions(seed=box_seed(scene.to_s(q), 0.22), cells=SLICE)
     region = grow(scene, asked)
