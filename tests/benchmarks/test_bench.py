@@ -51,6 +51,7 @@ def test_pairs_are_chosen_by_name_and_cost() -> None:
     assert all("link_5" in f"{task.scene.pairs[i].a} {task.scene.pairs[i].b}" for i in task.indices)
 
 
+@pytest.mark.slow
 def test_a_way_to_grow_is_a_row_with_its_region(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(growth, "WAYS", {"pushes": PaperOptions(max_rounds=0)})
     document = growth.growth(["planar_2dof"], against=False, limit=growth.LIMIT, progress=lambda _: None)
@@ -160,6 +161,7 @@ def test_the_store_is_measured_on_both_databases(postgres: Postgres) -> None:
         assert row["database"] in report.text(document)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("database", ["SQLite", pytest.param("PostgreSQL", marks=pytest.mark.slow)])
 def test_a_fleet_is_measured(database: str, request: pytest.FixtureRequest) -> None:
     """Twenty workers hold pieces of 50 ms: no more than 400 a second can be done, and more than one by one."""

@@ -29,6 +29,7 @@ def test_a_robot_is_drafted_with_a_free_seed(name: str, joints: int, pairs: int,
     assert drafted.seed is not None
 
 
+@pytest.mark.slow
 def test_a_row_says_how_long_each_command_took(monkeypatch: pytest.MonkeyPatch) -> None:
     """A robot of one joint, so that it is quick."""
     monkeypatch.setattr(models, "ROBOTS", {"small": lambda _: SMALL, "broken": lambda _: "<link/>"})

@@ -40,6 +40,7 @@ def run(machine: dict[str, str], *arguments: object, **variables: str) -> Done:
     return Done(done.returncode, done.stdout, done.stderr.decode())
 
 
+@pytest.mark.slow
 def test_no_secret_is_in_any_log(machine: dict[str, str], tmp_path: Path) -> None:
     refused = run(machine, "up", "--port", "0")
     assert (refused.status, "no API key has been made" in refused.stderr) == (2, True)

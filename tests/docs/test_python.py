@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tests.client.conftest import ROOT, surroundings
 from tests.docs.test_quickstart import BLOCK, service
@@ -32,6 +33,7 @@ def test_editors_find_nothing_wrong_with_the_programs(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.slow
 def test_every_program_of_the_page_works_as_it_stands(tmp_path: Path) -> None:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     environment = surroundings(CIRIS_DATA_DIR=str(tmp_path / "data"), PATH=path)

@@ -34,7 +34,7 @@ def free_region(name, options, deadline_s=None, processes=1):
 
 
 @pytest.mark.parametrize("paper", [None, PaperOptions(max_rounds=1)], ids=["by cells", "paper"])
-@pytest.mark.parametrize("name", ["planar_2dof", "arm_3dof"])
+@pytest.mark.parametrize("name", ["planar_2dof", pytest.param("arm_3dof", marks=pytest.mark.slow)])
 def test_no_sample_of_a_grown_region_collides(name, paper):
     free_region(name, {"paper": paper})
 

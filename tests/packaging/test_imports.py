@@ -77,6 +77,7 @@ def ciris(bare: dict[str, str], *arguments: object) -> "subprocess.CompletedProc
     return subprocess.run(command, cwd=ROOT, env=bare, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_every_proof_is_checked_where_only_numpy_and_flint_are_installed(tmp_path: Path, bare: dict[str, str]) -> None:
     words = {
         "region": "6 pairs of bodies separated",

@@ -10,6 +10,8 @@ import sys
 from functools import partial
 from pathlib import Path
 
+import pytest
+
 from tests.services import Queue
 from tests.workers.service import ROOT, environment, eventually
 from workers.app import SOLVE, celery_app, send_work, waiting
@@ -34,6 +36,7 @@ main()
 """A worker. All of its processes but the first need longer to start than the four seconds that Celery gives them by default."""
 
 
+@pytest.mark.slow
 def test_a_process_that_starts_slowly_is_not_killed(sqlite_url: str, own_queue: Queue, tmp_path: Path) -> None:
     log, started = tmp_path / "solve.log", tmp_path / "started"
     started.mkdir()

@@ -75,7 +75,7 @@ def check_rows(job_id: str) -> None:
             verify_region(proofs.get(session, region.proof_digest))
 
 
-@pytest.mark.lengthy
+@pytest.mark.slow
 def test_regions_come_to_cover_a_scene_and_each_is_proved(planar: Scene) -> None:
     job = ended(cover(planar, coverage=0.75, connected=True))
     assert (job.state, job.outcome, job.error, job.reason) == ("succeeded", "certified", None, "the goals are reached")
@@ -103,7 +103,7 @@ def test_configurations_are_connected(planar: Scene) -> None:
     assert known(job.id)["connect"] == [0, 0]
 
 
-@pytest.mark.lengthy
+@pytest.mark.slow
 def test_it_goes_on_when_workers_die_between_its_regions(planar: Scene, service: Service) -> None:
     """The process that looks is killed, then the control worker, then all solving processes, when a region has just ended."""
     job_id = cover(planar, coverage=0.7)
@@ -157,6 +157,7 @@ def test_the_deadline_ends_it_and_what_grows(planar: Scene) -> None:
     check_rows(job.id)
 
 
+@pytest.mark.lengthy
 def test_a_configuration_in_collision_is_refused(planar: Scene) -> None:
     rng = np.random.default_rng(0)
     q = rng.uniform(planar.q_lower, planar.q_upper, (500, planar.n))

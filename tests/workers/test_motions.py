@@ -88,6 +88,7 @@ def test_a_motion_is_certified_as_by_a_plain_call_and_its_proof_holds(client: Te
     assert told == [("motion", "open"), ("motion", "done")]
 
 
+@pytest.mark.lengthy
 def test_a_contact_is_an_answer(client: TestClient) -> None:
     job = ended(asked(client, swing(-0.01), s=[[-0.5], [0.6]], space="q"))
     assert (job.state, job.outcome, job.error) == ("succeeded", "refuted", None)
@@ -118,6 +119,7 @@ def test_another_worker_begins_again_when_one_is_killed(client: TestClient, plan
     assert verify_file(client.get(f"/v1/jobs/{job_id}/motion/proof").content).kind == "motion"
 
 
+@pytest.mark.lengthy
 def test_cancelling_ends_the_search(client: TestClient, planar: Scene) -> None:
     def cancelled(job_id: str) -> JobRow:
         running(job_id)

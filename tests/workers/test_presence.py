@@ -100,6 +100,7 @@ def test_a_paused_worker_takes_nothing_and_loses_no_message(crew: Service, plana
     seen(crew, "solve")
 
 
+@pytest.mark.slow
 def test_what_a_paused_worker_leaves_the_others_do(crew: Service, planar: Scene) -> None:
     crew.start("solve-2")
     seen(crew, "solve-2")
@@ -128,6 +129,7 @@ def test_a_drained_worker_finishes_what_it_holds_and_ends_well(crew: Service, ar
     assert not [event for event in events_of(job) if event.kind == "lost"], "nothing was taken from anybody"
 
 
+@pytest.mark.slow
 def test_processes_that_die_are_replaced_while_the_worker_tells_of_itself(crew: Service, planar: Scene) -> None:
     """Each is forked anew from a process with a thread that uses the database."""
     for round in range(3):

@@ -79,7 +79,7 @@ def certified_pairs(manifest: dict[str, Any]) -> list[tuple[Any, ...]]:
     return [tuple(pair[name] for name in ("a", "b", "outcome", "margin", "proof_digest")) for pair in manifest["pairs"]]
 
 
-@pytest.mark.lengthy
+@pytest.mark.slow
 def test_a_whole_region_is_the_same_when_workers_die_between_its_rounds(planar: Scene, service: Service) -> None:
     """What a dead process had begun is gone on with from where the round before left it."""
     options = grow_box(planar.to_s(SEED), 0.4, cells=600)
@@ -108,6 +108,7 @@ def test_a_whole_region_is_the_same_when_workers_die_between_its_rounds(planar: 
     assert certified_pairs(manifest) == certified_pairs(alone)
 
 
+@pytest.mark.lengthy
 def test_the_workers_say_that_they_are_alive() -> None:
     file = settings().heartbeat_file
     assert file is not None

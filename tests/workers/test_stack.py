@@ -158,7 +158,9 @@ def begin_a_job(stack: Stack) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc tells who is whose child")
-@pytest.mark.parametrize("loading", [True, False], ids=["while nurseries load", "while nurseries work"])
+@pytest.mark.parametrize(
+    "loading", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["while nurseries load", "while nurseries work"]
+)
 def test_nothing_outlives_a_supervisor_that_is_killed(stack: Stack, loading: bool) -> None:
     begin_a_job(stack)
     solve = stack.description["pids"]["solve"]

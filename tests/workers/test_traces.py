@@ -160,6 +160,7 @@ def test_one_trace_has_the_way_from_the_request_to_the_proof_and_a_caller_who_do
     assert not {span.name for _, span in collector.spans} & {"GET /healthz"}
 
 
+@pytest.mark.slow
 def test_a_collector_that_is_away_disturbs_nothing(database_url: str, own_queue: Queue, tmp_path: Path) -> None:
     with traced_service(database_url, own_queue, tmp_path, f"http://127.0.0.1:{free_port()}") as (service, client):
         made = post(client, a_job(client))

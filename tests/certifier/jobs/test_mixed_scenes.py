@@ -42,7 +42,7 @@ def test_scenes_with_joints_of_every_kind(seed):
     answer(*with_seed(rng, int(rng.integers(2, 8))), DEADLINE)
 
 
-@pytest.mark.parametrize("length", [1e3, 1e9])
+@pytest.mark.parametrize("length", [pytest.param(1e3, marks=pytest.mark.slow), 1e9])
 def test_a_slide_far_longer_than_the_robot_is_named(length):
     """Bodies metres apart count as touching beside a slide of a kilometre, and samples of the polytope ran out, with warnings."""
     scene = planar_arm(2)

@@ -281,6 +281,7 @@ def test_a_pair_of_two_chains_that_touches_is_refuted():
     assert result.outcome is Outcome.REFUTED, result
 
 
+@pytest.mark.slow
 def test_cells_are_not_cut_for_ever_in_joints_in_which_they_are_narrow(monkeypatch):
     """A ball about links 6 and 7 touches a board which link 7's own ball, 22 mm away, does not. It hardly moves with joint 6, which is wide
     in all cells, so cutting the other joints for it does not end."""

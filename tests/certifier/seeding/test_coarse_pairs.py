@@ -67,6 +67,7 @@ def test_nothing_joins_where_growth_parts_the_geometries_themselves(name):
     assert coarse_pairs_of(scene, scene.polytope(*catalogue.cube(seed, 0.2)), seed[None]) == {}
 
 
+@pytest.mark.slow
 def test_a_proposal_keeps_clear_of_what_growth_will_part(monkeypatch):
     """Where IRIS knows the balls, they touch in less of its polytope, and of what is likely to be kept there is no less."""
     scene, q = catalogue.scene("iiwa_shelf"), tuple(catalogue.seed("iiwa_shelf"))

@@ -92,6 +92,7 @@ def test_every_try_has_a_random_seed_of_its_own(monkeypatch, random_seed):
     assert of_tries(monkeypatch, found, 3, random_seed)[1] == asked[:3]
 
 
+@pytest.mark.slow
 def test_the_tries_of_an_arm():
     """On arm_3dof more tries come to no less, and the account names the random seed that comes to the same faces by itself."""
     scene, q = catalogue.scene("arm_3dof"), tuple(catalogue.seed("arm_3dof"))

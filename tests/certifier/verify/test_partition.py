@@ -107,6 +107,7 @@ COARSE = ("ball", "capsule", "both", "second", "below", "several", "beyond")
 NAMES = (*COARSE, "cells", "tip", "band", "corners", "inside", "slides", "arms", "wide")
 
 
+@pytest.mark.slow
 def test_the_proofs_choose_every_combination_of_volumes():
     chosen = {name: set(proof(name).choices.tolist()) for name in NAMES}
     assert set().union(*(chosen[name] for name in NAMES if name != "several")) == {0, 1, 3}
