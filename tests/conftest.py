@@ -17,6 +17,12 @@ settings.load_profile("ciris")
 
 pytest_plugins = ["tests.services", "tests.skips"]
 
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Many tests wait for processes, so there is one more of pytest than there are cores."""
+    return len(os.sched_getaffinity(0)) + 1
+
+
 ROOMS = Path(__file__).parent
 FIRST = ("workers", "client", "docs", "benchmarks")
 """Rooms whose tests wait for processes. Their files come first, so that short ones fill the end of a run in parallel."""

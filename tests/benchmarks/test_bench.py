@@ -288,6 +288,7 @@ def test_the_page_shows_the_figures_that_lie_beside_it() -> None:
     assert page == report.page(page)
 
 
+@pytest.mark.slow
 def test_motions_are_measured_beside_sampling() -> None:
     document = bench("path", "planar_2dof", "--motions", "4")
     (row,) = document["rows"]

@@ -195,6 +195,7 @@ def test_growing_here_says_what_happens(ciris: Ciris) -> None:
     assert "  1/" in watched
 
 
+@pytest.mark.slow
 def test_who_interrupts_growing_has_the_best_region_so_far(tmp_path: Path) -> None:
     scene, out = ROOT / "examples" / "ur3e_bin" / "scene.yaml", tmp_path / "so_far.proof"
     growing = subprocess.Popen(

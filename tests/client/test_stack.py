@@ -73,6 +73,7 @@ def test_a_region_is_grown_and_its_proof_holds_offline(machine: Machine) -> None
     assert f"hash {manifest['scene']['hash']}" in verified.stdout
 
 
+@pytest.mark.slow
 def test_several_seeds_grow_at_once_and_each_says_what_became_of_it(machine: Machine) -> None:
     seeds = ("--q", "0.0,0.1", "--q", "-1.2,1.0", "--q", "0.05,-0.05", "--contain", "0.02,0.02")
     done = machine.ciris("grow", PLANAR, *seeds, "--paper", "--method", "box", "--half-width", "0.001", "--pushes", "1", "--rounds", "0")

@@ -97,6 +97,7 @@ def test_no_command_but_up_makes_a_database(tmp_path: Path, words: tuple[str, ..
     assert not data.exists()
 
 
+@pytest.mark.slow
 def test_the_command_passes_limits_on(tmp_path: Path) -> None:
     migrate.upgrade(Settings(data_dir=tmp_path, database_url="").database)
     for words in (("add", "welding"), ("set", "welding", "--keep-days", "7")):

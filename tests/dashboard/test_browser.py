@@ -118,7 +118,7 @@ def test_axe_finds_no_barrier(page: Any, url: str, region: str, barriers: Any, p
     assert barriers(page) == []
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_no_page_is_wider_than_a_phone(browser: Any, url: str, region: str, scheme: str) -> None:
     context = browser.new_context(**PHONE, color_scheme=scheme)
     page = context.new_page()

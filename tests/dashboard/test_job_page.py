@@ -239,7 +239,7 @@ def test_a_service_that_does_not_answer_is_asked_again(browser: Any, url: str, j
 
 
 @pytest.mark.parametrize("screen", [PHONE, DESK], ids=["phone", "desk"])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_no_barriers_and_no_sideways_scrolling(
     browser: Any, url: str, job_id: str, barriers: Any, scheme: str, screen: dict[str, Any]
 ) -> None:

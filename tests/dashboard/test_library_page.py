@@ -128,7 +128,7 @@ def test_scenes_are_listed_with_their_regions(page: Any, url: str, regions: list
     page.get_by_text("Connected regions").wait_for()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_nothing_keeps_people_out(browser: Any, url: str, regions: list[str], barriers: Any, scheme: str) -> None:
     context = browser.new_context(viewport={"width": 390, "height": 844}, color_scheme=scheme)
     page = context.new_page()

@@ -197,7 +197,7 @@ def test_what_is_wrong_with_an_option_is_said_at_its_field(opened: Any, client: 
     assert jobs(client) == []
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_nothing_keeps_people_out(browser: Any, url: str, planar: Scene, barriers: Any, scheme: str) -> None:
     context = browser.new_context(viewport={"width": 390, "height": 844}, color_scheme=scheme)
     page = context.new_page()

@@ -120,7 +120,7 @@ def test_the_cells_of_a_pair_are_drawn_over_the_slice(opened: Any, planar: Scene
     assert opened.locator(".key-map.cells").count() == 1
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_nothing_keeps_people_out(browser: Any, url: str, planar_region: str, barriers: Any, scheme: str) -> None:
     context = browser.new_context(viewport={"width": 390, "height": 844}, color_scheme=scheme, reduced_motion="reduce")
     page = context.new_page()

@@ -98,7 +98,7 @@ WITHOUT_SHRINKING = (Phase.reuse, Phase.generate)
 """Making a failing example as short as can be takes minutes here."""
 
 
-@settings(max_examples=20, phases=WITHOUT_SHRINKING, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
+@settings(max_examples=10, phases=WITHOUT_SHRINKING, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(data=st.data(), pair_count=st.integers(1, 12), failures=st.sampled_from([None, 1, 2]))
 def test_counts_are_true_and_an_iteration_ends_once(db: Database, data: st.DataObject, pair_count: int, failures: int | None) -> None:
     log = Log(db, pair_count, failures)

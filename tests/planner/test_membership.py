@@ -64,6 +64,7 @@ def test_a_point_without_coordinates_is_outside_of_everything() -> None:
     assert set(found.point.tolist()) == {0}
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 2**32 - 1), steps=st.lists(st.tuples(st.sampled_from([0, 1, 40]), st.integers(0, 3)), max_size=4))
 def test_a_library_that_changed_again_and_again_is_like_a_new_one(seed: int, steps: list[tuple[int, int]]) -> None:
     """And the versions before stay as they were."""

@@ -16,6 +16,7 @@ from workers.app import send_coordinate, send_work
 pytestmark = [pytest.mark.usefixtures("service"), pytest.mark.parametrize("service", ["sqlite"], indirect=True)]
 
 
+@pytest.mark.slow
 def test_a_seed_in_collision_fails_the_job_and_says_which_pair(planar: Scene) -> None:
     job = ended(submit(planar, {"kind": "grow", "seed": {"q": [0.74, 0.0]}}))
     assert job.state == "failed"

@@ -64,6 +64,7 @@ def unacknowledged() -> int:
         return int(connection.default_channel.client.hlen("unacked"))
 
 
+@pytest.mark.slow
 def test_workers_say_what_they_are_and_leave(crew: Service) -> None:
     solve, control = seen(crew, "solve"), seen(crew, "control")
     assert (solve.kind, solve.processes, solve.cores) == ("solve", 2, machine.cores())
@@ -80,6 +81,7 @@ def test_a_worker_that_was_killed_is_forgotten(crew: Service) -> None:
     assert row_of(crew, "control") is not None
 
 
+@pytest.mark.slow
 def test_a_paused_worker_takes_nothing_and_loses_no_message(crew: Service, planar: Scene) -> None:
     ask(crew, "solve", WorkerState.PAUSED)
     seen(crew, "solve", WorkerState.PAUSED)

@@ -46,7 +46,7 @@ def grown() -> tuple[RegionRow, bytes]:
     return region_of(job.region_id or "")
 
 
-@pytest.mark.lengthy
+@pytest.mark.slow
 def test_a_region_of_a_changed_scene_is_the_same_by_the_service_and_without_it(grown: tuple[RegionRow, bytes]) -> None:
     row, proof = grown
     changed = moved((1.6, 0.8, 0.0))

@@ -119,6 +119,7 @@ def attributes(span: Span) -> dict[str, Any]:
     return {field.key: getattr(field.value, field.value.WhichOneof("value")) for field in span.attributes}
 
 
+@pytest.mark.slow
 def test_one_trace_has_the_way_from_the_request_to_the_proof_and_a_caller_who_does_not_sample_has_none(
     database_url: str, own_queue: Queue, tmp_path: Path, collector: Collector
 ) -> None:

@@ -131,6 +131,7 @@ def test_faces_of_the_polytope_are_what_proves_where_the_cell_alone_is_too_large
     assert needed >= 3
 
 
+@pytest.mark.slow
 def test_with_too_few_pieces_the_answer_is_a_joint():
     few = [Problem(seed).result(1) for seed in range(40)]
     many = [Problem(seed).result(200) for seed in range(40)]

@@ -125,6 +125,7 @@ def test_a_refinement_that_would_lose_a_point_is_left_out(monkeypatch):
     assert collisions(scene, C, d)[0] > 0.002
 
 
+@pytest.mark.slow
 def test_the_number_of_threads_changes_nothing():
     """The service seeds on one thread and ``--local`` on all cores."""
     code = "from tests.certifier.seeding.test_iris import printed; printed()"

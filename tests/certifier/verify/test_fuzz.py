@@ -44,7 +44,7 @@ from tests.certifier.truth import distances, distances_at
 from tests.certifier.verify.hostile import FAMILIES, HOSTILE, KINDS, bytes_changed, members, mutants, text_of, valid, zip_changed, zipped
 
 SECONDS_A_CASE, MEMORY_BYTES = 20.0, 1 << 30
-EXAMPLES, BUNDLES = 150, 30
+EXAMPLES, BUNDLES = 80, 20
 LONG_SECONDS = float(os.environ.get("CIRIS_FUZZ_SECONDS", "3600"))
 EXAMPLE = Path(__file__).parents[3] / "examples" / "planar_2dof" / "scene.yaml"
 
