@@ -40,7 +40,8 @@ PLACES = {
 """What may be wrong with a parameter, or a field of the body, of this name."""
 CHILDREN = ("busy", "child_timeout", "child_memory", "child_died")
 ALSO: dict[str, tuple[str, ...]] = {
-    "create_scene": ("bundle_too_large", "storage_quota", "bad_bundle", *CHILDREN),
+    "create_scene": ("bundle_too_large", "storage_quota", "bad_bundle", "scene_not_found", "scene_unchanged", *CHILDREN),
+    "promote_scene": ("scene_not_found", "scene_without_regions", "busy"),
     "delete_scene": ("has_dependents", "not_ended", "busy"),
     "create_job": ("idempotency_conflict", "quota_exceeded", "storage_quota", "region_not_found", "busy"),
     "create_jobs": ("scene_not_found", "region_not_found", "idempotency_conflict", "quota_exceeded", "storage_quota", "busy"),

@@ -43,7 +43,10 @@ _STATUS_OF_CODE = {
     ),
     "idempotency_conflict": HTTPStatus.CONFLICT,
     "job_not_retryable": HTTPStatus.CONFLICT,
-    **dict.fromkeys(("first_key", "has_dependents", "not_ended", "webhook_waits", "worker_draining"), HTTPStatus.CONFLICT),
+    **dict.fromkeys(
+        ("first_key", "has_dependents", "not_ended", "webhook_waits", "worker_draining", "scene_unchanged", "scene_without_regions"),
+        HTTPStatus.CONFLICT,
+    ),
     **dict.fromkeys(("storage_quota", "workers_shared"), HTTPStatus.FORBIDDEN),
     "ambiguous_id": HTTPStatus.CONFLICT,
     "too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,

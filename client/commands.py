@@ -56,8 +56,8 @@ def scene_ls(args: Namespace) -> int:
     if args.json:
         print_json(scenes)
     else:
-        rows = [(s["id"], s["name"], str(s["joints"]), str(s["geometries"]), str(s["pairs"])) for s in scenes]
-        output.print_table(("id", "name", "joints", "geometries", "pairs"), rows, right="joints geometries pairs")
+        rows = [(s["id"], s["name"], ", ".join(s["names"]), str(s["joints"]), str(s["geometries"]), str(s["pairs"])) for s in scenes]
+        output.print_table(("id", "name", "meant by", "joints", "geometries", "pairs"), rows, right="joints geometries pairs")
     return OK
 
 

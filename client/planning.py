@@ -93,11 +93,7 @@ def path(args: Namespace) -> int:
 def graph(args: Namespace) -> int:
     screen = Screen()
     with service.connect(args.url) as client:
-        scene = service.known_scene(client, args.scene)["id"]
-        answer = client.graph(scene)
-        while not answer["complete"]:
-            screen.status(f"comparing regions: {len(answer['edges'])} overlaps so far")
-            answer = client.graph(scene)
+        answer = service.graph(client, service.known_scene(client, args.scene)["id"], screen)
     screen.clear()
     if args.json:
         print_json(answer)

@@ -94,6 +94,15 @@ def run(client: Client, request: Document, screen: Screen) -> Document:
     return job
 
 
+def graph(client: Client, scene: str, screen: Screen) -> Document:
+    """Returns which regions of a scene overlap, once the service has compared them all."""
+    answer = client.graph(scene)
+    while not answer["complete"]:
+        screen.status(f"comparing regions: {len(answer['edges'])} overlaps so far")
+        answer = client.graph(scene)
+    return answer
+
+
 def certify(client: Client, scene: Document, given: PolytopeFile, asked: Document, screen: Screen, watch: bool = False) -> Document:
     """Makes the service certify a polytope, and returns the document of ``ciris certify --json``.
 

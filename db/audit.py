@@ -1,4 +1,4 @@
-"""The audit log says who changed keys and limits, deleted what, and paused or drained workers.
+"""The audit log says who changed keys and limits, promoted scenes, deleted what, and paused or drained workers.
 
 It is written with the change, in the same transaction.
 """
@@ -26,6 +26,7 @@ class Action(StrEnum):
     LIMITS_SET = "limits_set"
     KEY_MADE = "key_made"
     KEY_REVOKED = "key_revoked"
+    SCENE_PROMOTED = "scene_promoted"
     SCENE_DELETED = "scene_deleted"
     JOB_DELETED = "job_deleted"
     REGION_DELETED = "region_deleted"

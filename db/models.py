@@ -66,7 +66,7 @@ class SceneRow(Owned, Base):
     id: Mapped[str] = mapped_column(String(64), primary_key=True)
     """What db.scenes makes of the hash and the project."""
     name: Mapped[str]
-    """The name that it was last added under. Another scene may have been added under that name since."""
+    """The name that it was last added or staged under. That name may mean another scene."""
     hash: Mapped[str] = mapped_column(String(64))
     document: Mapped[Document]
     """The document that certifier.model.Scene.to_document() returns."""
@@ -74,7 +74,7 @@ class SceneRow(Owned, Base):
 
 
 class SceneNameRow(Owned, Base):
-    """A version of a name in a project. The name means the scene of its last version."""
+    """A version of a name in a project. The name means the scene of its last version. ``NAME@staged`` is a name, too (db.staging)."""
 
     __tablename__ = "scene_names"
 
@@ -124,7 +124,10 @@ class ApiKeyRow(Owned, Base):
 
 
 class AuditRow(Owned, Base):
-    """This row says who changed what a project's people rely on: a key, a limit, something that was deleted. Nobody changes such a row."""
+    """This row says who changed what a project's people rely on: a key, a limit, what a name means, something that was deleted.
+
+    Nobody changes such a row.
+    """
 
     __tablename__ = "audit"
     __table_args__ = (Index(None, "project", "created_at", "id"),)

@@ -20,10 +20,35 @@ from db.session import Database, insert_new, project_of
 ID_LENGTH = 16
 SUGGESTED_AMONG = 1000
 """Names are suggested among those of this many scenes, the newest."""
+STAGED = "@staged"
+"""A name with this behind it means the scene that is staged as the next version of the name (db.staging)."""
 
 
 def add(session: Session, scene: Scene) -> SceneRow:
     """Returns the row of this scene in the session's project, or in the default one. Its name means the scene from now on.
+
+    Raises:
+        SceneError: scene_name.
+    """
+    check_not_staged(scene.name, "name")
+    row = stored(session, scene)
+    mean(session, row.project, scene.name, row.id)
+    return row
+
+
+def check_not_staged(name: str, field: str) -> None:
+    """Refuses a name that only a staged scene has.
+
+    Raises:
+        SceneError: scene_name.
+    """
+    if name.endswith(STAGED):
+        hint = f"leave {STAGED} out: `ciris scene stage NAME FILE` gives such a name"
+        raise SceneError("scene_name", f"{name!r} is the name of a staged scene only", field=field, hint=hint)
+
+
+def stored(session: Session, scene: Scene) -> SceneRow:
+    """Returns the row of this scene in the session's project, or in the default one. What its name means stays as it is.
 
     It makes the row if no scene of the project has the same content.
     """
@@ -35,12 +60,11 @@ def add(session: Session, scene: Scene) -> SceneRow:
         row = session.scalar(select(SceneRow).where(SceneRow.project == project, SceneRow.hash == scene.hash))
         if row is not None:
             row.name = scene.name
-            _name(session, project, scene.name, row.id)
             return row
     raise AssertionError("all of a hash can only be taken by the scene that has it")
 
 
-def _name(session: Session, project: str, name: str, scene_id: str) -> None:
+def mean(session: Session, project: str, name: str, scene_id: str) -> None:
     """Makes the name mean this scene. An addition that is overtaken by another one under the name comes after it."""
     versions = select(SceneNameRow.version, SceneNameRow.scene_id).where(SceneNameRow.project == project, SceneNameRow.name == name)
     while True:
@@ -69,6 +93,11 @@ def names(session: Session, scene_ids: Sequence[str]) -> dict[str, list[str]]:
     return found
 
 
+def meaning(session: Session, name: str) -> str | None:
+    """Returns the id of the scene that a name means; None where there is no such name."""
+    return session.scalar(select(SceneNameRow.scene_id).where(SceneNameRow.name == name).order_by(SceneNameRow.version.desc()).limit(1))
+
+
 def find(session: Session, name: str) -> str:
     """Returns the id of the scene with this id, or else of the one that the name means, or else the only id that begins like this.
 
@@ -78,11 +107,13 @@ def find(session: Session, name: str) -> str:
         SceneError: scene_not_found, with the names that are most like it.
         CirisError: ambiguous_id.
     """
-    versions = select(SceneNameRow.scene_id).where(SceneNameRow.name == name).order_by(SceneNameRow.version.desc()).limit(1)
-    found = session.scalar(select(SceneRow.id).where(SceneRow.id == name)) or session.scalar(versions)
+    found = session.scalar(select(SceneRow.id).where(SceneRow.id == name)) or meaning(session, name)
     if found is not None:
         return found
     longer = expanded(session, SceneRow.id, name)
+    if longer == name and name.endswith(STAGED):
+        message = f"nothing is staged as the next version of {name.removesuffix(STAGED)!r}"
+        raise SceneError("scene_not_found", message, field="scene", hint="`ciris scene stage NAME FILE` stages a scene")
     if longer == name:
         known = session.scalars(select(SceneNameRow.name).order_by(SceneNameRow.created_at.desc()).limit(SUGGESTED_AMONG)).all()
         hint = close_matches(name, list(dict.fromkeys(known))) or "`ciris scene ls`, or `scenes()` in Python, lists them"

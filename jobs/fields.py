@@ -29,7 +29,15 @@ Vector = Annotated[list[Real], Field(min_length=1, max_length=64)]
 LabelName = Annotated[str, Field(min_length=1, max_length=64, pattern=patterns.LABEL_NAME)]
 LabelValue = Annotated[str, Field(max_length=200, pattern=patterns.ANY)]
 Labels = Annotated[dict[LabelName, LabelValue], Field(max_length=20)]
-SceneName = Annotated[str, Field(min_length=1, max_length=255, pattern=patterns.SOMETHING, description="The id or the name of a scene.")]
+SceneName = Annotated[
+    str,
+    Field(
+        min_length=1,
+        max_length=255,
+        pattern=patterns.SOMETHING,
+        description="The id or the name of a scene. `NAME@staged` is the scene that is staged as the next version of a name.",
+    ),
+]
 Rows = Annotated[list[Vector], Field(max_length=2000)]
 Offsets = Annotated[list[Real], Field(max_length=2000)]
 

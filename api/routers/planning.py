@@ -105,7 +105,9 @@ async def get_graph(
     db: Db,
     libraries: KeptLibraries,
     children: Children,
-    scene: Annotated[str, Query(min_length=1, max_length=255, description="The id or the name of a scene.", examples=["planar-2dof"])],
+    scene: Annotated[
+        str, Query(min_length=1, max_length=255, description="The id or the name of a scene, or `NAME@staged`.", examples=["planar-2dof"])
+    ],
 ) -> GraphResponse:
     """Returns which regions of a scene overlap, which sets of them are connected, and where to seed a region that may join two sets.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Annotated, BinaryIO
 
-from fastapi import APIRouter, File, Response, UploadFile, status
+from fastapi import APIRouter, File, Path, Query, Response, UploadFile, status
 
 from api import drawing
 from api.access import READ, Admin, Db, Submitter
@@ -14,13 +14,24 @@ from api.reading import ReadingRoute
 from api.room import KeptRoom, Room
 from api.schemas.common import Cursor, Listed, SceneGiven, WithDependents
 from api.schemas.drawing import SceneModel
-from api.schemas.scenes import IgnoredPair, LintReport, PairForecast, SceneDetail, ScenePage, ScenePairs, SceneSummary, Substitution
+from api.schemas.scenes import (
+    IgnoredPair,
+    LintReport,
+    PairForecast,
+    Promoted,
+    SceneDetail,
+    ScenePage,
+    ScenePairs,
+    SceneSummary,
+    Substitution,
+)
 from api.schemas.service import Dependents
 from api.writing import writing
+from certifier.model import MAX_NAME
 from certifier.pair.forecast import forecast
 from certifier.scene.bundle import load_bundle
 from certifier.verify import uncovered
-from db import audit, retention, scenes
+from db import audit, retention, scenes, staging
 from db.audit import Action
 from db.session import Database
 
@@ -37,6 +48,14 @@ async def create_scene(
     room: KeptRoom,
     caller: Submitter,
     response: Response,
+    stage: Annotated[
+        str | None,
+        Query(
+            min_length=1,
+            max_length=MAX_NAME,
+            description="Stage the scene as the next version of this name, in the place of one that is staged already.",
+        ),
+    ] = None,
 ) -> SceneDetail:
     """Uploads a scene.
 
@@ -48,18 +67,21 @@ async def create_scene(
 
     A separate process reads the zip, so a bad file cannot harm the service. The same content is the same scene, whose id does not change.
     From now on its name means this scene, also where it meant another one.
+
+    With `stage=NAME`, the name keeps its meaning, and `NAME@staged` means this scene. The name in the scene file does not count then.
+    Every request takes `NAME@staged` where it takes a scene. `POST /v1/scenes/NAME/promote` makes NAME mean the staged scene.
     """
-    scene = await children.run(_add_scene, db, room, caller.project, bundle.file)
+    scene = await children.run(_add_scene, db, room, caller.project, bundle.file, stage)
     response.headers["Location"] = f"/v1/scenes/{scene.id}"
     return scene
 
 
-def _add_scene(db: Database, room: Room, project: str, file: BinaryIO) -> SceneDetail:
+def _add_scene(db: Database, room: Room, project: str, file: BinaryIO, stage: str | None) -> SceneDetail:
     room.check(db, project)
     scene = load_bundle(file.read())
     besides = uncovered.document(scene)
     with db.write() as session:
-        row = scenes.add(session, scene)
+        row = scenes.add(session, scene) if stage is None else staging.stage(session, stage, scene)
         return SceneDetail.whole(row, scenes.names(session, [row.id])[row.id], besides)
 
 
@@ -74,7 +96,7 @@ def list_scenes(db: Db, after: Cursor = None, limit: Listed = 100) -> ScenePage:
 
 @router.get("/{scene_id}")
 def get_scene(scene_id: SceneGiven, db: Db) -> SceneDetail:
-    """Returns one scene, by its id or by its name. A name means the scene that was last added under it."""
+    """Returns one scene, by its id or by its name. A name means the scene that was last added under it or promoted."""
     with db.read() as session:
         row = scenes.get(session, scene_id)
         names = scenes.names(session, [row.id])[row.id]
@@ -124,6 +146,26 @@ def get_scene_dependents(scene_id: SceneGiven, db: Db) -> Dependents:
     """Returns what is deleted with a scene: its jobs, and their regions and proofs."""
     with db.read() as session:
         return Dependents(**asdict(retention.of_scene(session, scene_id)))
+
+
+@router.post("/{scene_name}/promote")
+@writing
+def promote_scene(
+    scene_name: Annotated[str, Path(max_length=MAX_NAME, description="The name that gets the new meaning.", examples=["planar-2dof"])],
+    caller: Submitter,
+    db: Db,
+    without_regions: Annotated[
+        bool, Query(description="Whether to promote a scene without regions where the present scene has some; refused otherwise.")
+    ] = False,
+) -> Promoted:
+    """Makes a name mean the scene that is staged as its next version, for every request from now on.
+
+    Ask `/v1/planning/graph` about `NAME@staged` first, until `complete` is true. Otherwise the first plans wait for it.
+    """
+    with db.write() as session:
+        done = staging.promote(session, scene_name, without_regions=without_regions)
+        audit.note(session, caller.project, str(caller), Action.SCENE_PROMOTED, f"{scene_name} = {done.scene}")
+    return Promoted(**asdict(done))
 
 
 @router.delete("/{scene_id}", status_code=status.HTTP_204_NO_CONTENT)

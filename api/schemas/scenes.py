@@ -17,10 +17,10 @@ class SceneSummary(BaseModel):
     """Describes a scene in a list."""
 
     id: str = Field(description="Id of the scene.")
-    name: str = Field(description="The name that the scene was last added under.")
+    name: str = Field(description="The name that the scene was last added or staged under.")
     names: list[str] = Field(
-        description="The names that mean this scene now. A name means the scene that was last added under it, so a scene may have none or "
-        "several."
+        description="The names that mean this scene now, `NAME@staged` among them. A name means the scene that was last added under it or "
+        "promoted, so a scene may have none or several."
     )
     hash: str = Field(description="SHA-256 of everything in the scene that a proof depends on.")
     joints: int = Field(description="Number of joint positions.")
@@ -109,6 +109,15 @@ class SceneDetail(SceneSummary):
             not_covered=NotCovered.model_validate(not_covered),
             provenance=document["provenance"],
         )
+
+
+class Promoted(BaseModel):
+    """Says what a name means since its staged scene was promoted, and what it meant before."""
+
+    scene: str = Field(description="Id of the scene that the name means.")
+    regions: int = Field(description="Number of its regions.")
+    before: str | None = Field(description="Id of the scene that the name meant before; null where that was deleted.")
+    regions_before: int = Field(description="Number of the regions of that scene.")
 
 
 class PairInfo(BaseModel):

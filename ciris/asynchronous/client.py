@@ -107,6 +107,15 @@ class AsyncClient:
         """Uploads a scene file with everything it refers to, and returns the scene."""
         return await self._json("POST", "/v1/scenes", files={"bundle": ("scene.zip", bundle(path), "application/zip")})
 
+    async def stage_scene(self, name: str, path: str | Path) -> Document:
+        """Uploads a scene file as the next version of a name, which ``NAME@staged`` means, and returns the scene."""
+        files = {"bundle": ("scene.zip", bundle(path), "application/zip")}
+        return await self._json("POST", "/v1/scenes", params={"stage": name}, files=files)
+
+    async def promote_scene(self, name: str, without_regions: bool = False) -> Document:
+        """Makes a name mean its staged scene, and returns what it means and what it meant."""
+        return await self._json("POST", f"/v1/scenes/{segment(name)}/promote", params={"without_regions": without_regions})
+
     async def scenes(self) -> list[Document]:
         """Returns every scene, newest first."""
         return await self._all("scenes")

@@ -127,7 +127,8 @@ class AsyncJob(JobData):
 class AsyncService:
     """The ciris service. :func:`ciris.connect` finds it.
 
-    A scene is named by its name, its id or a :class:`ciris.Scene`. Joint positions q are (n,) or, where several may be asked about, (k, n).
+    A scene is named by its name, its id or a :class:`ciris.Scene`; ``NAME@staged`` is the staged version of a name.
+    Joint positions q are (n,) or, where several may be asked about, (k, n).
     Every method may raise CirisError: what the service said, with the field that is meant, or ``unreachable``.
 
     Attributes:
@@ -157,6 +158,19 @@ class AsyncService:
     async def add_scene(self, path: str | Path) -> Scene:
         """Uploads a scene file with everything it refers to. It needs PyYAML and python-flint, which ``ciris[client]`` installs."""
         return await self.scene((await self.client.add_scene(path))["id"])
+
+    async def stage_scene(self, name: str, path: str | Path) -> Scene:
+        """Uploads a scene file as the next version of a name. ``NAME@staged`` means it, and the name means what it did."""
+        return await self.scene((await self.client.stage_scene(name, path))["id"])
+
+    async def promote_scene(self, name: str, *, without_regions: bool = False) -> Scene:
+        """Makes a name mean its staged scene, once the service has compared all of that scene's regions, and returns the scene.
+
+        Args:
+            without_regions: whether the scene may have no regions where the present one has some.
+        """
+        await self.graph(f"{name}@staged")
+        return await self.scene((await self.client.promote_scene(name, without_regions))["scene"])
 
     async def scenes(self) -> list[Scene]:
         """Returns every scene, newest first."""

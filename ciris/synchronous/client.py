@@ -106,6 +106,15 @@ class Client:
         """Uploads a scene file with everything it refers to, and returns the scene."""
         return self._json("POST", "/v1/scenes", files={"bundle": ("scene.zip", bundle(path), "application/zip")})
 
+    def stage_scene(self, name: str, path: str | Path) -> Document:
+        """Uploads a scene file as the next version of a name, which ``NAME@staged`` means, and returns the scene."""
+        files = {"bundle": ("scene.zip", bundle(path), "application/zip")}
+        return self._json("POST", "/v1/scenes", params={"stage": name}, files=files)
+
+    def promote_scene(self, name: str, without_regions: bool = False) -> Document:
+        """Makes a name mean its staged scene, and returns what it means and what it meant."""
+        return self._json("POST", f"/v1/scenes/{segment(name)}/promote", params={"without_regions": without_regions})
+
     def scenes(self) -> list[Document]:
         """Returns every scene, newest first."""
         return self._all("scenes")

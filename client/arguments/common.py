@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 
 from certifier.model import escaped
 
-SCENE = "path of a scene file, or the name or id of a scene that the service knows"
+SCENE = "path of a scene file, or the name or id of a scene that the service knows; NAME@staged is the staged version of a name"
 OF_ONE = "the id, or its first characters"
 WATCH = "print a line for every pair when it is decided"
 

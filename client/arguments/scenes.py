@@ -9,7 +9,7 @@ from client.arguments.common import as_json, dependents, group, remote
 
 def add(verbs: Any) -> None:
     """Adds the commands."""
-    scene = group(verbs.add_parser("scene", help="draft, check, add, list, show and delete scenes"))
+    scene = group(verbs.add_parser("scene", help="draft, check, add, stage, promote, list, show and delete scenes"))
     init = scene.add_parser("init", help="write a scene file and a seed for a robot's model", epilog="Nothing is overwritten.")
     init.add_argument("robot", metavar="ROBOT", help="model file: URDF, SDFormat or MJCF")
     init.add_argument("--world", metavar="FILE", action="append", default=[], help="model of an obstacle around it; may be repeated")
@@ -30,6 +30,19 @@ def add(verbs: Any) -> None:
     add = scene.add_parser("add", parents=[remote(), as_json()], help="upload a scene file and all files it refers to")
     add.add_argument("path", metavar="PATH.yaml", help="the scene file")
     add.set_defaults(run="client.commands:scene_add")
+    stage = scene.add_parser(
+        "stage",
+        parents=[remote(), as_json()],
+        help="upload a scene file as the next version of a name, which keeps its meaning for now",
+        epilog="NAME@staged means the staged scene, wherever a command takes a scene.",
+    )
+    stage.add_argument("name", metavar="NAME", help="the name of a scene that the service knows")
+    stage.add_argument("path", metavar="PATH.yaml", help="the scene file of the next version; its own name does not count")
+    stage.set_defaults(run="client.staging:scene_stage")
+    promote = scene.add_parser("promote", parents=[remote(), as_json()], help="make a name mean its staged scene from now on")
+    promote.add_argument("name", metavar="NAME", help="the name that the scene was staged under")
+    promote.add_argument("--without-regions", action="store_true", help="promote a scene without regions where the present scene has some")
+    promote.set_defaults(run="client.staging:scene_promote")
     scene.add_parser("ls", parents=[remote(), as_json()], help="list scenes, newest first").set_defaults(run="client.commands:scene_ls")
     show = scene.add_parser("show", parents=[remote(), as_json()], help="show a scene's joints, warnings and pairs")
     show.add_argument("scene", metavar="ID", help="its id or its name")

@@ -58,6 +58,7 @@ SELDOM: dict[str, dict[str, Any]] = {
     "Partition": {"iteration": 7},
     "PlanResponse": {"guarantee": "exact", "uncovered": {"time": 0.625, "segment": 0, "q": [0.4, 0.3], "s": [0.2, 0.15], "next": None}},
     "Project": {"max_bytes": 50_000_000_000, "keep_days": 30},
+    "Promoted": {"scene": "2138b0193bfdd632", "regions": 3, "before": "0f8a6f0c2b7e11aa", "regions_before": 4},
     "ScenePage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},
     "Verification": {"error": {"code": "bad_proof", "message": "a plane does not separate its pair", "field": None, "hint": ""}},
     "WorkerPage": {"next": "MjAyNi0wNS0wMVQwODowMDowMCswMDowMCA1ZDBj"},

@@ -13,7 +13,7 @@ from sqlalchemy.orm import aliased
 
 from api.access import KEYS_SECONDS
 from certifier.model import Scene
-from db import jobs, keys, projects, regions, scenes, webhooks
+from db import jobs, keys, projects, regions, scenes, staging, webhooks
 from db.keys import Scope
 from db.models import JobRow, ProofRow, RegionRow, SceneRow
 from db.session import Database
@@ -51,6 +51,7 @@ def theirs(database: Database, scene: Scene, region: str) -> dict[str, str]:
         projects.add(session, "others")
         made = {name: keys.add(session, "admin", Scope.ADMIN, name) for name in ("default", "others")}
         scene_id = scenes.find(session, "slider")
+        staging.stage(session, "slider", slider(posts=1))
     time.sleep(KEYS_SECONDS)
     return {"scene_id": scene_id, "job_id": job, "region_id": region, "key": made["default"], "stranger": made["others"]}
 
@@ -87,7 +88,7 @@ def requests(document: dict[str, Any], theirs: dict[str, str]) -> list[tuple[str
         if name in ABOUT_THE_SERVICE | OWN:
             continue
         method, path = route.split(" ", 1)
-        values = {**theirs, "pair": "0", "name": "admin"}
+        values = {**theirs, "pair": "0", "name": "admin", "scene_name": "slider"}
         parameters = operation.get("parameters", [])
         asked = {p["name"]: "0" for p in parameters if p["in"] == "query" and p.get("required") and p["name"] != "scene"}
         asked |= {p["name"]: theirs["scene_id"] for p in parameters if p["name"] == "scene"}

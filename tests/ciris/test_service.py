@@ -47,6 +47,17 @@ def test_a_scene_file_is_uploaded_with_all_it_refers_to(service: Any) -> None:
     assert np.allclose(added.to_s([np.pi / 2, 0]), [1, 0])
 
 
+def test_a_scene_is_staged_and_promoted(service: Any, region: str) -> None:
+    present = service.scene("slider")
+    staged = service.stage_scene("slider", ROOT / "examples" / "planar_2dof" / "scene.yaml")
+    assert (staged.name, service.scene("slider@staged"), service.scene("slider")) == ("slider", staged, present)
+    assert service.graph("slider@staged").edges == ()
+    with pytest.raises(ciris.CirisError) as caught:
+        service.promote_scene("slider")
+    assert caught.value.code == "scene_without_regions"
+    assert service.promote_scene("slider", without_regions=True) == service.scene("slider") == staged
+
+
 def test_a_region_is_arrays_a_proof_and_a_verdict(service: Any, region: str, scene: Scene) -> None:
     (found,) = service.regions("slider")
     assert (found.id, found.guarantee, found.joints) == (region, ciris.Guarantee.EXACT, tuple(joint.name for joint in scene.moving))

@@ -8,7 +8,7 @@ from typing import Any
 
 from api.access import KEYS_SECONDS
 from certifier.pair.forecast import forecast
-from db import keys, projects, proofs, scenes, workers
+from db import keys, projects, proofs, scenes, staging, workers
 from db.keys import Scope
 from db.settings import Settings, settings
 from db.states import WorkerState
@@ -109,6 +109,17 @@ def certify(t: Trial, **polytope: Any) -> None:
     post(t, CERTIFY | {"polytope": {"C": [[1], [-1]], "d": [0.2, 0.2], **polytope}})
 
 
+def staged(t: Trial, name: str = "slider", posts: int = 1) -> None:
+    """Stages a slider with so many posts; the present one has two, and a region."""
+    t.need("region")
+    write(t, lambda session: staging.stage(session, name, slider(posts=posts)))
+
+
+def promoted(t: Trial) -> None:
+    staged(t)
+    t.ask("POST", "/v1/scenes/slider/promote")
+
+
 def sliced(t: Trial, **parts: Any) -> None:
     t.need("client")
     with t.need("database").write() as session:
@@ -158,7 +169,16 @@ SERVICE: Table = {
         lambda t: t.ask("DELETE", f"/v1/regions/{t.need('region')[:8]}"),
     ],
     ("region_elsewhere", "goal"): [elsewhere],
-    ("scene_not_found", "scene"): [lambda t: post(t, GROW | {"scene": "slidr"}), lambda t: post(t, GROW | {"scene": "zzz"})],
+    ("scene_not_found", "scene"): [
+        lambda t: post(t, GROW | {"scene": "slidr"}),
+        lambda t: post(t, GROW | {"scene": "zzz"}),
+        lambda t: post(t, GROW | {"scene": "slider@staged"}),
+    ],
+    ("scene_not_found", "stage"): [lambda t: staged(t, name="slidr")],
+    ("scene_name", "stage"): [lambda t: staged(t, name="slider@staged")],
+    ("scene_name", "name"): [lambda t: write(t, lambda session: scenes.add(session, slider("slider@staged")))],
+    ("scene_unchanged", "stage"): [lambda t: staged(t, posts=2)],
+    ("scene_without_regions", "without_regions"): [promoted],
     ("webhook_not_found", "job"): [lambda t: t.ask("GET", f"/v1/jobs/{queued(t)}/webhook")],
     ("scope_missing", "Authorization"): [lambda t: with_key(t, "DELETE", "/v1/regions/nope")],
     ("polytope_shape", "polytope.d"): [lambda t: certify(t, d=[0.2])],

@@ -1,0 +1,48 @@
+"""These commands change what a name means without an outage: they stage the changed scene, and promote it once it has its regions."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from shlex import quote
+
+from client import service
+from client.output import Screen, print_json
+
+OK = 0
+
+
+def scene_stage(args: Namespace) -> int:
+    with service.connect(args.url) as client:
+        scene = client.stage_scene(args.name, args.path)
+        warnings = client.lint(scene["id"])["warnings"]
+    for warning in warnings:
+        print("warning:", warning, file=sys.stderr)
+    if args.json:
+        print_json(scene)
+        return OK
+    name, staged = quote(args.name), quote(_staged(args.name))
+    print(f"{scene['id']}  {_staged(args.name)}: {scene['joints']} joints, {scene['geometries']} geometries, {scene['pairs']} pairs")
+    print(f"next: ciris recertify --from {name} --scene {staged}")
+    print(f"then: ciris scene promote {name}")
+    return OK
+
+
+def scene_promote(args: Namespace) -> int:
+    """Has the service compare the regions of the staged scene first, so that the first plans need not wait for it."""
+    screen = Screen()
+    with service.connect(args.url) as client:
+        service.graph(client, _staged(args.name), screen)
+        screen.clear()
+        done = client.promote_scene(args.name, args.without_regions)
+    if args.json:
+        print_json(done)
+        return OK
+    print(f"{args.name} means {done['scene']} from now on; regions: {done['regions']}")
+    if done["before"] is not None:
+        print(f"before, it meant {done['before']}; regions: {done['regions_before']}")
+    return OK
+
+
+def _staged(name: str) -> str:
+    return f"{name}@staged"
