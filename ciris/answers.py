@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from certifier.outcome import Guarantee, Outcome
-from ciris.space import Array
+from ciris.space import Array, Straight
 
 Document = dict[str, Any]
 T = TypeVar("T", covariant=True)
@@ -311,7 +311,7 @@ class Place:
     """A place on a motion."""
 
     piece: int
-    """The piece from waypoint ``piece`` to the next one, from 0 on."""
+    """The piece from waypoint ``piece`` to the next one, or the polynomial piece; both count from 0."""
     time: float
     """Which part of the piece is behind, from 0 to 1."""
     q: Array
@@ -327,10 +327,26 @@ class Approach(Place):
     """How far the bodies, with the scene's padding, are apart there, in metres, in floating point; 0 where they overlap."""
 
 
+@dataclass(frozen=True)
+class SceneReference:
+    """The scene that an answer is about."""
+
+    name: str
+    hash: str
+    """SHA-256 of everything in the scene that a proof depends on."""
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """What has become of a motion. It is true if all of it is certified, that is, proved to be free of collision."""
 
+    scene: SceneReference
+    space: Straight
+    """In which coordinates the motion is straight, or polynomial."""
+    degree: int
+    """Of the polynomial pieces; 1 for a motion that is straight between waypoints."""
+    waypoints: int
+    """Number of the waypoints, or of the places where polynomial pieces begin or end."""
     outcome: Outcome
     guarantee: Guarantee
     padding: float
@@ -352,7 +368,12 @@ class Motion:
     certified."""
     not_covered_summary: str | None
     """Which pairs of geometries the proof is not about, in a sentence; None in a verdict that an earlier version stored."""
+    intervals: int
+    """How many planes the proof has."""
     seconds: float
+    """How long the search and the verification took together."""
+    verify_seconds: float
+    """How long the verification took."""
     proof: bytes | None = field(repr=False)
     """The proof file; None where it was not asked for."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from certifier.errors import CirisError, RegionError, close_matches
 from ciris.answers import Document
 from ciris.options import GROW, Fields, GrowOptions
-from ciris.space import numbers
+from ciris.space import Array, Straight, numbers
 
-Straight = Literal["q", "s"]
+_WAYS = "give waypoints as q or s, or a curve: bezier, or knots with control_points"
 
 
 def grow_request(scene: str, q: ArrayLike, options: GrowOptions) -> Document:
@@ -128,6 +128,40 @@ def points(axes: int, **values: ArrayLike | None) -> Document:
     if array.ndim not in (axes - 1, axes):
         raise RegionError("points", f"it must be finite numbers in {axes - 1} or {axes} axes, joints last", field=name)
     return {name: (array if array.ndim == axes else array[None]).tolist()}
+
+
+def motion_request(
+    scene: str,
+    *,
+    q: ArrayLike | None,
+    s: ArrayLike | None,
+    bezier: ArrayLike | None,
+    knots: ArrayLike | None,
+    control_points: ArrayLike | None,
+    space: Straight | None,
+) -> Document:
+    """Returns what every request about a motion has: the scene, and the motion, which is given in one way.
+
+    Raises:
+        RegionError: points.
+    """
+    ways = given(q=q, s=s, bezier=bezier, knots=knots, control_points=control_points)
+    if tuple(ways) not in (("q",), ("s",), ("bezier",), ("knots", "control_points")):
+        message = f"the motion is given by {' and '.join(ways)}" if ways else "the motion is missing"
+        raise RegionError("points", message, field=next(reversed(ways), "q"), hint=_WAYS)
+    if knots is None:
+        motion = points(2 if bezier is None else 3, **ways)
+    else:
+        motion = {name: _in_axes(axes, name, ways[name]).tolist() for name, axes in (("knots", 1), ("control_points", 2))}
+    return {"scene": scene, **motion, "space": straight(space, s)}
+
+
+def _in_axes(axes: int, name: str, values: ArrayLike) -> Array:
+    array = numbers(values, name)
+    if array.ndim != axes:
+        message = f"it has the shape {array.shape}"
+        raise RegionError("points", message, field=name, hint="knots are (k + m + 1,), control_points (k, n), joints last")
+    return array
 
 
 def bundle(path: str | Path) -> bytes:

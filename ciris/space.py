@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from certifier.errors import RegionError
 
 Array = NDArray[np.float64]
+Straight = Literal["q", "s"]
+"""The coordinates in which a motion is straight, or polynomial."""
 
 
 def numbers(values: object, field: str) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -34,9 +34,9 @@ from ciris.job import JobData, why_no_region
 from ciris.options import CERTIFY, COVER, JOB, RECERTIFY, CertifyOptions, CoverOptions, GrowOptions, JobOptions, RecertifyOptions
 from ciris.reading import read
 from ciris.region import RegionData, region_fields
-from ciris.requests import Straight, asked_for, given, grow_request, named, plain, points, straight
+from ciris.requests import asked_for, given, grow_request, motion_request, named, plain, points, straight
 from ciris.scene import Scene, scene_name
-from ciris.space import numbers
+from ciris.space import Straight, numbers
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -295,19 +295,22 @@ class AsyncService:
         q: ArrayLike | None = None,
         *,
         s: ArrayLike | None = None,
+        bezier: ArrayLike | None = None,
+        knots: ArrayLike | None = None,
+        control_points: ArrayLike | None = None,
         space: Straight | None = None,
-        times: Sequence[float] | None = None,
+        times: ArrayLike | None = None,
     ) -> Coverage:
         """Returns whether every point of a path is in certified regions, which is proved, and in which.
 
+        The path is given as to :meth:`certify_path`.
+
         Args:
-            q: (k, n), the waypoints, or else ``s``.
-            space: in which the path is straight between them; default: in which they are given.
-            times: (k,) when the path is at each waypoint; the answer is in these. Default: 0, 1, 2 ...
+            times: (k,) when the path is at each waypoint, or (P + 1,) when the pieces of ``bezier`` begin and end; the answer is in these.
+                Default: 0, 1, 2 ... A B-spline has its knots instead.
         """
-        when = None if times is None else numbers(times, "times").tolist()
-        asked = {"scene": scene_name(scene), **points(2, q=q, s=s), "space": straight(space, s), **given(times=when)}
-        return read(Coverage, await self.client.path(asked))
+        asked = motion_request(scene_name(scene), q=q, s=s, bezier=bezier, knots=knots, control_points=control_points, space=space)
+        return read(Coverage, await self.client.path({**asked, **given(times=plain(times, "times"))}))
 
     async def plan(
         self,
@@ -337,6 +340,9 @@ class AsyncService:
         q: ArrayLike | None = None,
         *,
         s: ArrayLike | None = None,
+        bezier: ArrayLike | None = None,
+        knots: ArrayLike | None = None,
+        control_points: ArrayLike | None = None,
         space: Straight | None = None,
         tube: bool = False,
         padding: float = 0.0,
@@ -346,16 +352,21 @@ class AsyncService:
         """Certifies a motion itself, without any region, or finds its first contact.
 
         Args:
-            q: (k, n), the waypoints, or else ``s``.
-            space: in which the motion is straight between them; default: in which they are given.
+            q: (k, n), the waypoints, or else ``s``, or a curve of a degree m from 1 to 15.
+            bezier: (P, m + 1, n), the control points of polynomial pieces, or (m + 1, n) of one. A piece begins where the one before ends.
+            knots: (k + m + 1,), those of a B-spline; ``control_points`` come with it.
+            control_points: (k, n), those of the B-spline.
+            space: in which the motion is straight between waypoints; default: in which they are given. For a curve, which coordinates its
+                control points are; default: q.
             tube: whether to look for the largest certified tube about the motion.
             padding: metres that are added around every body, beyond the scene's padding: the motion is certified with the bodies of each
                 pair twice this apart.
             clearance: whether to prove nearly the least distance of the bodies.
             prove: whether to return the proof file as well.
         """
+        asked = motion_request(scene_name(scene), q=q, s=s, bezier=bezier, knots=knots, control_points=control_points, space=space)
         options = {"tube": tube, "padding": float(padding), "clearance": clearance, "prove": prove}
-        document = await self.client.certify_path({"scene": scene_name(scene), **points(2, q=q, s=s), **given(space=space), **options})
+        document = await self.client.certify_path({**asked, **options})
         proof = document["proof"] and base64.b64decode(document["proof"])
         return read(Motion, {**document, "proof": proof})
 
@@ -365,6 +376,9 @@ class AsyncService:
         q: ArrayLike | None = None,
         *,
         s: ArrayLike | None = None,
+        bezier: ArrayLike | None = None,
+        knots: ArrayLike | None = None,
+        control_points: ArrayLike | None = None,
         space: Straight | None = None,
         tube: bool = False,
         padding: float = 0.0,
@@ -375,8 +389,9 @@ class AsyncService:
 
         The arguments are as of :meth:`certify_path`.
         """
-        motion = {**points(2, q=q, s=s), **given(space=space), "tube": tube, "padding": float(padding), "clearance": clearance}
-        job, _ = await self.client.create_job({"kind": "certify-path", "scene": scene_name(scene), **motion, **asked_for(options, JOB)})
+        asked = motion_request(scene_name(scene), q=q, s=s, bezier=bezier, knots=knots, control_points=control_points, space=space)
+        motion = {**asked, "tube": tube, "padding": float(padding), "clearance": clearance}
+        job, _ = await self.client.create_job({"kind": "certify-path", **motion, **asked_for(options, JOB)})
         return self._job(job)
 
     async def graph(self, scene: str | Scene) -> Graph:

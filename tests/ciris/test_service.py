@@ -11,9 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydrake.math import BsplineBasis
+from pydrake.trajectories import BezierCurve, BsplineTrajectory
+from scipy.interpolate import BPoly, CubicSpline, make_interp_spline
 
 import ciris
 from api.access import KEYS_SECONDS
+from api.schemas.motions import JobMotion, MotionResponse
 from certifier.model import Scene
 from certifier.verify.file import verify_file
 from certifier.verify.region import verify_region
@@ -158,6 +162,77 @@ def test_a_motion_is_certified_by_itself_or_its_contact_is_named(service: Any, s
     assert motion.tube > 0
     assert verify_file(motion.proof)
     assert service.certify_path("slider", s=[[0.0], [0.1]]).proof is None
+
+
+BEZIER = [[[0.0], [0.08], [0.05], [0.1]], [[0.1], [0.15], [0.12], [0.05]]]
+
+
+def test_a_curve_is_asked_about_as_scipy_and_drake_have_it(service: Any, region: str, worker: None) -> None:
+    cubic = CubicSpline([2.0, 3.0, 5.0], [[0.0], [0.1], [0.05]])
+    pieces = np.moveaxis(BPoly.from_power_basis(cubic).c, 1, 0)
+    pieces[:-1, -1] = pieces[1:, 0]
+    spline = make_interp_spline([2.0, 3.0, 4.0, 5.0], [[0.0], [0.1], [0.02], [0.05]], k=3)
+    drakes = BsplineTrajectory(BsplineBasis(4, spline.t), [point[:, None] for point in spline.c])
+    one = BezierCurve(0.0, 2.0, np.array([[0.0, 0.08, 0.05, 0.1]]))
+    curves = [
+        ({"bezier": pieces}, cubic.x, 2.0, 5.0),
+        ({"knots": spline.t, "control_points": spline.c}, None, 2.0, 5.0),
+        ({"knots": drakes.basis().knots(), "control_points": np.hstack(drakes.control_points()).T}, None, 2.0, 5.0),
+        ({"bezier": one.control_points().T}, [one.start_time(), one.end_time()], 0.0, 2.0),
+    ]
+    for curve, times, begin, end in curves:
+        motion = service.certify_path("slider", **curve, prove=True)
+        assert motion
+        assert (motion.degree, verify_file(motion.proof).kind) == (3, "motion")
+        path = service.path("slider", **curve, times=times)
+        assert path
+        assert [path.pieces[0].begin, path.pieces[-1].end] == [begin, end]
+    assert service.submit_certify_path("slider", **curves[0][0], deadline=600).motion()
+
+
+def test_the_control_points_of_a_curve_may_be_in_s(service: Any, region: str) -> None:
+    motion = service.certify_path("slider", bezier=BEZIER, space="s")
+    assert (motion.space, motion.waypoints) == ("s", 3)
+    assert service.path("slider", bezier=BEZIER, space="s", times=[0.0, 1.0, 3.0]).pieces[-1].end == 3.0
+    assert service.certify_path("slider", bezier=BEZIER).space == "q"
+
+
+@pytest.mark.parametrize(
+    ("given", "field", "words"),
+    [
+        ({}, "q", "the motion is missing \\(give waypoints as q or s, or a curve: bezier, or knots with control_points\\)"),
+        ({"q": [[0.0], [0.1]], "bezier": BEZIER}, "bezier", "the motion is given by q and bezier"),
+        ({"bezier": BEZIER, "knots": [0.0], "control_points": [[0.0]]}, "control_points", "given by bezier and knots and control_points"),
+        ({"knots": [0.0, 0.0, 1.0, 1.0]}, "knots", "given by knots"),
+        ({"control_points": [[0.0], [0.1]]}, "control_points", "given by control_points"),
+        ({"knots": [0.0, 0.0, 1.0, 1.0], "control_points": [0.0, 0.1]}, "control_points", "it has the shape \\(2,\\)"),
+        ({"bezier": [0.0, 0.1]}, "bezier", "2 or 3 axes"),
+        ({"bezier": [["x"]]}, "bezier", "not finite numbers"),
+    ],
+)
+def test_a_motion_that_is_not_given_in_one_way_is_refused(service: Any, given: dict[str, Any], field: str, words: str) -> None:
+    for ask in (service.certify_path, service.submit_certify_path, service.path):
+        with pytest.raises(ciris.CirisError, match=words) as caught:
+            ask("slider", **given)
+        assert (caught.value.code, caught.value.field) == ("points", field)
+
+
+def test_a_spline_has_its_knots_for_times(service: Any, region: str) -> None:
+    with pytest.raises(ciris.CirisError, match="the knots are the times of a B-spline: leave times out"):
+        service.path("slider", knots=[0.0, 0.0, 1.0, 1.0], control_points=[[0.0], [0.1]], times=[0.0, 1.0])
+
+
+@pytest.mark.parametrize("by_job", [False, True])
+def test_a_motion_has_every_field_of_the_document(service: Any, worker: None, scene: Scene, by_job: bool) -> None:
+    names = set(JobMotion.model_fields if by_job else MotionResponse.model_fields)
+    waypoints = [[0.0], [0.1], [0.05]]
+    motion = service.submit_certify_path("slider", waypoints).motion() if by_job else service.certify_path("slider", waypoints)
+    assert {name for name in names if hasattr(motion, name)} == names
+    assert (motion.scene.name, motion.scene.hash) == ("slider", scene.hash)
+    assert (motion.space, motion.degree, motion.waypoints) == ("q", 1, 3)
+    assert motion.intervals > 0
+    assert 0 < motion.verify_seconds < motion.seconds
+    assert motion.certified_to.piece == 1
 
 
 def test_the_first_contact_of_a_motion_is_named(service: Any, database: Database) -> None:

@@ -29,6 +29,8 @@ def plan() -> None:
         assert_type(service.path("my-cell", np.zeros((3, 2))), ciris.Coverage)
         assert_type(service.graph("my-cell"), ciris.Graph)
         assert_type(service.certify_path("my-cell", np.zeros((3, 2))).proof, bytes | None)
+        assert_type(service.certify_path("my-cell", bezier=np.zeros((1, 4, 2))).verify_seconds, float)
+        assert_type(service.path("my-cell", knots=np.zeros(8), control_points=np.zeros((4, 2))), ciris.Coverage)
         assert_type(service.plan("my-cell", [0.0, 0.1], "1f9b2a7c").q, NDArray[np.float64])
         assert_type(service.cover("my-cell", connect=np.zeros((2, 2)), deadline=60), ciris.Cover)
         assert_type(service.recertify(region, scene), ciris.Region)
