@@ -12,7 +12,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import re
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -31,30 +30,6 @@ Array = NDArray[Any]
 SCHEMA_VERSION = 1
 _STORED = "the document was changed or is of another version; load the scene from its file again"
 WORLD = "world"
-MAX_NAME, MAX_SENTENCE = 200, 500
-"""A name has at most MAX_NAME characters, and a sentence of free text has at most MAX_SENTENCE."""
-ALPHABET = f"at most {MAX_NAME} ASCII letters, digits, _-./:+@#()[],= and single spaces inside"
-"""This text tells people what a name may consist of (:func:`is_name`)."""
-_NAME = re.compile(r"[\w\-./:+@#()\[\],=]+(?: [\w\-./:+@#()\[\],=]+)*", re.ASCII)
-
-
-def is_name(text: object) -> bool:
-    """Returns whether a joint, a body or a geometry may have this name.
-
-    A name consists of at most 200 ASCII letters, digits, characters of ``_-./:+@#()[],=`` and single spaces inside. Statements print
-    names, so nothing in a name may look like another line or control a terminal.
-    """
-    return isinstance(text, str) and len(text) <= MAX_NAME and _NAME.fullmatch(text) is not None
-
-
-def is_sentence(text: object) -> bool:
-    """Returns whether this may be a reason or a substitution: one line of at most 500 printable characters."""
-    return isinstance(text, str) and len(text) <= MAX_SENTENCE and text.isprintable() and "  " not in text
-
-
-def escaped(text: str) -> str:
-    """Returns the text as one line for people. What is not printable, and the backslash, is written as Python escapes it."""
-    return "".join(c if c.isprintable() and c != "\\" else c.encode("unicode_escape").decode() for c in text)
 
 
 class JointKind(StrEnum):

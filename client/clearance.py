@@ -9,7 +9,7 @@ from typing import Any
 
 from certifier.errors import CirisError
 from certifier.isolation.child import run_in_child
-from certifier.model import escaped
+from certifier.names import escaped
 from certifier.verify.decimals import at_least_mm
 from client import output
 from client.cores import cores

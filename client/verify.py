@@ -17,7 +17,7 @@ from typing import Any
 
 from certifier.errors import CirisError, unreadable
 from certifier.isolation.child import run_in_child
-from certifier.model import escaped
+from certifier.names import escaped
 from certifier.proof.limits import FILE_BYTES
 from client.cores import cores
 from client.output import Screen, print_json

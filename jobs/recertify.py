@@ -8,7 +8,8 @@ from pydantic import ConfigDict, Field
 
 from certifier.carry.robot import same_bodies
 from certifier.growth.options import RecertifyOptions
-from certifier.model import MAX_NAME, Scene
+from certifier.model import Scene
+from certifier.names import MAX_NAME
 from db import regions, scenes
 from db.session import Database
 from jobs.fields import model_of

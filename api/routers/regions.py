@@ -20,7 +20,7 @@ from api.schemas.regions import RegionDetail, RegionPage, RegionSummary, Verific
 from api.writing import writing
 from certifier.errors import CirisError
 from certifier.isolation.child import run_in_child
-from certifier.model import ALPHABET, escaped, is_name
+from certifier.names import ALPHABET, escaped, is_name
 from db import audit, jobs, proofs, regions, scenes
 from db.audit import Action
 from db.session import Database

@@ -16,7 +16,7 @@ from typing import Any
 import yaml
 
 from certifier.errors import SceneError, close_matches
-from certifier.model import ALPHABET, MAX_SENTENCE, is_name, is_sentence
+from certifier.names import ALPHABET, MAX_SENTENCE, is_name, is_sentence
 from certifier.positions import MAGNITUDE
 from certifier.scene.directives import added_files, check_directives, replaced, resolved
 from certifier.scene.nodes import MEND, compose, decoded

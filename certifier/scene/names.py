@@ -11,7 +11,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Joint, JointIndex, RigidBody
 
 from certifier.errors import SceneError
-from certifier.model import ALPHABET, MAX_NAME, WORLD, is_name
+from certifier.model import WORLD
+from certifier.names import ALPHABET, MAX_NAME, is_name
 
 
 class Register:

@@ -41,7 +41,8 @@ from pydrake.solvers import MathematicalProgram
 from pydrake.systems.framework import DiagramBuilder
 
 from certifier.errors import SceneError
-from certifier.model import MAX_SENTENCE, Array, Geometry, Joint, JointKind, Scene, escaped
+from certifier.model import Array, Geometry, Joint, JointKind, Scene
+from certifier.names import MAX_SENTENCE, escaped
 from certifier.positions import MAGNITUDE
 from certifier.scene import shapes
 from certifier.scene.census import check_counts

@@ -10,7 +10,7 @@ from typing import NoReturn
 import numpy as np
 
 from certifier.errors import SceneError
-from certifier.model import escaped
+from certifier.names import escaped
 from certifier.positions import MAGNITUDE
 from certifier.scene.directives import AddedFile, added_by
 from certifier.scene.file import SceneFile

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from certifier.errors import CirisError, ProofError, unreadable
-from certifier.model import Scene, escaped
+from certifier.model import Scene
+from certifier.names import escaped
 from certifier.outcome import Guarantee
 from certifier.proof import limits
 from certifier.proof.container import header_of, malformed

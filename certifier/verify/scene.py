@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from certifier.errors import ProofError
-from certifier.model import WORLD, Joint, JointKind, Scene, escaped, is_name, is_sentence
+from certifier.model import WORLD, Joint, JointKind, Scene
+from certifier.names import escaped, is_name, is_sentence
 from certifier.proof import limits
 
 RIGID = 1e-9

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from importlib import metadata
 
 from client.arguments import jobs, planning, regions, scenes, service
-from client.arguments.common import Parser, group
+from client.arguments.common import Parser, Version, group
 
 EPILOG = """exit status: 0 success; 1 a negative answer (not certified, a proof that does not hold, a point outside);
 2 bad input or no service; 130 interrupted. An error is one line on standard error. With --json a command prints one
@@ -23,7 +22,7 @@ def parser() -> Parser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    ciris.add_argument("--version", action="version", version=f"ciris {metadata.version('ciris')}")
+    ciris.add_argument("--version", action=Version)
     verbs = group(ciris)
     for commands in (scenes, regions, planning, jobs, service):
         commands.add(verbs)

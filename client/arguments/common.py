@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from certifier.model import escaped
+from certifier.names import escaped
 
 SCENE = "path of a scene file, or the name or id of a scene that the service knows; NAME@staged is the staged version of a name"
 OF_ONE = "the id, or its first characters"
@@ -21,6 +22,19 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"error: {escaped(message.removeprefix('argument '))} (see {self.prog} --help)\n")
+
+
+class Version(argparse.Action):
+    """Prints the version. Only then is it looked up, which takes as long as many a question to a service."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str) -> None:
+        super().__init__(option_strings, argparse.SUPPRESS, nargs=0, help="show program's version number and exit")
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from importlib.metadata import version
+
+        print("ciris", version("ciris"))
+        parser.exit()
 
 
 def group(parser: argparse.ArgumentParser) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from certifier.model import escaped, is_name, is_sentence
+from certifier.names import escaped, is_name, is_sentence
 
 
 @pytest.mark.parametrize("name", ["world", "arm/link_1/Box_2", "a::b/c", "sub/a b (1) [2], x=3", "m/world-a", "a@b#c+d", "x" * 200])

@@ -7,7 +7,7 @@ without an element of the kind: a geom of a class without <geom> gets nothing fr
 from __future__ import annotations
 
 from certifier.errors import close_matches
-from certifier.model import escaped
+from certifier.names import escaped
 from certifier.scene.formats.mjcf_names import ELEMENTS, ORIENTATIONS
 from certifier.scene.formats.mjcf_tree import MEND, Node, refuse
 

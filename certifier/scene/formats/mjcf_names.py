@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from certifier.errors import close_matches
-from certifier.model import escaped
+from certifier.names import escaped
 from certifier.scene.formats.mjcf_tree import MEND, Node, refuse
 
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")

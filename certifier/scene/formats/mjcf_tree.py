@@ -11,7 +11,7 @@ from typing import NoReturn
 from xml.parsers import expat
 
 from certifier.errors import SceneError
-from certifier.model import escaped
+from certifier.names import escaped
 from certifier.scene.formats.model_file import decimals, wanted
 from certifier.scene.paths import beside
 from certifier.scene.xml import parse_xml
