@@ -27,7 +27,8 @@ from certifier.polytopes.polytope import bounds
 from certifier.proof.region import RegionProof
 from certifier.scene import load_scene
 from client import service
-from client.inputs import is_scene_file, polytope_file
+from client.inputs import is_scene_file
+from client.polytopes import polytope_file
 from planner.cover.ground import free_samples
 from planner.library import Library
 from planner.overlap import beside, components, overlap

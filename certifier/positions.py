@@ -6,10 +6,13 @@ refuses numbers above MAGNITUDE, and below it whole turns are taken off to the l
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from typing import TYPE_CHECKING
 
 from certifier.errors import RegionError
+
+if TYPE_CHECKING:  # Commands that only need the bound start without numpy.
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
 MAGNITUDE = 1e6
 """No joint position, in radians or metres, and no coordinate s of a configuration is larger than this."""
@@ -28,6 +31,8 @@ def check_magnitude(values: ArrayLike, field: str, most: float = MAGNITUDE, code
     Raises:
         RegionError: ``code``, with the first such number.
     """
+    import numpy as np
+
     numbers = np.asarray(values, dtype=float)
     wrong = np.argwhere(~(np.abs(numbers) <= most))
     if len(wrong):

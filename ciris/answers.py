@@ -8,18 +8,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Any, Self, TypeVar, overload
+from typing import Self, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from certifier.outcome import Guarantee, Outcome
+from ciris.documents import Document
 from ciris.space import Array, Straight
 
-Document = dict[str, Any]
 T = TypeVar("T", covariant=True)
-SHORT = 8
-"""Number of characters of an id that are shown; the service knows a job or a region by them."""
 
 
 class Answers(Sequence[T]):

@@ -7,7 +7,7 @@ from datetime import datetime
 
 from certifier.errors import CirisError
 from certifier.outcome import Outcome
-from ciris.answers import SHORT, Document
+from ciris.documents import SHORT, Document
 
 
 @dataclass(frozen=True, repr=False)

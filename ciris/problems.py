@@ -10,8 +10,7 @@ from urllib.parse import quote
 import httpx2
 
 from certifier.errors import CirisError
-from ciris.answers import Document
-from ciris.requests import named
+from ciris.documents import Document, named
 
 DESCRIBED, WHICH = "/openapi.json", "is that the address of a ciris service of this version?"
 HELP = {"invalid_request": "help() of the method in Python, or --help of the command, says what it takes"}

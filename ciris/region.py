@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from certifier.outcome import Guarantee
-from ciris.answers import SHORT, Document, NotCovered, QVolume, Share
+from ciris.answers import NotCovered, QVolume, Share
+from ciris.documents import SHORT, Document
 from ciris.reading import values
 from ciris.space import Array, InSpace, Space, frozen
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from certifier.errors import CirisError, RegionError, close_matches
-from ciris.answers import Document
+from ciris.documents import Document, given
 from ciris.options import GROW, Fields, GrowOptions
 from ciris.space import Array, Straight, numbers
 
@@ -62,42 +60,6 @@ def _taken(name: str, value: Any, takes: str | Fields) -> Any:
     if not isinstance(value, Mapping):
         raise CirisError("argument", f"{type(value).__name__} is no options", field=name, hint="give a dict of options")
     return asked_for(value, takes)
-
-
-def document(value: Any) -> Any:
-    """Returns what json writes of a value: numpy's numbers and arrays as Python's."""
-    if isinstance(value, Mapping):
-        return {name: document(one) for name, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [document(one) for one in value]
-    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
-
-
-def named(name: object, field: str, what: str) -> str:
-    """Returns the name or the id of something.
-
-    Raises:
-        CirisError: argument, for what is no text.
-    """
-    if isinstance(name, str):
-        return name
-    raise CirisError("argument", f"{type(name).__name__} is no {field}", field=field, hint=f"give {what}")
-
-
-def patience(timeout: float) -> float:
-    """Returns the seconds that a question may take.
-
-    Raises:
-        CirisError: argument, for what is no positive, finite number.
-    """
-    if isinstance(timeout, int | float | np.number) and 0 < timeout < np.inf:
-        return float(timeout)
-    raise CirisError("argument", f"{timeout!r} is no timeout", field="timeout", hint="give seconds, a number above 0")
-
-
-def given(**values: Any) -> Document:
-    """Returns the values that are not None, by name."""
-    return {name: value for name, value in values.items() if value is not None}
 
 
 def plain(value: ArrayLike | str | None, field: str) -> Any:
@@ -162,15 +124,3 @@ def _in_axes(axes: int, name: str, values: ArrayLike) -> Array:
         message = f"it has the shape {array.shape}"
         raise RegionError("points", message, field=name, hint="knots are (k + m + 1,), control_points (k, n), joints last")
     return array
-
-
-def bundle(path: str | Path) -> bytes:
-    """Packs a scene file. What it takes, PyYAML and python-flint, is loaded here, so that asking needs neither.
-
-    Raises:
-        CirisError: argument, for what is no path.
-        SceneError: as :func:`certifier.scene.bundle.pack_bundle`.
-    """
-    from certifier.scene.bundle import pack_bundle
-
-    return pack_bundle(named(os.fspath(path) if isinstance(path, os.PathLike) else path, "path", "the path of a scene file"))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ciris.answers import Document, NotCovered
+from ciris.answers import NotCovered
+from ciris.documents import Document, named
 from ciris.reading import read
-from ciris.requests import named
 from ciris.space import InSpace, Space, frozen
 
 

@@ -12,13 +12,15 @@ from certifier.errors import CirisError
 from certifier.outcome import Outcome
 from certifier.verify.decimals import at_most_mm, exactly
 from certifier.verify.uncovered import named
-from ciris.answers import Document
+from ciris.documents import Document
 from client import output, service
 from client.files import ProofFile, check_writable
-from client.inputs import configuration, polytope_file, seed_of
+from client.inputs import configuration
 from client.options import CERTIFY, GROW
 from client.output import Screen, print_json
+from client.polytopes import polytope_file
 from client.request import refuse_of_service, request
+from client.seeds import seed_of
 
 OK, NO = 0, 1
 

@@ -23,8 +23,8 @@ from ciris.find import api_key, data_dir, running_stack
 from ciris.synchronous.client import Client
 from client import output, service
 from client.files import ProofFile, file_name
-from client.inputs import seed_of
 from client.output import Screen
+from client.seeds import seed_of
 
 SCENE = Path(__file__).resolve().parent.parent / "examples" / "iiwa_shelf" / "scene.yaml"
 DEADLINE_SECONDS = 120

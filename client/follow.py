@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from certifier.outcome import Outcome, Stage
-from ciris.answers import Document
+from ciris.documents import Document
 from ciris.synchronous.client import Client
 from client.output import Screen, number, plain, q_volume, seconds, share
 

@@ -1,25 +1,12 @@
-"""This module turns what users type and the files they name into numbers."""
+"""This module turns what users type into numbers and names."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
-from zipfile import BadZipFile
-
-import numpy as np
-import yaml
 
 from certifier.errors import CirisError, RegionError
-from certifier.model import Array, Polytope
-from certifier.scene.file import existing
 
-SAME_CENTER = 1e-9
-"""Two q* are the same where no joint differs by more than this, in radians or metres."""
-_FORMATS = "give C, d and perhaps center as lists of numbers, or a region that `ciris region export` wrote"
 _LIST = "joint positions, separated by commas"
 
 
@@ -46,118 +33,6 @@ def configuration(text: str, field: str = "--q") -> list[float]:
 def is_scene_file(scene: str) -> bool:
     """Says whether the user means a file, and not a name or id that the service knows."""
     return scene.endswith((".yaml", ".yml")) or "/" in scene
-
-
-def seed_file(scene: str | Path) -> Path:
-    """Returns where the seed of a scene file is: seed.yaml beside scene.yaml, and NAME.seed.yaml beside NAME.yaml."""
-    path = Path(scene)
-    return path.with_name("seed.yaml" if path.stem == "scene" else f"{path.stem}.seed.yaml")
-
-
-def seed_of(scene: str, q: str | None) -> list[float]:
-    """Returns the seed configuration: ``q``, or the ``q`` of the scene file's seed file.
-
-    Raises:
-        CirisError: scene_not_found for a scene file that is not there; seed_missing; seed_file.
-        RegionError: bad_number.
-    """
-    if q is not None:
-        return configuration(q)
-    if is_scene_file(scene):
-        existing(scene)
-    path = seed_file(scene if is_scene_file(scene) else "scene.yaml")
-    if not is_scene_file(scene) or not path.is_file():
-        hint = f"give one, or put q into {path.name} beside the scene file"
-        raise CirisError("seed_missing", "no seed was given", field="--q", hint=hint)
-    try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
-        return configuration(" ".join(str(float(value)) for value in document["q"]), field=f"{path}: q")
-    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError):
-        hint = "write q: [0, 0.3] into it, one number for each joint"
-        raise CirisError("seed_file", f"{path} holds no list of numbers called q", field="--q", hint=hint) from None
-
-
-@dataclass(frozen=True)
-class PolytopeFile:
-    """Holds a polytope in s.
-
-    Attributes:
-        polytope: the faces; the joint limits need not be among them.
-        center: a point inside, (n,), in s; None where the file has none.
-        joints: names of the joints, in the order of the columns; None where the file does not say.
-        q_star: (n,) the joint positions at which s is 0; None where the file does not say.
-    """
-
-    polytope: Polytope
-    center: Array | None = None
-    joints: tuple[str, ...] | None = None
-    q_star: Array | None = None
-
-    def check_space(self, joints: Sequence[str], q_star: Sequence[float]) -> None:
-        """Refuses a polytope of another robot, or with another q*: its numbers would mean other joint positions in this scene.
-
-        Raises:
-            RegionError: polytope_joints, polytope_q_star.
-        """
-        if self.joints is not None and self.joints != tuple(joints):
-            message = f"the polytope has the joints {', '.join(self.joints)}, and the scene {', '.join(joints)}"
-            raise RegionError("polytope_joints", message, field="--polytope", hint="certify it in the scene that it was grown in")
-        if self.q_star is not None and not np.allclose(self.q_star, q_star, rtol=0, atol=SAME_CENTER):
-            mine, others = (", ".join(f"{x:.6g}" for x in center) for center in (self.q_star, q_star))
-            message = f"the polytope is about q* = {mine}, and the scene about {others}"
-            raise RegionError("polytope_q_star", message, field="--polytope", hint="set q_star of the scene file to the polytope's")
-
-
-def polytope_file(path: str) -> PolytopeFile:
-    """Reads C, d and optionally center, joints and q_star from an npz, JSON or YAML file, or a region that was exported as npz or JSON.
-
-    Raises:
-        RegionError: polytope_file, polytope_shape, or as :meth:`Polytope.given`.
-    """
-    suffix = Path(path).suffix.lower()
-    try:
-        content = _arrays(path) if suffix == ".npz" else _document(path) if suffix in (".json", ".yaml", ".yml") else None
-    except FileNotFoundError:
-        raise RegionError("polytope_file", f"there is no file {path}", field="--polytope", hint=_FORMATS) from None
-    except (OSError, ValueError, TypeError, BadZipFile, EOFError, yaml.YAMLError, RecursionError):
-        kind = "npz" if suffix == ".npz" else suffix[1:].upper()
-        raise RegionError("polytope_file", f"{path} is no {kind} file of numbers", field="--polytope", hint=_FORMATS) from None
-    if content is None:
-        raise RegionError("polytope_file", f"{path} is neither .npz nor .json nor .yaml", field="--polytope", hint=_FORMATS)
-    missing = {"C", "d"} - content.keys()
-    if missing:
-        raise RegionError("polytope_file", f"{path} has no {' and no '.join(sorted(missing))}", field="--polytope", hint=_FORMATS)
-    polytope, center = Polytope.given(content["C"], content["d"], field="--polytope"), content.get("center")
-    if center is not None and not (center.shape == polytope.C.shape[1:] and np.isfinite(center).all()):
-        raise RegionError(
-            "polytope_shape", f"center must be {polytope.C.shape[1]} finite numbers, as many as C has columns", field="--polytope"
-        )
-    joints, q_star = content.get("joints"), content.get("q_star")
-    return PolytopeFile(polytope, center, None if joints is None else tuple(joints.tolist()), q_star)
-
-
-def _arrays(path: str) -> dict[str, Any]:
-    with np.load(path, allow_pickle=False) as arrays:
-        numbers = {name: arrays[name].astype(float, casting="same_kind") for name in arrays.files if name in ("C", "d", "center", "q_star")}
-        return numbers | ({"joints": arrays["joints"]} if "joints" in arrays.files else {})
-
-
-def _document(path: str) -> dict[str, Any]:
-    text = Path(path).read_text(encoding="utf-8")
-    document: Any = json.loads(text) if path.lower().endswith(".json") else yaml.safe_load(text)
-    if not isinstance(document, dict):
-        raise TypeError("not a mapping")
-    space = document.get("space", document)
-    document = {**space, **document}
-    names = {
-        "C": ("C", "halfspace_normals"),
-        "d": ("d", "halfspace_offsets"),
-        "center": ("center", "interior_point"),
-        "q_star": ("q_star",),
-    }
-    found = {name: next((document[key] for key in keys if key in document), None) for name, keys in names.items()}
-    numbers = {name: np.array(value, dtype=float) for name, value in found.items() if value is not None}
-    return numbers | ({"joints": np.array(space["joints"], dtype=str)} if space.get("joints") is not None else {})
 
 
 def labels(given: Sequence[str]) -> dict[str, str]:

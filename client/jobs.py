@@ -6,7 +6,7 @@ from argparse import Namespace
 from typing import Any
 
 from certifier.errors import CirisError
-from ciris.answers import Document
+from ciris.documents import Document
 from client import output
 from client.follow import follow
 from client.inputs import labels

@@ -11,12 +11,13 @@ from certifier.growth.options import CertifyOptions, GrowthOptions, RecertifyOpt
 from certifier.jobs.options import JobOptions
 from certifier.model import Scene
 from certifier.options import Options, read, table
-from ciris.answers import Document
+from ciris.documents import Document
 from client import verdicts
 from client.cores import cores
 from client.follow import Teller
-from client.inputs import PolytopeFile, is_scene_file
+from client.inputs import is_scene_file
 from client.output import Screen
+from client.polytopes import PolytopeFile
 from client.service import Grown
 
 if TYPE_CHECKING:

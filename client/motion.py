@@ -8,17 +8,15 @@ from argparse import Namespace
 from typing import Any
 
 from certifier.errors import CirisError
-from certifier.motion.given import padding_of
-from certifier.proof.motion import Space
+from certifier.motion.padding import padding_of
 from certifier.verify.decimals import at_least_mm, rounded_down
-from ciris.answers import Document
+from ciris.documents import Document
 from ciris.synchronous.client import Client
 from client import output, service
 from client.files import ProofFile, check_writable
-from client.local import load
 from client.options import JOB
 from client.output import Screen, print_json
-from client.paths import PathFile, named, path_of
+from client.paths import GivenPath, named, path_of
 from client.request import refuse_options, request
 
 OK, NO = 0, 1
@@ -53,23 +51,26 @@ def certify_path(args: Namespace) -> int:
     return OK if document["outcome"] == "certified" else NO
 
 
-def _here(args: Namespace, path: PathFile) -> tuple[dict[str, Any], bytes | None]:
+def _here(args: Namespace, path: GivenPath) -> tuple[dict[str, Any], bytes | None]:
     """Returns the document of the verdict of this process, and the proof where there is one."""
+    from client.local import load
+
     scene = load(args.scene)
     from certifier.jobs.motion import certify
     from certifier.motion.given import motion_of
+    from certifier.proof.motion import Space
 
     motion = motion_of(scene, path.motion, Space(args.space) if args.space else None)
     verdict = certify(scene, motion, args.tube, padding_of(args.padding), args.clearance)
     return verdict.document(), verdict.proof
 
 
-def _by_service(args: Namespace, path: PathFile) -> tuple[dict[str, Any], bytes | None]:
+def _by_service(args: Namespace, path: GivenPath) -> tuple[dict[str, Any], bytes | None]:
     """Returns the document of the service's verdict, and the proof where it was asked for and there is one."""
     padding_of(args.padding)
     with service.connect(args.url) as client:
-        scene = service.known_scene(client, args.scene)["id"]
-        asked = {"scene": scene, **path.document(), **{name: getattr(args, name) for name in ("space", "tube", "padding", "clearance")}}
+        scene = service.scene_name(client, args.scene)
+        asked = {"scene": scene, **path.motion, **{name: getattr(args, name) for name in ("space", "tube", "padding", "clearance")}}
         if args.job:
             return _by_job(client, {**asked, "kind": "certify-path", **request(args, JOB)}, args.out is not None)
         document = client.certify_path({**asked, "prove": args.out is not None})
@@ -83,12 +84,12 @@ def _by_job(client: Client, request: Document, prove: bool) -> tuple[dict[str, A
     return document, client.motion_proof(job) if prove and document["proof"] else None
 
 
-def _timed(document: dict[str, Any], path: PathFile) -> dict[str, Any]:
+def _timed(document: dict[str, Any], path: GivenPath) -> dict[str, Any]:
     """Returns the document with the file's own time, ``t``, at each place on the motion; None where the file has no times."""
     places = {name: document[name] for name in ("certified_to", "nearest", "stop") if document[name]}
     for place in places.values():
         start = place["piece"]
-        place["t"] = None if path.times is None else float(path.times[start] + place["time"] * (path.times[start + 1] - path.times[start]))
+        place["t"] = None if path.times is None else path.times[start] + place["time"] * (path.times[start + 1] - path.times[start])
     return {**document, **places}
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from certifier.errors import CirisError
-from ciris.answers import Document
+from ciris.documents import Document
 from ciris.synchronous.client import Client
 from client import output, service
 from client.inputs import configuration
@@ -29,7 +29,7 @@ REGION = re.compile(r"[0-9a-f]{4,8}|[0-9a-f]{8}-[0-9a-f-]*")
 def nearest(args: Namespace) -> int:
     points = [configuration(text) for text in args.q]
     with service.connect(args.url) as client:
-        answer = client.nearest(service.known_scene(client, args.scene)["id"], points)
+        answer = client.nearest(service.scene_name(client, args.scene), points)
     found = [point["nearest"] for point in answer["points"]]
     if args.json:
         print_json(answer)
@@ -46,7 +46,7 @@ def plan(args: Namespace) -> int:
     if not args.grow:
         refuse_options(args, JOB, "grow")
     with service.connect(args.url) as client:
-        scene = service.known_scene(client, args.scene)["id"]
+        scene = service.scene_name(client, args.scene)
         answer = _planned(client, scene, ends, limits)
         if args.grow and answer["reason"] in GROWABLE:
             _grow_between(client, scene, ends, asked)
@@ -64,13 +64,13 @@ def plan(args: Namespace) -> int:
 
 def path(args: Namespace) -> int:
     given = path_of(args)
-    asked: dict[str, Any] = {**given.document(), "space": args.space or ("s" if "s" in given.motion else "q")}
+    asked: dict[str, Any] = {**given.motion, "space": args.space or ("s" if "s" in given.motion else "q")}
     if len(asked.get("q", [0, 0])) < 2:
         raise CirisError("option", "a path has two waypoints or more", field="--q", hint="give it once for each waypoint")
     if given.times is not None and "knots" not in asked:
-        asked["times"] = given.times.tolist()
+        asked["times"] = given.times
     with service.connect(args.url) as client:
-        scene = service.known_scene(client, args.scene)["id"]
+        scene = service.scene_name(client, args.scene)
         try:
             answer = client.path({"scene": scene, **asked})
         except CirisError as error:
@@ -93,7 +93,7 @@ def path(args: Namespace) -> int:
 def graph(args: Namespace) -> int:
     screen = Screen()
     with service.connect(args.url) as client:
-        answer = service.graph(client, service.known_scene(client, args.scene)["id"], screen)
+        answer = service.graph(client, service.scene_name(client, args.scene), screen)
     screen.clear()
     if args.json:
         print_json(answer)

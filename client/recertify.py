@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from certifier.errors import CirisError, unreadable
-from ciris.answers import Document
+from ciris.documents import Document
 from ciris.synchronous.client import Client
 from client import output, service
 from client.files import ProofFile, check_writable

@@ -8,10 +8,9 @@ from typing import Any
 
 from certifier.errors import CirisError
 from certifier.options import Option, Takes, fits, within
-from ciris.answers import Document
+from ciris.documents import Document
 from client.inputs import configuration, labels
 from client.options import JOB, Part
-from client.paths import path_file
 
 
 def request(args: Namespace, parts: tuple[Part, ...]) -> Document:
@@ -90,8 +89,10 @@ def _value(one: Option, value: Any) -> Any:
 
 def _waypoints(path: str) -> list[list[float]]:
     """Returns the waypoints of a file, which have to be joint positions."""
+    from client.path_files import path_file  # which needs numpy
+
     read = path_file(path)
     if "q" not in read.motion:
         message = f"{path} has no waypoints in q; a path to cover is straight in q between them"
         raise CirisError("option", message, field="--path", hint="give waypoints in q")
-    return read.motion["q"].tolist()
+    return read.motion["q"]

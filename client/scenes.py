@@ -18,7 +18,8 @@ from certifier.scene.load import load_scene
 from certifier.seeding.limits import check_limits
 from certifier.verify.uncovered import unlisted
 from client import output
-from client.inputs import configuration, seed_file, seed_of
+from client.inputs import configuration
+from client.seeds import seed_file, seed_of
 
 COSTLIEST = 5
 

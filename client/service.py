@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from certifier.errors import CirisError
 from certifier.outcome import Guarantee, Outcome
-from ciris.answers import Document
+from ciris.documents import Document
 from ciris.find import api_key, service_url
 from ciris.job import why_no_region
 from ciris.synchronous.client import Client
 from client import verdicts
 from client.follow import follow
-from client.inputs import PolytopeFile, is_scene_file
+from client.inputs import is_scene_file
 from client.output import NEGATIVE, Screen
+
+if TYPE_CHECKING:  # It needs numpy, and most questions do not.
+    from client.polytopes import PolytopeFile
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,14 @@ def connect(url: str | None) -> Client:
 def known_scene(client: Client, scene: str) -> Document:
     """Returns the scene of a scene file, which it uploads, or the scene with a name or id that the service knows."""
     return client.add_scene(scene) if is_scene_file(scene) else client.scene(scene)
+
+
+def scene_name(client: Client, scene: str) -> str:
+    """Returns what a question calls a scene: the id of a scene file, which it uploads, or the name or id that was typed.
+
+    The answer says if the service does not know it. So a name takes no request of its own.
+    """
+    return known_scene(client, scene)["id"] if is_scene_file(scene) else scene
 
 
 def grow(client: Client, request: Document, screen: Screen, watch: bool = False, idempotency_key: str | None = None) -> Grown:

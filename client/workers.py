@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from ciris.answers import Document
+from ciris.documents import Document
 from client.jobs import SHORT
 from client.output import plain, print_facts, print_json, print_table
 from client.service import connect

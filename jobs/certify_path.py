@@ -13,7 +13,8 @@ from sqlalchemy.orm import Session
 from certifier.errors import CirisError
 from certifier.growth.actions import Finish
 from certifier.model import Scene
-from certifier.motion.given import motion_of, padding_of
+from certifier.motion.given import motion_of
+from certifier.motion.padding import padding_of
 from certifier.outcome import Outcome
 from certifier.proof.motion import Space
 from db import jobs, proofs, steps

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import asdict
+from threading import Lock
 from typing import Annotated, BinaryIO
 
+from cachetools import LRUCache, cached
 from fastapi import APIRouter, File, Path, Query, Response, UploadFile, status
 
 from api import drawing
@@ -27,13 +30,17 @@ from api.schemas.scenes import (
 )
 from api.schemas.service import Dependents
 from api.writing import writing
-from certifier.model import MAX_NAME
+from certifier.model import MAX_NAME, Scene
 from certifier.pair.forecast import forecast
 from certifier.scene.bundle import load_bundle
 from certifier.verify import uncovered
 from db import audit, retention, scenes, staging
 from db.audit import Action
 from db.session import Database
+
+KEPT = 8
+"""Number of scenes that an API process keeps beside their bundles, those that came last: a command sends the bundle of its scene file
+every time."""
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"], dependencies=[READ], route_class=ReadingRoute)
 
@@ -78,11 +85,17 @@ async def create_scene(
 
 def _add_scene(db: Database, room: Room, project: str, file: BinaryIO, stage: str | None) -> SceneDetail:
     room.check(db, project)
-    scene = load_bundle(file.read())
+    scene = _read(file.read())
     besides = uncovered.document(scene)
     with db.write() as session:
         row = scenes.add(session, scene) if stage is None else staging.stage(session, stage, scene)
         return SceneDetail.whole(row, scenes.names(session, [row.id])[row.id], besides)
+
+
+@cached(LRUCache(KEPT), key=lambda data: hashlib.sha256(data).digest(), lock=Lock())
+def _read(data: bytes) -> Scene:
+    """Returns the scene in a bundle. Equal bundles hold equal scenes, and a child process reads each once."""
+    return load_bundle(data)
 
 
 @router.get("")

@@ -20,8 +20,6 @@ from multiprocessing.connection import Pipe
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from certifier.errors import CirisError, RegionError, SceneError
 
 ERRORS = {cls.__name__: cls for cls in (CirisError, SceneError, RegionError)}
@@ -152,6 +150,8 @@ def encode(value: Any) -> bytes:
         TypeError: something in the value cannot be JSON.
     """
 
+    import numpy as np
+
     def array(x: Any) -> Any:
         if isinstance(x, np.generic):
             return x.item()
@@ -165,5 +165,7 @@ def encode(value: Any) -> bytes:
 def decode(document: dict[str, Any]) -> Any:
     """Makes arrays again of what :func:`encode` made of them; it is an ``object_hook``."""
     if "__array__" in document:
+        import numpy as np
+
         return np.array(document["__array__"], dtype=document["dtype"]).reshape(document["shape"])
     return document

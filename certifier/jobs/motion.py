@@ -11,7 +11,8 @@ import numpy as np
 
 from certifier.errors import ProofError
 from certifier.model import WORLD, Geometry, Joint, JointKind, Pair, Scene
-from certifier.motion.given import motion_of, padding_of
+from certifier.motion.given import motion_of
+from certifier.motion.padding import padding_of
 from certifier.motion.search import Approach, Stop, search
 from certifier.outcome import Guarantee, Outcome
 from certifier.proof.container import with_scene

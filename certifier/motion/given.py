@@ -55,17 +55,6 @@ def given(scene: Scene, waypoints: Any, coordinates: Space, space: Space | None 
     return Motion(space, points if space is coordinates else np.clip(scene.to_q(points), *space.limits(scene)))
 
 
-def padding_of(value: float) -> float:
-    """Returns the padding of a request, in metres.
-
-    Raises:
-        RegionError: ``padding``, for what is no distance.
-    """
-    if not 0 <= value <= limits.MAGNITUDE:
-        raise RegionError("padding", f"must be from 0 to {limits.MAGNITUDE:g} metres, not {value!r}", field="padding")
-    return float(value)
-
-
 def curved(scene: Scene, found: Curve, space: Space, field: str = "bezier") -> Motion:
     """Returns the motion along a curve, whose control points are in the coordinates of the space.
 

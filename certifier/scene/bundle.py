@@ -13,13 +13,16 @@ import tempfile
 import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from certifier.errors import CirisError, SceneError
 from certifier.isolation.child import prepare
-from certifier.model import Scene
 from certifier.scene.file import existing, read_scene_file, with_relative_packages
 from certifier.scene.load import read_in_child
 from certifier.scene.references import is_mjcf, mjcf_references, references, resolve
+
+if TYPE_CHECKING:  # The command packs bundles without numpy, which the model needs.
+    from certifier.model import Scene
 
 INDEX = "bundle.json"
 """In this file the bundle says which file is the scene file."""
@@ -92,6 +95,8 @@ def load_bundle(data: bytes, limits: BundleLimits | None = None) -> Scene:
         SceneError: ``bundle_too_large``, ``bundle_zip``, ``bundle_path``, ``bundle_file``, ``bundle_uri``, ``bundle_xml``,
             ``bundle_text``, or what :func:`load_scene` raises.
     """
+    from certifier.model import Scene
+
     limits = limits or BundleLimits()
     if len(data) > limits.bytes:
         message = f"the bundle has {len(data)} bytes; at most {limits.bytes} are accepted"

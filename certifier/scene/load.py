@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from certifier.errors import CirisError, SceneError
 from certifier.isolation.child import run_in_child
-from certifier.model import Scene
 from certifier.scene.file import existing
+
+if TYPE_CHECKING:  # The command packs scene files without numpy, which the model needs.
+    from certifier.model import Scene
 
 TIMEOUT_S, MEMORY_BYTES = 60.0, 4 * 2**30
 
@@ -24,6 +26,8 @@ def load_scene(path: str | Path, *, timeout_s: float = TIMEOUT_S, memory_bytes: 
     Raises:
         SceneError: what is wrong and where; ``scene_model_crash`` when reading the models ended the child.
     """
+    from certifier.model import Scene
+
     path = existing(path)
     document = read_in_child("certifier.scene.parse:parse", {"path": str(path)}, path.name, timeout_s, memory_bytes)
     return Scene.from_document(document)

@@ -17,10 +17,9 @@ from typing import Any, Self
 import httpx2
 
 from certifier.errors import CirisError
-from ciris.answers import Document
+from ciris.documents import Document, bundle, document, given, patience
 from ciris.find import api_key
 from ciris.problems import address, content, problem, segment, unreachable
-from ciris.requests import bundle, document, given, patience
 
 Rows = list[list[float]]
 Limit = float | list[float]
@@ -72,7 +71,8 @@ class AsyncClient:
     def _connect(self) -> None:
         # Every wait for a job has a connection, so there is no limit to their number.
         limits = httpx2.Limits(max_connections=None, max_keepalive_connections=20)
-        transport = _Patient(trust_env=False, limits=limits)
+        # Without TLS nobody needs the certificates, which take 20 ms to load.
+        transport = _Patient(trust_env=False, limits=limits, verify=httpx2.URL(self.url).scheme != "http")
         self._process = os.getpid()
         self._connections = httpx2.AsyncClient(
             base_url=self.url, headers=self._headers, timeout=self._timeout, trust_env=False, transport=transport
@@ -357,6 +357,10 @@ class AsyncClient:
     async def contains(self, scene: str, q: Rows | None = None, s: Rows | None = None) -> Document:
         """Returns which regions of a scene contain each of these points."""
         return await self._json("POST", "/v1/planning/contains", json={"scene": scene, **given(q=q, s=s)})
+
+    async def contacts(self, scene: str, q: Rows) -> Document:
+        """Returns which pairs of a scene may touch at each of these joint positions, in floating point: it proves nothing."""
+        return await self._json("POST", "/v1/planning/contacts", json={"scene": scene, "q": q})
 
     async def certify_path(self, request: Document) -> Document:
         """Returns the verdict about a motion, and the proof in base 64 if the request asks for it."""

@@ -18,7 +18,6 @@ from ciris.answers import (
     Containment,
     Cover,
     Coverage,
-    Document,
     Event,
     Graph,
     Motion,
@@ -29,11 +28,12 @@ from ciris.answers import (
     Segments,
     Verification,
 )
+from ciris.documents import Document, given, named
 from ciris.job import JobData, why_no_region
 from ciris.options import CERTIFY, COVER, JOB, RECERTIFY, CertifyOptions, CoverOptions, GrowOptions, JobOptions, RecertifyOptions
 from ciris.reading import read
 from ciris.region import RegionData, region_fields
-from ciris.requests import asked_for, given, grow_request, motion_request, named, plain, points, straight
+from ciris.requests import asked_for, grow_request, motion_request, plain, points, straight
 from ciris.scene import Scene, scene_name
 from ciris.space import Straight, numbers
 from ciris.synchronous.client import Client

@@ -44,6 +44,13 @@ def test_a_scene_is_uploaded_once_whatever_how_often(client: TestClient) -> None
     assert set(lint) == {"warnings", "substitutions", "ignored"}
 
 
+def test_equal_bundles_are_read_once(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A command sends the bundle of its scene file every time, and starting a process for it takes longer than the question."""
+    first = upload(client, pack_bundle(EXAMPLE)).json()
+    monkeypatch.setattr("api.routers.scenes.load_bundle", pytest.fail)
+    assert upload(client, pack_bundle(EXAMPLE)).json() == first
+
+
 def test_a_name_means_the_scene_that_was_last_added_under_it(client: TestClient, database: Database) -> None:
     """Whoever adds a scene again makes its name mean it again; the same content has every name that it was added under."""
     first, other = slider(posts=1), slider(posts=2)

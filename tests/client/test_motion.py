@@ -10,7 +10,7 @@ import pytest
 
 from certifier.errors import RegionError
 from certifier.model import Scene
-from client.paths import path_file
+from client.path_files import path_file
 from tests.client.conftest import PLANAR, Ciris
 
 FREE, TOUCHING = ("0.2,-0.4", "-0.4,0.3"), ("0,0", "2,2")
@@ -142,10 +142,10 @@ def test_files_of_every_kind_say_the_same(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(f"t,s1,s2\n{rows}\n\n")
     for suffix in ("npz", "json", "yaml", "csv"):
         found = path_file(str(tmp_path / f"a.{suffix}"))
-        assert (found.document(), found.times.tolist()) == ({"s": s.tolist()}, t.tolist())
+        assert (found.motion, found.times) == ({"s": s.tolist()}, t.tolist())
     (tmp_path / "b.csv").write_text("0.1,-0.2\n0.3,0.4\n")
     found = path_file(str(tmp_path / "b.csv"))
-    assert (found.document(), found.times) == ({"q": s[:2].tolist()}, None)
+    assert (found.motion, found.times) == ({"q": s[:2].tolist()}, None)
 
 
 def test_files_of_curves_say_the_same(tmp_path: Path) -> None:
@@ -157,8 +157,8 @@ def test_files_of_curves_say_the_same(tmp_path: Path) -> None:
         (tmp_path / f"{name}.yaml").write_text("\n".join(f"{key}: {array.tolist()}" for key, array in arrays.items()))
         for suffix in ("npz", "json", "yaml"):
             found = path_file(str(tmp_path / f"{name}.{suffix}"))
-            assert found.document() == {key: array.tolist() for key, array in arrays.items() if key != "t"}
-            assert found.times.tolist() == (t.tolist() if name == "pieces" else [0.0, 0.5, 2.0])
+            assert found.motion == {key: array.tolist() for key, array in arrays.items() if key != "t"}
+            assert found.times == (t.tolist() if name == "pieces" else [0.0, 0.5, 2.0])
 
 
 @pytest.mark.parametrize(

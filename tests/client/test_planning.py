@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,7 +14,7 @@ from ciris.synchronous.client import Client
 from db.session import Database
 from tests.api.conftest import store_region
 from tests.api.test_planning import a_part
-from tests.client.conftest import Ciris
+from tests.client.conftest import PLANAR, Ciris, surroundings
 
 
 def test_nearest_says_how_far_the_nearest_region_is(ciris: Ciris, url: str, region: str) -> None:
@@ -111,3 +113,28 @@ def test_a_plan_that_is_not_found_says_why(ciris: Ciris, url: str, region: str, 
     assert (wrong.status, wrong.error) == (2, "--to[0]: 'far' is not a finite number (joint positions, separated by commas)")
     longer = ciris("plan", "slider", "--from", "0.1,0.2", "--to", "0.1", CIRIS_URL=url)
     assert (longer.status, longer.error.partition(" (")[0]) == (2, "--from: 2 numbers were given; slider has 1 joints")
+
+
+HEAVY = ("asyncio.base_events", "flint", "numba", "numpy", "scipy")
+WATCHED = f"""
+import sys
+from client.cli import main
+
+status = main()
+print(status, [name for name in {HEAVY} if name in sys.modules], file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("plan", "slider", "--from", "0", "--to", "0.1"),
+        ("certify-path", "slider", "--q", "0", "--q", "0.1"),
+        ("certify-path", PLANAR, "--q", "0.2,-0.4", "--q", "-0.4,0.3"),
+    ],
+)
+def test_a_question_loads_nothing_that_takes_long(url: str, region: str, tmp_path: Path, arguments: tuple[object, ...]) -> None:
+    """Half of the time of such a command would be numpy's, and nothing here needs it."""
+    command = [sys.executable, "-c", WATCHED, *map(str, arguments)]
+    done = subprocess.run(command, cwd=tmp_path, env=surroundings(CIRIS_URL=url), capture_output=True, text=True, check=False)
+    assert done.stderr == "0 []\n"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from certifier.motion.given import given, motion_of, padding_of
+from certifier.motion.given import given, motion_of
+from certifier.motion.padding import padding_of
 from certifier.motion.splines import curve
 from certifier.proof.motion import Space
 from db import scenes

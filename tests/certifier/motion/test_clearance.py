@@ -10,8 +10,9 @@ import pytest
 from certifier.errors import ProofError, RegionError
 from certifier.jobs.motion import certify
 from certifier.motion.approach import FINEST
-from certifier.motion.given import given, padding_of
+from certifier.motion.given import given
 from certifier.motion.intervals import RESOLUTION
+from certifier.motion.padding import padding_of
 from certifier.motion.search import search
 from certifier.outcome import Outcome
 from certifier.proof import limits

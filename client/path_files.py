@@ -1,0 +1,103 @@
+"""This module reads a planner's path from a file."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+import yaml
+
+from certifier.errors import CirisError, RegionError
+from certifier.model import Array
+from certifier.motion.splines import curve
+from client.paths import FIELD, GivenPath
+
+KINDS = (".npz", ".json", ".yaml", ".yml", ".csv")
+_HINT = "give q or s, one row of numbers for each waypoint, and perhaps t; or bezier, or knots and control_points"
+_NAMES = ("q", "s", "bezier", "knots", "control_points", "t")
+
+
+def path_file(path: str) -> GivenPath:
+    """Reads q or s and perhaps t from an npz, JSON, YAML or CSV file; or a curve, but not from CSV.
+
+    A CSV file has one row for each waypoint. Its first row may name the columns; one that is called t holds the times. Its numbers are q,
+    unless all other columns' names begin with s.
+
+    Raises:
+        RegionError: path_file, saying what is wrong with it; or what is wrong with the curve, as certifier.motion.splines.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in KINDS:
+        raise RegionError("path_file", f"{path} is neither .npz nor .json, .yaml or .csv", field=FIELD, hint=_HINT)
+    try:
+        content = {".npz": _arrays, ".csv": _table}.get(suffix, _document)(path)
+    except FileNotFoundError:
+        raise RegionError("path_file", f"there is no file {path}", field=FIELD, hint=_HINT) from None
+    except CirisError:
+        raise
+    except (OSError, ValueError, TypeError, BadZipFile, EOFError, yaml.YAMLError, RecursionError):
+        kind = suffix[1:].upper().replace("NPZ", "npz")
+        raise RegionError("path_file", f"{path} is no {kind} file of numbers", field=FIELD, hint=_HINT) from None
+    given = {name: content[name] for name in _NAMES[:-1] if name in content}
+    if tuple(given) not in (("q",), ("s",), ("bezier",), ("knots", "control_points")):
+        raise RegionError("path_file", f"{path} must have either q or s, or one curve", field=FIELD, hint=_HINT)
+    try:
+        found, times = curve(given), content.get("t")
+    except RegionError as error:
+        error.field = f"{FIELD} {error.field}"
+        raise
+    motion = {name: array.tolist() for name, array in given.items()}
+    if found is not None and found.times is not None:
+        if times is not None:
+            raise RegionError("path_file", f"{path} has knots, which are its times, and t", field=FIELD, hint="leave t out")
+        return GivenPath(motion, found.times.tolist())
+    places = next(iter(given.values())) if found is None else found.controls[:: found.degree]
+    if times is not None and not (times.shape == places.shape[:1] and (np.diff(times) > 0).all()):
+        problem = f"t of {path} must be ascending numbers, one for each waypoint, or for each piece's beginning and for the end"
+        raise RegionError("path_file", problem, field=FIELD, hint="t may be left out")
+    return GivenPath(motion, None if times is None else times.tolist())
+
+
+def _arrays(path: str) -> dict[str, Array]:
+    with np.load(path, allow_pickle=False) as arrays:
+        return {name: arrays[name].astype(float, casting="same_kind") for name in arrays.files if name in _NAMES}
+
+
+def _document(path: str) -> dict[str, Array]:
+    text = Path(path).read_text(encoding="utf-8")
+    document: Any = json.loads(text) if path.lower().endswith(".json") else yaml.safe_load(text)
+    if not isinstance(document, dict):
+        raise TypeError("not a mapping")
+    return {name: np.array(document[name], dtype=float) for name in _NAMES if name in document}
+
+
+def _table(path: str) -> dict[str, Array]:
+    with open(path, encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.reader(file) if row]
+    if not rows:
+        raise ValueError("no rows")
+    names = [] if _is_number(rows[0][0]) else [name.strip() for name in rows.pop(0)]
+    columns = len(names or rows[0])
+    for i, row in enumerate(rows):
+        wrong = next((text for text in row if not _is_number(text)), None)
+        if wrong is not None:
+            raise RegionError("path_file", f"{path}, waypoint {i}: {wrong!r} is no number", field=FIELD, hint=_HINT)
+        if len(row) != columns:
+            raise RegionError("path_file", f"{path}, waypoint {i}: it must have {columns} numbers, as the first row", field=FIELD)
+    numbers = np.array([[float(text) for text in row] for row in rows])
+    timed = np.array([name == "t" for name in names], dtype=bool) if names else np.zeros(numbers.shape[1:], dtype=bool)
+    in_s = bool(names) and all(name.startswith("s") for name in names if name != "t")
+    found = {"s" if in_s else "q": numbers[:, ~timed]}
+    return found | ({"t": numbers[:, timed][:, 0]} if timed.any() else {})
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,40 @@
+"""This module finds the seed of a scene file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import yaml
+
+from certifier.errors import CirisError
+from certifier.scene.file import existing
+from client.inputs import configuration, is_scene_file
+
+
+def seed_file(scene: str | Path) -> Path:
+    """Returns where the seed of a scene file is: seed.yaml beside scene.yaml, and NAME.seed.yaml beside NAME.yaml."""
+    path = Path(scene)
+    return path.with_name("seed.yaml" if path.stem == "scene" else f"{path.stem}.seed.yaml")
+
+
+def seed_of(scene: str, q: str | None) -> list[float]:
+    """Returns the seed configuration: ``q``, or the ``q`` of the scene file's seed file.
+
+    Raises:
+        CirisError: scene_not_found for a scene file that is not there; seed_missing; seed_file.
+        RegionError: bad_number.
+    """
+    if q is not None:
+        return configuration(q)
+    if is_scene_file(scene):
+        existing(scene)
+    path = seed_file(scene if is_scene_file(scene) else "scene.yaml")
+    if not is_scene_file(scene) or not path.is_file():
+        hint = f"give one, or put q into {path.name} beside the scene file"
+        raise CirisError("seed_missing", "no seed was given", field="--q", hint=hint)
+    try:
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        return configuration(" ".join(str(float(value)) for value in document["q"]), field=f"{path}: q")
+    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError):
+        hint = "write q: [0, 0.3] into it, one number for each joint"
+        raise CirisError("seed_file", f"{path} holds no list of numbers called q", field="--q", hint=hint) from None
