@@ -1,4 +1,4 @@
-"""docs/python.md: all its code, as one program, and Drake's planner on the regions that the program leaves, against a real service."""
+"""docs/python.md: all its code, as one program, and the programs of examples/ after it, as it calls them, against a real service."""
 
 from __future__ import annotations
 
@@ -46,10 +46,14 @@ def test_every_program_of_the_page_works_as_it_stands(tmp_path: Path) -> None:
         assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
         return done.stdout
 
-    (by_drake,) = re.findall(r"^    python (examples/planner_gcs\.py .*)$", page, re.MULTILINE)
+    calls = re.findall(r"^    python (examples/(\w+)\.py .*)$", page, re.MULTILINE)
+    (trajectory,) = re.findall(r"^```json\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    (tmp_path / "trajectory.json").write_text(trajectory)
     with service(environment, tmp_path):
         said = run("-c", f"{programs()}\n{CHECK}")
-        waypoints = run(*by_drake.split()).splitlines()
+        printed = {name: run(*call.split()).splitlines() for call, name in calls}
     assert re.search(r"^Region\(\w{8} of planar-2dof: 2 joints, \d+ faces, .* rad\^2, exact\)$", said, re.MULTILINE)
     assert "[ True False]" in said
-    assert np.allclose([np.fromstring(waypoints[0], sep=","), np.fromstring(waypoints[-1], sep=",")], [[0.1, 0.05], [0.2, 0.1]])
+    for name, ends in (("planner_gcs", [[0.1, 0.05], [0.2, 0.1]]), ("planner_ompl", [[0.1, 0.05], [1.0, -1.5]])):
+        assert np.allclose([np.fromstring(printed[name][k], sep=",") for k in (0, -1)], ends)
+    assert printed["moveit_trajectory"][0].startswith("certified: no collision in 1.5 s, ")
