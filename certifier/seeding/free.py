@@ -68,7 +68,7 @@ class Nearest:
 
     Attributes:
         q: (n,) the configuration.
-        field: where in the user's input it is.
+        field: where in the user's input it is, or which line between such places.
         distance: of the padded bodies, in metres; infinite in a scene without pairs.
         pair: None in a scene without pairs.
     """
@@ -77,6 +77,11 @@ class Nearest:
     field: str
     distance: float
     pair: Pair | None
+
+
+def named(field: str) -> str:
+    """Returns how a message names a place in the user's input."""
+    return "the seed" if field == "seed.q" else field.removeprefix("seed.")
 
 
 def check_free(scene: Scene, q: Array, field: str) -> Nearest:

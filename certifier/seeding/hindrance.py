@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from certifier.model import JointKind, Scene
-from certifier.seeding.free import Clearance, Nearest, nearest_free, written
+from certifier.seeding.free import Clearance, Nearest, named, nearest_free, written
 from certifier.seeding.proposal import NO_ROOM, TOO_LONG
 
 NEAR = 5e-3
@@ -28,9 +28,10 @@ def hindrance(scene: Scene, checked: Sequence[Nearest]) -> str:
     """Returns what is likely to keep a region from growing around these configurations; "" where nothing is known.
 
     Args:
-        checked: the nearest pair at the seed and at every other configuration to keep.
+        checked: the nearest pair at the seed and at every other configuration to keep, then those on the lines between these.
     """
-    tight = min(checked, key=lambda one: one.distance, default=None)
+    # A line is no nearer to contact than its ends but by rounding, where an end is the nearest.
+    tight = min(checked, key=lambda one: round(one.distance, 6), default=None)
     if tight is not None and tight.pair is not None and tight.distance <= NEAR:
         return _next_to_contact(scene, tight)
     size = max((float(np.ptp(g.vertices, axis=0).max()) + 2 * g.radius for g in scene.geometries), default=0.0)
@@ -42,8 +43,7 @@ def hindrance(scene: Scene, checked: Sequence[Nearest]) -> str:
 
 def _next_to_contact(scene: Scene, tight: Nearest) -> str:
     assert tight.pair is not None
-    where = "the seed" if tight.field == "seed.q" else tight.field
-    text = f"{where} is {1e3 * tight.distance:.3g} mm from contact of {tight.pair.a} and {tight.pair.b}{NO_ROOM}"
+    text = f"{named(tight.field)} is {1e3 * tight.distance:.3g} mm from contact of {tight.pair.a} and {tight.pair.b}{NO_ROOM}"
     clearance, q = Clearance(scene), scene.in_windows(tight.q)
     found = ((room, nearest_free(scene, clearance, q, room, REACH)) for room in ROOM)
     room, roomy = next((known for known in found if known[1] is not None), (0.0, None))

@@ -17,6 +17,7 @@ from certifier.polytopes.polytope import chebyshev_center, drop_redundant
 from certifier.seeding.free import Nearest, check_free
 from certifier.seeding.hindrance import hindrance
 from certifier.seeding.limits import check_limits, off_limits
+from certifier.seeding.lines import check_lines
 from certifier.seeding.options import Method, SeedOptions
 from certifier.seeding.proposal import Proposal, mend
 from certifier.seeding.tries import best_of_tries
@@ -47,29 +48,32 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
     IRIS may take minutes, and it runs native code, so call it in a process that may die.
 
     Raises:
-        RegionError: as :func:`check_seed` and ``polytope.chebyshev_center``; ``polytope_shape``; ``center_outside``; ``seed_hindered``;
-            ``seed_cut_off`` when the polytope does not contain the seed and ``contain``; ``seeding_failed`` with Drake's words.
+        RegionError: as :func:`check_seed`, :func:`certifier.seeding.lines.check_lines` and ``polytope.chebyshev_center``;
+            ``polytope_shape``; ``center_outside``; ``seed_hindered``; ``seed_cut_off`` when the polytope does not contain the seed and
+            ``contain``; ``seeding_failed`` with Drake's words.
     """
     start = time.perf_counter()
     method = options.method or Method.IRIS_NP2
     checked = [check_seed(scene, q, f"seed.contain[{i}]") for i, q in enumerate(options.contain)]
     contain = scene.to_s(off_limits(scene, options.contain)) if options.contain else np.zeros((0, scene.n))
     if method is Method.POLYTOPE:
+        checked += check_lines(scene, contain, checked)
         C, d, center = _given(scene, options)
         said: dict[str, Any] = {}
     else:
         assert options.q is not None, "every method but polytope has a seed"
         checked.insert(0, check_seed(scene, options.q))
         center = scene.to_s(off_limits(scene, options.q))
+        points = np.concatenate([center[None], contain])
+        checked += check_lines(scene, points, checked)
         if method is Method.LIMITS:
             C, d = np.zeros((0, scene.n)), np.zeros(0)
             said = {}
         elif method is Method.BOX:
             assert options.half_width is not None, "a box has a width"
-            C, d = _box(scene, np.concatenate([center[None], contain]), options.half_width)
+            C, d = _box(scene, points, options.half_width)
             said = {}
         else:
-            points = np.concatenate([center[None], contain])
             try:
                 C, d, said = best_of_tries(scene, points, replace(options, method=method))
             except RegionError:

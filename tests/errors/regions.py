@@ -118,6 +118,7 @@ REGIONS: Table = {
     ("seed_outside_window", "seed.q[0]"): [
         lambda t: propose(t.scene(limit='<limit lower="-6" upper="6" effort="1" velocity="1"/>'), SeedOptions(q=(3.1,)))
     ],
+    ("contain_blocked", "seed.contain[0]"): [lambda t: seeded(q=[1.5, 0.8], contain=[[1.5, 2.4]])],
     ("missing_option", "seed.q"): [lambda t: seeded(method="box")],
     ("option_value", "seed.center"): [lambda t: seeded(q=[0, 0], center=[0, 0])],
     ("center_outside", "seed.center"): [lambda t: given([[1.0, 0.0]], [0.5], center=[0.6, 0.0])],

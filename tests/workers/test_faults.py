@@ -24,6 +24,13 @@ def test_a_seed_in_collision_fails_the_job_and_says_which_pair(planar: Scene) ->
     assert job.error["code"] == "seed_in_collision"
 
 
+@pytest.mark.slow
+def test_points_that_no_region_can_hold_together_fail_the_job_at_once(planar: Scene) -> None:
+    job = ended(submit(planar, {"kind": "grow", "seed": {"q": [0.0, 0.0], "contain": [[1.6, 0.9]]}}))
+    assert job.error is not None
+    assert (job.state, job.error["code"], job.error["field"]) == ("failed", "contain_blocked", "seed.contain[0]")
+
+
 def test_a_pair_that_kills_its_process_every_time_ends_as_an_error(arm: tuple[Scene, np.ndarray]) -> None:
     scene, s = arm
     job_id = submit(scene, box_around(s, 0.01))
