@@ -19,7 +19,7 @@ from certifier.growth.options import GrowthOptions
 from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.seeding.limits import check_limits
-from certifier.seeding.options import SeedOptions
+from certifier.seeding.options import IRIS_SEEDS, SeedOptions
 from db import events, jobs, regions, steps
 from db.models import JobRow
 from db.session import Database
@@ -170,7 +170,9 @@ def _begin(session: Session, job: JobRow, options: CoverOptions, number: int, ta
     ends = [job.deadline_at] if job.deadline_at is not None else []
     if options.region_seconds is not None:
         ends.append(utcnow() + timedelta(seconds=options.region_seconds))
-    seed = SeedOptions(q=task.q, contain=task.contain, random_seed=options.random_seed)
+    # Each of the tries of a seeding takes the next random seed, so the next turn begins after them.
+    random_seed = (options.random_seed + task.turn * SeedOptions.tries) % IRIS_SEEDS
+    seed = SeedOptions(q=task.q, contain=task.contain, random_seed=random_seed)
     growth = GrowthOptions(seed=seed.to_document(), cells=options.cells, stages=options.stages, random_seed=options.random_seed)
     child, _ = jobs.create(
         session,

@@ -7,6 +7,7 @@ not reached are named in its last words.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from planner.cover.options import CoverOptions
@@ -74,9 +75,9 @@ def _after_look(state: CoverState, seen: Scouted) -> Transition:
     if left <= 0 and not state.growing:
         return _finish(state, seen, f"{state.begun} regions were grown, and no more are asked for")
     free = min(state.options.at_once - len(state.growing), left)
-    chosen = [task for task in (*_given(state, seen), *seen.proposals) if _is_worth_it(state, task)][: max(free, 0)]
-    begun = dict(enumerate(chosen, state.begun))
-    state = replace(state, begun=state.begun + len(begun), growing={**state.growing, **begun})
+    chosen = _worth_it(state, (*_given(state, seen), *seen.proposals))[: max(free, 0)]
+    begun, tried = dict(enumerate(chosen, state.begun)), (*state.tried, *(task.request for task in chosen))
+    state = replace(state, begun=state.begun + len(begun), growing={**state.growing, **begun}, tried=tried)
     if state.growing:
         return Transition(replace(state, fruitless=0), Watch(begun))
     if state.fruitless + 1 < LOOKS:
@@ -121,15 +122,20 @@ def _finish(state: CoverState, seen: Scouted, reason: str) -> Transition:
 
 
 def _given(state: CoverState, seen: Scouted) -> list[Task]:
-    """Returns the given configurations that are in no region and that nothing grows around."""
+    """Returns the given configurations that are in no region and that nothing grows around. After a failure the random seed is another."""
     options, growing = state.options, {task.key for task in state.growing.values()}
     connect = [Task(q, Purpose.CONNECT, i) for i, q in enumerate(options.connect) if seen.connect[i] is None]
     seeds = [Task(q, Purpose.SEED, i) for i, q in enumerate(options.seeds) if not seen.seeds[i]]
-    return [task for task in (*seeds, *connect) if task.key not in growing]
+    return [replace(task, turn=state.failed.get(task.key, 0)) for task in (*seeds, *connect) if task.key not in growing]
 
 
-def _is_worth_it(state: CoverState, task: Task) -> bool:
-    return state.failed.get(task.key, 0) < TRIES or task.purpose is Purpose.COVER
+def _worth_it(state: CoverState, tasks: Iterable[Task]) -> list[Task]:
+    """Returns those of the tasks that did not fail too often, none of which asks for what was asked for before."""
+    new: dict[str, Task] = {}
+    for task in tasks:
+        if state.failed.get(task.key, 0) < TRIES or task.purpose is Purpose.COVER:
+            new.setdefault(task.request, task)
+    return [task for request, task in new.items() if request not in state.tried]
 
 
 def _is_given(key: str) -> bool:

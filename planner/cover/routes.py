@@ -6,6 +6,7 @@ together far more quickly than one by one.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -24,19 +25,23 @@ FINE = 6
 SHORTCUTS = 40
 
 
-def route(scene: Scene, collides: Collides, starts: Array, ends: Array, rng: np.random.Generator) -> Array | None:
-    """Returns the corners, (k, n) in s, of a route from one of the starts (a, n) to one of the ends (b, n).
+def routes(scene: Scene, collides: Collides, starts: Array, ends: Array, rng: np.random.Generator) -> Iterator[Array]:
+    """Yields the corners, (k, n) in s, of routes from one of the starts (a, n) to one of the ends (b, n).
 
-    None where none was found, which does not mean that there is none.
+    Straight lines come first, the shortest of them before the others, and then one that trees have found. If there is none, that does not
+    mean that no route exists.
     """
     distances = np.linalg.norm(starts[:, None] - ends[None], axis=2)
-    nearest = np.argsort(distances, axis=None)[:NEAREST]
-    i, j = np.unravel_index(nearest, distances.shape)
-    straight = np.flatnonzero(sees(collides, starts[i], ends[j], FINE))
-    if len(straight):
-        return np.stack([starts[i[straight[0]]], ends[j[straight[0]]]])
+    i, j = np.unravel_index(np.argsort(distances, axis=None)[:NEAREST], distances.shape)
+    yield from straight(collides, starts[i], ends[j])
     found = _grow(scene, collides, starts, ends, rng)
-    return None if found is None else _shortened(collides, found, rng)
+    if found is not None:
+        yield _shortened(collides, found, rng)
+
+
+def straight(collides: Collides, starts: Array, ends: Array) -> list[Array]:
+    """Returns the ends, (2, n), of those of the lines in s from starts to ends, (k, n) each, that are free."""
+    return [np.stack([starts[i], ends[i]]) for i in np.flatnonzero(sees(collides, starts, ends, FINE))]
 
 
 class _Tree:

@@ -6,17 +6,18 @@ in samples: a region is grown where many of them see one another.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import zip_longest
+from itertools import product, zip_longest
 
 import numpy as np
+from numpy.typing import NDArray
 
 from certifier.model import Array, Scene
 from planner.cover.ground import Collides, clique, free_samples, seen_from_each_other, sees
 from planner.cover.known import Known
 from planner.cover.machine import TRIES
-from planner.cover.routes import FINE, along, route
+from planner.cover.routes import FINE, along, routes, straight
 from planner.cover.state import CoverState, Purpose, Scouted, Task
 from planner.membership import locate, to_s
 from planner.motion.path import follow
@@ -43,7 +44,7 @@ BACK = 4
 def proposals(scene: Scene, collides: Collides, known: Known, state: CoverState, seen: Scouted) -> Scouted:
     """Returns what was seen with what to grow next, the best first, and with what cannot be joined.
 
-    Nothing is proposed for what a region grows for already, or what was tried too often.
+    Nothing is proposed for what a region grows for already, or what was tried too often, and no region that cannot be a new one.
     """
     return _Search(scene, collides, known, state, seen).proposed()
 
@@ -96,18 +97,30 @@ class _Search:
         return [self._joining(*join) for join in wanted[:JOINS]]
 
     def _joining(self, purpose: Purpose, number: int, here: int, there: int) -> Task | None:
-        """Returns a region for the first part of a route to another component that is outside of this one; None without a route."""
-        nearest = gap(self._known.library, list(self._known.parts[there]))
-        starts, ends = self._roots(here), self._roots(there)
-        if nearest is not None:
-            ends = np.concatenate([nearest.s_a[None], ends])
-            if self._known.part_of[nearest.b] == here:
-                starts = np.concatenate([nearest.s_b[None], starts])
-        corners = route(self._scene, self._collides, starts, ends, self._rng)
-        if corners is None:
-            end = f"connect[{number}]" if purpose is Purpose.JOIN else f"region {self._known.library.ids[number]}"
-            self._obstacles.append(f"no collision-free motion to the component of {end} was found")
-            return None
+        """Returns a region for the first part of a route to another component that is outside of this one; None without a new one."""
+        found = False
+        for corners in self._routes(here, there):
+            found = True
+            task = self._stretch(self._outside(corners, here), purpose, number)
+            if task is not None:
+                return task
+        end = f"connect[{number}]" if purpose is Purpose.JOIN else f"region {self._known.library.ids[number]}"
+        motion = f"collision-free motion to the component of {end}"
+        self._obstacles.append(f"no region is left to try along a {motion}" if found else f"no {motion} was found")
+        return None
+
+    def _routes(self, here: int, there: int) -> Iterator[Array]:
+        """Yields routes from one component to another, (k, n) in s, the straight lines between nearest and given points first."""
+        known, starts, ends = self._known, self._roots(here), self._roots(there)
+        nearest = gap(known.library, list(known.parts[there]), list(known.parts[here]))
+        assert nearest is not None, "a component has regions"
+        pairs = [(nearest.s_b, nearest.s_a), *product(self._given_in(here), self._given_in(there))]
+        first, second = np.array(pairs).transpose(1, 0, 2)
+        yield from straight(self._collides, first, second)
+        yield from routes(self._scene, self._collides, starts, ends, self._rng)
+
+    def _outside(self, corners: Array, here: int) -> Array:
+        """Returns points, (k, n) in s, of the first part of a route that is outside of a component, from just inside of it on."""
         points = along(corners, self._spacing)
         hits = locate(self._known.library, points)
         inside = np.isin(np.arange(len(points)), hits.point[self._known.part_of[hits.region] == here])
@@ -115,32 +128,49 @@ class _Search:
         leaves = int(np.flatnonzero(~inside)[0]) if not inside.all() else len(points) - 1
         again = np.flatnonzero(covered[leaves:])
         last = leaves + int(again[0]) if len(again) else len(points) - 1
-        return self._stretch(points[max(leaves - 1, 0) : last + 1], purpose, number)
+        return points[max(leaves - 1, 0) : last + 1]
 
     def _roots(self, part: int) -> Array:
         """Returns points in s, (k, n), of a component, to begin routes at."""
         witnesses = self._known.witnesses_in(part)
         some = witnesses[self._rng.permutation(len(witnesses))[:ROOTS]]
-        given = [q for q, at in zip(self._state.options.connect, self._seen.connect, strict=True) if at == part]
         boxes = list(self._known.parts[part])[:ROOTS]
         middles = (self._known.library.lower[boxes] + self._known.library.upper[boxes]) / 2
         hits = locate(self._known.library, middles)
         inside = np.unique(hits.point[np.isin(hits.region, boxes)])
-        s = to_s(self._scene, np.array(given).reshape(-1, self._scene.n))
-        return np.concatenate([s, some, middles[inside]])
+        return np.concatenate([self._given_in(part), some, middles[inside]])
+
+    def _given_in(self, part: int) -> Array:
+        """Returns the configurations to connect that are in a component, (k, n) in s."""
+        given = [q for q, at in zip(self._state.options.connect, self._seen.connect, strict=True) if at == part]
+        return to_s(self._scene, np.array(given).reshape(-1, self._scene.n))
 
     def _stretch(self, points: Array, purpose: Purpose, number: int) -> Task | None:
-        """Returns a region from the first of the points (k, n) in s to as far along them as it sees; less far after failures."""
+        """Returns a region from the first of the points (k, n) in s to as far along them as it sees; less far after failures.
+
+        If that one is not new, it is one that reaches half as far, and so on; at last one around a single point. None if none is new.
+        """
         if not len(points):
             return None
         failed = self._state.failed.get(Task((), purpose, number).key, 0)
         ends = np.unique(np.linspace(0, len(points) - 1, 33).astype(int))[::-1]
         sees_all = sees(self._collides, np.repeat(points[:1], len(ends), axis=0), points[ends], FINE)
-        last = int(ends[np.flatnonzero(sees_all)[0]]) if sees_all.any() else 0
-        last = last // 2**failed
-        seed, begin, end = (points[last] + points[0]) / 2, points[0], points[last]
-        contain = () if failed == TRIES - 1 or last == 0 else (self._q(begin), self._q(end))
-        return Task(self._q(seed), purpose, number, contain)
+        far = int(ends[np.flatnonzero(sees_all)[0]]) if sees_all.any() else 0
+        lasts = [far // 2**half for half in range(failed, TRIES)]
+        tasks = [self._task(points[[0, last]], purpose, number) for last in lasts[:-1] if last]
+        middle, outside = points[[0, lasts[-1]]].mean(axis=0), points[self._uncovered_of(points)]
+        tasks += [Task(self._q(s), purpose, number) for s in (middle, *outside[:1])]
+        return next(filter(self._is_new, tasks), None)
+
+    def _task(self, ends: Array, purpose: Purpose, number: int) -> Task:
+        """Returns a region that contains both ends, (2, n) in s, of a line."""
+        return Task(self._q(ends.mean(axis=0)), purpose, number, (self._q(ends[0]), self._q(ends[1])))
+
+    def _is_new(self, task: Task) -> bool:
+        """Returns whether a region was not asked for yet, and no region holds all of its points: it might become the same one again."""
+        points = to_s(self._scene, np.array([task.q, *task.contain]))
+        held = np.bincount(locate(self._known.library, points).region, minlength=1)
+        return task.request not in self._state.tried and int(held.max()) < len(points)
 
     def _covering(self) -> list[Task]:
         """Returns regions for free configurations that are in none: one for each of a few cliques among them."""
@@ -157,22 +187,26 @@ class _Search:
             members = clique(visible, weights)
             tasks.append(Task(self._q(self._middle(targets[members])), Purpose.COVER))
             weights[members] = 0.0
-        return tasks
+        return list(filter(self._is_new, tasks))
 
     def _uncovered(self) -> Array:
         found: list[Array] = []
         for _ in range(DRAWS):
             drawn = free_samples(self._scene, self._collides, DRAWN, self._rng)
-            covered = np.unique(locate(self._known.library, drawn).point)
-            found.append(np.delete(drawn, covered, axis=0))
+            found.append(drawn[self._uncovered_of(drawn)])
             if sum(map(len, found)) >= TARGETS:
                 break
         return np.concatenate(found)[:TARGETS]
 
+    def _uncovered_of(self, points: Array) -> NDArray[np.intp]:
+        """Returns the numbers of those of the points s, (k, n), that are in no region."""
+        return np.setdiff1d(np.arange(len(points)), locate(self._known.library, points).point)
+
     def _middle(self, members: Array) -> Array:
-        """Returns the mean of points in s, (k, n), where it is free and sees them; else the point that is nearest to it."""
+        """Returns the mean of points in s, (k, n), where it is free, in no region and sees them; else the point that is nearest to it."""
         mean = members.mean(axis=0)
-        if not self._collides(mean[None])[0] and sees(self._collides, np.repeat(mean[None], len(members), axis=0), members).all():
+        alone = len(self._uncovered_of(mean[None])) and not self._collides(mean[None])[0]
+        if alone and sees(self._collides, np.repeat(mean[None], len(members), axis=0), members).all():
             return mean
         nearest: Array = members[np.linalg.norm(members - mean, axis=1).argmin()]
         return nearest

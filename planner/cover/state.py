@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from hashlib import sha256
 
 from planner.cover.options import CoverOptions, Q
 
@@ -36,17 +37,24 @@ class Task:
         purpose: why it is grown.
         about: number of the seed, of the configuration to connect or of the path that it is about; what it joins; 0 else.
         contain: (n,) each, joint positions that it has to contain besides.
+        turn: how often it was tried with other random seeds before.
     """
 
     q: Q
     purpose: Purpose
     about: int = 0
     contain: tuple[Q, ...] = ()
+    turn: int = 0
 
     @property
     def key(self) -> str:
         """Returns what it is about, as a text."""
         return self.purpose.value if self.purpose is Purpose.COVER else f"{self.purpose}[{self.about}]"
+
+    @property
+    def request(self) -> str:
+        """Returns a digest of what the job that grows it is asked for. All else of that is the same for all regions of a cover."""
+        return sha256(repr((self.q, self.contain, self.turn)).encode()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)
@@ -160,6 +168,7 @@ class CoverState:
         options: what was asked for.
         begun: how many regions were begun.
         growing: number of a region that grows -> what it is.
+        tried: the requests of all regions that were begun.
         last: the last look at the scene; None before the first.
         failed: key of a task -> how often in a row it gave no region.
         why: key of a task -> why it gave no region the last time.
@@ -172,6 +181,7 @@ class CoverState:
     options: CoverOptions
     begun: int = 0
     growing: Mapping[int, Task] = field(default_factory=dict)
+    tried: tuple[str, ...] = ()
     last: Scouted | None = None
     failed: Mapping[str, int] = field(default_factory=dict)
     why: Mapping[str, str] = field(default_factory=dict)

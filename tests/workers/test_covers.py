@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 from dataclasses import replace
@@ -64,6 +65,7 @@ def check_rows(job_id: str) -> None:
     job, grown = job_of(job_id), children(job_id)
     assert [child.number for child in grown] == list(range(len(grown)))
     assert all(child.state not in unfinished(JOB) for child in grown)
+    assert len({json.dumps(child.options, sort_keys=True) for child in grown}) == len(grown), "nothing is asked for twice"
     events = events_of(job_id)
     assert [event.seq for event in events] == list(range(1, len(events) + 1))
     begun = [event.data["job"] for event in events if event.kind == "child" and event.data["state"] == "queued"]

@@ -16,7 +16,7 @@ from planner.cover.known import Known
 from planner.cover.look import Look
 from planner.cover.machine import TRIES, begin
 from planner.cover.options import CoverOptions
-from planner.cover.routes import along, route
+from planner.cover.routes import along, routes
 from planner.cover.state import Purpose, Scouted, Task
 from planner.overlap import compare
 from tests.certifier.scenes import planar_arm
@@ -54,8 +54,15 @@ def known(scene: Scene, *boxes: tuple[Sequence[float], Sequence[float]]) -> Know
     return Known.of(found, edges)
 
 
-def looked(scene: Scene, those: Sequence[Wall], options: CoverOptions, there: Known, failed: dict[str, int] | None = None) -> Scouted:
-    state = replace(begin(options).state, failed=failed or {})
+def looked(
+    scene: Scene,
+    those: Sequence[Wall],
+    options: CoverOptions,
+    there: Known,
+    failed: dict[str, int] | None = None,
+    tried: Sequence[Task] = (),
+) -> Scouted:
+    state = replace(begin(options).state, failed=failed or {}, tried=tuple(task.request for task in tried))
     return Look(scene, walls(scene, those), options)(there, state)
 
 
@@ -141,6 +148,40 @@ def test_what_was_tried_too_often_is_not_tried_again(scene: Scene) -> None:
     assert looked(scene, DOOR, options, there, {"join[1]": TRIES}).proposals == ()
 
 
+def test_a_free_straight_line_is_tried_first_and_shorter_parts_of_it_after_it(scene: Scene) -> None:
+    """The nearest points are on both sides of the wall; the line between the configurations goes over it, and ends in no region."""
+    low = (-0.1, 0.1, -LIMIT, 0.0)
+    there = known(scene, ((-1.9, -1.9), (-0.15, 0.9)), ((0.15, -1.9), (1.9, 0.9)))
+    options = CoverOptions(connect=((-1.0, 0.5), (1.0, 0.5)))
+    tried: list[Task] = []
+    for _ in range(4):
+        seen = looked(scene, [low], options, there, tried=tried)
+        (join,) = seen.proposals
+        assert join.request not in {task.request for task in tried}
+        tried.append(join)
+    begin_q, end_q = np.array(tried[0].contain)
+    assert sees(walls(scene, [low]), scene.to_s(begin_q[None]), scene.to_s(end_q[None]))[0]
+    assert np.sign(begin_q[0]) != np.sign(end_q[0]), "it holds all of what is between the components"
+    whole, shorter = (np.linalg.norm(np.subtract(*task.contain)) for task in tried[:2])
+    assert shorter < whole
+
+
+def test_nothing_is_asked_for_that_a_region_holds_already(scene: Scene) -> None:
+    """The route leaves through a sliver: what is close to the component is in it, and would become the same region again."""
+    there = known(scene, ((-1.9, -1.9), (-0.15, 0.9)), ((0.15, -1.9), (1.9, 0.9)))
+    options = CoverOptions(connect=((-1.0, 0.5), (1.0, 0.5)))
+    tried: list[Task] = []
+    for _ in range(30):
+        seen = looked(scene, [(-0.1, 0.1, -LIMIT, 1.8)], options, there, tried=tried)
+        if not seen.proposals:
+            break
+        points = scene.to_s(np.array([seen.proposals[0].q, *seen.proposals[0].contain]))
+        library = there.library
+        assert not any(((points >= library.lower[i]) & (points <= library.upper[i])).all() for i in range(len(library)))
+        tried += seen.proposals
+    assert len({task.request for task in tried}) == len(tried) > 0
+
+
 def test_a_path_goes_on_where_it_stops_being_covered(scene: Scene) -> None:
     options = CoverOptions(paths=(((-1.5, 1.5), (1.5, 1.5)),))
     seen = looked(scene, DOOR, options, known(scene, ((-1.9, 1.2), (-0.5, 1.9))))
@@ -175,11 +216,11 @@ def test_a_scene_without_anything_free_is_refused(scene: Scene) -> None:
 
 def test_a_route_is_free_and_there_is_none_through_a_wall(scene: Scene) -> None:
     starts, ends = scene.to_s([[-1.0, -1.0]]), scene.to_s([[1.0, -1.0]])
-    found = route(scene, walls(scene, DOOR), starts, ends, np.random.default_rng(0))
+    found = next(routes(scene, walls(scene, DOOR), starts, ends, np.random.default_rng(0)), None)
     assert found is not None
     assert (found[0].tolist(), found[-1].tolist()) == (starts[0].tolist(), ends[0].tolist())
     assert not walls(scene, DOOR)(along(found, 0.02)).any()
-    assert route(scene, walls(scene, SHUT), starts, ends, np.random.default_rng(0)) is None
+    assert not list(routes(scene, walls(scene, SHUT), starts, ends, np.random.default_rng(0)))
 
 
 def test_a_clique_sees_itself() -> None:

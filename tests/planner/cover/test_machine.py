@@ -64,7 +64,7 @@ def test_whatever_is_reported_in_whatever_order_it_ends_and_says_why(data: st.Da
         regions=data.draw(st.integers(1, 6)),
         at_once=data.draw(st.integers(1, 3)),
     )
-    transition, late, told = begin(options), False, 0
+    transition, late, told, asked = begin(options), False, 0, list[str]()
     for _ in range(100):
         state, action = transition.state, transition.action
         document = json.loads(json.dumps(stored.document(state)))
@@ -76,6 +76,7 @@ def test_whatever_is_reported_in_whatever_order_it_ends_and_says_why(data: st.Da
         if isinstance(action, Watch):
             assert state.growing
             assert set(action.begin) <= set(state.growing)
+            asked += [task.request for task in action.begin.values()]
         report: Report
         if not late and data.draw(st.integers(0, 9)) == 0:
             report, late = Late(), True
@@ -87,6 +88,7 @@ def test_whatever_is_reported_in_whatever_order_it_ends_and_says_why(data: st.Da
         transition = advance(state, report)
     assert isinstance(action, Finish), "it did not end"
     assert not state.growing
+    assert len(set(asked)) == len(asked), "nothing is asked for twice"
     assert state.last is not None
     assert action.reason
     assert action.reached == (not unreached(options, state.last))
@@ -99,14 +101,14 @@ def test_it_begins_what_is_given_first_and_no_more_than_may_grow_at_once() -> No
     options = CoverOptions(seeds=(HERE,), connect=(HERE, THERE), at_once=2)
     first = after(begin(options).state, seen(seeds=(False,), connect=(None, None), proposals=(SOMEWHERE,)))
     assert isinstance(first.action, Watch)
-    assert [task.key for task in first.action.begin.values()] == ["seed[0]", "connect[0]"]
-    then = after(first.state, Ended({0: None}), seen(seeds=(True,), connect=(None, None), proposals=(SOMEWHERE,)))
+    assert [task.key for task in first.action.begin.values()] == ["seed[0]", "connect[1]"], "the seed is connect[0] as well"
+    then = after(first.state, Ended({0: None}), seen(seeds=(True,), connect=(0, None), proposals=(SOMEWHERE,)))
     assert isinstance(then.action, Watch)
-    assert [task.key for task in then.action.begin.values()] == ["connect[1]"], "connect[0] grows already"
+    assert [task.key for task in then.action.begin.values()] == ["cover"], "connect[1] grows already"
 
 
 def test_goals_that_are_reached_end_it_and_what_grows() -> None:
-    state = after(begin(CoverOptions(coverage=0.5)).state, seen(10, proposals=(SOMEWHERE, SOMEWHERE))).state
+    state = after(begin(CoverOptions(coverage=0.5)).state, seen(10, proposals=(SOMEWHERE, Task(THERE, Purpose.COVER)))).state
     stopping = after(state, Ended({0: None}), seen(60))
     assert stopping.action == Watch(stop=True)
     last = after(stopping.state, Ended({1: "cancelled"}))
@@ -130,7 +132,8 @@ def test_a_configuration_around_which_no_region_grows_is_given_up_with_words() -
     transition = after(state, seen(connect=(0, None)))
     for number in range(TRIES):
         assert isinstance(transition.action, Watch)
-        assert transition.action.begin[number].key == "connect[1]"
+        task = transition.action.begin[number]
+        assert (task.key, task.turn) == ("connect[1]", number), "each time with another random seed"
         transition = after(transition.state, Ended({number: "bodies touch"}), seen(connect=(0, None)))
     for _ in range(LOOKS - 1):
         assert transition.action == Scout()
@@ -150,9 +153,10 @@ def test_components_that_cannot_be_joined_end_it_with_words() -> None:
 
 
 def test_regions_that_change_nothing_end_it() -> None:
-    transition = after(begin(CoverOptions(at_once=1)).state, seen(10, proposals=(SOMEWHERE,)))
+    places = [Task((float(i), 0.0), Purpose.COVER) for i in range(IDLE + 1)]
+    transition = after(begin(CoverOptions(at_once=1)).state, seen(10, proposals=tuple(places[:1])))
     for number in range(IDLE):
-        transition = after(transition.state, Ended({number: None}), seen(10, proposals=(SOMEWHERE,)))
+        transition = after(transition.state, Ended({number: None}), seen(10, proposals=tuple(places[: number + 2])))
     assert isinstance(transition.action, Finish)
     assert transition.action.reason.startswith(f"the last {IDLE} regions changed nothing")
     assert transition.state.begun == IDLE
