@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from api.advice import seed_between
 from api.schemas.planning import Edge, Gap, GraphRegion, GraphResponse
 from certifier.model import Scene
 from certifier.outcome import Guarantee
@@ -74,7 +75,7 @@ def _gaps(library: Library, scene: Scene, parts: list[list[int]]) -> list[Gap]:
             a=library.ids[near.a],
             b=library.ids[near.b],
             distance=near.distance,
-            q=scene.to_q((near.s_a + near.s_b) / 2).tolist(),
+            q=seed_between(scene, library, near),
             q_a=scene.to_q(near.s_a).tolist(),
             q_b=scene.to_q(near.s_b).tolist(),
         )

@@ -221,14 +221,14 @@ class Edge:
 
 @dataclass(frozen=True, eq=False)
 class Gap:
-    """The place where a component comes nearest to another. A region that is grown at q may join them."""
+    """The place where a component comes nearest to another."""
 
     a: str
     b: str
     distance: float
     """In s."""
-    q: Array
-    """(n,) midway between a and b."""
+    q: Array | None
+    """(n,) a seed to try: midway between a and b, or near there, free of collision and in no region; None where none was found."""
     q_a: Array
     """(n,) a's point that is nearest to b."""
     q_b: Array
@@ -258,8 +258,8 @@ class PlanGap:
     goal: str
     distance: float
     """Between the two, in s."""
-    q: Array
-    """(n,) midway between the two: a seed to try."""
+    q: Array | None
+    """(n,) a seed to try: midway between the two, or near there, free of collision and in no region; None where none was found."""
     q_start: Array
     """(n,) the point of the region ``start`` that is nearest to the other."""
     q_goal: Array

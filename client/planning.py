@@ -103,7 +103,7 @@ def graph(args: Namespace) -> int:
         rows = [(edge["a"], edge["b"], f"{edge['depth']:.3g}", _place(edge["q"])) for edge in answer["edges"]]
         output.print_table(("region", "overlaps", "depth", "witness q"), rows, right="depth")
     for gap in answer["gaps"]:
-        print(f"gap of {gap['distance']:.3g} in s between {gap['a']} and {gap['b']}; try the seed {_place(gap['q'])}")
+        print(f"gap of {gap['distance']:.3g} in s between {gap['a']} and {gap['b']}; {_advice(gap)}")
     return OK
 
 
@@ -162,7 +162,7 @@ def _why_not(answer: dict[str, Any]) -> str:
         case "disconnected":
             sides = f"{gap['start_regions']} of {answer['regions']} regions are connected with --from, {gap['goal_regions']} with --to"
             between = f"between {gap['start']} and {gap['goal']}"
-            return f"{sides}\ngap of {gap['distance']:.3g} in s {between}; try the seed {_place(gap['q'])}"
+            return f"{sides}\ngap of {gap['distance']:.3g} in s {between}; {_advice(gap)}"
         case _:
             where = f", the last one not at {stop['time']:.6g} s, q = {_place(stop['q'])}" if stop else ""
             return f"regions lead from --from to --to, but no trajectory was proved to be in them{where}"
@@ -178,6 +178,11 @@ def _near(near: dict[str, Any]) -> str:
     if near["distance"] == 0:
         return f"inside {near['region']} ({near['guarantee']})"
     return f"{near['distance']:.3g} in s from {near['region']} ({near['guarantee']}), whose nearest point is {_place(near['q'])}"
+
+
+def _advice(gap: dict[str, Any]) -> str:
+    """Returns what to do about a gap between regions."""
+    return "no free configuration was found near its middle" if gap["q"] is None else f"try the seed {_place(gap['q'])}"
 
 
 def _no_region(answer: dict[str, Any]) -> str:

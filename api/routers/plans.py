@@ -9,6 +9,7 @@ from fastapi import APIRouter
 
 from api import answers, checks
 from api.access import READ, Db
+from api.advice import seed_between
 from api.children import Children
 from api.libraries import KeptLibraries, Libraries
 from api.links import KeptLinks, LinksKept
@@ -102,7 +103,7 @@ def _gap(library: Library, scene: Scene, apart: Apart) -> PlanGap:
         start=library.ids[gap.a],
         goal=library.ids[gap.b],
         distance=gap.distance,
-        q=scene.to_q((gap.s_a + gap.s_b) / 2).tolist(),
+        q=seed_between(scene, library, gap),
         q_start=scene.to_q(gap.s_a).tolist(),
         q_goal=scene.to_q(gap.s_b).tolist(),
     )

@@ -273,7 +273,14 @@ class Gap(BaseModel):
     a: RegionId
     b: RegionId
     distance: Distance
-    q: Annotated[list[float], Field(description="(n,), joint positions midway between a and b: a seed to try.", examples=[[0.4, 0.3]])]
+    q: Annotated[
+        list[float] | None,
+        Field(
+            description="(n,), a seed to try: joint positions midway between a and b, or near there, free of collision and in no region; "
+            "null where none was found.",
+            examples=[[0.4, 0.3]],
+        ),
+    ]
     q_a: Annotated[list[float], Field(description="(n,), joint positions of a's point that is nearest to b.", examples=[[0.3, 0.3]])]
     q_b: Annotated[list[float], Field(description="(n,), joint positions of b's point that is nearest to a.", examples=[[0.5, 0.3]])]
 

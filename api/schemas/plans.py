@@ -63,7 +63,14 @@ class PlanGap(BaseModel):
     start: RegionId
     goal: RegionId
     distance: Distance
-    q: Annotated[list[float], Field(description="(n,), joint positions midway between the two: a seed to try.", examples=[[0.4, 0.3]])]
+    q: Annotated[
+        list[float] | None,
+        Field(
+            description="(n,), a seed to try: joint positions midway between the two, or near there, free of collision and in no region; "
+            "null where none was found.",
+            examples=[[0.4, 0.3]],
+        ),
+    ]
     q_start: Annotated[list[float], Field(description="(n,), the point of the region `start` that is nearest.", examples=[[0.3, 0.3]])]
     q_goal: Annotated[list[float], Field(description="(n,), the point of the region `goal` that is nearest.", examples=[[0.5, 0.3]])]
 

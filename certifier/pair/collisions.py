@@ -14,15 +14,18 @@ from certifier.model import Array, Geometry, Scene, Volume
 from certifier.pair.closest import closest
 
 
-def in_collision(scene: Scene, s: Array) -> NDArray[np.bool_]:
+def in_collision(scene: Scene, s: Array, room: float = 0.0) -> NDArray[np.bool_]:
     """Returns at which of the points s, (N, n), some pair of the scene is not shown to be apart, padding included; (N,).
 
     The bodies are shown apart by a direction between them. Errors of rounding therefore make a configuration collide, never the contrary.
+
+    Args:
+        room: metres by which the padded bodies have to be apart.
     """
     collides = np.zeros(len(s), dtype=bool)
     for _, (a, b), R, p in _poses(scene, s):
         left = np.flatnonzero(~collides)
-        collides[left[_touching(a, b, R[left], p[left], 2 * scene.padding)]] = True
+        collides[left[_touching(a, b, R[left], p[left], 2 * scene.padding + room)]] = True
     return collides
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from api import graph
+from api import advice, graph
 from certifier.model import Scene
 from db import scenes
 from db.session import Database
@@ -67,6 +67,16 @@ def test_regions_apart_are_told_with_the_gap_between_them(client: TestClient, re
     assert (gap["q_start"], gap["q_goal"]) == ([pytest.approx(0.4)], [pytest.approx(0.6)])
     store_region(database, a_part(0.3, 0.7))
     assert plan(client, [-0.2], [0.8])["found"], "a region over the gap joins them"
+
+
+def test_a_gap_without_a_free_place_advises_none(
+    client: TestClient, region: str, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store_region(database, a_part(0.6, 0.9))
+    monkeypatch.setattr(advice, "in_collision", lambda scene, s, room: np.ones(len(s), dtype=bool))
+    assert plan(client, [0.1], [0.8])["gap"]["q"] is None
+    (gap,) = client.get("/v1/planning/graph?scene=slider").json()["gaps"]
+    assert gap["q"] is None
 
 
 def test_an_answer_without_all_overlaps_says_so(

@@ -7,8 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from api import advice
 from certifier.model import Scene
 from ciris.synchronous.client import Client
 from db.session import Database
@@ -95,6 +97,16 @@ def test_a_plan_is_printed_with_its_regions(ciris: Ciris, url: str, region: str,
     assert verdict == "every point between them is in certified regions, guarantee exact"
     found = ciris("plan", "slider", "--from=-0.2", "--to", more, "--json", CIRIS_URL=url).json
     assert (found["found"], found["q"][0], found["t"][0]) == (True, [-0.2], 0.0)
+
+
+def test_no_seed_is_advised_where_none_was_found(
+    ciris: Ciris, url: str, region: str, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store_region(database, a_part(0.6, 0.9))
+    monkeypatch.setattr(advice, "in_collision", lambda scene, s, room: np.ones(len(s), dtype=bool))
+    plan = ciris("plan", "slider", "--from", "0.1", "--to", "0.7", CIRIS_URL=url).stdout
+    graph = ciris("graph", "slider", CIRIS_URL=url).stdout
+    assert [text.splitlines()[-1].partition("; ")[2] for text in (plan, graph)] == 2 * ["no free configuration was found near its middle"]
 
 
 def test_a_plan_that_is_not_found_says_why(ciris: Ciris, url: str, region: str, database: Database) -> None:

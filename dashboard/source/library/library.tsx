@@ -111,7 +111,7 @@ function Library({ model }: { model: SceneModel }) {
                   <summary>{graph.gaps.length} {graph.gaps.length === 1 ? "gap" : "gaps"} between components</summary>
                   <ul>
                     {graph.gaps.map((gap) => (
-                      <li key={`${gap.a} ${gap.b}`}>{gap.distance.toPrecision(3)} in s between {gap.a.slice(0, 8)} and {gap.b.slice(0, 8)}: <button type="button" class="plain" onClick={() => setQ(gap.q)}>look there</button> <a href={`/new?scene=${model.scene}&q=${gap.q.join(",")}`}>grow a region there</a></li>
+                      <li key={`${gap.a} ${gap.b}`}>{gap.distance.toPrecision(3)} in s between {gap.a.slice(0, 8)} and {gap.b.slice(0, 8)}: <Advice scene={model.scene} q={gap.q} onLook={setQ} /></li>
                     ))}
                   </ul>
                 </details>
@@ -126,4 +126,10 @@ function Library({ model }: { model: SceneModel }) {
       </div>
     </div>
   );
+}
+
+/** What people can do about a gap between two components. */
+function Advice({ scene, q, onLook }: { scene: string; q: number[] | null; onLook: (q: number[]) => void }) {
+  if (!q) return <>no free configuration was found near its middle</>;
+  return <><button type="button" class="plain" onClick={() => onLook(q)}>look there</button> <a href={`/new?scene=${scene}&q=${q.join(",")}`}>grow a region there</a></>;
 }

@@ -84,7 +84,7 @@ function why(plan: PlanResponse, units: ("rad" | "m")[]): string {
       : `There is no trajectory: no region contains the ${end}.`;
   }
   if (reason === "disconnected" && gap) {
-    return `There is no trajectory: the ${gap.start_regions} regions that are connected with the start do not overlap the ${gap.goal_regions} that are connected with the goal. The gap is ${gap.distance.toPrecision(3)} in s; a region that is grown at ${asText(gap.q, units)} may join them.`;
+    return `There is no trajectory: the ${gap.start_regions} regions that are connected with the start do not overlap the ${gap.goal_regions} that are connected with the goal. The gap is ${gap.distance.toPrecision(3)} in s; ${gap.q ? `a region that is grown at ${asText(gap.q, units)} may join them` : "no free configuration was found near its middle"}.`;
   }
   return "There is no trajectory: regions lead from the start to the goal, but none was found that is proved to be covered.";
 }
