@@ -104,6 +104,7 @@ PYTHON: Table = {
     ("argument", "timeout"): [lambda t: connect(NOBODY, timeout=0)],
     ("argument", "paths"): [lambda t: connect(NOBODY).cover("cell", paths=3)],
     ("points", "q"): [lambda t: connect(NOBODY).grow("cell", [[0.0], [1.0, 2.0]]), lambda t: connect(NOBODY).certify_path("cell")],
+    ("points", "bezier"): [lambda t: connect(NOBODY).path("cell", [[0.0], [1.0]], bezier=[[[0.0], [1.0]]])],
     ("points", "knots"): [lambda t: connect(NOBODY).path("cell", knots=[[0.0, 1.0]], control_points=[[0.0], [1.0]])],
     ("outside_window", "q"): [half_turn],
     ("url", ""): [lambda t: connect("http://127.0.0.1:port"), lambda t: connect("localhost:8643")],
