@@ -11,6 +11,7 @@ from certifier.model import WORLD, Array, Scene
 from certifier.pair.collisions import in_collision
 from certifier.seeding.free import Clearance
 from planner.advice import seed_near
+from planner.cover.ground import sees
 from planner.library import Library
 from planner.membership import locate
 from tests.certifier.scenes import box as body
@@ -26,7 +27,7 @@ def scene(request: pytest.FixtureRequest) -> Scene:
 
 
 def advised(scene: Scene, there: Library, q: Array) -> Array | None:
-    return seed_near(scene, there, partial(in_collision, scene), scene.to_s(q))
+    return seed_near(scene, there, partial(in_collision, scene), scene.to_s(np.stack([q, q])))
 
 
 def test_a_seed_is_free_as_it_is_printed_and_near_what_was_wanted(scene: Scene) -> None:
@@ -40,7 +41,7 @@ def test_a_seed_is_free_as_it_is_printed_and_near_what_was_wanted(scene: Scene) 
             np.testing.assert_allclose(found, q, atol=1e-12)
         else:
             moved += 1
-            assert np.linalg.norm(found - q) < 0.7
+            assert np.linalg.norm(found - q) < 1.0
     assert moved >= 10
 
 
@@ -56,6 +57,24 @@ def test_a_seed_that_was_moved_is_in_no_region(scene: Scene) -> None:
         found = advised(scene, there, q)
         if found is not None:
             assert not len(locate(there, scene.to_s(found[None])).point)
+
+
+def test_a_place_that_sees_both_ends_comes_first(scene: Scene) -> None:
+    """The lines between the ends are blocked in the middle. More seeds see both ends than where only the middle is known."""
+    collides, rng, seeing, nearest = partial(in_collision, scene), np.random.default_rng(2), [], []
+
+    def sees_both(seed: Array | None, ends: Array) -> bool:
+        assert seed is not None
+        return bool(sees(collides, np.repeat(scene.to_s(seed)[None], 2, axis=0), ends).all())
+
+    while len(seeing) < 20:
+        ends = scene.to_s(rng.uniform(scene.q_lower, scene.q_upper, scene.n) + np.array([[0.0, -0.4], [0.0, 0.4]]))
+        if collides(ends).any() or not collides(ends.mean(axis=0, keepdims=True))[0]:
+            continue
+        seeing.append(sees_both(seed_near(scene, FAR, collides, ends), ends))
+        middle = np.repeat(ends.mean(axis=0, keepdims=True), 2, axis=0)
+        nearest.append(sees_both(seed_near(scene, FAR, collides, middle), ends))
+    assert np.mean(seeing) > np.mean(nearest)
 
 
 def test_nothing_is_advised_where_nothing_is_free() -> None:
