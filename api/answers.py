@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from api.libraries import Libraries
 from api.schemas.planning import Near, Piece, Uncovered
@@ -13,6 +14,7 @@ from db.session import Database
 from planner.library import Library
 from planner.motion import path
 from planner.nearest import Nearest
+from planner.tubes import Tubes
 
 
 def asked(db: Database, libraries: Libraries, name: str) -> tuple[str, Scene, Library]:
@@ -23,8 +25,14 @@ def asked(db: Database, libraries: Libraries, name: str) -> tuple[str, Scene, Li
     return scene_id, scene, libraries.of(db, scene_id, scene.n)
 
 
-def pieces(library: Library, stretches: Sequence[path.Stretch]) -> list[Piece]:
-    return [Piece(begin=s.begin, end=s.end, region=library.ids[s.region], guarantee=guarantee(library, s.region)) for s in stretches]
+def pieces(library: Library, tubes: Tubes, stretches: Sequence[path.Stretch]) -> list[Piece]:
+    return [Piece(begin=s.begin, end=s.end, **_proved_by(library, tubes, s.region)) for s in stretches]
+
+
+def _proved_by(library: Library, tubes: Tubes, number: int) -> dict[str, Any]:
+    if number < len(library):
+        return {"region": library.ids[number], "guarantee": guarantee(library, number)}
+    return {"region": None, "motion": tubes.motions[number - len(library)].id, "guarantee": Guarantee.EXACT}
 
 
 def uncovered(library: Library, scene: Scene, stop: path.Uncovered | None) -> Uncovered | None:

@@ -16,10 +16,11 @@ from api.access import Keyring
 from api.access_log import AccessLog
 from api.announce import Announcer
 from api.cells import OutlinesKept
-from api.children import AT_ONCE, ChildLimiter
+from api.children import AT_ONCE, ChildLimiter, expect_motions
 from api.libraries import Libraries
 from api.links import LinksKept
 from api.metrics import Requests
+from api.motions import MotionsKept
 from api.pages import site
 from api.pages.rendering import render_problem
 from api.questions import LARGE, SMALL
@@ -78,6 +79,7 @@ def create_app(db: Database | None = None) -> FastAPI:
     app.state.children = ChildLimiter()
     app.state.libraries = Libraries()
     app.state.links = LinksKept()
+    app.state.motions = MotionsKept()
     app.state.outlines = OutlinesKept()
     app.state.room = Room()
     app.state.keyring = Keyring(app.state.database, open_without_keys=settings().loopback)
@@ -105,6 +107,7 @@ async def _lifespan(_app: FastAPI) -> AsyncIterator[None]:
     """Limits the threads that answer requests. Each has its connection to the database, so more threads would only wait for each other."""
     to_thread.current_default_thread_limiter().total_tokens = THREADS
     expect_bundles()
+    expect_motions()
     yield
 
 

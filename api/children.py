@@ -1,18 +1,25 @@
-"""Some requests are answered by a child process: reading an uploaded scene, checking a proof. This module limits how many."""
+"""Some requests are answered by a child process: reading an uploaded scene, checking a proof, finding a motion. Their number is limited."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
-from typing import Annotated, TypeVar, TypeVarTuple
+from functools import lru_cache
+from typing import Annotated, Any, TypeVar, TypeVarTuple
 
 from anyio import CapacityLimiter, to_thread
 from fastapi import Depends, Request
 
 from certifier.errors import CirisError
+from certifier.isolation.child import prepare, run_in_child
+from certifier.model import Scene
+from db.settings import settings
 
 AT_ONCE = 2
 """At most this many run at once: each may take minutes and gigabytes. They never occupy the threads of other requests."""
 WAITING = 16
+MOTIONS, MOTION_SECONDS = "planner.sampling.child", 60.0
+"""What answers questions about motions, and how long it may take."""
 
 Answer = TypeVar("Answer")
 Arguments = TypeVarTuple("Arguments")
@@ -33,6 +40,26 @@ class ChildLimiter:
         if self._limiter.statistics().tasks_waiting >= WAITING:
             raise CirisError("busy", "too many requests of this kind wait already", hint="try again in a while")
         return await to_thread.run_sync(function, *arguments, limiter=self._limiter)
+
+
+def expect_motions() -> None:
+    """Begins to load what the first question about a motion needs, without waiting."""
+    prepare(f"{MOTIONS}:planned")
+
+
+def about_motions(function: str, scene: Scene, payload: dict[str, Any]) -> Any:
+    """Returns what a function of the process that knows about motions says of a scene.
+
+    Raises:
+        CirisError: the function's own error, or what befell the process.
+    """
+    memory, kept = settings().child_memory_bytes, (scene.hash, _document(scene))
+    return run_in_child(f"{MOTIONS}:{function}", payload, timeout_s=MOTION_SECONDS, memory_bytes=memory, kept=kept)
+
+
+@lru_cache(maxsize=4)
+def _document(scene: Scene) -> str:
+    return json.dumps(scene.to_document())
 
 
 async def _limiter(request: Request) -> ChildLimiter:

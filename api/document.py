@@ -67,6 +67,7 @@ ALSO: dict[str, tuple[str, ...]] = {
     "find_nearest": ("busy",),
     "cover_segments": ("busy",),
     "cover_path": ("busy",),
+    "download_kept_proof": ("motion_not_found", "ambiguous_id", "proof_not_found"),
     "plan_trajectory": ("region_elsewhere", "region_not_found", *CHILDREN),
     "slice_space": CHILDREN,
     "certify_path": CHILDREN,

@@ -100,7 +100,7 @@ _BENCHMARKS: dict[str, Callable[[Namespace, Screen], dict[str, Any]]] = {
     "robots": lambda args, screen: robots.robots(args.robots, args.deadline, screen.line),
     "recertify": lambda args, screen: recertify.changes(args.scenes, args.limit, screen.line),
     "query": lambda args, screen: query.query(args.regions, screen.line),
-    "plan": lambda args, screen: plan.trajectories(args.scene, args.regions, args.url, args.queries, screen.line, args.free),
+    "plan": lambda args, screen: plan.motions(args.scene, args.url, args.queries, args.points, screen.line),
     "survey": lambda args, screen: survey.survey(args.scenes, args.most, screen.line, args.cells),
 }
 
@@ -179,14 +179,13 @@ def _parser() -> ArgumentParser:
     )
     asked = kinds.add_parser("query", parents=[as_json], help="measure questions of planners about many regions, beside a plain product")
     asked.add_argument("--regions", type=_count, default=query.REGIONS, metavar="N", help=f"default {query.REGIONS}")
-    planned = kinds.add_parser("plan", parents=[as_json], help="plan trajectories through regions, beside RRT-Connect")
-    planned.add_argument("scene", metavar="SCENE", help=f"a scene file, or one of {', '.join(catalogue.SCENES)}")
+    planned = kinds.add_parser("plan", parents=[as_json], help="find and prove motions by a running service, beside OMPL without proofs")
+    planned.add_argument("scene", metavar="SCENE", help=f"a scene file, or one of {', '.join(catalogue.FILES)}")
+    planned.add_argument("--url", help="the service; default: the one that is found")
+    planned.add_argument("--queries", type=_count, default=plan.QUERIES, metavar="N", help=f"how many questions; default {plan.QUERIES}")
     planned.add_argument(
-        "--regions", type=Path, action="append", default=[], metavar="PATH", help="a proof, a manifest or a polytope, or a folder of them"
+        "--points", type=_count, default=plan.POINTS, metavar="N", help=f"points of each motion that Drake looks at; default {plan.POINTS}"
     )
-    planned.add_argument("--url", help="the service that has the regions, where no --regions are given; default: the one that is found")
-    planned.add_argument("--free", action="store_true", help="plan between any free configurations, in regions or not")
-    planned.add_argument("--queries", type=_count, default=plan.QUERIES, metavar="N", help=f"how many trajectories; default {plan.QUERIES}")
     changed = kinds.add_parser("recertify", parents=[as_json], help="certify regions again whose scenes have changed, and grow them anew")
     changed.add_argument(
         "scenes", nargs="*", metavar="EXAMPLE", default=list(recertify.SCENES), help=f"default: {', '.join(recertify.SCENES)}"

@@ -18,7 +18,9 @@ from certifier.scene import load_scene
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ("planar_2dof", "arm_3dof", "ur3e_bin", "iiwa_shelf", "dual_ur3e", "sphere_arm")
 """The examples are in the order of their cost."""
-FILES = {name: ROOT / "examples" / name / "scene.yaml" for name in EXAMPLES} | {"rail_arm": ROOT / "benchmarks/scenes/rail_arm/scene.yaml"}
+FILES = {name: ROOT / "examples" / name / "scene.yaml" for name in EXAMPLES} | {
+    name: ROOT / "benchmarks" / "scenes" / name / "scene.yaml" for name in ("rail_arm", "gripper_cell")
+}
 VARIANTS = {
     f"iiwa_{figure}_{furniture or 'shelf'}": (figure, furniture)
     for figure, furniture in (

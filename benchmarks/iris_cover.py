@@ -28,7 +28,7 @@ from planner.cover.look import Look
 from planner.cover.machine import advance, begin
 from planner.cover.options import CoverOptions
 from planner.cover.result import said
-from planner.cover.state import Ended, Finish, Late, Report, Scout, Scouted, Task, Watch
+from planner.cover.state import Ended, Finish, Late, Move, Moved, Report, Scout, Scouted, Task, Watch
 from planner.library import Library
 from planner.overlap import beside, overlap
 
@@ -82,6 +82,8 @@ def cover(scene: Scene, options: dict[str, Any], processes: int, seconds: float,
                 late, report = True, Late()
             elif isinstance(action, Scout):
                 report = look(regions.known, transition.state)
+            elif isinstance(action, Move):
+                report = Moved(())  # regions alone are compared
             elif action.stop:
                 report = Ended(dict.fromkeys(transition.state.growing, "given up"))
             else:

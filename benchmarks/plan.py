@@ -1,202 +1,146 @@
-"""This module measures how trajectories are planned through certified regions, beside RRT-Connect on the same questions.
+"""This module measures how motions are found and proved, beside OMPL without proofs on the same questions.
 
-Seconds are by the clock, because a child process makes the curves; nothing else should run on the machine.
+Seconds are by the clock, because a service and its child processes answer; nothing else should run on the machine.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from functools import partial
-from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks import catalogue, measure
 from benchmarks.measure import Progress
-from benchmarks.rrt import RESOLUTION, RRTConnect
-from certifier.errors import CirisError
-from certifier.isolation.child import run_in_child
-from certifier.model import Array, Polytope, Scene, StoredRegion
-from certifier.outcome import Guarantee
+from benchmarks.ompl import RESOLUTION, Ompl
+from certifier.collisions.bodies import bodies_of
+from certifier.collisions.free import free_at_all
+from certifier.kinematics import Kinematics
+from certifier.model import Array, Scene
 from certifier.pair.collisions import in_collision
-from certifier.polytopes.gibbs import uniform_in_q
-from certifier.polytopes.polytope import bounds
-from certifier.proof.region import RegionProof
 from certifier.scene import load_scene
+from ciris.answers import Plan
+from ciris.synchronous.service import Service
 from client import service
 from client.inputs import is_scene_file
-from client.polytopes import polytope_file
 from planner.cover.ground import free_samples
-from planner.library import Library
-from planner.overlap import beside, components, overlap
-from planner.trajectory.plan import Answer, Limits, Trajectory, plan
-from planner.trajectory.routes import Links
 
-QUERIES = 100
-SPEED, ACCELERATION = 1.0, 2.0
-TIMEOUT_S, MEMORY = 60.0, 16 << 30
-RRT_SECONDS = 20.0
-"""RRT-Connect gives up after so long."""
-DENSE = 20
-"""The check whether a path collides takes this many configurations for each one that RRT-Connect looks at."""
+QUERIES, POINTS = 100, 10_000
+SECONDS = 5.0
+"""Both planners search for at most this long."""
+FINGER = "gripper/left/finger"
+NARROW = {"gripper_cell": {"shelf": ((0.72, -0.28, 0.06), (0.9, 0.28, 0.86)), "bin": ((0.0, 0.4, 0.0), (0.2, 0.7, 0.12))}}
+"""Boxes, least and largest corner in the world in metres, that FINGER has to be in for a task."""
+TASKS = 10
+DRAWN = 50_000
 
 
-def trajectories(name: str, files: list[Path], url: str | None, queries: int, progress: Progress, free: bool = False) -> dict[str, Any]:
-    """Plans between random configurations. Returns the document of ``ciris bench plan``.
+def motions(name: str, url: str | None, queries: int, points: int, progress: Progress) -> dict[str, Any]:
+    """Plans between random free configurations. Returns the document of ``ciris bench plan``.
 
     Args:
         name: an example, or a scene file.
-        files: regions as manifests, proofs or polytopes, or folders of such; none for those of the service at ``url``.
-        free: whether the configurations are uniform among all that are free of collision, in regions or not; else each is in a region.
+        url: of a running service; None for the one that is found. It answers from what it has of the scene.
+        points: at how many points Drake looks at each motion.
 
     Raises:
-        CirisError: no_regions, or what is wrong with a file, the scene or the service.
+        CirisError: what is wrong with the scene or the service.
     """
-    scene = load_scene(name) if is_scene_file(name) else catalogue.scene(name)
-    stored = list(_from_files(files)) if files else _of_service(scene, url)
-    if not stored:
-        raise CirisError("no_regions", f"there are no regions of {scene.name}", field="--regions", hint="`ciris grow` makes one")
-    library = Library(scene.n).changed(1, [], stored)
-    start = time.perf_counter()
-    links = _links(library, scene)
-    compared = time.perf_counter() - start
-    progress(f"{len(library)} regions, {len(links.ends)} overlaps")
-    rival, rng = RRTConnect(scene), np.random.default_rng(0)
-    points = _free(scene, 2 * queries + 2, rng) if free else _points(library, scene, 2 * queries + 2, rng)
-    _planned(library, scene, links, points[-2], points[-1])  # loads Drake
-    rows = []
-    for i, (a, b) in enumerate(zip(points[:queries], points[queries:-2], strict=True)):
-        rows.append(_asked(library, scene, links, rival, (a, b), rng))
-        progress(_line(i, rows[-1]))
-    both = [row for row in rows if row["plan"]["length"] is not None and row["rrt"]["length"] is not None]
-    parts = components(len(library), [(one, other) for one, other in links.ends.tolist()])
+    file = name if is_scene_file(name) else str(catalogue.FILES[name])
+    scene, rng = load_scene(file), np.random.default_rng(0)
+    rival = Ompl(scene)
+    free = scene.to_q(free_samples(scene, partial(in_collision, scene), 2 * queries, rng))
+    pairs = list(zip(free[:queries], free[queries:], strict=True))
+    narrow = _tasks(scene, name, rng)
+    with service.connect(url) as client:
+        asked = Service(client)
+        known = asked.add_scene(file)
+        begin = time.perf_counter()
+        asked.plan(known, *pairs[0], seconds=SECONDS)
+        first = time.perf_counter() - begin
+        rows = [_row(scene, rival, partial(asked.plan, known), pair, points, progress, i) for i, pair in enumerate(pairs[1:], 1)]
+        tasks = [_row(scene, rival, partial(asked.plan, known), pair, points, progress, i) for i, pair in enumerate(narrow)]
+        again = [_timed(partial(asked.plan, known), pair)[1] for pair in pairs[1:]]
     return {
         "benchmark": "plan",
         "machine": measure.machine(),
         "scene": scene.name,
         "joints": scene.n,
-        "regions": len(library),
-        "faces": len(library.faces),
-        "overlaps": len(links.ends),
-        "components": len(parts),
-        "compare_seconds": compared,
-        "queries": queries,
-        "free": free,
-        "connected": sum(row["outcome"] not in ("Apart", "Outside") for row in rows),
-        "plan": _summary([row["plan"] for row in rows]),
-        "rrt": {**_summary([row["rrt"] for row in rows]), "resolution": RESOLUTION, "limit_seconds": RRT_SECONDS},
-        "both": len(both),
-        "length_ratio": _quantiles([row["plan"]["length"] / row["rrt"]["length"] for row in both]),
+        "pairs": len(scene.pairs),
+        "first_seconds": first,
+        "queries": len(rows),
+        "points": points,
+        "resolution": RESOLUTION,
+        "limit_seconds": SECONDS,
+        **_compared(rows),
+        "again_seconds": _quantiles(again),
+        "tasks": _compared(tasks) if tasks else None,
         "rows": rows,
     }
 
 
-def _asked(
-    library: Library, scene: Scene, links: Links, rival: RRTConnect, ends: tuple[Array, Array], rng: np.random.Generator
-) -> dict[str, Any]:
-    """Returns what both planners make of one question."""
-    begin = time.perf_counter()
-    found = _planned(library, scene, links, *ends)
-    seconds = time.perf_counter() - begin
-    theirs = rival.plan(*ends, rng, RRT_SECONDS)
-    ours = found.q if isinstance(found, Trajectory) else None
-    return {
-        "straight": float(np.linalg.norm(ends[1] - ends[0])),
-        "outcome": type(found).__name__,
-        "plan": {
-            "seconds": seconds,
-            **_path(scene, ours),
-            "duration": float(found.t[-1]) if isinstance(found, Trajectory) else None,
-            "pieces": len(found.stretches) if isinstance(found, Trajectory) else None,
-        },
-        "rrt": {"seconds": theirs.seconds, "first_seconds": theirs.first_seconds, **_path(scene, theirs.path)},
+def _tasks(scene: Scene, name: str, rng: np.random.Generator) -> list[tuple[Array, Array]]:
+    """Returns pairs of free configurations in narrow places, from each place to the next; none for a scene without tasks."""
+    if name not in NARROW:
+        return []
+    geometry, bodies, kinematics, order = scene.geometry(FINGER), bodies_of(scene), Kinematics.of(scene), np.arange(len(scene.pairs))
+    found: dict[str, list[Array]] = {place: [] for place in NARROW[name]}
+    while min(map(len, found.values())) < TASKS:
+        q = rng.uniform(scene.q_lower, scene.q_upper, (DRAWN, scene.n))
+        at = kinematics.points("world", geometry.body, geometry.vertices, scene.to_s(q))
+        for place, (least, largest) in NARROW[name].items():
+            inside = q[((at >= np.array(least)) & (at <= np.array(largest))).all(axis=(1, 2))]
+            found[place] += list(inside[free_at_all(bodies, inside, order)])
+    places = list(found.values())
+    return [(places[i % len(places)][i], places[(i + 1) % len(places)][i]) for i in range(TASKS)]
+
+
+def _row(scene: Scene, rival: Ompl, ask: Any, pair: tuple[Array, Array], points: int, progress: Progress, number: int) -> dict[str, Any]:
+    """Returns what both planners make of one question, each in its turn."""
+    found, seconds = _timed(ask, pair)
+    path, theirs = rival.plan(*pair, SECONDS)
+    row: dict[str, Any] = {
+        "straight": float(np.linalg.norm(pair[1] - pair[0])),
+        "ours": {"seconds": seconds, "reason": found.reason, **_path(rival, found.q if found else None, points)},
+        "ompl": {"seconds": theirs, **_path(rival, path, points)},
     }
+    progress(f"{scene.name} {number}: {_said(row['ours'])}; OMPL {_said(row['ompl'])}")
+    return row
 
 
-def _planned(library: Library, scene: Scene, links: Links, start: Array, goal: Array) -> Answer:
-    """Plans as an API process does: a child makes the curves."""
-
-    def optimise(payload: dict[str, Any]) -> Any:
-        return run_in_child("planner.trajectory.curve:optimised", payload, timeout_s=TIMEOUT_S, memory_bytes=MEMORY)
-
-    limits = Limits(np.full(scene.n, SPEED), np.full(scene.n, ACCELERATION))
-    return plan(library, scene, links, start, goal, limits, optimise)
+def _said(side: dict[str, Any]) -> str:
+    return f"{side['seconds']:.3f} s, {'-' if side['length'] is None else format(side['length'], '.2f')} rad"
 
 
-def _path(scene: Scene, path: Array | None) -> dict[str, Any]:
-    """Returns the length of a path, and whether it collides at one of many configurations."""
+def _timed(ask: Any, pair: tuple[Array, Array]) -> tuple[Plan, float]:
+    begin = time.perf_counter()
+    found: Plan = ask(*pair, seconds=SECONDS)
+    return found, time.perf_counter() - begin
+
+
+def _path(rival: Ompl, path: Array | None, points: int) -> dict[str, Any]:
     if path is None:
         return {"length": None, "collides": None}
-    length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
-    return {"length": length, "collides": any(bool(in_collision(scene, scene.to_s(q)).any()) for q in _dense(path))}
+    return {"length": float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()), "collides": rival.collides(path, points)}
 
 
-def _dense(path: Array) -> Iterator[Array]:
-    for a, b in pairwise(path):
-        count = int(np.ceil(np.linalg.norm(b - a) / RESOLUTION)) * DENSE + 1
-        yield a + np.linspace(0, 1, count)[:, None] * (b - a)
-
-
-def _points(library: Library, scene: Scene, count: int, rng: np.random.Generator) -> Array:
-    """Returns configurations (count, n), each uniform in joint positions in a region that is drawn for it."""
-    chosen = rng.integers(0, len(library), count)
-    points = np.empty((count, scene.n))
-    for region in np.unique(chosen).tolist():
-        mine = np.flatnonzero(chosen == region)
-        drawn = uniform_in_q(library.polytope(region), scene, chains=len(mine), each=1, seed=region)
-        points[mine] = scene.to_q(drawn[:, 0])
-    return points
-
-
-def _free(scene: Scene, count: int, rng: np.random.Generator) -> Array:
-    return scene.to_q(free_samples(scene, partial(in_collision, scene), count, rng))
-
-
-def _links(library: Library, scene: Scene) -> Links:
-    pairs = ((a, b) for b in range(len(library)) for a in beside(library, b, range(b)))
-    found = [(pair, common) for pair in pairs if (common := overlap(library, *pair)) is not None]
-    ends = np.array([pair for pair, _ in found], dtype=np.intp).reshape(-1, 2)
-    witness = np.array([common.witness for _, common in found]).reshape(-1, scene.n)
-    return Links(ends, witness, np.array([common.depth for _, common in found]), scene.to_q(witness))
-
-
-def _from_files(paths: list[Path]) -> Iterator[StoredRegion]:
-    """Yields the regions of files, and of the files of folders.
-
-    Raises:
-        CirisError: as RegionProof.from_bytes and polytope_file.
-    """
-    for path in paths:
-        files = sorted(path.iterdir()) if path.is_dir() else [path]
-        proofs = {file.stem for file in files if file.suffix == ".proof"}
-        for file in files:
-            if file.suffix == ".proof":
-                proof = RegionProof.from_bytes(file.read_bytes())
-                yield _stored(file.stem, Polytope(proof.C, proof.d))
-            elif file.stem not in proofs:
-                yield _stored(file.stem, polytope_file(str(file)).polytope)
-
-
-def _of_service(scene: Scene, url: str | None) -> list[StoredRegion]:
-    """Returns the regions that a running service has of the scene."""
-    with service.connect(url) as client:
-        manifests = [client.region(region["id"]) for region in client.regions(scene=scene.hash[:16])]
-    return [
-        _stored(m["id"], Polytope(np.array(m["manifest"]["halfspace_normals"]), np.array(m["manifest"]["halfspace_offsets"])))
-        for m in manifests
-    ]
-
-
-def _stored(name: str, polytope: Polytope) -> StoredRegion:
-    return StoredRegion(name, Guarantee.NONE, polytope.C, polytope.d, *bounds(polytope))
+def _compared(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Returns what the rows say of both planners."""
+    solved = [row for row in rows if row["ompl"]["length"] is not None]
+    both = [row for row in solved if row["ours"]["length"] is not None]
+    return {
+        "asked": len(rows),
+        "ompl_solved": len(solved),
+        "answered_of_these": len(both),
+        "answered": sum(row["ours"]["length"] is not None for row in rows),
+        "length_ratio": _quantiles([row["ours"]["length"] / row["ompl"]["length"] for row in both]),
+        **{side: _summary([row[side] for row in rows]) for side in ("ours", "ompl")},
+    }
 
 
 def _summary(found: list[dict[str, Any]]) -> dict[str, Any]:
     return {
-        "found": sum(each["length"] is not None for each in found),
         "collide": sum(each["collides"] is True for each in found),
         "seconds": _quantiles([each["seconds"] for each in found]),
         "length": _quantiles([each["length"] for each in found if each["length"] is not None]),
@@ -205,9 +149,3 @@ def _summary(found: list[dict[str, Any]]) -> dict[str, Any]:
 
 def _quantiles(values: list[float]) -> dict[str, float] | None:
     return {"p50": float(np.quantile(values, 0.5)), "p99": float(np.quantile(values, 0.99))} if values else None
-
-
-def _line(number: int, row: dict[str, Any]) -> str:
-    ours, theirs = row["plan"], row["rrt"]
-    sides = [f"{each['seconds']:.3f} s, {'-' if each['length'] is None else format(each['length'], '.2f')} rad" for each in (ours, theirs)]
-    return f"{number}: {row['outcome']}, {sides[0]}; RRT-Connect {sides[1]}"

@@ -282,22 +282,26 @@ def _query(document: Document) -> list[str]:
 
 
 def _plan(document: Document) -> list[str]:
-    """Returns a table of both planners, and a sentence about the lengths where both found a path."""
-    header = ["planner", "found", "p50, s", "p99, s", "length, p50", "collide between samples"]
-    rows = []
-    for name, side in (("ciris plan", document["plan"]), ("RRT-Connect with shortcuts", document["rrt"])):
-        length = f"{side['length']['p50']:.2f}" if side["length"] else "-"
-        times = [f"{side['seconds'][which]:.3f}" for which in ("p50", "p99")]
-        rows.append([name, f"{side['found']} of {document['queries']}", *times, length, str(side["collide"])])
-    ends = "any free configurations" if document["free"] else "random configurations of the regions"
-    about = (
-        f"{document['scene']}: {document['joints']} joints, {document['regions']} regions with {document['faces']} faces, "
-        f"{document['overlaps']} overlaps, {document['components']} components. The questions are between {ends}; "
-        f"these were connected {document['connected']} of {document['queries']} times."
-    )
-    ratio = document["length_ratio"]
-    lengths = f"Our length over theirs, {document['both']} paths: median {ratio['p50']:.2f}." if ratio else "No question has two paths."
-    return [about, _table(header, rows), lengths]
+    """Returns a table of both planners, and sentences about lengths, repeated questions and tasks in narrow places."""
+    header = ["planner", "answered", "p50, s", "p99, s", "length, p50", "collide"]
+    parts = [("random questions", document), *([("tasks in narrow places", document["tasks"])] if document["tasks"] else [])]
+    about = f"{document['scene']}: {document['joints']} joints, {document['pairs']} pairs"
+    said = [f"{about}; the first motion took {document['first_seconds']:.2f} s."]
+    for what, part in parts:
+        rows = []
+        for name, side, answered in (("ciris plan", "ours", part["answered"]), ("OMPL, no proof", "ompl", part["ompl_solved"])):
+            found = part[side]
+            times = [f"{found['seconds'][which]:.3f}" for which in ("p50", "p99")]
+            length = f"{found['length']['p50']:.2f}" if found["length"] else "-"
+            rows.append([name, f"{answered} of {part['asked']}", *times, length, str(found["collide"])])
+        ratio = part["length_ratio"]
+        solved = f"{part['answered_of_these']} of {part['ompl_solved']}"
+        said += [f"{what}:", _table(header, rows), f"Of those that OMPL solved, ciris answered {solved}."]
+        if ratio:
+            said.append(f"Our length over OMPL's: median {ratio['p50']:.3f}.")
+    again = document["again_seconds"]
+    said.append(f"The same questions again: p50 {1000 * again['p50']:.1f} ms, p99 {1000 * again['p99']:.1f} ms.")
+    return said
 
 
 def _cover(document: Document) -> list[str]:

@@ -99,17 +99,19 @@ class Contained:
     """The regions that contain the point, the one with the largest margin first."""
     margin: float | None
     """The largest margin, in s; None where no region contains the point."""
+    motions: tuple[str, ...]
+    """Ids of the proved motions whose tubes contain the point."""
 
     def __bool__(self) -> bool:
         return self.inside
 
 
 class Containment(Answers[Contained]):
-    """Which regions contain each of k points. It is true only if every point is in some region."""
+    """Which regions and tubes contain each of k points. It is true only if every point is in one."""
 
     @property
     def inside(self) -> NDArray[np.bool_]:
-        """(k,) whether some region contains the point."""
+        """(k,) whether some region, or the tube of some motion, contains the point."""
         return np.array([point.inside for point in self])
 
     @property
@@ -144,13 +146,15 @@ class Nearest(Answers[Near | None]):
 
 @dataclass(frozen=True)
 class Piece:
-    """A region that contains all of a motion between two times."""
+    """What proves a motion between two times: a region that contains it, or the tube of a proved motion."""
 
     begin: float
     end: float
-    region: str
-    """Id of the region."""
+    region: str | None
+    """Id of the region; None where a motion's tube contains it."""
     guarantee: Guarantee
+    motion: str | None = None
+    """Id of the proved motion; None for a region."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,20 +269,71 @@ class PlanGap:
     q_goal: Array
 
 
+@dataclass(frozen=True)
+class BeyondLimit:
+    """A joint that is outside its limits."""
+
+    where: str
+    """The argument, as ``start`` or ``via[0]``."""
+    joint: str
+    value: float
+    """In radians or metres, as the limits are."""
+    lower: float | None
+    """None for no limit."""
+    upper: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Collision:
+    """Two bodies that touch."""
+
+    where: str
+    """The argument, as ``start`` or ``via[0]``."""
+    a: str
+    b: str
+    depth: float | None
+    """How deep the padded bodies are in each other, in metres; None where that is not known."""
+    free: Array | None
+    """(n,) free joint positions near by; None where none were found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """How near to a pose a frame comes."""
+
+    q: Array
+    """(n,)"""
+    metres: float
+    radians: float
+
+
+@dataclass(frozen=True)
+class LineStop:
+    """Where a motion along a line ends."""
+
+    part: float
+    """How much of the line there is a motion for, from 0 to 1."""
+    joint: str | None
+    """The joint that is at its limit."""
+    a: str | None
+    """The geometries that touch."""
+    b: str | None
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A trajectory from rest to rest, or why there is none. It is true if there is one.
+    """A motion from rest to rest that is proved to be free of collision, or why there is none. It is true if there is one.
 
-    A trajectory is straight in q between its configurations, and every point of it is proved to be in certified regions.
+    The motion is straight in q between its configurations.
     """
 
     found: bool
     q: Array
-    """(k, n) configurations; without a row where there is no trajectory."""
+    """(k, n) configurations; without a row where there is no motion."""
     t: Array
     """(k,) seconds, when the robot is there."""
     pieces: tuple[Piece, ...]
-    """The regions that contain the trajectory, in order, with begin and end in seconds."""
+    """What proves the motion, in order, with begin and end in seconds: regions, or a proved motion."""
     length: float | None
     """In q, in radians (and metres)."""
     duration: float | None
@@ -286,14 +341,28 @@ class Plan:
     guarantee: Guarantee | None
     complete: bool
     """Whether every pair of regions has been compared."""
+    motion: str | None
+    """Id of the proved motion in whose tube the answer is; None for regions."""
+    tube: float | None
+    """Half the width of that tube, in radians or metres."""
     reason: str | None
-    """Why there is no trajectory: start_uncovered, goal_uncovered, disconnected or not_proved."""
+    """Why there is no motion, as start_in_collision or no_motion; docs/planning.md lists all."""
+    limit: BeyondLimit | None
+    """The joint that is outside its limits."""
+    collision: Collision | None
+    """The bodies that touch."""
+    reached: Reached | None
+    """Where the frame comes nearest to the pose."""
+    line: LineStop | None
+    """Where the motion along the line ends."""
     nearest: Near | None
     """The region that is nearest to the end that no region contains."""
     gap: PlanGap | None
     """Where the regions of the two ends come nearest to each other."""
     uncovered: Uncovered | None
     """Where the last trajectory that was tried is not proved to be covered."""
+    proof: bytes | None = field(repr=False)
+    """The proof file about exactly this motion; None where it was not asked for."""
 
     def __bool__(self) -> bool:
         return self.found

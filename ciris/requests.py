@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,21 @@ from ciris.options import GROW, Fields, GrowOptions
 from ciris.space import Array, Straight, numbers
 
 _WAYS = "give waypoints as q or s, or a curve: bezier, or knots with control_points"
+
+
+class FramePose(TypedDict):
+    """A pose of a frame in the world: the body's name, position (3,) in metres, and roll, pitch and yaw (3,) in radians."""
+
+    frame: str
+    position: ArrayLike
+    rpy: NotRequired[ArrayLike]
+
+
+class Tolerance(TypedDict, total=False):
+    """How far a frame may be from a line, in metres and radians; the service's defaults where they are missing."""
+
+    metres: float
+    radians: float
 
 
 def grow_request(scene: str, q: ArrayLike, options: GrowOptions) -> Document:

@@ -1,18 +1,19 @@
-"""These commands ask the service about its regions: for a trajectory through them, which is nearest, whether a path stays inside, and
-how they are connected.
-"""
+"""These commands are a planner's questions: for a motion, for the nearest region, whether a path stays in regions, how regions connect."""
 
 from __future__ import annotations
 
+import base64
 import re
 from argparse import Namespace
 from collections.abc import Sequence
 from typing import Any
 
 from certifier.errors import CirisError
+from certifier.verify.decimals import at_least_mm
 from ciris.documents import Document
 from ciris.synchronous.client import Client
 from client import output, service
+from client.files import ProofFile, check_writable
 from client.inputs import configuration
 from client.options import JOB
 from client.output import Screen, print_json
@@ -22,6 +23,17 @@ from client.request import refuse_options, request
 OK, NO = 0, 1
 GROWABLE = {"start_uncovered", "goal_uncovered", "disconnected"}
 """For these reasons there may be a trajectory once more regions have been grown."""
+FIELDS = {
+    "pose": "--to-pose",
+    "line": "--tolerance",
+    "start": "--from",
+    "goal": "--to",
+    "goals": "--to",
+    "via": "--via",
+    "speed": "--speed",
+    "acceleration": "--acceleration",
+}
+"""Maps a field of the request to the argument that gives it."""
 REGION = re.compile(r"[0-9a-f]{4,8}|[0-9a-f]{8}-[0-9a-f-]*")
 """An id of a region, or its beginning."""
 
@@ -40,26 +52,79 @@ def nearest(args: Namespace) -> int:
 
 
 def plan(args: Namespace) -> int:
-    ends = [_end(args.start, "--from"), _end(args.goal, "--to")]
-    limits = [_limit(args.speed, "--speed"), _limit(args.acceleration, "--acceleration")]
-    asked = request(args, JOB)
+    start, goals = _end(args.start, "--from"), [_end(text, "--to") for text in args.goals]
+    job = request(args, JOB)
     if not args.grow:
         refuse_options(args, JOB, "grow")
+    elif not args.regions_only:
+        raise CirisError("option", "--grow is about regions", field="--grow", hint="add --regions-only, or leave out --grow")
+    if len(goals) > 1 and any(isinstance(goal, str) for goal in goals):
+        raise CirisError("option", "several goals are configurations, not regions", field="--to", hint="give joint positions")
+    proof = None
+    if args.out is not None:
+        check_writable(args.out)
+        proof = ProofFile(args.out)
+    asked: Document = {
+        "start": start,
+        **_goal(args, goals),
+        "via": [configuration(text, "--via") for text in args.via],
+        "regions_only": args.regions_only,
+        "prove": args.out is not None,
+    }
+    for name in ("speed", "acceleration"):
+        if getattr(args, name) is not None:
+            asked[name] = _limit(getattr(args, name), f"--{name}")
+    if args.seconds is not None:
+        asked["seconds"] = args.seconds
     with service.connect(args.url) as client:
-        scene = service.scene_name(client, args.scene)
-        answer = _planned(client, scene, ends, limits)
-        if args.grow and answer["reason"] in GROWABLE:
-            _grow_between(client, scene, ends, asked)
-            answer = _planned(client, scene, ends, limits)
+        scene = asked["scene"] = service.scene_name(client, args.scene)
+        try:
+            answer = _planned(client, asked)
+            if args.grow and answer["reason"] in GROWABLE:
+                _grow_between(client, scene, [start, *goals], job)
+                answer = _planned(client, asked)
+        except CirisError as error:
+            error.field = error.field and _argument(error.field)
+            raise
+    written = None
+    if proof is not None and answer["proof"] is not None:
+        written = str(proof.write(answer["scene"], base64.b64decode(answer["proof"])))
     if args.json:
-        print_json(answer)
+        print_json({**answer, "proof": written})
     elif answer["found"]:
         _print_pieces(answer["pieces"])
         print(f"{len(answer['q'])} configurations, {answer['length']:.4g} long in q, {answer['duration']:.4g} s; --json prints them")
-        print(f"every point between them is in certified regions, guarantee {answer['guarantee']}")
+        by = "lies in certified regions" if answer["motion"] is None else "is proved to be free of collision"
+        print(f"all of the motion {by}, guarantee {answer['guarantee']}")
+        if written:
+            print(f"proof: {written} (check it: ciris verify {written})")
     else:
         print(_why_not(answer))
     return OK if answer["found"] else NO
+
+
+def _goal(args: Namespace, goals: list[list[float] | str]) -> Document:
+    """Returns the fields of a request that say where the motion ends."""
+    if bool(goals) == (args.to_pose is not None):
+        raise CirisError("option", "the motion has to end somewhere", field="--to", hint="give either --to or --to-pose")
+    if args.to_pose is None:
+        for name in ("frame", "line", "tolerance"):
+            if getattr(args, name):
+                raise CirisError("option", "it is about a pose", field=f"--{name}", hint="give --to-pose, or leave it out")
+        return {"goal": goals[0]} if len(goals) == 1 else {"goals": goals}
+    numbers = configuration(args.to_pose, "--to-pose")
+    if len(numbers) not in (3, 6):
+        hint = "give x, y and z in metres, then roll, pitch and yaw in radians"
+        raise CirisError("option", f"a pose has 6 numbers, not {len(numbers)}", field="--to-pose", hint=hint)
+    if args.frame is None:
+        raise CirisError("option", "it is not said of which frame the pose is", field="--frame", hint="name a body, such as tool0")
+    asked: Document = {"pose": {"frame": args.frame, "position": numbers[:3], "rpy": numbers[3:] or None}}
+    if args.line:
+        names = ("metres", "radians")
+        asked["line"] = dict(zip(names, configuration(args.tolerance, "--tolerance"), strict=False)) if args.tolerance else {}
+    elif args.tolerance:
+        raise CirisError("option", "it is about a line", field="--tolerance", hint="give --line, or leave it out")
+    return asked
 
 
 def path(args: Namespace) -> int:
@@ -107,13 +172,13 @@ def graph(args: Namespace) -> int:
     return OK
 
 
-def _planned(client: Client, scene: str, ends: Sequence[Any], limits: Sequence[Any]) -> dict[str, Any]:
+def _planned(client: Client, asked: Document) -> Document:
     """Returns the answer of the service. It is asked again as long as pairs of regions are compared that may join the ends."""
     screen = Screen()
-    answer = client.plan(scene, *ends, *limits)
+    answer = client.plan(asked)
     while answer["reason"] == "disconnected" and not answer["complete"]:
         screen.status("comparing regions")
-        answer = client.plan(scene, *ends, *limits)
+        answer = client.plan(asked)
     screen.clear()
     return answer
 
@@ -153,11 +218,33 @@ def _limit(text: str | None, field: str) -> float | list[float] | None:
 
 
 def _why_not(answer: dict[str, Any]) -> str:
-    """Returns in words why there is no trajectory."""
-    gap, stop = answer["gap"], answer["uncovered"]
-    match answer["reason"]:
+    """Returns in words why there is no motion."""
+    gap, stop, reason = answer["gap"], answer["uncovered"], answer["reason"]
+    if limit := answer["limit"]:
+        bounds = " ".join(f"{word} {limit[side]:g}" for word, side in (("from", "lower"), ("to", "upper")) if limit[side] is not None)
+        return f"{_field(limit['where'])}: joint {limit['joint']} is at {limit['value']:g}, and its limits are {bounds}"
+    if touching := answer["collision"]:
+        how = "overlap" if touching["depth"] is None else f"overlap by {at_least_mm(touching['depth'])}"
+        free = f"; free near by: {_place(touching['free'])}" if touching["free"] else ""
+        return f"{_field(touching['where'])}: {touching['a']} and {touching['b']} {how}{free}"
+    if reached := answer["reached"]:
+        nearest = f"the nearest that was found is off by {1000 * reached['metres']:.3g} mm and {reached['radians']:.3g} rad"
+        return f"--to-pose: no configuration reaches it; {nearest}, at q = {_place(reached['q'])}"
+    if stop_at := answer["line"]:
+        why = {
+            "line_limit": f"joint {stop_at['joint']} is at its limit",
+            "line_singular": "the arm cannot move the frame on: it is stretched, or axes are in line",
+            "line_tolerance": "the tolerance needs segments that are too short; --tolerance allows more",
+            "line_collision": f"{stop_at['a']} and {stop_at['b']} touch",
+        }[reason]
+        return f"the line ends at the part {stop_at['part']:.3g} of it: {why}"
+    match reason:
+        case "no_motion":
+            return "no motion was found in time; --seconds gives more time"
+        case "not_certified":
+            return "a motion was found, but none that could be certified: it passes by something too closely"
         case "start_uncovered" | "goal_uncovered":
-            end = "--from" if answer["reason"] == "start_uncovered" else "--to"
+            end = "--from" if reason == "start_uncovered" else "--to"
             return f"{end} is in no certified region; nearest: {_near(answer['nearest']) if answer['nearest'] else _no_region(answer)}"
         case "disconnected":
             sides = f"{gap['start_regions']} of {answer['regions']} regions are connected with --from, {gap['goal_regions']} with --to"
@@ -168,10 +255,26 @@ def _why_not(answer: dict[str, Any]) -> str:
             return f"regions lead from --from to --to, but no trajectory was proved to be in them{where}"
 
 
+def _argument(field: str) -> str:
+    """Returns the argument that gave a field of the request."""
+    return "--frame" if field == "pose.frame" else FIELDS.get(re.split(r"[\[.]", field)[0], field)
+
+
+def _field(where: str) -> str:
+    """Returns the argument that gave a field of the request, with its number among several."""
+    name, bracket, number = where.partition("[")
+    return f"{FIELDS.get(name, name)}{bracket}{number}"
+
+
 def _print_pieces(pieces: Sequence[dict[str, Any]]) -> None:
-    rows = [(f"{piece['begin']:.6g}", f"{piece['end']:.6g}", piece["region"], piece["guarantee"]) for piece in pieces]
+    rows = [(f"{piece['begin']:.6g}", f"{piece['end']:.6g}", _proof_of(piece), piece["guarantee"]) for piece in pieces]
     if rows:
-        output.print_table(("from", "to", "region", "guarantee"), rows, right="from to")
+        output.print_table(("from", "to", "proved by", "guarantee"), rows, right="from to")
+
+
+def _proof_of(piece: dict[str, Any]) -> str:
+    """Returns what proves a piece of a motion."""
+    return f"motion {piece['motion']}" if piece["motion"] else f"region {piece['region']}"
 
 
 def _near(near: dict[str, Any]) -> str:

@@ -413,6 +413,27 @@ class LibraryRow(Base):
     """The row outlives its scene. So a version never means other regions, even when the scene is added again."""
     version: Mapped[int] = mapped_column(default=0)
     """How often a region of the scene was added or deleted."""
+    motions: Mapped[int] = mapped_column(default=0)
+    """How often a motion of the scene was added or deleted."""
+
+
+class MotionRow(Owned, Base):
+    """A motion that was planned in a scene and proved, with a tube about it. ``proof_digest`` names the proof."""
+
+    __tablename__ = "motions"
+    __table_args__ = (UniqueConstraint("scene_id", "number"), _proofs_of("motions"))
+
+    id: Mapped[str] = mapped_column(String(36), primary_key=True)
+    scene_id: Mapped[str] = mapped_column(ForeignKey("scenes.id"))
+    number: Mapped[int]
+    """What the scene's library counted as its motions when this one was added. The oldest ones go first."""
+    arrays: Mapped[Arrays]
+    """``path`` (k, n), the configurations that the proof is about, straight in q between them; ``q`` (K, n) and ``t`` (K,), the motion with
+    its times, which is in the tube; ``speed`` and ``acceleration`` (n,), the limits that it keeps."""
+    tube: Mapped[float]
+    """Half the width of the tube, in radians or metres."""
+    proof_digest: Mapped[str] = mapped_column(ForeignKey("proofs.digest"))
+    created_at: Mapped[datetime] = mapped_column(default=utcnow)
 
 
 class OverlapRow(Base):

@@ -9,7 +9,7 @@ from sqlalchemy import delete, exists, or_
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db.models import PairRow, ProofRow, RegionRow, StepRow
+from db.models import MotionRow, PairRow, ProofRow, RegionRow, StepRow
 from db.session import insert_new
 
 TOGETHER = 500
@@ -46,7 +46,7 @@ def drop_unused(session: Session, digests: Collection[str]) -> None:
 
     Projects may share a proof. So the rows are looked for in the tables themselves, where a session's project does not count.
     """
-    tables = (model.__table__ for model in (RegionRow, PairRow, StepRow))
+    tables = (model.__table__ for model in (RegionRow, PairRow, StepRow, MotionRow))
     used = or_(*(exists().where(table.c.proof_digest == ProofRow.digest) for table in tables))
     session.flush()
     wanted = list(digests)

@@ -150,7 +150,7 @@ def delete(session: Session, region_id: str) -> None:
 
 def changed(session: Session, scene_id: str) -> int:
     """Counts a change of the scene's regions and returns the new version. Changes of one scene wait for each other until they commit."""
-    insert_new(session, LibraryRow, [{"scene_id": scene_id, "version": 0}])
+    insert_new(session, LibraryRow, [{"scene_id": scene_id, "version": 0, "motions": 0}])
     counted = update(LibraryRow).where(LibraryRow.scene_id == scene_id).values(version=LibraryRow.version + 1)
     return session.scalars(counted.returning(LibraryRow.version)).one()
 

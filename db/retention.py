@@ -14,10 +14,11 @@ from sqlalchemy import ColumnElement, Select, Text, cast, delete, exists, func, 
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
-from db import jobs, projects, proofs, regions, scenes
+from db import jobs, motions, projects, proofs, regions, scenes
 from db.models import (
     EventRow,
     JobRow,
+    MotionRow,
     PairRow,
     ProjectRow,
     ProofRow,
@@ -87,6 +88,7 @@ def delete_scene(session: Session, scene_id: str, *, dependents: bool) -> None:
     found = _counted(session, which)
     _check(found, found.jobs, f"scene {scene_id}", dependents)
     _delete_jobs(session, which)
+    motions.delete_all(session, scene_id)
     session.execute(delete(SceneNameRow).where(SceneNameRow.scene_id == scene_id))
     session.execute(delete(SceneRow).where(SceneRow.id == scene_id))
 
@@ -167,12 +169,15 @@ def _bytes(session: Session, mine: Select[str]) -> int:
 
 
 def stored(session: Session, project: str) -> int:
-    """Returns how many bytes of scenes, jobs, proofs and cells a project stores."""
+    """Returns how many bytes of scenes, jobs, proofs, cells and motions a project stores."""
     documents = select(func.sum(func.length(cast(SceneRow.document, Text)))).where(SceneRow.project == project)
+    moved = select(func.sum(func.length(MotionRow.arrays) + func.length(ProofRow.data)))
+    moved = moved.join(ProofRow, ProofRow.digest == MotionRow.proof_digest).where(MotionRow.project == project)
     asked = select(func.sum(JobRow.bytes)).where(JobRow.project == project)
     return (
         int(session.scalar(documents) or 0)
         + int(session.scalar(asked) or 0)
+        + int(session.scalar(moved) or 0)
         + _bytes(session, select(JobRow.id).where(JobRow.project == project))
     )
 

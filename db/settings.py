@@ -93,6 +93,9 @@ class Settings(BaseSettings):
     max_jobs_per_key: int = Field(default=1000, ge=1)
     """One API key may have this many unfinished jobs. Where the service asks for no key, all callers share the limit."""
 
+    kept_motions: int = Field(default=500, ge=0)
+    """Number of proved motions of a scene that are kept to answer later questions. The oldest ones go."""
+
     @property
     def family(self) -> socket.AddressFamily:
         """Returns the address family of the API's address."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
@@ -138,7 +139,8 @@ class CertifyPath(Kind):
             with database().read() as session:
                 return jobs.get(session, claim.job_id).options
 
-        found = in_child(CERTIFY, {"scene": scene.to_document(), "space": None, **persistently(read), "prove": True})
+        kept = scene.hash, json.dumps(scene.to_document())
+        found = in_child(CERTIFY, {"space": None, **persistently(read), "prove": True}, kept)
         if found["proof"] is None:
             return Done(found)
         proof = base64.b64decode(found["proof"])

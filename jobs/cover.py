@@ -29,12 +29,13 @@ from db.types import utcnow
 from jobs.checks import check_length
 from jobs.fields import model_of
 from jobs.kind import Done, Held, Kind, Turn, report_of
+from jobs.moving import move
 from jobs.request import JobRequest
 from jobs.scouting import scout
 from planner.cover.machine import advance, begin
 from planner.cover.options import MOST_JOINTS, STAGES, CoverOptions
 from planner.cover.result import said
-from planner.cover.state import CoverState, Ended, Finish, Late, Report, Scout, Scouted, Task, Transition, Watch
+from planner.cover.state import CoverState, Ended, Finish, Late, Move, Moved, Report, Scout, Scouted, Task, Transition, Watch
 from workers.app import send_coordinate, send_work
 
 ACTIVE = unfinished(JOB)
@@ -96,8 +97,10 @@ class Cover(Kind):
                 if str(child.number) in known["growing"] and child.state not in ACTIVE
             }
             return Ended(ended) if ended else None
-        found = report_of(session, job, Scout.kind)
-        return stored.value(Scouted, found) if isinstance(found, dict) else found
+        found = report_of(session, job, action["kind"])
+        if not isinstance(found, dict):
+            return found
+        return stored.value(Moved, found) if action["kind"] == Move.kind else stored.value(Scouted, found)
 
     def save(self, session: Session, job: JobRow, turn: Turn, decision: Transition, afterwards: Afterwards) -> bool:
         state = decision.state
@@ -106,9 +109,9 @@ class Cover(Kind):
             _tell_ended(session, job, turn.report)
         steps.skip(session, job.id)  # a look that the deadline has overtaken
         match decision.action:
-            case Scout() as action:
+            case Scout() | Move() as action:
                 jobs.next_turn(job, {"kind": action.kind})
-                steps.add(session, job, Scout.kind, {})
+                steps.add(session, job, action.kind, {})
                 afterwards.append(send_work)
             case Watch() as action:
                 jobs.next_turn(job, {"kind": action.kind})
@@ -127,6 +130,8 @@ class Cover(Kind):
         return isinstance(decision.action, Finish) or (isinstance(decision.action, Watch) and decision.action.stop)
 
     def do(self, claim: steps.Claim, scene: Scene) -> Done:
+        if claim.kind == Move.kind:
+            return Done(stored.document(move(scene, claim.scene_id, claim.job_id)))
         return Done(stored.document(scout(scene, claim.scene_id, claim.job_id)))
 
     def is_late(self, session: Session, job: JobRow, now: datetime) -> bool:

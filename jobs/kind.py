@@ -169,8 +169,12 @@ def report_of(session: Session, job: JobRow, kind: str) -> dict[str, Any] | Ciri
     return CirisError.from_document(found) if step.state == StepState.FAILED else found
 
 
-def in_child(function: str, payload: dict[str, Any]) -> dict[str, Any]:
-    """Returns what a function finds in a child process. If that aborts, hangs or wants too much memory, only the step fails."""
-    limits = settings()
-    found: dict[str, Any] = run_in_child(function, payload, timeout_s=limits.time_limit_seconds, memory_bytes=limits.child_memory_bytes)
+def in_child(function: str, payload: dict[str, Any], kept: tuple[str, str] | None = None) -> dict[str, Any]:
+    """Returns what a function finds in a child process. If that aborts, hangs or wants too much memory, only the step fails.
+
+    Args:
+        kept: as for certifier.isolation.child.run_in_child.
+    """
+    seconds, memory = settings().time_limit_seconds, settings().child_memory_bytes
+    found: dict[str, Any] = run_in_child(function, payload, timeout_s=seconds, memory_bytes=memory, kept=kept)
     return found

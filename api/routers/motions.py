@@ -7,14 +7,10 @@ from typing import Any
 from fastapi import APIRouter
 
 from api.access import SUBMIT, Db
-from api.children import Children
+from api.children import Children, about_motions
 from api.schemas.motions import MotionRequest, MotionResponse
-from certifier.isolation.child import run_in_child
 from db import scenes
 from db.session import Database
-from db.settings import settings
-
-TIMEOUT_S = 60.0
 
 router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[SUBMIT])
 
@@ -31,6 +27,4 @@ async def certify_path(body: MotionRequest, db: Db, children: Children) -> Motio
 def _certify(db: Database, body: MotionRequest) -> Any:
     with db.read() as session:
         scene_id = scenes.find(session, body.scene)
-    payload = {"scene": scenes.load(db, scene_id).to_document(), **body.model_dump(mode="json", exclude={"scene"})}
-    memory = settings().child_memory_bytes
-    return run_in_child("certifier.jobs.motion:certify_in_child", payload, timeout_s=TIMEOUT_S, memory_bytes=memory)
+    return about_motions("certify_in_child", scenes.load(db, scene_id), body.model_dump(mode="json", exclude={"scene"}))

@@ -14,6 +14,7 @@ from api.access import READ, Db
 from api.answers import asked
 from api.children import Children
 from api.libraries import KeptLibraries, Libraries
+from api.motions import KeptMotions
 from api.questions import asking
 from api.schemas.planning import (
     Containment,
@@ -38,23 +39,28 @@ from planner.membership import locate, to_s
 from planner.motion.path import follow
 from planner.motion.space import Space
 from planner.nearest import nearest
+from planner.tubes import Tubes
 
 router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ])
 
 
 @router.post("/contains")
 @asking(few=100)
-def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries) -> ContainsResponse:
-    """Returns, for each point, the certified regions of the scene that contain it, and how deep inside it is."""
+def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions) -> ContainsResponse:
+    """Returns, for each point, the certified regions that contain it, how deep inside it is, and the motions whose tubes contain it."""
     scene_id, scene, library = asked(db, libraries, body.scene)
     points = _points(scene, body.q, body.s)
     found = locate(library, points)
+    tubes = motions.of(db, scene_id, scene.n).tubes
+    q = np.array(body.q) if body.q is not None else scene.to_q(points)
     ends = np.searchsorted(found.point, np.arange(len(points) + 1)).tolist()
     containments = []
-    for begin, end in pairwise(ends):
+    for (begin, end), at in zip(pairwise(ends), q, strict=True):
         deepest = zip(found.region[begin:end].tolist(), found.margin[begin:end].tolist(), strict=True)
         hits = [Hit(region=library.ids[i], margin=margin, guarantee=answers.guarantee(library, i)) for i, margin in deepest]
-        containments.append(Containment(inside=bool(hits), regions=hits, margin=hits[0].margin if hits else None))
+        inside = list(dict.fromkeys(tubes.motions[i].id for i in tubes.motion[tubes.at(at)[0]].tolist()))
+        margin = hits[0].margin if hits else None
+        containments.append(Containment(inside=bool(hits or inside), regions=hits, margin=margin, motions=inside))
     return ContainsResponse(scene=scene_id, version=library.version, regions=len(library), points=containments)
 
 
@@ -71,16 +77,17 @@ def find_nearest(body: NearestRequest, db: Db, libraries: KeptLibraries) -> Near
 
 @router.post("/segment")
 @asking(few=20)
-def cover_segments(body: SegmentRequest, db: Db, libraries: KeptLibraries) -> SegmentResponse:
+def cover_segments(body: SegmentRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions) -> SegmentResponse:
     """Says of each straight motion whether every point of it is in certified regions, and which.
 
     `covered` is proved, for the numbers of the request taken literally. A motion that is straight in `s` is cut with the regions exactly.
     One that is straight in `q` is proved piece by piece, with bounds on what lies between, so one that only touches may not be proved.
     """
     scene_id, scene, library = asked(db, libraries, body.scene)
+    tubes = motions.of(db, scene_id, scene.n).tubes
     given, name = (body.q, "q") if body.q is not None else (body.s or [], "s")
     segments = [
-        _covering(library, scene, body.space, _waypoints(scene, body.space, ends, f"{name}[{i}]", name), [0.0, 1.0])
+        _covering(library, tubes, scene, body.space, _waypoints(scene, body.space, ends, f"{name}[{i}]", name), [0.0, 1.0])
         for i, ends in enumerate(given)
     ]
     return SegmentResponse(scene=scene_id, version=library.version, regions=len(library), segments=segments)
@@ -88,7 +95,7 @@ def cover_segments(body: SegmentRequest, db: Db, libraries: KeptLibraries) -> Se
 
 @router.post("/path")
 @asking(few=20)
-def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries) -> PathResponse:
+def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions) -> PathResponse:
     """Says whether every point of a path, straight between its waypoints or along a curve, is in certified regions, and which.
 
     With `times` the path is a trajectory, and the answer is in its times. What `covered` means is said at `/v1/planning/segment`.
@@ -96,7 +103,8 @@ def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries) -> PathRespo
     scene_id, scene, library = asked(db, libraries, body.scene)
     found = _curve(scene, body)
     times = body.times or (np.arange(len(found.controls) // found.degree + 1.0) if found.times is None else found.times).tolist()
-    answer = _covering(library, scene, body.space, found.controls, times, found.degree)
+    tubes = motions.of(db, scene_id, scene.n).tubes
+    answer = _covering(library, tubes, scene, body.space, found.controls, times, found.degree)
     return PathResponse(scene=scene_id, version=library.version, regions=len(library), **dict(answer))
 
 
@@ -141,7 +149,9 @@ def _curve(scene: Scene, body: PathRequest) -> Curve:
     return found
 
 
-def _covering(library: Library, scene: Scene, space: Space, controls: Array, times: Sequence[float], degree: int = 1) -> Covering:
-    found = follow(library, scene, space, controls, times, degree)
+def _covering(
+    library: Library, tubes: Tubes, scene: Scene, space: Space, controls: Array, times: Sequence[float], degree: int = 1
+) -> Covering:
+    found = follow(library, scene, space, controls, times, degree, tubes)
     stop = answers.uncovered(library, scene, found.uncovered)
-    return Covering(covered=stop is None, pieces=answers.pieces(library, found.stretches), uncovered=stop)
+    return Covering(covered=stop is None, pieces=answers.pieces(library, tubes, found.stretches), uncovered=stop)

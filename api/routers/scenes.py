@@ -30,7 +30,8 @@ from api.schemas.scenes import (
 )
 from api.schemas.service import Dependents
 from api.writing import writing
-from certifier.model import MAX_NAME, Scene
+from certifier.model import Scene
+from certifier.names import MAX_NAME
 from certifier.pair.forecast import forecast
 from certifier.scene.bundle import load_bundle
 from certifier.verify import uncovered

@@ -16,6 +16,7 @@ MAX_POINTS, MAX_NEAREST = 10_000, 1000
 MAX_SEGMENTS = MAX_WAYPOINTS = 500
 
 SCENE, REGION = "planar-2dof", "1f0c6d4e-6d0e-4f0e-9a51-0c1f5d0a7b11"
+MOTION = "5b8f8d6e-27a5-4f1c-9a83-6a1a2d0f2d6e"
 
 POINTS_IN_Q = "(k, n), joint positions in radians or metres, one row a point."
 POINTS_IN_S = "(k, n), tangent-space coordinates s, one row a point."
@@ -25,6 +26,7 @@ Ends = Annotated[list[Vector], Field(min_length=2, max_length=2)]
 Q = Annotated[list[float], Field(description="(n,), joint positions in radians or metres.", examples=[[0.4, 0.3]])]
 S = Annotated[list[float], Field(description="(n,), tangent-space coordinates.", examples=[[0.2027, 0.1511]])]
 RegionId = Annotated[str, Field(description="Id of a region.", examples=[REGION])]
+MotionId = Annotated[str, Field(description="Id of a proved motion.", examples=[MOTION])]
 Distance = Annotated[float, Field(description="Euclidean distance in s.", examples=[0.05])]
 
 
@@ -174,9 +176,10 @@ class Hit(BaseModel):
 class Containment(BaseModel):
     """Answers for one point."""
 
-    inside: bool = Field(description="Whether some region contains the point.", examples=[True])
+    inside: bool = Field(description="Whether some region, or the tube of some motion, contains the point.", examples=[True])
     regions: list[Hit] = Field(description="The regions that contain the point, the one with the largest margin first.")
     margin: float | None = Field(description="The largest margin; null where no region contains the point.", examples=[0.05])
+    motions: list[MotionId] = Field(description="The proved motions whose tubes contain the point.")
 
 
 class ContainsResponse(Answer):
@@ -211,12 +214,17 @@ class NearestResponse(Answer):
 
 
 class Piece(BaseModel):
-    """Says that a region contains all of the motion between two times."""
+    """Says what proves that the motion is free between two times: a region that contains it, or the tube of a proved motion."""
 
     begin: float = Field(description="Time at which the piece begins; the doubles nearest to the exact ends are shown.", examples=[0.0])
     end: float = Field(description="Time at which the piece ends, and the next begins.", examples=[0.625])
-    region: RegionId
-    guarantee: Guarantee = Field(description="What the region's certificate is worth.", examples=["exact"])
+    region: RegionId | None = Field(
+        description="The region that contains the motion here; null where a motion's tube does.", examples=[REGION]
+    )
+    motion: MotionId | None = Field(
+        default=None, description="The proved motion whose tube contains the motion here; null for a region.", examples=[MOTION]
+    )
+    guarantee: Guarantee = Field(description="What the certificate is worth.", examples=["exact"])
 
 
 class Uncovered(BaseModel):

@@ -23,13 +23,19 @@ from typing import Any
 from certifier.errors import CirisError, RegionError, SceneError
 
 ERRORS = {cls.__name__: cls for cls in (CirisError, SceneError, RegionError)}
+KEEP = b"keep"
+"""A message that begins so is no call: it gives a text to keep."""
 STATUS = struct.Struct("i")
 """This says how a child ended, before its answer: 0, an exit status, or a signal with a minus."""
+AT_ONCE = 2
+"""Number of nurseries of a module that are kept for its next calls."""
+KEPT = 4
+"""Number of texts that a nursery keeps, those that were named last."""
 _TAIL_BYTES = 2000
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
-def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes: int) -> Any:
+def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes: int, kept: tuple[str, str] | None = None) -> Any:
     """Returns ``function(payload)``, computed by a child process that is killed when it takes too long or outlives this process.
 
     Args:
@@ -37,25 +43,29 @@ def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes:
         payload: JSON-able data; NumPy arrays are allowed anywhere in it, as in the result.
         timeout_s: wall-clock limit in seconds.
         memory_bytes: limit of the child's address space in bytes.
+        kept: a name, and a text that this program has written. The function gets what ``keep(text)`` of the module makes of it as a second
+            argument. The nursery calls ``keep`` once for a name. So it reads a scene once for all calls about the scene.
 
     Raises:
         CirisError: the function's own error, of the class it was raised with; or ``child_timeout``, ``child_memory``, or
             ``child_died`` with the tail of its standard error.
     """
     module, _, name = function.partition(":")
-    request = encode({"function": name, "payload": payload, "memory_bytes": int(memory_bytes), "directory": str(Path.cwd())})
-    nursery = _idle.pop(module, None)
-    if nursery is None or nursery.process.poll() is not None:
-        nursery = _Nursery(module)
+    call = {"function": name, "payload": payload, "memory_bytes": int(memory_bytes), "directory": str(Path.cwd())}
+    call["kept"] = None if kept is None else kept[0]
+    nursery = _free(module)
     try:
-        status, answer = nursery.ask(request, timeout_s)
+        status, answer = nursery.ask(encode(call), timeout_s, kept)
     except TimeoutError:
         message = f"it took more than {timeout_s:g} s and was stopped{nursery.tail()}"
         raise CirisError("child_timeout", message, hint="ask for less, or try again when the machine has less to do") from None
     except (EOFError, ConnectionError):
         raise _death(nursery.process.returncode, nursery.tail(), memory_bytes) from None
     tail = nursery.tail()
-    if _idle.setdefault(module, nursery) is not nursery:
+    waiting = _idle.setdefault(module, [])
+    if len(waiting) < AT_ONCE:
+        waiting.append(nursery)
+    else:
         nursery.kill()
     if status != 0:
         raise _death(status, tail, memory_bytes)
@@ -65,14 +75,25 @@ def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes:
 def prepare(function: str) -> None:
     """Begins to load what the first call of a function needs, without waiting."""
     module = function.partition(":")[0]
-    if module not in _idle:
-        _idle[module] = _Nursery(module)
+    if not _idle.get(module):
+        _idle.setdefault(module, []).append(_Nursery(module))
+
+
+def _free(module: str) -> _Nursery:
+    """Returns a nursery of the module that nobody else asks."""
+    waiting = _idle.setdefault(module, [])
+    while waiting:
+        nursery = waiting.pop()
+        if nursery.process.poll() is None:
+            return nursery
+    return _Nursery(module)
 
 
 class _Nursery:
     """Holds a process that has loaded a module, and the connection to it."""
 
     def __init__(self, module: str) -> None:
+        self._kept: list[str] = []
         self._connection, theirs = Pipe()
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
         root = str(Path(__file__).resolve().parents[2])
@@ -88,8 +109,8 @@ class _Nursery:
                 env={**os.environ, **_ONE_THREAD, "PYTHONPATH": path},
             )
 
-    def ask(self, request: bytes, timeout_s: float) -> tuple[int, bytes]:
-        """Returns how the child ended, and its answer.
+    def ask(self, request: bytes, timeout_s: float, kept: tuple[str, str] | None) -> tuple[int, bytes]:
+        """Returns how the child ended, and its answer. What is kept is sent first, unless the nursery has it.
 
         The nursery is killed before any error is raised.
 
@@ -100,6 +121,9 @@ class _Nursery:
         self._log.seek(0)
         self._log.truncate()
         try:
+            if kept is not None and kept[0] not in self._kept:
+                self._kept, gone = [*self._kept[1 - KEPT :], kept[0]], self._kept[: 1 - KEPT]
+                self._connection.send_bytes(KEEP + encode({"name": kept[0], "text": kept[1], "gone": gone}))
             self._connection.send_bytes(request)
             if not self._connection.poll(timeout_s):
                 raise TimeoutError
@@ -124,8 +148,8 @@ class _Nursery:
         return f": {text}" if text else ""
 
 
-_idle: dict[str, _Nursery] = {}
-"""Maps a module to the nursery that waits for its next call; one is kept for each module, however many were needed at once."""
+_idle: dict[str, list[_Nursery]] = {}
+"""Maps a module to the nurseries that wait for its next call, at most AT_ONCE, however many were needed at once."""
 os.register_at_fork(after_in_child=_idle.clear)
 
 

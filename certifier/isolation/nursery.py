@@ -1,7 +1,8 @@
 """``python -m certifier.isolation.nursery MODULE FD`` loads a module once and forks a child for every call of one of its functions.
 
-If the module has a function ``warm_up()``, it is called once, to load what the first call would otherwise load. The calls come over the
-connection FD from certifier.isolation.child. When that connection is closed, the nursery ends, and its child with it.
+If the module has a function ``warm_up()``, it is called once, to load what the first call would otherwise load. The calls, and texts to
+keep for them, come over the connection FD from certifier.isolation.child. When that connection is closed, the nursery ends, and its child
+with it.
 """
 
 from __future__ import annotations
@@ -20,14 +21,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
 from types import ModuleType
+from typing import Any
 
 from certifier.errors import CirisError
-from certifier.isolation.child import ERRORS, STATUS, decode, encode
+from certifier.isolation.child import ERRORS, KEEP, STATUS, decode, encode
 
 _PR_SET_PDEATHSIG = 1
 _MOST_WRITTEN = 2**28
 """A child may write this many bytes of its answer, and of any file, its log among them."""
 _CHUNK = 2**16
+_kept: dict[str, Any] = {}
 
 
 def main() -> None:
@@ -38,7 +41,11 @@ def main() -> None:
             module.warm_up()
     try:
         while True:
-            connection.send_bytes(_call(module, connection, connection.recv_bytes()))
+            request = connection.recv_bytes()
+            if request.startswith(KEEP):
+                _keep(module, **json.loads(request.removeprefix(KEEP)))
+            else:
+                connection.send_bytes(_call(module, connection, request))
     except (EOFError, ConnectionError):
         return
 
@@ -75,6 +82,13 @@ def _signal_at_death_of_parent(number: int) -> None:
     """Asks Linux for a signal when the thread ends that started this process; 0 for none. Elsewhere nothing happens."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
+
+
+def _keep(module: ModuleType, name: str, text: str, gone: list[str]) -> None:
+    """Keeps what the module makes of a text for the calls that name it, and drops what is gone."""
+    for former in gone:
+        del _kept[former]
+    _kept[name] = module.keep(text)
 
 
 def _call(module: ModuleType, connection: Connection, request: bytes) -> bytes:
@@ -114,7 +128,8 @@ def _answer(module: ModuleType, request: bytes, writing: int, nursery: int) -> i
         _confine(call["memory_bytes"], nursery)
         os.chdir(call["directory"])
         try:
-            reply = {"result": getattr(module, call["function"])(call["payload"])}
+            given = [] if call["kept"] is None else [_kept[call["kept"]]]
+            reply = {"result": getattr(module, call["function"])(call["payload"], *given)}
         except CirisError as error:
             reply = {"error": error.to_document(), "class": type(error).__name__ if type(error).__name__ in ERRORS else "CirisError"}
         with os.fdopen(writing, "wb") as answer:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import time
 from dataclasses import dataclass
 from typing import Any
@@ -116,17 +117,21 @@ def certify(scene: Scene, motion: Motion, tube: bool = False, padding: float = 0
     return MotionVerdict(scene, motion, statement, proof, found.stop, found.nearest, padding, intervals, *seconds)
 
 
-def certify_in_child(payload: dict[str, Any]) -> dict[str, Any]:
+def keep(text: str) -> Scene:
+    """Returns the scene of a document, for all calls about it (certifier.isolation.child)."""
+    return Scene.from_document(json.loads(text))
+
+
+def certify_in_child(payload: dict[str, Any], scene: Scene) -> dict[str, Any]:
     """Returns the document of a verdict, with the ``proof`` in base 64 or None. A child process runs this function.
 
     Args:
-        payload: the ``scene``'s document; the motion, as certifier.motion.given.motion_of takes it; ``space`` or None; ``tube``;
+        payload: the motion, as certifier.motion.given.motion_of takes it; ``space`` or None; ``tube``;
             ``padding`` and ``clearance``, or neither; and ``prove``, whether to give the proof.
 
     Raises:
         RegionError: as certifier.motion.given; the field names the place in the payload.
     """
-    scene = Scene.from_document(payload["scene"])
     motion = motion_of(scene, payload, Space(payload["space"]) if payload["space"] else None)
     padding = padding_of(payload.get("padding", 0.0))
     verdict = certify(scene, motion, payload["tube"], padding, payload.get("clearance", False))
@@ -134,10 +139,14 @@ def certify_in_child(payload: dict[str, Any]) -> dict[str, Any]:
     return {**verdict.document(), "proof": proof}
 
 
-def warm_up() -> None:
-    """Loads the compiled functions that a motion needs, by certifying one of a ball that swings about a post."""
+def swing() -> Scene:
+    """Returns a scene in which a ball swings about a post. A motion in it loads the compiled functions that motions need."""
     joint = Joint("arm/turn", JointKind.REVOLUTE, WORLD, "arm/link", np.array([0.0, 0.0, 1.0]), np.eye(4), np.eye(4), 0, -1.0, 1.0)
     balls = [Geometry(f"{body}/ball", body, np.array([[x, 0.0, 0.0]]), 0.1, {}) for body, x in (("arm/link", 1.0), (WORLD, 0.0))]
     pair = Pair(balls[0].name, balls[1].name)
-    scene = Scene("swing", (joint,), (WORLD, "arm/link"), tuple(balls), (pair,), (), np.zeros(1))
-    certify(scene, Motion(Space.Q, np.array([[0.0], [0.5]])), tube=True, clearance=True)
+    return Scene("swing", (joint,), (WORLD, "arm/link"), tuple(balls), (pair,), (), np.zeros(1))
+
+
+def warm_up() -> None:
+    """Loads the compiled functions that a motion needs."""
+    certify(swing(), Motion(Space.Q, np.array([[0.0], [0.5]])), tube=True, clearance=True)

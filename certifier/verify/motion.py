@@ -42,6 +42,8 @@ RUNS = 1 << 10
 
 Way = tuple[str, str]
 """A frame and a body, from which and to which a chain leads."""
+_Side = tuple[str, str, str]
+"""A frame, a body, and a geometry of the body."""
 
 
 @dataclass(frozen=True)
@@ -153,6 +155,7 @@ class _Check:
     def __init__(self, proof: MotionProof) -> None:
         self._proof, self._scene = proof, proof.scene
         self._places, self._pieces = Places(proof.scene), Pieces(proof.scene, proof.motion, proof.rho)
+        self._known: dict[_Side, tuple[Reach, tuple[Array, Array]]] = {}
         self._starts = _starts(proof)
         per_pair = proof.counts.sum(axis=1, dtype=np.int64)
         self._first = np.cumsum(per_pair) - per_pair
@@ -208,29 +211,42 @@ class _Check:
         chains = {way: self._places.chain(*way) for two in ways for way in two}
         turned, at = self._reached(runs, ways, chains, piece, np.array([t0, t1]), normals)
         rates, changes = self._pieces.rates(piece, t0, t1)
-        needed, ends = np.full(len(rows), 2 * self._scene.padding), np.empty((2, len(rows)))
-        known: dict[tuple[str, str, str], tuple[Reach, tuple[Array, Array]]] = {}
-        begin = 0
-        for run, two in zip(runs, ways, strict=True):
-            own = slice(begin, begin := begin + run.last - run.first)
-            for k, (way, name) in enumerate(zip(two, self._names(run), strict=True)):
-                geometry, chain = self._scene.geometry(name), chains[way]
-                if (*way, name) not in known:
-                    reach = chain.reach(geometry.vertices)
-                    known[*way, name] = reach, self._bounds(chain, reach, self._pieces.slid[:1])
-                reach, (levers, error) = known[*way, name]
-                if chain.slides.any():  # otherwise, one row of levers holds for every piece
-                    levers, error = self._bounds(chain, reach, self._pieces.slid[piece[own]])
-                ends[k, own] = _least(turned[k, :, own], at[k, :, own], geometry.vertices)
-                bent = _acceleration(chain, levers, rates[own], changes[own])
-                needed[own] += geometry.radius + (t1 - t0)[own] ** 2 / 8 * bent + proof.rho * levers.sum(axis=1) + error
-        gaps = ends.sum(axis=0) / (np.linalg.norm(normals, axis=1) * UP) - needed * UP
+        needed, ends = np.empty((2, len(rows))), np.empty((2, len(rows)))
+        for (*way, name), k, own in self._sides(runs, ways):
+            geometry, chain = self._scene.geometry(name), chains[way[0], way[1]]
+            levers, error = self._moved(chain, (way[0], way[1], name), piece[own])
+            ends[k, own] = _least(turned[k, :, own].swapaxes(0, 1), at[k, :, own].T, geometry.vertices)
+            bent = _acceleration(chain, levers, rates[own], changes[own])
+            needed[k, own] = geometry.radius + (t1 - t0)[own] ** 2 / 8 * bent + proof.rho * levers.sum(axis=1) + error
+        needs = 2 * self._scene.padding + needed.sum(axis=0)
+        gaps = ends.sum(axis=0) / (np.linalg.norm(normals, axis=1) * UP) - needs * UP
         worst = int(gaps.argmin())
         if not gaps[worst] > 0:
             a, b = self._names(runs[int(np.searchsorted(np.cumsum([run.last - run.first for run in runs]), worst, side="right"))])
             problem = f"piece {piece[worst]}, time {t0[worst]:.6g} to {t1[worst]:.6g}: the plane does not keep {a} and {b} apart"
             raise ProofError("proof_motion", problem)
         return float(gaps[worst] / UP)
+
+    def _sides(self, runs: list[_Run], ways: list[list[Way]]) -> Iterator[tuple[_Side, np.ndarray, np.ndarray]]:
+        """Yields every geometry that intervals have on a side, as a frame sees it, with these sides, (K,) 0 or 1, and intervals, (K,)."""
+        number: dict[_Side, int] = {}
+        which = [
+            [number.setdefault((*way, name), len(number)) for way, name in zip(two, self._names(run), strict=True)]
+            for run, two in zip(runs, ways, strict=True)
+        ]
+        of_intervals = np.repeat(np.array(which).T, [run.last - run.first for run in runs], axis=1)
+        order = np.argsort(of_intervals.ravel(), kind="stable")
+        last = np.cumsum(np.bincount(of_intervals.ravel(), minlength=len(number)))
+        for side, places in zip(number, np.split(order, last[:-1]), strict=True):
+            yield side, *np.divmod(places, of_intervals.shape[1])
+
+    def _moved(self, chain: Chain, side: _Side, piece: np.ndarray) -> tuple[Array, Array]:
+        """Returns the levers and the bound of what is rounded of a side on pieces, (K, m) and (K,), or one row for all of them."""
+        if side not in self._known:
+            reach = chain.reach(self._scene.geometry(side[2]).vertices)
+            self._known[side] = reach, self._bounds(chain, reach, self._pieces.slid[:1])
+        reach, bounds = self._known[side]
+        return self._bounds(chain, reach, self._pieces.slid[piece]) if chain.slides.any() else bounds
 
     def _bounds(self, chain: Chain, reach: Reach, slid: Array) -> tuple[Array, Array]:
         """Returns the levers, (K, m), and the bound of what is rounded, (K,) metres, for slides (K, n)."""

@@ -60,9 +60,15 @@ class Places:
         self._balls: dict[_Place, _Ball] = {}
         self._fixed: dict[tuple[_Place, _Place], tuple[Array, Array]] = {}
         self._axes: dict[str, Array] = {}
+        self._chains: dict[tuple[str, str], Chain] = {}
 
     def chain(self, frame: str, body: str) -> Chain:
         """Returns the chain from a body's frame to a body."""
+        if (frame, body) not in self._chains:
+            self._chains[frame, body] = self._made(frame, body)
+        return self._chains[frame, body]
+
+    def _made(self, frame: str, body: str) -> Chain:
         with ctx.workprec(BITS):
             up, down = self._roots(frame), self._roots(body)
             while up and down and up[-1] == down[-1]:

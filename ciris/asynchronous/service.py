@@ -29,12 +29,12 @@ from ciris.answers import (
     Verification,
 )
 from ciris.asynchronous.client import AsyncClient
-from ciris.documents import Document, given, named
+from ciris.documents import Document, document, given, named
 from ciris.job import JobData, why_no_region
 from ciris.options import CERTIFY, COVER, JOB, RECERTIFY, CertifyOptions, CoverOptions, GrowOptions, JobOptions, RecertifyOptions
 from ciris.reading import read
 from ciris.region import RegionData, region_fields
-from ciris.requests import asked_for, grow_request, motion_request, plain, points, straight
+from ciris.requests import FramePose, Tolerance, asked_for, grow_request, motion_request, plain, points, straight
 from ciris.scene import Scene, scene_name
 from ciris.space import Straight, numbers
 
@@ -316,23 +316,44 @@ class AsyncService:
         self,
         scene: str | Scene,
         start: ArrayLike | str,
-        goal: ArrayLike | str,
+        goal: ArrayLike | str | None = None,
         *,
+        goals: ArrayLike | None = None,
+        pose: FramePose | None = None,
+        line: Tolerance | None = None,
+        via: ArrayLike | None = None,
         speed: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
+        regions_only: bool = False,
+        seconds: float | None = None,
+        prove: bool = False,
     ) -> Plan:
-        """Plans a trajectory through certified regions, from rest to rest, or says why there is none.
+        """Finds a motion from rest to rest that is proved to be free of collision, or says why there is none.
 
         Args:
             start, goal: joint positions (n,), or the id of a region, for any point of it.
+            goals: (k, n) instead of ``goal``; the motion ends in the one to which it is shortest.
+            pose: instead of ``goal``, where a frame ends: ``{"frame": ..., "position": (3,) metres, "rpy": (3,) radians}``.
+            line: the frame goes to the pose on a straight line, within ``{"metres": ..., "radians": ...}`` of it.
+            via: (m, n) configurations to go through, in this order.
             speed, acceleration: limits in rad/s and rad/s² (or m), one for all joints or one for each; default: those of the service.
+            regions_only: whether the motion has to lie in certified regions.
+            seconds: how long to search; default: that of the service.
+            prove: whether to fetch the proof file about the motion.
         """
-        begin, end = plain(start, "start"), plain(goal, "goal")
-        fastest, hardest = plain(speed, "speed"), plain(acceleration, "acceleration")
+        asked: Document = {
+            "scene": scene_name(scene),
+            "start": plain(start, "start"),
+            **given(goal=plain(goal, "goal"), goals=plain(goals, "goals"), via=plain(via, "via"), seconds=seconds),
+            **given(pose=document(pose) if pose is not None else None, line=line),
+            **given(speed=plain(speed, "speed"), acceleration=plain(acceleration, "acceleration")),
+            "regions_only": regions_only,
+            "prove": prove,
+        }
         while True:
-            answer = await self.client.plan(scene_name(scene), begin, end, fastest, hardest)
+            answer = await self.client.plan(asked)
             if answer["complete"] or answer["reason"] != "disconnected":
-                return read(Plan, answer)
+                return read(Plan, {**answer, "proof": answer["proof"] and base64.b64decode(answer["proof"])})
 
     async def certify_path(
         self,

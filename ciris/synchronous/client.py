@@ -377,16 +377,9 @@ class Client:
         """Returns whether a path, through waypoints or along a curve, is in certified regions."""
         return self._json("POST", "/v1/planning/path", json=request)
 
-    def plan(
-        self, scene: str, start: list[float] | str, goal: list[float] | str, speed: Limit | None = None, acceleration: Limit | None = None
-    ) -> Document:
-        """Returns a trajectory through certified regions from one configuration, or any of a region with this id, to another; or why not.
-
-        Args:
-            speed, acceleration: limits, one for all joints or one for each, in rad/s and rad/s² (or m); None for the service's defaults.
-        """
-        asked = {"scene": scene, "start": start, "goal": goal, **given(speed=speed, acceleration=acceleration)}
-        return self._json("POST", "/v1/planning/plan", json=asked)
+    def plan(self, request: Document) -> Document:
+        """Returns a motion between configurations that is proved to be free of collision; or why there is none."""
+        return self._json("POST", "/v1/planning/plan", json=request)
 
     def graph(self, scene: str) -> Document:
         """Returns which regions of a scene overlap, as far as the service has compared them."""

@@ -49,19 +49,42 @@ def add(verbs: Any) -> None:
     plan = verbs.add_parser(
         "plan",
         parents=[remote(), as_json()],
-        help="plan a trajectory between two configurations through the certified regions",
-        epilog="Example: ciris plan planar-2dof --from 0,0 --to 0.35,-0.2 --speed 1.5",
+        help="find a motion between two configurations and prove that it is free of collision",
+        epilog="Example: ciris plan planar-2dof --from 0,0 --to 0.35,-0.2 --speed 1.5. Give either --to or --to-pose.",
     )
     plan.add_argument("scene", metavar="SCENE", help=SCENE)
     of_end = "joint positions, or the id of a region for any point of it"
     plan.add_argument("--from", dest="start", metavar=JOINTS, required=True, help=f"where the motion begins: {of_end}")
-    plan.add_argument("--to", dest="goal", metavar=JOINTS, required=True, help=f"where it ends: {of_end}")
+    plan.add_argument(
+        "--to",
+        dest="goals",
+        metavar=JOINTS,
+        action="append",
+        default=[],
+        help=f"where it ends: {of_end}; give it several times, and the motion goes to the one to which it is shortest",
+    )
+    plan.add_argument(
+        "--to-pose",
+        metavar="X,Y,Z,R,P,Y",
+        help="instead of --to: a pose of a frame in the world, metres and radians (roll, pitch, yaw); with --line, X,Y,Z will do",
+    )
+    plan.add_argument("--frame", help="the body whose frame goes to the pose, or the last part of its name")
+    plan.add_argument("--line", action="store_true", help="the frame goes to the pose on a straight line")
+    plan.add_argument(
+        "--tolerance",
+        metavar="METRES[,RADIANS]",
+        help="how far the frame may be from the line; default 0.001,0.01",
+    )
+    plan.add_argument("--via", metavar=JOINTS, action="append", default=[], help="go through these joint positions; may be repeated")
     plan.add_argument("--speed", help="largest speed in rad/s or m/s, one for all joints or one for each; default 1")
     plan.add_argument("--acceleration", help="largest acceleration in rad/s² or m/s², one for all joints or one for each; default 2")
+    plan.add_argument("--seconds", type=float, help="how long to search for a motion; default 5")
+    plan.add_argument("--regions-only", action="store_true", help="only take motions that lie in certified regions")
+    plan.add_argument("--out", metavar="FILE", help="new file for a proof of the motion; default: none")
     plan.add_argument(
         "--grow",
         action="store_true",
-        help="if there is no trajectory, grow regions until the two ends are connected, and plan again; "
+        help="with --regions-only: if there is no motion, grow regions until the two ends are connected, and plan again; "
         "--deadline, --priority and --label need this",
     )
     add_options(plan, JOB)

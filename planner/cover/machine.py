@@ -1,17 +1,17 @@
 """This pure state machine decides what happens next in a cover. It takes reports of what was seen, and returns which regions to grow.
 
 A cover looks at the scene, grows a few regions at a time, and looks again whenever one of them has ended. It ends when its goals are
-reached, when its number of regions is, when it is late, or when it cannot go on: then the last look says why. The goals that were
-not reached are named in its last words.
+reached, when its number of regions is, when it is late, or when it cannot go on: then the last look says why. Before it ends, it searches
+for motions between configurations that regions do not connect. The goals that were not reached are named in its last words.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from planner.cover.options import CoverOptions
-from planner.cover.state import CoverState, Ended, Finish, Late, Purpose, Report, Scout, Scouted, Task, Transition, Watch
+from planner.cover.state import CoverState, Ended, Finish, Late, Move, Moved, Purpose, Report, Scout, Scouted, Task, Transition, Watch
 
 LATE = "the deadline was reached"
 TRIES = 4
@@ -34,18 +34,21 @@ def advance(state: CoverState, report: Report) -> Transition:
             return _after_look(state, report)
         case Ended():
             return _after_regions(state, report)
+        case Moved(pairs):
+            assert state.last is not None, "motions are searched for after a look"
+            return _finish(replace(state, moved=pairs), state.last, state.closing or "")
         case Late():
             return _close(state, LATE)
 
 
-def unreached(options: CoverOptions, seen: Scouted) -> list[str]:
-    """Returns in words which goals are not reached."""
+def unreached(options: CoverOptions, seen: Scouted, moved: Sequence[tuple[int, int]] = ()) -> list[str]:
+    """Returns in words which goals are not reached. ``moved`` are pairs of configurations that proved motions connect."""
     missing = []
     if options.enough is not None and seen.coverage < options.enough:
         missing.append(f"{_percent(seen.coverage)} of the free configurations are covered, not {_percent(options.enough)}")
     if not all(seen.seeds):
         missing.append(f"no region contains {_listed('seed', [i for i, there in enumerate(seen.seeds) if not there])}")
-    if not seen.joined:
+    if not seen.joined(moved):
         alone = [i for i, part in enumerate(seen.connect) if part is None]
         if alone:
             missing.append(f"no region contains {_listed('connect', alone)}")
@@ -113,9 +116,12 @@ def _close(state: CoverState, reason: str) -> Transition:
 
 
 def _finish(state: CoverState, seen: Scouted, reason: str) -> Transition:
-    missing = unreached(state.options, seen)
+    if state.moved is None and not seen.joined():
+        return Transition(replace(state, closing=state.closing or reason), Move())
+    missing = unreached(state.options, seen, state.moved or ())
     if not missing:
-        return Transition(state, Finish(True, "the goals are reached"))
+        by = ", by motions where regions do not lead" if state.moved else ""
+        return Transition(state, Finish(True, f"the goals are reached{by}"))
     troubles = [*seen.obstacles, *(f"{key}: {said}" for key, said in state.why.items() if _is_given(key))]
     by_limit = state.closing == LATE or state.begun >= state.options.regions
     return Transition(state, Finish(False, "; ".join([reason, *missing, *troubles]), fruitless=not seen.regions or not by_limit))

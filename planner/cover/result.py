@@ -20,7 +20,7 @@ def said(state: CoverState) -> dict[str, Any] | None:
     seen = state.last
     if seen is None:
         return None
-    missing = unreached(state.options, seen)
+    missing = unreached(state.options, seen, state.moved or ())
     return {
         "coverage": {"value": seen.coverage, "stderr": seen.stderr, "samples": seen.samples},
         "regions": seen.regions,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from hashlib import sha256
@@ -99,10 +99,14 @@ class Scouted:
             return 1.0
         return max(math.sqrt(self.coverage * (1 - self.coverage) / self.samples), 1 / self.samples)
 
-    @property
-    def joined(self) -> bool:
-        """Returns whether the configurations to connect are in one component."""
-        return None not in self.connect and len(set(self.connect)) <= 1
+    def joined(self, moved: Sequence[tuple[int, int]] = ()) -> bool:
+        """Returns whether the configurations to connect are connected, by regions and by proved motions between two of them."""
+        same = [(i, j) for i, part in enumerate(self.connect) for j in range(i) if part is not None and part == self.connect[j]]
+        reached, ahead = set[int](), {0}
+        while ahead:
+            reached |= ahead
+            ahead = {b for pair in (*same, *moved) for a, b in (pair, pair[::-1]) if a in ahead} - reached
+        return len(reached) >= len(self.connect)
 
 
 @dataclass(frozen=True)
@@ -113,11 +117,18 @@ class Ended:
 
 
 @dataclass(frozen=True)
+class Moved:
+    """A report: proved motions lead between these pairs of configurations to connect, by number."""
+
+    pairs: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
 class Late:
     """A report: the deadline was reached."""
 
 
-Report = Scouted | Ended | Late
+Report = Scouted | Ended | Moved | Late
 
 
 @dataclass(frozen=True)
@@ -157,7 +168,14 @@ class Finish:
     fruitless: bool = False
 
 
-Action = Scout | Watch | Finish
+@dataclass(frozen=True)
+class Move:
+    """An action: search for motions between configurations to connect where regions do not lead, and prove them."""
+
+    kind = "move"
+
+
+Action = Scout | Watch | Move | Finish
 
 
 @dataclass(frozen=True)
@@ -176,6 +194,7 @@ class CoverState:
         looks: how many scouts were sent.
         fruitless: how many looks in a row found nothing to grow while nothing grew.
         closing: why the cover ends, once that is decided.
+        moved: pairs of configurations to connect between which motions were proved; None where no motion was searched for.
     """
 
     options: CoverOptions
@@ -189,6 +208,7 @@ class CoverState:
     looks: int = 0
     fruitless: int = 0
     closing: str | None = None
+    moved: tuple[tuple[int, int], ...] | None = None
 
 
 @dataclass(frozen=True)

@@ -11,16 +11,21 @@ from certifier.model import Array, Scene
 from certifier.positions import check_magnitude
 from planner.library import Library
 from planner.membership import locate, to_s
+from planner.motion.beside import Beside
 from planner.motion.cover import Line, cover
 from planner.motion.curve import Curve, at
 from planner.motion.space import Space
 from planner.motion.straight_s import StraightInS
 from planner.nearest import Nearest, nearest
+from planner.tubes import Tubes
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """Says that a region contains all of the path from begin to end, in the unit of the path's times."""
+    """Says that a region contains all of the path from begin to end, in the unit of the path's times.
+
+    From the number of regions on, ``region`` counts the motions whose tubes contain it.
+    """
 
     begin: float
     end: float
@@ -54,8 +59,16 @@ class Covering:
     uncovered: Uncovered | None
 
 
-def follow(library: Library, scene: Scene, space: Space, controls: Array, times: Sequence[float], degree: int = 1) -> Covering:
-    """Covers a path with certified regions.
+def follow(
+    library: Library,
+    scene: Scene,
+    space: Space,
+    controls: Array,
+    times: Sequence[float],
+    degree: int = 1,
+    tubes: Tubes | None = None,
+) -> Covering:
+    """Covers a path with certified regions, and with the tubes of proved motions where it is straight in q.
 
     Args:
         controls: (k m + 1, n), k >= 1, in the coordinates of ``space``: control points of k segments of degree m. Those of segment i are
@@ -70,9 +83,11 @@ def follow(library: Library, scene: Scene, space: Space, controls: Array, times:
     stretches: list[Stretch] = []
     for i in range((len(controls) - 1) // degree):
         segment = controls[i * degree : (i + 1) * degree + 1]
-        last = stretches[-1].region if stretches else None
+        last = stretches[-1].region if stretches and stretches[-1].region < len(library) else None
         straight = space is Space.S and degree == 1
         line: Line = StraightInS(library, *segment) if straight else Curve(library, scene, space, segment, last)
+        if tubes is not None and len(tubes) and space is Space.Q and degree == 1:
+            line = Beside(line, tubes, len(library), *segment)
         found = cover(line)
         for piece in found.pieces:
             begin, end = (_time(times[i], times[i + 1], t) for t in (piece.begin, piece.end))
@@ -82,7 +97,7 @@ def follow(library: Library, scene: Scene, space: Space, controls: Array, times:
                 stretches.append(Stretch(begin, end, piece.region))
         if found.uncovered is not None:
             time, point = _time(times[i], times[i + 1], found.uncovered), at(segment, found.uncovered)
-            held = {stretches[-1].region} if stretches else set()
+            held = {region for region in (stretches[-1].region,) if region < len(library)} if stretches else set()
             return Covering(tuple(stretches), _uncovered(library, scene, space, time, i, point, held))
     return Covering(tuple(stretches), None)
 

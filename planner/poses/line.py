@@ -100,6 +100,33 @@ def line(
     return _followed(scene, arm, begin, way, np.array([metres, radians]))
 
 
+def keeps(
+    scene: Scene,
+    frame: str,
+    start: ArrayLike,
+    position: ArrayLike,
+    rpy: ArrayLike | None,
+    q: Array,
+    *,
+    metres: float,
+    radians: float,
+) -> bool:
+    """Says whether a motion, (K, n) and straight in q between its rows, stays within the tolerances of a line and goes forward on it.
+
+    The other arguments are those of :func:`line`. Each row belongs to the part of the line that its frame is nearest to.
+    """
+    arm = frame_of(scene, frame)
+    here, goal = pose_at(arm, np.array(start, dtype=float)), pose_of(position, np.zeros(3) if rpy is None else rpy)
+    way = _Way(here, Pose(goal.position, here.turn) if rpy is None else goal)
+    parts = np.maximum.accumulate([way.nearest(pose_at(arm, row)) for row in q])
+    parts[0], parts[-1] = 0.0, 1.0
+    for a, b, u, end in zip(q[:-1], q[1:], parts[:-1].tolist(), parts[1:].tolist(), strict=True):
+        off, apart = deviation(arm, a, b, way.at(u), way.at((u + end) / 2), way.at(end), (end - u) * way.angle)
+        if not (off <= metres and apart <= radians):
+            return False
+    return True
+
+
 class _Way:
     """The line itself, from a pose to another; ``angle`` is by how much it turns, radians."""
 
@@ -116,6 +143,15 @@ class _Way:
         half = u * self.angle / 2
         turn = times(np.array([np.cos(half), *(np.sin(half) * self._axis)]), self._here.turn)
         return Pose(self._here.position + u * self._shift, turn)
+
+    def nearest(self, pose: Pose) -> float:
+        """Returns the part of the line that a pose is nearest to: by its position, or by its turn where the position rests."""
+        square = float(self._shift @ self._shift)
+        if square > 0:
+            return float(np.clip((pose.position - self._here.position) @ self._shift / square, 0.0, 1.0))
+        turn = times(pose.turn, self._here.turn * np.array([1.0, -1.0, -1.0, -1.0]))
+        turned = 2 * float(np.arctan2(turn[1:] @ self._axis, turn[0]))
+        return float(np.clip(turned / self.angle, 0.0, 1.0)) if self.angle > 0 else 0.0
 
 
 def _followed(scene: Scene, arm: Frame, start: Array, way: _Way, tolerance: Array) -> Line:

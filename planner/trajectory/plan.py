@@ -104,7 +104,7 @@ def plan(library: Library, scene: Scene, links: Links, start: Array | int, goal:
             goes to the goal's pose in the turn that it starts in.
     """
     if isinstance(start, int) and isinstance(goal, int) and start == goal:
-        start = scene.to_q(_inner(library, start))
+        start = scene.to_q(inner(library, start))
     first, last = (_terminal(library, scene, end) for end in (start, goal))
     for name, given, end in (("start", start, first), ("goal", goal, last)):
         if not end.regions and not isinstance(given, int):
@@ -185,7 +185,7 @@ def _moved_in(library: Library, region: int, margin: float, keep: Sequence[Array
     return Polytope(C, inner)
 
 
-def _inner(library: Library, region: int) -> Array:
+def inner(library: Library, region: int) -> Array:
     """Returns a point (n,) of a region, in s."""
     polytope, norms = library.polytope(region), library.norms[library.rows(region)]
     point = project(polytope.C / norms[:, None], polytope.d / norms, (library.lower[region] + library.upper[region]) / 2)

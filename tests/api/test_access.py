@@ -78,6 +78,7 @@ SCOPES = [
     ("GET", "/", Scope.READ),
     ("POST", "/v1/planning/contains", Scope.READ),
     ("POST", "/v1/planning/certify-path", Scope.SUBMIT),
+    ("GET", "/v1/planning/motions/x/proof", Scope.READ),
     ("POST", "/v1/scenes", Scope.SUBMIT),
     ("POST", "/v1/jobs", Scope.SUBMIT),
     ("POST", "/v1/jobs/x/cancel", Scope.SUBMIT),

@@ -63,6 +63,7 @@ OPERATIONS = {
     "export_region": "GET /v1/regions/{region_id}/export",
     "delete_region": "DELETE /v1/regions/{region_id}",
     "contains": "POST /v1/planning/contains",
+    "download_kept_proof": "GET /v1/planning/motions/{motion_id}/proof",
     "certify_path": "POST /v1/planning/certify-path",
     "find_nearest": "POST /v1/planning/nearest",
     "cover_segments": "POST /v1/planning/segment",

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import base64
 from typing import Any
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
+from sqlalchemy import func, select
 
 from api import advice, graph
 from certifier.model import Scene
-from db import scenes
+from certifier.proof.motion import MotionProof
+from certifier.verify.file import verify_file
+from db import motions, scenes
+from db.models import ProofRow
 from db.session import Database
+from db.settings import settings
 from tests.api.conftest import store_region
 from tests.api.test_planning import a_part
 from tests.scenes import slider
 
 
 def plan(client: TestClient, start: object, goal: object, **limits: object) -> dict[str, Any]:
-    answer = client.post("/v1/planning/plan", json={"scene": "slider", "start": start, "goal": goal, **limits})
+    asked = {"scene": "slider", "start": start, "goal": goal, "regions_only": True, **limits}
+    answer = client.post("/v1/planning/plan", json=asked)
     assert answer.status_code == 200, answer.text
     return answer.json()
 
@@ -106,7 +113,7 @@ def test_overlaps_that_are_kept_follow_the_regions(client: TestClient, region: s
         ({"start": [0.1, 0.2], "goal": [0.1]}, "start"),
         ({"start": [0.1], "goal": []}, "goal"),
         ({"start": [0.1], "goal": "abc"}, "goal"),
-        ({"start": [0.1]}, "goal"),
+        ({"start": [0.1]}, "body"),
         ({"start": [0.1], "goal": [0.1], "speed": 0}, "speed"),
         ({"start": [0.1], "goal": [0.1], "speed": [1, 2]}, "speed"),
         ({"start": [0.1], "goal": [0.1], "acceleration": "fast"}, "acceleration"),
@@ -122,3 +129,81 @@ def test_a_region_of_another_scene_is_no_end(client: TestClient, region: str, da
         other = scenes.add(session, slider(posts=1)).id
     answer = client.post("/v1/planning/plan", json={"scene": other, "start": [0.1], "goal": region})
     assert (answer.status_code, answer.json()["code"], answer.json()["field"]) == (422, "region_elsewhere", "goal")
+
+
+def ask(client: TestClient, start: object, goal: object, **more: object) -> dict[str, Any]:
+    return plan(client, start, goal, regions_only=False, **more)
+
+
+def test_without_regions_a_motion_is_found_proved_and_kept(client: TestClient, scene: Scene, database: Database) -> None:
+    found = ask(client, [-0.5], [0.9], prove=True)
+    assert (found["found"], found["regions"], found["guarantee"], found["reason"]) == (True, 0, "exact", None)
+    assert (found["q"][0], found["q"][-1], found["length"]) == ([-0.5], [0.9], pytest.approx(1.4))
+    assert [(piece["region"], piece["motion"]) for piece in found["pieces"]] == [(None, found["motion"])]
+    data = base64.b64decode(found["proof"])
+    assert (verify_file(data).kind, verify_file(data).scene.hash) == ("motion", scene.hash)
+    assert MotionProof.from_bytes(data, scene).motion.controls.tolist() == found["q"]
+    kept = client.get(f"/v1/planning/motions/{found['motion'][:8]}/proof")
+    assert MotionProof.from_bytes(kept.content, scene).rho == found["tube"]
+    assert verify_file(kept.content).kind == "motion"
+    again = ask(client, [-0.5], [0.9])
+    assert {**again, "proof": None} == {**found, "proof": None}
+    slower = ask(client, [-0.5], [0.9], speed=0.5)
+    assert slower["motion"] != found["motion"]
+    assert max(np.abs(np.diff(np.ravel(slower["q"])) / np.diff(slower["t"]))) <= 0.5
+
+
+def test_what_is_kept_answers_questions_about_points_and_paths(client: TestClient, scene: Scene, database: Database) -> None:
+    motion = ask(client, [-0.5], [0.9])
+    asked = {"scene": "slider", "q": [[0.0], [-0.5 - 2 * motion["tube"]]]}
+    points = client.post("/v1/planning/contains", json=asked).json()["points"]
+    assert [(point["inside"], point["motions"]) for point in points] == [(True, [motion["motion"]]), (False, [])]
+    path = client.post("/v1/planning/path", json={"scene": "slider", "q": [[-0.4], [0.8], [0.1]]}).json()
+    assert (path["covered"], [piece["motion"] for piece in path["pieces"]]) == (True, [motion["motion"]])
+    beyond = client.post("/v1/planning/path", json={"scene": "slider", "q": [[0.0], [-1.0]]}).json()
+    assert (beyond["covered"], beyond["uncovered"]["q"]) == (False, [pytest.approx(-0.5 - motion["tube"])])
+
+
+def test_the_oldest_motions_go(client: TestClient, scene: Scene, database: Database, environment: pytest.MonkeyPatch) -> None:
+    environment.setenv("CIRIS_KEPT_MOTIONS", "2")
+    settings.cache_clear()
+    first, second, third = (ask(client, [-0.5], [goal])["motion"] for goal in (0.1, 0.2, 0.3))
+    with database.read() as session:
+        assert motions.roll(session, scenes.find(session, "slider")) == [second, third]
+        assert session.scalar(select(func.count()).select_from(ProofRow)) == 2
+    assert ask(client, [-0.5], [0.1])["motion"] not in (first, second, third)
+
+
+def test_a_motion_goes_through_what_is_asked_for_to_the_nearest_goal(client: TestClient, scene: Scene) -> None:
+    found = client.post("/v1/planning/plan", json={"scene": "slider", "start": [0.0], "goals": [[0.9], [-0.3]], "via": [[0.2]]}).json()
+    assert (found["found"], found["q"][-1], found["length"]) == (True, [-0.3], pytest.approx(0.7))
+    assert min(abs(q[0] - 0.2) for q in found["q"]) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("more", "reason", "where"),
+    [
+        ({"start": [1.5], "goal": [0.1]}, "start_outside_limits", "start"),
+        ({"start": [0.1], "goal": [1.5]}, "goal_outside_limits", "goal"),
+        ({"start": [0.1], "goals": [[1.5], [1.6]]}, "goal_outside_limits", "goals[0]"),
+        ({"start": [0.1], "goal": [0.2], "via": [[0.3], [1.5]]}, "via_outside_limits", "via[1]"),
+    ],
+)
+def test_a_joint_outside_its_limits_is_named(client: TestClient, scene: Scene, more: dict[str, Any], reason: str, where: str) -> None:
+    answer = client.post("/v1/planning/plan", json={"scene": "slider", **more}).json()
+    assert (answer["found"], answer["reason"], answer["collision"]) == (False, reason, None)
+    assert answer["limit"] == {"where": where, "joint": "model/slide", "value": 1.5, "lower": -1.0, "upper": 1.0}
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"goal": [0.1], "goals": [[0.1]]},
+        {"goals": [[0.1]], "regions_only": True},
+        {"goal": [0.1], "via": [[0.1]], "regions_only": True},
+        {"goal": [0.1], "seconds": 0},
+        {"goal": [0.1], "seconds": 1000},
+    ],
+)
+def test_what_does_not_go_together_is_refused(client: TestClient, scene: Scene, more: dict[str, Any]) -> None:
+    assert client.post("/v1/planning/plan", json={"scene": "slider", "start": [0.1], **more}).status_code == 422

@@ -73,8 +73,9 @@ def test_the_proof_of_a_pair_carries_its_scene(client: TestClient, region: str, 
 
 def test_a_check_that_takes_too_long_is_stopped(client: TestClient, region: str, environment: pytest.MonkeyPatch) -> None:
     """A process that waits, loaded, may well answer in ten milliseconds; a new one loads its modules first and never does."""
-    for nursery in child._idle.values():
-        nursery.kill()
+    for nurseries in child._idle.values():
+        for nursery in nurseries:
+            nursery.kill()
     environment.setenv("CIRIS_VERIFY_TIMEOUT_SECONDS", "0.01")
     settings.cache_clear()
     answer = client.post(f"/v1/regions/{region}/verify")

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import agreement, catalogue, compare, growth, path, plan, query, recertify, report, service, store, survey
+from benchmarks import agreement, catalogue, compare, growth, path, query, recertify, report, service, store, survey
 from benchmarks.compare import Verdict, verdict
+from benchmarks.ompl import Ompl
 from certifier.carry.robot import same_bodies
 from certifier.errors import CirisError
 from certifier.growth.paper.options import PaperOptions
@@ -24,6 +25,8 @@ from certifier.pair.closest import closest
 from certifier.pair.result import PairResult
 from certifier.scene import load_scene
 from certifier.verify.scene import check_scene
+from tests.client.conftest import surroundings
+from tests.docs.test_quickstart import service as service_of
 from tests.services import Postgres
 
 
@@ -250,37 +253,24 @@ def test_questions_about_many_regions_are_measured_beside_a_plain_product() -> N
     assert "plain product, 1 point" in report.text(document)
 
 
-@pytest.fixture
-def library_of_boxes(tmp_path: Path) -> Path:
-    """A folder with three boxes about the planar example's seed, of which two overlap. Nothing about them has to be certified here."""
-    scene = catalogue.scene("planar_2dof")
-    for name, (lower, upper) in {"a": ([-0.3, -0.4], [0.3, 0.4]), "b": ([0.1, -0.6], [0.4, 0.2]), "c": ([-1.5, -1], [-1.3, -0.8])}.items():
-        C, d = catalogue.cube(scene.to_s(np.add(lower, upper) / 2), 0.0)
-        d = np.concatenate([scene.to_s(upper), -scene.to_s(lower)])
-        (tmp_path / f"{name}.json").write_text(json.dumps({"C": C.tolist(), "d": d.tolist()}))
-    return tmp_path
-
-
-def test_trajectories_are_planned_beside_a_planner_that_samples(library_of_boxes: Path) -> None:
-    document = bench("plan", "planar_2dof", "--regions", str(library_of_boxes), "--queries", "12")
-    assert (document["regions"], document["overlaps"], document["components"]) == (3, 1, 2)
-    assert 0 < document["connected"] == document["plan"]["found"] < document["queries"] == len(document["rows"]) == 12
-    assert document["plan"]["collide"] == 0
-    assert document["rrt"]["found"] == 12
+@pytest.mark.slow
+def test_motions_are_planned_beside_ompl(tmp_path: Path) -> None:
+    environment = surroundings(CIRIS_DATA_DIR=str(tmp_path / "data"))
+    with service_of(environment, tmp_path):
+        url = json.loads((tmp_path / "data" / "stack.json").read_text())["url"]
+        document = bench("plan", "planar_2dof", "--url", url, "--queries", "12", "--points", "500")
+    assert document["asked"] == len(document["rows"]) == document["answered"] == 11
+    assert document["answered_of_these"] == document["ompl_solved"]
+    assert document["ours"]["collide"] == 0
     for row in document["rows"]:
-        assert (row["plan"]["length"] is None) is (row["outcome"] == "Apart")
-        assert row["plan"]["length"] is None or row["plan"]["length"] >= row["straight"] * (1 - 1e-9)
-    assert "RRT-Connect with shortcuts" in report.text(document)
-    anywhere = bench("plan", "planar_2dof", "--regions", str(library_of_boxes), "--queries", "12", "--free")
-    assert {row["outcome"] for row in anywhere["rows"]} >= {"Outside"}
-    assert anywhere["connected"] == anywhere["plan"]["found"]
-    assert "between any free configurations" in report.text(anywhere)
+        assert row["ours"]["length"] >= row["straight"] * (1 - 1e-9)
+    assert "OMPL, no proof" in report.text(document)
 
 
-def test_a_path_that_collides_between_its_ends_is_seen() -> None:
-    scene = catalogue.scene("planar_2dof")
-    assert plan._path(scene, np.array([[0.0, 0.0], [1.72, -2.1]]))["collides"] is True
-    assert plan._path(scene, np.array([[0.0, 0.0], [0.1, -0.1]]))["collides"] is False
+def test_the_check_of_a_path_finds_what_collides() -> None:
+    rival = Ompl(catalogue.scene("planar_2dof"))
+    assert rival.collides(np.array([[0.0, 0.0], [1.72, -2.1]]), 500)
+    assert not rival.collides(np.array([[0.0, 0.0], [0.1, -0.1]]), 500)
 
 
 def test_the_page_shows_the_figures_that_lie_beside_it() -> None:

@@ -38,8 +38,9 @@ def test_a_path_is_answered_by_the_exit_status(ciris: Ciris, url: str, region: s
     covered = ciris("path", "slider", "--q", "-0.2", "--q", "0.1", "--q", "0.3", CIRIS_URL=url)
     assert (covered.status, covered.stderr) == (0, "")
     header, first, second, verdict = covered.stdout.splitlines()
-    assert header.split() == ["from", "to", "region", "guarantee"]
-    assert [first.split()[0], first.split()[2], second.split()[1], second.split()[2]] == ["0", region, "2", more]
+    assert header.split() == ["from", "to", "proved", "by", "guarantee"]
+    assert (first.split()[0], second.split()[1]) == ("0", "2")
+    assert [first.split()[2:4], second.split()[2:4]] == [["region", region], ["region", more]]
     assert verdict == "covered: every point of the path is in certified regions, 2 of 2"
     beyond = ciris("path", "slider", "--q", "-0.4", "--q", "0.1", "--space", "s", CIRIS_URL=url)
     assert beyond.status == 1
@@ -91,10 +92,10 @@ def test_a_plan_is_printed_with_its_regions(ciris: Ciris, url: str, region: str,
     done = ciris("plan", "slider", "--from", "-0.2", "--to", "0.3", "--speed", "0.5", "--acceleration", "1", CIRIS_URL=url)
     assert (done.status, done.stderr) == (0, "")
     header, first, second, what, verdict = done.stdout.splitlines()
-    assert header.split() == ["from", "to", "region", "guarantee"]
-    assert [first.split()[0], first.split()[2], second.split()[2]] == ["0", region, more]
+    assert header.split() == ["from", "to", "proved", "by", "guarantee"]
+    assert [first.split()[0], first.split()[3], second.split()[3]] == ["0", region, more]
     assert " configurations, 0.5 long in q, " in what
-    assert verdict == "every point between them is in certified regions, guarantee exact"
+    assert verdict == "all of the motion lies in certified regions, guarantee exact"
     found = ciris("plan", "slider", "--from=-0.2", "--to", more, "--json", CIRIS_URL=url).json
     assert (found["found"], found["q"][0], found["t"][0]) == (True, [-0.2], 0.0)
 
@@ -104,19 +105,19 @@ def test_no_seed_is_advised_where_none_was_found(
 ) -> None:
     store_region(database, a_part(0.6, 0.9))
     monkeypatch.setattr(advice, "in_collision", lambda scene, s, room: np.ones(len(s), dtype=bool))
-    plan = ciris("plan", "slider", "--from", "0.1", "--to", "0.7", CIRIS_URL=url).stdout
+    plan = ciris("plan", "slider", "--from", "0.1", "--to", "0.7", "--regions-only", CIRIS_URL=url).stdout
     graph = ciris("graph", "slider", CIRIS_URL=url).stdout
     assert [text.splitlines()[-1].partition("; ")[2] for text in (plan, graph)] == 2 * ["no free configuration was found near its middle"]
 
 
 def test_a_plan_that_is_not_found_says_why(ciris: Ciris, url: str, region: str, database: Database) -> None:
     far = store_region(database, a_part(0.6, 0.9))
-    apart = ciris("plan", "slider", "--from", "0.1", "--to", "0.7", CIRIS_URL=url)
+    apart = ciris("plan", "slider", "--from", "0.1", "--to", "0.7", "--regions-only", CIRIS_URL=url)
     assert (apart.status, apart.stdout) == (
         1,
         f"1 of 2 regions are connected with --from, 1 with --to\ngap of 0.4 in s between {region} and {far}; try the seed 0.4\n",
     )
-    outside = ciris("plan", "slider", "--from", "0.1", "--to", "-0.8", CIRIS_URL=url)
+    outside = ciris("plan", "slider", "--from", "0.1", "--to", "-0.8", "--regions-only", CIRIS_URL=url)
     assert (outside.status, outside.stdout) == (
         1,
         f"--to is in no certified region; nearest: 0.5 in s from {region} (exact), whose nearest point is -0.3\n",
@@ -125,6 +126,52 @@ def test_a_plan_that_is_not_found_says_why(ciris: Ciris, url: str, region: str, 
     assert (wrong.status, wrong.error) == (2, "--to[0]: 'far' is not a finite number (joint positions, separated by commas)")
     longer = ciris("plan", "slider", "--from", "0.1,0.2", "--to", "0.1", CIRIS_URL=url)
     assert (longer.status, longer.error.partition(" (")[0]) == (2, "--from: 2 numbers were given; slider has 1 joints")
+
+
+def test_without_regions_a_motion_is_planned_and_its_proof_kept(ciris: Ciris, url: str, scene: Scene, tmp_path: Path) -> None:
+    done = ciris("plan", "slider", "--from=-0.5", "--to", "0.9", "--to", "0.4", "--via", "0.1", "--out", tmp_path / "p", CIRIS_URL=url)
+    assert (done.status, done.stderr) == (0, "")
+    header, piece, what, verdict, proof = done.stdout.splitlines()
+    assert (header.split()[2:4], piece.split()[2]) == (["proved", "by"], "motion")
+    assert " configurations, 0.9 long in q, " in what
+    assert verdict == "all of the motion is proved to be free of collision, guarantee exact"
+    assert proof == f"proof: {tmp_path / 'p'} (check it: ciris verify {tmp_path / 'p'})"
+    assert ciris("verify", tmp_path / "p").status == 0
+
+
+def test_what_is_wrong_with_the_ends_is_said_in_words(ciris: Ciris, url: str, scene: Scene) -> None:
+    beyond = ciris("plan", "slider", "--from", "0.1", "--to", "1.5", CIRIS_URL=url)
+    assert (beyond.status, beyond.stdout) == (1, "--to: joint model/slide is at 1.5, and its limits are from -1 to 1\n")
+    pose = ("--to-pose", "0.5,0,0,0,0,0", "--frame", "cart")
+    there = ciris("plan", "slider", "--from", "0.1", *pose, "--json", CIRIS_URL=url).json
+    assert there["q"][-1] == [pytest.approx(0.5)]
+    on_line = ("--to-pose", "0.5,0,0", "--frame", "cart", "--line", "--tolerance", "0.01")
+    assert ciris("plan", "slider", "--from", "0.1", *on_line, CIRIS_URL=url).status == 0
+    off = ciris("plan", "slider", "--from", "0.1", "--to-pose", "0.5,0.2,0,0,0,0", "--frame", "cart", CIRIS_URL=url)
+    assert off.status == 1
+    assert off.stdout.startswith("--to-pose: no configuration reaches it; the nearest that was found is off by 200 mm and ")
+    past = ciris("plan", "slider", "--from", "0.1", "--to-pose", "1.9,0,0", "--frame", "cart", "--line", CIRIS_URL=url)
+    assert (past.status, past.stdout) == (1, "the line ends at the part 0.5 of it: joint model/slide is at its limit\n")
+    unknown = ciris("plan", "slider", "--from", "0.1", "--to-pose", "0.5,0,0,0,0,0", "--frame", "tool", CIRIS_URL=url)
+    assert (unknown.status, unknown.error.partition(":")[0]) == (2, "--frame")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [
+        ((), "--to"),
+        (("--to", "0.1", "--to-pose", "0,0,0,0,0,0"), "--to"),
+        (("--to", "0.1", "--line"), "--line"),
+        (("--to-pose", "0,0,0,0"), "--to-pose"),
+        (("--to-pose", "0,0,0,0,0,0"), "--frame"),
+        (("--to-pose", "0,0,0,0,0,0", "--frame", "cart", "--tolerance", "0.1"), "--tolerance"),
+        (("--to", "0.1", "--to", "0123abcd"), "--to"),
+        (("--to", "0.1", "--grow"), "--grow"),
+    ],
+)
+def test_an_option_that_does_not_fit_the_others_is_refused(ciris: Ciris, arguments: tuple[str, ...], field: str) -> None:
+    done = ciris("plan", "slider", "--from", "0.1", *arguments, CIRIS_URL="http://127.0.0.1:9")
+    assert (done.status, done.error.partition(":")[0]) == (2, field)
 
 
 HEAVY = ("asyncio.base_events", "flint", "numba", "numpy", "scipy")

@@ -20,6 +20,8 @@ TESTED = {
     "certifier/step/step.py:_check_size": "tests/certifier/step/test_step.py",
     "certifier/step/step.py:step": "tests/certifier/step/test_step.py",
     "ciris/job.py:why_no_region": "tests/ciris/test_endurance.py",
+    "client/planning.py:_goal": "tests/client/test_planning.py",
+    "client/planning.py:plan": "tests/client/test_planning.py",
     "db/migrate.py:_check": "tests/db/test_migrations.py",
     "jobs/cover.py:save": "tests/workers/test_covers.py",
     "planner/poses/frame.py:_body": "tests/planner/poses/test_frame.py",

@@ -164,6 +164,7 @@ SERVICE: Table = {
     ("no_keys", "CIRIS_HOST"): [lambda t: keys.check_bind(Settings(host="0.0.0.0", database_url=t.need("sqlite_url")))],
     ("cursor", "after"): [lambda t: t.ask("GET", "/v1/jobs?after=nope")],
     ("proof_not_found", "proof"): [lambda t: write(t, lambda session: proofs.get(session, "nothing"))],
+    ("motion_not_found", "motion"): [lambda t: t.ask("GET", "/v1/planning/motions/5b8f8d6e/proof")],
     ("region_not_found", "region"): [
         lambda t: t.ask("GET", "/v1/regions/nope"),
         lambda t: t.ask("DELETE", f"/v1/regions/{t.need('region')[:8]}"),

@@ -17,7 +17,7 @@ THIRD_PARTIES = {
     "certifier.verify": {"flint", "numpy"},
     "db": {"alembic", "cryptography", "numpy", "opentelemetry", "pydantic", "pydantic_settings", "sqlalchemy", "structlog"},
     "jobs": {"cachetools", "numpy", "pydantic", "pydantic_core", "sqlalchemy"},
-    "planner": {"flint", "numba", "numpy", "pydrake", "scipy"},
+    "planner": {"flint", "numba", "numpy", "ompl", "pydrake", "scipy"},
     "ciris": {"httpx2", "numpy"},
     "client": {"flint", "httpx2", "numpy", "pydrake", "yaml"},
     "dashboard": set(),

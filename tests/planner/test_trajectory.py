@@ -94,7 +94,7 @@ def test_what_is_returned_is_covered_and_keeps_the_limits(seed: int, count: int,
 def test_in_many_dimensions_it_is_so_too_or_there_is_no_route(seed: int, n: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     stored, scene = cut_boxes(rng, n, count), arm(n, -3.0, 3.0)
-    inner = [scene.to_q(planning._inner(stored, region)) for region in rng.integers(0, count, 2).tolist()]
+    inner = [scene.to_q(planning.inner(stored, region)) for region in rng.integers(0, count, 2).tolist()]
     found = planned(stored, scene, inner[0], inner[1])
     if isinstance(found, Apart):
         assert found.gap.distance >= 0

@@ -16,8 +16,10 @@ import pytest
 from certifier import stored
 from certifier.model import Scene
 from certifier.pair.collisions import in_collision
+from certifier.proof.motion import MotionProof
+from certifier.verify.motion import verify_motion
 from certifier.verify.region import verify_region
-from db import jobs, proofs, regions, scenes, steps
+from db import jobs, motions, proofs, regions, scenes, steps
 from db.models import JobRow
 from db.session import database
 from db.states import JOB, unfinished
@@ -103,6 +105,18 @@ def test_configurations_are_connected(planar: Scene) -> None:
     assert (job.state, job.outcome) == ("succeeded", "certified")
     check_rows(job.id)
     assert known(job.id)["connect"] == [0, 0]
+
+
+@pytest.mark.lengthy
+def test_a_proved_motion_connects_what_regions_do_not(planar: Scene) -> None:
+    job = ended(cover(planar, connect=[LEFT, RIGHT], regions=1))
+    assert (job.state, job.outcome, job.reason) == ("succeeded", "certified", "the goals are reached, by motions where regions do not lead")
+    with database().read() as session:
+        (motion_id,) = motions.roll(session, job.scene_id)
+        motion = motions.get(session, motion_id)
+        statement = verify_motion(MotionProof.from_bytes(proofs.get(session, motion.proof_digest), scenes.load(database(), job.scene_id)))
+    assert (motion.arrays["q"][[0, -1]] == [LEFT, RIGHT]).all()
+    assert (statement.end, statement.rho) == (1.0, motion.tube)
 
 
 @pytest.mark.slow

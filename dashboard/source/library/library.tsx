@@ -61,7 +61,7 @@ function Library({ model }: { model: SceneModel }) {
     void get<RegionConfigurations>(`/v1/regions/${region}/configurations?samples=0`).then(({ center }) => setQ(center), (reason: unknown) => setGraphProblem(said(reason)));
   };
   const touching = useMemo(() => touchingOf(model, moment), [moment, model]);
-  const planned = useMemo(() => new Set(plan?.pieces.map(({ region }) => region) ?? []), [plan]);
+  const planned = useMemo(() => new Set(plan?.pieces.flatMap(({ region }) => region ?? []) ?? []), [plan]);
   const holding = useMemo(() => new Set(moment.regions), [moment]);
   return (
     <div class="library">

@@ -76,7 +76,16 @@ export function Planning({ scene, names, units, lower, upper, q, onMove, plan, o
 }
 
 function why(plan: PlanResponse, units: ("rad" | "m")[]): string {
-  const { reason, nearest, gap } = plan;
+  const { reason, nearest, gap, limit, collision } = plan;
+  if (limit) {
+    return `There is no motion: joint ${limit.joint} is outside its limits at the ${limit.where}.`;
+  }
+  if (collision) {
+    const free = collision.free ? ` It is free near by, at ${asText(collision.free, units)}.` : "";
+    return `There is no motion: ${collision.a} and ${collision.b} touch at the ${collision.where}.${free}`;
+  }
+  if (reason === "no_motion") return "No motion was found in time. There may be one.";
+  if (reason === "not_certified") return "A motion was found, but none that could be certified.";
   if (reason === "start_uncovered" || reason === "goal_uncovered") {
     const end = reason === "start_uncovered" ? "start" : "goal";
     return nearest
@@ -128,7 +137,7 @@ function Player({ plan, names, units, onMove }: { plan: PlanResponse; names: str
     <div class="player">
       <p>
         <strong>{plan.duration!.toFixed(2)} s</strong>, {plan.length!.toPrecision(3)} long in q, {plan.pieces.length} {plan.pieces.length === 1 ? "piece" : "pieces"}; guarantee <span class={`badge ${plan.guarantee}`}>{plan.guarantee}</span>:
-        every point of it is proved to be in the regions named.
+        every point of it is proved to be free of collision, by what the pieces name.
       </p>
       <div class="toolbar">
         <button type="button" onClick={() => setPlaying(!playing)}>{playing ? "Pause" : "Play"}</button>
@@ -137,7 +146,7 @@ function Player({ plan, names, units, onMove }: { plan: PlanResponse; names: str
         <label>speed <select value={speed} onChange={(event) => setSpeed(Number(event.currentTarget.value))}>{[0.25, 0.5, 1, 2].map((factor) => <option value={factor} key={factor}>{factor}×</option>)}</select></label>
         <a href={file} download="plan.json">Download</a>
       </div>
-      <p class="moment">Now in region <a href={`/regions/${piece.region}`}>{piece.region.slice(0, 8)}</a>, {piece.begin.toFixed(2)} to {piece.end.toFixed(2)} s, <span class={`badge ${piece.guarantee}`}>{piece.guarantee}</span></p>
+      <p class="moment">Now {piece.region ? <>in region <a href={`/regions/${piece.region}`}>{piece.region.slice(0, 8)}</a></> : <>on the proved motion {piece.motion?.slice(0, 8)}</>}, {piece.begin.toFixed(2)} to {piece.end.toFixed(2)} s, <span class={`badge ${piece.guarantee}`}>{piece.guarantee}</span></p>
       <Curves plan={plan} names={names} units={units} time={time} />
     </div>
   );

@@ -90,7 +90,7 @@ def test_components_and_what_they_hold_are_told_the_one_that_covers_most_first(s
     seen = looked(scene, DOOR, options, there)
     assert (seen.components, seen.connect, seen.seeds) == ((2, 1), (1, 0, None), (True, False))
     assert 0 < seen.largest < seen.covered
-    assert not seen.joined
+    assert not seen.joined()
 
 
 def test_a_seed_sees_what_is_not_covered(scene: Scene) -> None:

@@ -15,7 +15,7 @@ from certifier.errors import RegionError
 from planner.cover.machine import IDLE, LATE, LOOKS, TRIES, advance, begin, unreached
 from planner.cover.options import ENOUGH, CoverOptions
 from planner.cover.result import said
-from planner.cover.state import CoverState, Ended, Finish, Late, Purpose, Report, Scout, Scouted, Task, Transition, Watch
+from planner.cover.state import CoverState, Ended, Finish, Late, Move, Moved, Purpose, Report, Scout, Scouted, Task, Transition, Watch
 
 HERE, THERE = (0.0, 0.0), (1.0, 1.0)
 SOMEWHERE = Task((0.5, 0.5), Purpose.COVER)
@@ -82,6 +82,9 @@ def test_whatever_is_reported_in_whatever_order_it_ends_and_says_why(data: st.Da
             report, late = Late(), True
         elif isinstance(action, Scout):
             report, told = data.draw(looks(options)), told + 1
+        elif isinstance(action, Move):
+            assert options.connect
+            report = Moved(data.draw(st.sampled_from([(), ((0, 1),)])))
         else:
             some = data.draw(st.sets(st.sampled_from(sorted(state.growing)), min_size=1))
             report = Ended({number: data.draw(st.sampled_from([None, "it touches"])) for number in some})
@@ -91,8 +94,9 @@ def test_whatever_is_reported_in_whatever_order_it_ends_and_says_why(data: st.Da
     assert len(set(asked)) == len(asked), "nothing is asked for twice"
     assert state.last is not None
     assert action.reason
-    assert action.reached == (not unreached(options, state.last))
-    assert action.reached or all(text in action.reason for text in unreached(options, state.last))
+    missing = unreached(options, state.last, state.moved or ())
+    assert action.reached == (not missing)
+    assert action.reached or all(text in action.reason for text in missing)
     assert (said(state) or {})["goals"] is action.reached
     assert told == state.looks or late
 
@@ -138,6 +142,8 @@ def test_a_configuration_around_which_no_region_grows_is_given_up_with_words() -
     for _ in range(LOOKS - 1):
         assert transition.action == Scout()
         transition = after(transition.state, seen(connect=(0, None)))
+    assert transition.action == Move()
+    transition = after(transition.state, Moved(()))
     assert isinstance(transition.action, Finish)
     assert not transition.action.reached
     assert transition.action.fruitless
@@ -146,7 +152,10 @@ def test_a_configuration_around_which_no_region_grows_is_given_up_with_words() -
 
 def test_components_that_cannot_be_joined_end_it_with_words() -> None:
     apart = replace(seen(connect=(0, 1), obstacles=("no motion was found",)), components=(1, 1))
-    action = after(begin(CoverOptions(connect=(HERE, THERE))).state, *[apart] * LOOKS).action
+    moving = after(begin(CoverOptions(connect=(HERE, THERE))).state, *[apart] * LOOKS)
+    assert moving.action == Move()
+    assert after(moving.state, Moved(((0, 1),))).action == Finish(True, "the goals are reached, by motions where regions do not lead")
+    action = after(moving.state, Moved(())).action
     assert isinstance(action, Finish)
     assert (action.reached, action.fruitless) == (False, True)
     assert action.reason.endswith("the configurations to connect are in 2 components; no motion was found")

@@ -17,7 +17,7 @@ from planner.cover.ground import Collides
 from planner.cover.look import Look
 from planner.cover.machine import advance, begin
 from planner.cover.options import CoverOptions
-from planner.cover.state import Ended, Finish, Purpose, Report, Scout, Task, Watch
+from planner.cover.state import Ended, Finish, Move, Moved, Purpose, Report, Scout, Task, Watch
 from tests.planner.cover.test_look import LIMIT, Wall, known, scene, walls
 
 __all__ = ["scene"]
@@ -59,6 +59,9 @@ def covered(
     growing: dict[int, Box | None] = {}
     while not isinstance(transition.action, Finish):
         state, action = transition.state, transition.action
+        if isinstance(action, Move):
+            transition = advance(state, Moved(()))
+            continue
         if isinstance(action, Scout):
             report: Report = look(known(scene, *there), state)
         else:

@@ -1,0 +1,90 @@
+"""Motions that were planned in a scene and proved are kept, so that they answer later questions. The oldest ones go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+from uuid import uuid4
+
+from sqlalchemy import delete, select, update
+from sqlalchemy.orm import Session
+
+from certifier.errors import CirisError
+from certifier.model import Array
+from db import proofs
+from db.ids import expanded
+from db.models import LibraryRow, MotionRow, SceneRow
+from db.session import insert_new
+
+
+def add(session: Session, scene_id: str, arrays: dict[str, Array], tube: float, proof: bytes, most: int) -> MotionRow:
+    """Stores a motion whose proof has been verified, and deletes the oldest ones of the scene beyond ``most``.
+
+    Args:
+        arrays: as in :class:`db.models.MotionRow`.
+    """
+    number = _changed(session, scene_id)
+    motion = MotionRow(
+        id=str(uuid4()),
+        project=session.get_one(SceneRow, scene_id).project,
+        scene_id=scene_id,
+        number=number,
+        arrays=arrays,
+        tube=tube,
+        proof_digest=proofs.put(session, [proof])[proof],
+    )
+    session.add(motion)
+    session.flush()
+    of_scene = select(MotionRow.id).where(MotionRow.scene_id == scene_id).order_by(MotionRow.number.desc())
+    _delete(session, session.scalars(of_scene.offset(most)).all())
+    return motion
+
+
+def get(session: Session, motion_id: str) -> MotionRow:
+    """Returns the motion with this id, or with the only id that begins like this.
+
+    Raises:
+        CirisError: motion_not_found, or ambiguous_id.
+    """
+    row = session.get(MotionRow, motion_id) or session.get(MotionRow, expanded(session, MotionRow.id, motion_id))
+    if row is None:
+        hint = "the service keeps the latest motions of a scene; plan again, or keep the proof (`ciris plan --out FILE`)"
+        raise CirisError("motion_not_found", f"there is no motion {motion_id!r}", field="motion", hint=hint)
+    return row
+
+
+def version(session: Session, scene_id: str) -> int:
+    """Returns how often a motion of this scene was added or deleted."""
+    return session.scalar(select(LibraryRow.motions).where(LibraryRow.scene_id == scene_id)) or 0
+
+
+def roll(session: Session, scene_id: str) -> list[str]:
+    """Returns the ids of the motions that a scene has, in the order of their numbers."""
+    return list(session.scalars(select(MotionRow.id).where(MotionRow.scene_id == scene_id).order_by(MotionRow.number)))
+
+
+def read(session: Session, ids: Sequence[str]) -> list[tuple[str, dict[str, Any], float]]:
+    """Returns id, arrays and tube of these motions, by their numbers; those that are gone are left out."""
+    columns = select(MotionRow.id, MotionRow.arrays, MotionRow.tube)
+    rows = session.execute(columns.where(MotionRow.id.in_(ids)).order_by(MotionRow.number))
+    return [(row.id, row.arrays, row.tube) for row in rows]
+
+
+def delete_all(session: Session, scene_id: str) -> None:
+    """Deletes the motions of a scene, and their proofs unless somebody else has them."""
+    _delete(session, roll(session, scene_id))
+
+
+def _delete(session: Session, ids: Sequence[str]) -> None:
+    if not ids:
+        return
+    digests = session.scalars(select(MotionRow.proof_digest).where(MotionRow.id.in_(ids))).all()
+    session.execute(delete(MotionRow).where(MotionRow.id.in_(ids)))
+    proofs.drop_unused(session, digests)
+
+
+def _changed(session: Session, scene_id: str) -> int:
+    """Counts a change of the scene's motions and returns their version. Changes of one scene wait for each other until they commit."""
+    insert_new(session, LibraryRow, [{"scene_id": scene_id, "version": 0, "motions": 0}])
+    counted = update(LibraryRow).where(LibraryRow.scene_id == scene_id).values(motions=LibraryRow.motions + 1)
+    return session.scalars(counted.returning(LibraryRow.motions)).one()

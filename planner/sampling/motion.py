@@ -1,0 +1,106 @@
+"""A path becomes a motion here: rounded at its corners, with times, and proved.
+
+What is certified is the path, with the widest tube. The motion with times has more configurations, and has to be in the tube; where it is
+not, the motion itself is certified. If nothing is certified, a motion that stops at the corners follows the path exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from certifier.jobs.motion import MotionVerdict, certify
+from certifier.model import Array, Scene
+from certifier.outcome import Outcome
+from certifier.proof.motion import Motion, Space
+from planner.sampling.corners import rounded
+from planner.sampling.route import Route
+from planner.sampling.search import Search
+from planner.trajectory.stretch import stretch
+from planner.trajectory.timing import timed
+from planner.tubes import Tube, follows
+
+SPACING = 0.1
+"""How far a joint moves between two configurations of an answer, in radians or metres."""
+FINE = 0.05
+"""How far a joint moves between two points of the curve that gets times, in radians or metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proved:
+    """A motion with its proof.
+
+    Attributes:
+        q: (K, n) configurations of the motion, straight in q between them.
+        t: (K,) their times in seconds.
+        path: (k, n) the path that is certified, straight in q between its points. The motion is in the tube about it.
+        verdict: on the path.
+    """
+
+    q: Array
+    t: Array
+    path: Array
+    verdict: MotionVerdict
+
+
+def prove(
+    scene: Scene,
+    search: Search,
+    route: Route,
+    speed: Array,
+    acceleration: Array,
+    accepts: Callable[[Array], bool] = lambda q: True,
+) -> Proved | None:
+    """Returns a certified motion from rest to rest along a path; None where none could be certified.
+
+    Args:
+        search: says which lines are free.
+        speed, acceleration: (n,) limits of every joint.
+        accepts: says whether a motion, (K, n), may be the answer.
+    """
+    for path, q, t in _candidates(search, route, speed, acceleration):
+        q = np.clip(q, *scene.own_limits)
+        if t[-1] > 0:
+            t = t * stretch(q, t, speed, acceleration)
+        if not accepts(q):
+            continue
+        for certified in (path, q):
+            verdict = certify(scene, Motion(Space.Q, certified), tube=True)
+            if verdict.outcome is not Outcome.CERTIFIED or verdict.statement is None:
+                break
+            if certified is q or follows(Tube("", certified, verdict.statement.rho), q):
+                return Proved(q, t, certified, verdict)
+    return None
+
+
+def _candidates(search: Search, route: Route, speed: Array, acceleration: Array) -> Iterator[tuple[Array, Array, Array]]:
+    """Yields paths with configurations of motions along them and their times: first one with round corners, then one that stops there."""
+    path = rounded(route.path, search.sees, route.kept)
+    curve = _fine(path)
+    through = [int(i) for i in np.flatnonzero((curve[:, None] == route.path[list(route.kept)]).all(axis=2).any(axis=1))]
+    found = timed(curve, through, speed, acceleration, SPACING)
+    if found is not None:
+        yield path, *found
+    parts = [timed(_fine(np.array(line)), [], speed, acceleration, SPACING) for line in pairwise(route.path)]
+    if all(part is not None for part in parts):
+        yield route.path, *_joined([part for part in parts if part is not None])
+
+
+def _fine(points: Array) -> Array:
+    """Returns points on the lines between points, (m, n), in which no joint moves by more than FINE from one to the next."""
+    parts = [points[:1]]
+    for a, b in pairwise(points):
+        u = np.linspace(0, 1, max(1, int(np.ceil(np.abs(b - a).max() / FINE))) + 1)[1:, None]
+        parts.append((1 - u) * a + u * b)
+    return np.concatenate(parts)
+
+
+def _joined(parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Returns motions one after the other, each from rest to rest, as one."""
+    q, t = parts[0]
+    for more, later in parts[1:]:
+        q, t = np.concatenate([q, more[1:]]), np.concatenate([t, t[-1] + later[1:]])
+    return q, t

@@ -1,0 +1,126 @@
+"""Tubes about proved motions: sets of configurations that are free of collision, because a proof says so.
+
+The tube about a straight line in q from c to e holds every q with |q_i - c_i - t (e_i - c_i)| <= rho for all joints i, at one time t from
+0 to 1. It is convex. So a straight motion in q lies in it from u0 to u1 where its points at u0 and at u1 do. The times at which it does
+follow from linear inequalities; then both points are checked, with room for what doubles round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from certifier.model import Array
+from planner.boxes import BoxGrid
+
+_ROUNDED = 1e-14
+"""What a few operations round is a smaller part of the largest number in them."""
+_INSIDE = 1e-12
+"""The times at which a motion enters and leaves a tube, from 0 to 1, are moved inside by this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tube:
+    """A proved motion: straight in q between configurations path (k, n), with a tube of half the width rho, in radians or metres."""
+
+    id: str
+    path: Array
+    rho: float
+
+
+class Tubes:
+    """Holds the tubes of M straight lines. It never changes.
+
+    Attributes:
+        motions: the tubes that were given.
+        motion: (M,) number of the tube that each line belongs to.
+        place: (M,) number of the line within its tube's path.
+    """
+
+    def __init__(self, n: int, motions: Sequence[Tube]) -> None:
+        self.motions = tuple(motions)
+        counts = [len(tube.path) - 1 for tube in motions]
+        self.motion = np.repeat(np.arange(len(motions)), counts)
+        self.place = np.concatenate([np.zeros(0, dtype=np.intp), *(np.arange(count) for count in counts)])
+        self._begin = np.concatenate([np.zeros((0, n)), *(tube.path[:-1] for tube in motions)])
+        self._end = np.concatenate([np.zeros((0, n)), *(tube.path[1:] for tube in motions)])
+        self._rho = np.repeat([tube.rho for tube in motions], counts)[:, None]
+        self._lower, self._upper = np.minimum(self._begin, self._end) - self._rho, np.maximum(self._begin, self._end) + self._rho
+        self._grid = BoxGrid(self._lower, self._upper)
+
+    def __len__(self) -> int:
+        return len(self.motions)
+
+    def at(self, q: Array) -> tuple[NDArray[np.intp], Array]:
+        """Returns the lines in whose tubes q, (n,), is proved to be, (h,), and the times on them, (h,) from 0 to 1."""
+        _, lines = self._grid.candidates(q[None])
+        inside, _, times = self._spans(lines, q, q)
+        return lines[inside], times[inside, 0]
+
+    def spans(self, a: Array, b: Array) -> tuple[NDArray[np.intp], Array]:
+        """Returns in the tubes of which lines the straight motion in q from a to b, (n,) each, is proved to be for a while.
+
+        Returns:
+            The lines, (h,), and from when to when, (h, 2), from 0 to 1.
+        """
+        lower, upper = np.minimum(a, b), np.maximum(a, b)
+        lines = np.flatnonzero(((self._lower <= upper) & (lower <= self._upper)).all(axis=1))
+        inside, spans, _ = self._spans(lines, a, b)
+        return lines[inside], spans[inside]
+
+    def _spans(self, lines: NDArray[np.intp], a: Array, b: Array) -> tuple[NDArray[np.bool_], Array, Array]:
+        """Returns whether the motion is in the tubes for a while, (h,), from when to when, and when the lines are there, (h, 2) each."""
+        if not len(lines):
+            return np.zeros(0, dtype=bool), np.zeros((0, 2)), np.zeros((0, 2))
+        way, rho = self._end[lines] - self._begin[lines], self._rho[lines]
+        here, step, moves = a - self._begin[lines], np.broadcast_to(b - a, way.shape), way != 0
+        # At the time u of the motion, the line's time t is at least low + u rate and at most high + u rate, for every joint that it moves.
+        pace = np.where(moves, way, 1.0)
+        sides = (here - rho) / pace, (here + rho) / pace
+        bound = [(np.minimum(*sides), -np.inf, 0.0), (np.maximum(*sides), np.inf, 1.0)]
+        low, high = (np.column_stack([np.where(moves, side, none), np.full(len(lines), end)]) for side, none, end in bound)
+        rate = np.column_stack([np.where(moves, step / pace, 0.0), np.zeros(len(lines))])
+        # A joint that rests on the line bounds u alone.
+        at_rest = [(np.where(moves, -1.0, sign * here - rho), np.where(moves, 0.0, sign * step)) for sign in (1, -1)]
+        against = low[:, :, None] - high[:, None, :], rate[:, :, None] - rate[:, None, :]
+        rows = [(alpha.reshape(len(lines), -1), beta.reshape(len(lines), -1)) for alpha, beta in (against, *at_rest)]
+        first, last = _solved(*(np.concatenate(part, axis=1) for part in zip(*rows, strict=True)))
+        spans = np.column_stack([first, last])
+        inside, times = first <= last, np.zeros_like(spans)
+        for k in (0, 1):
+            u = spans[:, k : k + 1]
+            times[:, k] = np.clip(((low + u * rate).max(axis=1) + (high + u * rate).min(axis=1)) / 2, 0.0, 1.0)
+            off = np.abs(here + u * step - times[:, k : k + 1] * way)
+            size = np.abs(a) + np.abs(b) + np.abs(self._begin[lines]) + np.abs(self._end[lines])
+            inside &= (off + _ROUNDED * size <= rho).all(axis=1)
+        return inside, spans, times
+
+
+def _solved(alpha: Array, beta: Array) -> tuple[Array, Array]:
+    """Returns the least and the largest u from 0 to 1, (h,) each, with alpha + u beta <= 0 in all columns; none where least > largest."""
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        at = -alpha / beta
+    last = np.where(beta > 0, at, np.where((beta == 0) & (alpha > 0), -np.inf, np.inf)).min(axis=1, initial=np.inf)
+    first = np.where(beta < 0, at, -np.inf).max(axis=1, initial=-np.inf)
+    first, last = np.clip(first, -1.0, 2.0), np.clip(last, -1.0, 2.0)
+    return np.where(first > 0, first + _INSIDE, 0.0), np.where(last < 1, last - _INSIDE, 1.0)
+
+
+def follows(tube: Tube, path: Array) -> bool:
+    """Says whether a path, (k, n) and straight in q between its points, is proved to be in a tube."""
+    tubes = Tubes(path.shape[1], [tube])
+    return all(_covers(tubes.spans(a, b)[1]) for a, b in pairwise(path))
+
+
+def _covers(spans: Array) -> bool:
+    """Says whether spans of time, (h, 2), cover all from 0 to 1, each beginning where another one still lasts."""
+    reached = 0.0
+    for first, last in spans[np.argsort(spans[:, 0], kind="stable")].tolist():
+        if first > reached:
+            return False
+        reached = max(reached, last)
+    return bool(len(spans) and reached == 1.0)
