@@ -74,10 +74,11 @@ def browser_text(browser: Browser, address: str) -> str:
 
 
 def planning(page: Page) -> None:
-    """Has a trajectory planned between two configurations that are far from each other, and stops halfway."""
+    """Has a motion planned between two configurations that are far from each other, and stops halfway."""
     page.get_by_label("From").fill("-90, -35")
     page.get_by_label("To", exact=True).fill("90, 50")
-    page.get_by_role("button", name="Plan a trajectory").click()
+    page.get_by_label("Only in certified regions").check()
+    page.get_by_role("button", name="Plan a motion").click()
     page.get_by_text("Now in region").wait_for()
     page.get_by_label("Time, seconds").evaluate("field => { field.value = field.max / 2; field.dispatchEvent(new Event('input')); }")
 

@@ -1,4 +1,4 @@
-// What is known of one configuration: what touches there, which regions hold it, and which is nearest. An answer counts for the
+// What is known of one configuration: what touches there, which regions and motions hold it, and which region is nearest. An answer counts for the
 // configuration that it was asked for, and for no other.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { post, said } from "./api";
@@ -10,12 +10,14 @@ export interface Moment {
   /** Joints that are outside of their limits, by name. */
   outside: string[];
   regions: string[];
+  /** The proved motions whose tubes hold it. */
+  motions: string[];
   nearest: Near | null;
   problem: string | null;
 }
 
 const AGAIN_MS = 2000;
-const NOTHING: Moment = { outside: [], regions: [], nearest: null, problem: null };
+const NOTHING: Moment = { outside: [], regions: [], motions: [], nearest: null, problem: null };
 
 async function ask(scene: string, q: number[]): Promise<Moment> {
   const body = { scene, q: [q] };
@@ -24,12 +26,13 @@ async function ask(scene: string, q: number[]): Promise<Moment> {
     post<ContainsResponse>("/v1/planning/contains", body),
   ]);
   const { pairs, outside } = touching.contacts[0]!;
+  const { inside, motions } = containing.points[0]!;
   const regions = containing.points[0]!.regions.map(({ region }) => region);
   let nearest: Moment["nearest"] = null;
-  if (regions.length === 0 && containing.regions > 0 && outside.length === 0) {
+  if (!inside && containing.regions > 0 && outside.length === 0) {
     nearest = (await post<NearestResponse>("/v1/planning/nearest", body)).points[0]!.nearest;
   }
-  return { pairs, outside, regions, nearest, problem: null };
+  return { pairs, outside, regions, motions, nearest, problem: null };
 }
 
 /** Asks about one configuration at a time, then about the latest; where the service does not answer, again. */
@@ -75,7 +78,7 @@ export function touchingOf(model: SceneModel, moment: Moment): number[] {
 
 /** Says in words what is known of the configuration, and how surely. */
 export function MomentText({ model, moment }: { model: SceneModel; moment: Moment }) {
-  const { pairs, outside, regions, nearest, problem } = moment;
+  const { pairs, outside, regions, motions, nearest, problem } = moment;
   const names = (pairs ?? []).map((pair) => model.pairs[pair]!.map((i) => model.geometries[i]!.name).join(" and "));
   return (
     <p class="said" role="status">
@@ -85,6 +88,8 @@ export function MomentText({ model, moment }: { model: SceneModel; moment: Momen
         <span class="bad">In collision: {names.slice(0, 3).join("; ")}{names.length > 3 && `; and ${names.length - 3} more pairs`}.</span>
       ) : regions.length ? (
         <span class="good">In {regions.length === 1 ? "a certified region" : `${regions.length} certified regions`}: {regions.slice(0, 4).map((region, i) => <>{i > 0 && ", "}<a href={`/regions/${region}`} key={region}>{region.slice(0, 8)}</a></>)}. No collision of the scene's pairs, as proved.</span>
+      ) : motions.length ? (
+        <span class="good">In the tube of the proved motion {motions[0]!.slice(0, 8)}. No collision of the scene's pairs, as proved.</span>
       ) : (
         <span>Free here, by floating point, and in no certified region{nearest && <>; the nearest is <a href={`/regions/${nearest.region}`}>{nearest.region.slice(0, 8)}</a>, {nearest.distance.toPrecision(3)} away in s</>}.</span>
       )}

@@ -36,7 +36,7 @@ export async function coverage(model: SceneModel): Promise<Coverage> {
   }
   if (free.length === 0) return { value: 0, stderr: 0, free: 0, samples: SAMPLES };
   const { points } = await post<ContainsResponse>("/v1/planning/contains", { scene: model.scene, q: free });
-  const value = points.filter(({ inside }) => inside).length / free.length;
+  const value = points.filter(({ regions }) => regions.length > 0).length / free.length;
   // Where all of them are inside, or none is, one of them more is what nobody knows.
   return { value, stderr: Math.max(Math.sqrt((value * (1 - value)) / free.length), 1 / free.length), free: free.length, samples: SAMPLES };
 }

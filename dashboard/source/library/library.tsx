@@ -1,4 +1,4 @@
-// A scene and its library of regions: the robot, which regions hold it, how they are connected, slices, and plans.
+// A scene and its library of regions: the robot, which regions hold it, how they are connected, slices, and motions.
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { get, said } from "../common/api";
 import { positions } from "../common/kinematics";
@@ -120,8 +120,8 @@ function Library({ model }: { model: SceneModel }) {
           )}
         </section>
         <section aria-labelledby="h-plan">
-          <h2 id="h-plan">Plan</h2>
-          <Planning scene={model.scene} names={names} units={model.units} lower={model.q_lower} upper={model.q_upper} q={q} onMove={setQ} plan={plan} onPlan={setPlan} />
+          <h2 id="h-plan">Plan a motion</h2>
+          <Planning model={model} names={names} q={q} onMove={setQ} plan={plan} onPlan={setPlan} />
         </section>
       </div>
     </div>

@@ -1,0 +1,117 @@
+// A motion to be played: the robot moves along it, and the page says what proves each part of it.
+import type { ComponentChildren } from "preact";
+import { useEffect, useRef, useState } from "preact/hooks";
+import { LINKS } from "../common/colours";
+import { shortNames, shown } from "../common/kinematics";
+
+/** A motion, straight in q between its configurations. The first time is 0. */
+export interface Motion {
+  q: number[][];
+  t: number[];
+}
+
+/** A part of a motion, and what proves it. */
+export interface Part {
+  begin: number;
+  end: number;
+  by: "region" | "motion" | "path" | "nothing";
+  said: ComponentChildren;
+}
+
+interface Props {
+  motion: Motion;
+  parts: Part[];
+  names: string[];
+  units: ("rad" | "m")[];
+  onMove: (q: number[]) => void;
+  /** What else there is to do, after the controls. */
+  children?: ComponentChildren;
+}
+
+/** The configuration at a time, on the straight line in q between two of the motion's. */
+function at({ q, t }: Motion, time: number): number[] {
+  const next = t.findIndex((moment) => moment >= time);
+  if (next <= 0) return q[next < 0 ? q.length - 1 : 0]!;
+  const share = (time - t[next - 1]!) / (t[next]! - t[next - 1]!);
+  return q[next - 1]!.map((value, i) => value + share * (q[next]![i]! - value));
+}
+
+export function Player({ motion, parts, names, units, onMove, children }: Props) {
+  const end = motion.t.at(-1)!;
+  const [time, setTime] = useState(0);
+  const [playing, setPlaying] = useState(false);
+  const [speed, setSpeed] = useState(1);
+  const now = useRef(0);
+  const go = (to: number): void => {
+    now.current = to;
+    setTime(to);
+    onMove(at(motion, to));
+  };
+  useEffect(() => {
+    now.current = 0;
+    setTime(0);
+    setPlaying(false);
+  }, [motion]);
+  useEffect(() => {
+    if (!playing) return;
+    if (now.current >= end) go(0);
+    let before = performance.now();
+    let frame = requestAnimationFrame(function step(stamp: number) {
+      go(Math.min(now.current + (speed * Math.max(stamp - before, 0)) / 1000, end));
+      before = stamp;
+      if (now.current >= end) setPlaying(false);
+      else frame = requestAnimationFrame(step);
+    });
+    return () => cancelAnimationFrame(frame);
+  }, [playing, speed, motion]);
+  const part = parts.find((candidate) => time <= candidate.end) ?? parts.at(-1)!;
+  return (
+    <div class="player">
+      <div class="toolbar">
+        <button type="button" onClick={() => setPlaying(!playing)}>{playing ? "Pause" : "Play"}</button>
+        <input type="range" min={0} max={end} step="any" value={time} aria-label="Time, seconds" aria-valuetext={`${time.toFixed(2)} s`} onInput={(event) => { setPlaying(false); go(Number(event.currentTarget.value)); }} />
+        <output>{time.toFixed(2)} s</output>
+        <label>speed <select value={speed} onChange={(event) => setSpeed(Number(event.currentTarget.value))}>{[0.25, 0.5, 1, 2].map((factor) => <option value={factor} key={factor}>{factor}×</option>)}</select></label>
+        {children}
+      </div>
+      <p class="moment">Now {part.said}</p>
+      <Curves motion={motion} parts={parts} names={names} units={units} time={time} />
+      <ol class="parts">
+        {parts.map(({ begin, end, by, said }) => (
+          <li key={begin} class={by}>{begin.toFixed(2)} to {end.toFixed(2)} s: {said}</li>
+        ))}
+      </ol>
+    </div>
+  );
+}
+
+const CHART = { width: 560, height: 140, pad: 6, band: 8 };
+const DASHES = ["", "6 3", "2 3", "8 3 2 3", "1 4", "10 4", "4 2"];
+
+function Curves({ motion, parts, names, units, time }: { motion: Motion; parts: Part[]; names: string[]; units: ("rad" | "m")[]; time: number }) {
+  const end = Math.max(motion.t.at(-1)!, 1e-9);
+  const short = shortNames(names);
+  const x = (t: number): number => CHART.pad + ((CHART.width - 2 * CHART.pad) * t) / end;
+  const lines = names.map((_, joint) => {
+    const values = motion.q.map((q) => q[joint]!);
+    const [low, high] = values.reduce(([least, most], value) => [Math.min(least, value), Math.max(most, value)], [Infinity, -Infinity]);
+    const bottom = CHART.height - CHART.band - CHART.pad;
+    const y = (value: number): number => bottom - (bottom - CHART.pad) * (high - low > 1e-9 ? (value - low) / (high - low) : 0.5);
+    return { d: motion.t.map((t, i) => `${i ? "L" : "M"}${x(t).toFixed(1)},${y(values[i]!).toFixed(1)}`).join(""), from: values[0]!, to: values.at(-1)! };
+  });
+  return (
+    <figure>
+      <svg class="chart" viewBox={`0 0 ${CHART.width} ${CHART.height}`} role="img" aria-label="Every joint over time, each between its own least and greatest position; the list below says from where to where. The band shows what proves each part.">
+        {parts.map(({ begin, end: until, by }) => <rect key={begin} class={`part ${by}`} x={x(begin)} width={x(until) - x(begin)} y={CHART.height - CHART.band} height={CHART.band} />)}
+        {parts.slice(1).map(({ begin }) => <line key={begin} class="between" x1={x(begin)} x2={x(begin)} y1={0} y2={CHART.height} />)}
+        {lines.map(({ d }, joint) => <path key={names[joint]} d={d} style={{ stroke: LINKS[joint % LINKS.length], strokeDasharray: DASHES[joint % DASHES.length] }} />)}
+        <line class="now" x1={x(time)} x2={x(time)} y1={0} y2={CHART.height} />
+      </svg>
+      <figcaption>
+        {lines.map(({ from, to }, joint) => (
+          <span class="joint-key" key={names[joint]}><svg width="22" height="8" aria-hidden="true"><line x1="0" x2="22" y1="4" y2="4" style={{ stroke: LINKS[joint % LINKS.length], strokeDasharray: DASHES[joint % DASHES.length] }} /></svg> {short[joint]} {shown(from, units[joint]!)} → {shown(to, units[joint]!)}</span>
+        ))}
+      </figcaption>
+    </figure>
+  );
+}
