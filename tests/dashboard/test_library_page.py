@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
+from pydrake.math import RigidTransform, RollPitchYaw
 
 from certifier.jobs.region import certified_region
 from certifier.model import Scene
 from certifier.pair.certification import Certification
+from db import scenes
 from db.session import Database
+from planner.poses.frame import frame_of, pose_at, pose_of
 from tests.api.conftest import store_region
-from tests.certifier.scenes import accepted, cube
+from tests.certifier.scenes import accepted, cube, planar_arm
 
 BOXES = [((-0.2, -0.1), 0.1), ((-0.05, -0.1), 0.1), ((-0.5, -0.5), 0.05)]
 """Centres and half widths in s of three regions: the first two overlap, the third is apart."""
@@ -149,6 +153,66 @@ def test_a_goal_in_collision_is_moved_to_a_free_configuration_near_by(page: Any,
     assert page.get_by_label("To", exact=True).input_value() != "22, 15"
     page.get_by_role("button", name="Plan a motion").press("Enter")
     page.get_by_text("Now in the tube of the proved motion").wait_for()
+
+
+@pytest.mark.parametrize("straight", [False, True])
+def test_a_goal_may_be_the_pose_of_a_frame(page: Any, url: str, planar: Scene, straight: bool) -> None:
+    """The frame ends where it was when the goal was set, and the robot, of two joints, has one configuration for that."""
+    plans: list[dict[str, Any]] = []
+    page.on("request", lambda request: plans.append(request.post_data_json) if request.url.endswith("/plan") else None)
+    page.goto(f"{url}/scenes/planar")
+    move(page, -20, 10)
+    page.get_by_role("button", name="Set as start").press("Enter")
+    page.get_by_label("Goal").select_option("arm/link2")
+    move(page, -17, 25)
+    page.get_by_role("button", name="Set as goal").press("Enter")
+    assert float(page.get_by_label("yaw, degrees").input_value()) == pytest.approx(8)
+    if straight:
+        page.get_by_label("On a straight line").check()
+    page.get_by_role("button", name="Plan a motion").press("Enter")
+    page.get_by_text("Now in the tube of the proved motion").wait_for()
+    (asked,) = plans
+    assert asked["pose"]["position"] == pytest.approx([np.cos(np.deg2rad(17)), -np.sin(np.deg2rad(17)), 0.0])
+    assert asked["pose"]["rpy"] == pytest.approx([0.0, 0.0, np.deg2rad(8)])
+    assert ("line" in asked, "goal" in asked) == (straight, False)
+    end = page.get_by_label("Time, seconds")
+    end.focus()
+    end.press("End")
+    shown = [float(field.input_value()) for field in page.locator(".library .sliders input[type=number]").all()]
+    assert shown == pytest.approx([-17, 25], abs=0.06)
+
+
+def test_a_pose_out_of_reach_is_shown_how_near_the_robot_comes(page: Any, url: str, planar: Scene) -> None:
+    page.goto(f"{url}/scenes/planar")
+    page.get_by_label("Goal").select_option("arm/link2")
+    page.get_by_label("z, metres").fill("0.25")
+    page.get_by_label("z, metres").press("Enter")
+    page.get_by_text("No configuration was found at which the frame has this pose").wait_for()
+    page.get_by_role("button", name="Show the nearest configuration").press("Enter")
+    page.get_by_label("z, metres").fill("")
+    page.get_by_role("button", name="Plan a motion").press("Enter")
+    assert page.get_by_label("z, metres").evaluate("field => field.matches(':focus:invalid')"), "the browser says what is missing"
+
+
+@pytest.mark.parametrize("angles", [(0.3, -0.7, 2.0), (0.4, np.pi / 2, 0.0)])
+def test_roll_pitch_and_yaw_are_those_of_the_service(page: Any, url: str, database: Database, angles: tuple[float, ...]) -> None:
+    wrist = wrist_at(*angles)
+    with database.write() as session:
+        scenes.add(session, wrist)
+    page.goto(f"{url}/scenes/{wrist.name}")
+    page.get_by_label("Goal").select_option("arm/link1")
+    shown = [np.deg2rad(float(page.get_by_label(f"{name}, degrees").input_value())) for name in ("roll", "pitch", "yaw")]
+    frame = frame_of(wrist, "arm/link1")
+    at, expected = pose_of(np.zeros(3), shown).turn, pose_at(frame, np.zeros(wrist.n)).turn
+    assert abs(at @ expected) == pytest.approx(1.0, abs=1e-12)
+
+
+def wrist_at(roll: float, pitch: float, yaw: float) -> Scene:
+    """The planar arm on a base that is turned."""
+    arm = planar_arm(limit=1.2)
+    first, *others = arm.joints
+    turned = RigidTransform(RollPitchYaw(roll, pitch, yaw), np.zeros(3)).GetAsMatrix4()
+    return replace(arm, name="wrist", joints=(replace(first, X_PF=turned), *others))
 
 
 def test_a_joint_beyond_its_limit_is_named(page: Any, url: str, planar: Scene) -> None:

@@ -74,6 +74,15 @@ export function movingBodies(model: SceneModel): string[] {
   return model.bodies.filter(moves);
 }
 
+/** Where a body's frame is in the world: its origin in metres, and roll, pitch and yaw in radians, turns about the world's x, then y, then z. */
+export function poseAt(model: SceneModel, body: string, q: number[]): { position: number[]; rpy: number[] } {
+  const [a, , , x, d, e, f, y, g, h, i, z] = poses(model)(q).get(body)! as [number, number, number, number, number, number, number, number, number, number, number, number];
+  const level = Math.hypot(a, d);
+  // Where the frame's x points straight up or down, roll and yaw turn about the same line: yaw is 0 there.
+  const [roll, yaw] = level > 1e-9 ? [Math.atan2(h, i), Math.atan2(d, a)] : [Math.atan2(-f, e), 0];
+  return { position: [x, y, z], rpy: [roll, Math.atan2(-g, level), yaw] };
+}
+
 const DEGREE = Math.PI / 180;
 
 /** A joint position as people read it: degrees or metres. */

@@ -1,9 +1,10 @@
 // A motion from a start to a goal: asked for, said why there is none, or played.
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { post, said } from "../common/api";
-import { asText } from "../common/kinematics";
+import { asText, movingBodies } from "../common/kinematics";
 import type { Piece, PlanResponse, SceneModel } from "../common/schema";
 import { Player, type Part } from "./player";
+import { asked, PoseFields, typedAt, type Typed } from "./pose";
 import { Why } from "./why";
 
 interface Props {
@@ -24,6 +25,8 @@ interface End {
 type Units = ("rad" | "m")[];
 
 const DEGREE = Math.PI / 180;
+/** How far a frame may be from a straight line. */
+const LINE = { metres: 1e-3, radians: 0.5 * DEGREE };
 
 /** Reads numbers in degrees and metres; null where they are not one for each joint. */
 function read(text: string, units: Units): number[] | null {
@@ -35,18 +38,21 @@ export function Planning({ model, names, q, onMove, plan, onPlan }: Props) {
   const { units } = model;
   const here = (at: number[]): End => ({ text: asText(at, units), q: at });
   const [ends, setEnds] = useState({ start: here(q), goal: here(q) });
-  const [only, setOnly] = useState(false);
+  const frames = useMemo(() => movingBodies(model).reverse(), [model]);
+  /** The goal where it is the pose of a frame; null where it is a configuration. */
+  const [pose, setPose] = useState<Typed | null>(null);
+  const [flags, setFlags] = useState({ only: false, straight: false });
   const [problem, setProblem] = useState<string | null>(null);
   const [asking, setAsking] = useState(false);
   const words = units.every((unit) => unit === "rad") ? "degrees" : units.every((unit) => unit === "m") ? "metres" : "degrees and metres";
   const ask = async (event: Event): Promise<void> => {
     event.preventDefault();
     const [start, goal] = [ends.start.q, ends.goal.q];
-    if (!start || !goal) return setProblem(`Give ${units.length} numbers for ${start ? "the goal" : "the start"}, one for each joint, in ${words}.`);
+    if (!start || !(goal || pose)) return setProblem(`Give ${units.length} numbers for ${start ? "the goal" : "the start"}, one for each joint, in ${words}.`);
     setProblem(null);
     setAsking(true);
     try {
-      const found = await post<PlanResponse>("/v1/planning/plan", { scene: model.scene, start, goal, regions_only: only });
+      const found = await post<PlanResponse>("/v1/planning/plan", { scene: model.scene, start, ...(pose ? { pose: asked(pose), ...(flags.straight && { line: LINE }) } : { goal, regions_only: flags.only }) });
       onPlan(found);
       if (found.found) onMove(found.q[0]!);
     } catch (reason) {
@@ -59,22 +65,44 @@ export function Planning({ model, names, q, onMove, plan, onPlan }: Props) {
     setEnds((old) => ({ ...old, [end]: to }));
     onPlan(null);
   };
+  const setGoalPose = (to: Typed | null): void => {
+    setPose(to);
+    onPlan(null);
+  };
+  const flag = (name: keyof typeof flags, on: boolean): void => {
+    setFlags((old) => ({ ...old, [name]: on }));
+    onPlan(null);
+  };
   const use = (end: "start" | "goal", free: number[]): void => {
+    if (end === "goal") setPose(null);
     set(end, here(free));
     onMove(free);
   };
+  const field = (end: "start" | "goal") => (
+    <>
+      <label for={`plan-${end}`}>{end === "start" ? "From" : "To"}</label>
+      <input id={`plan-${end}`} value={ends[end].text} onInput={({ currentTarget: { value } }) => set(end, { text: value, q: read(value, units) })} aria-describedby="plan-units" spellcheck={false} autocomplete="off" />
+      <button type="button" onClick={() => set(end, here(q))}>Set as {end}</button>
+    </>
+  );
   return (
     <div class="planning">
       <form onSubmit={(event) => void ask(event)}>
-        {(["start", "goal"] as const).map((end) => (
-          <p class="end" key={end}>
-            <label for={`plan-${end}`}>{end === "start" ? "From" : "To"}</label>
-            <input id={`plan-${end}`} value={ends[end].text} onInput={({ currentTarget: { value } }) => set(end, { text: value, q: read(value, units) })} aria-describedby="plan-units" spellcheck={false} autocomplete="off" />
-            <button type="button" onClick={() => set(end, here(q))}>Set as {end}</button>
-          </p>
-        ))}
-        <p class="quiet small" id="plan-units">One number for each joint, in {words}. Move the robot and set its configuration as the start or the goal, or type.</p>
-        <p><label><input type="checkbox" checked={only} onChange={(event) => { setOnly(event.currentTarget.checked); onPlan(null); }} /> Only in certified regions</label></p>
+        <p class="end">{field("start")}</p>
+        <p class="end">
+          <label for="plan-kind">Goal</label>
+          <select id="plan-kind" value={pose?.frame ?? ""} onChange={({ currentTarget: { value } }) => setGoalPose(value ? typedAt(model, value, q) : null)}>
+            <option value="">a configuration</option>
+            <optgroup label="a pose of the frame">{frames.map((frame) => <option key={frame}>{frame}</option>)}</optgroup>
+          </select>
+        </p>
+        {pose ? <PoseFields model={model} q={q} pose={pose} onChange={setGoalPose} /> : <p class="end">{field("goal")}</p>}
+        <p class="quiet small" id="plan-units">A configuration has one number for each joint, in {words}. Move the robot and set the start or the goal, or type.</p>
+        {pose ? (
+          <p><label><input type="checkbox" checked={flags.straight} onChange={(event) => flag("straight", event.currentTarget.checked)} /> On a straight line of the frame, to 1 mm and 0.5°</label></p>
+        ) : (
+          <p><label><input type="checkbox" checked={flags.only} onChange={(event) => flag("only", event.currentTarget.checked)} /> Only in certified regions</label></p>
+        )}
         <button type="submit" class="primary" disabled={asking}>{asking ? "Planning …" : "Plan a motion"}</button>
       </form>
       <div role="status">
