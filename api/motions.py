@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from threading import Lock
 from typing import Annotated, Any
 
+import numpy as np
 from cachetools import LRUCache
 from fastapi import Depends, Request
 
@@ -35,6 +36,25 @@ class Known:
     def width(self, motion_id: str) -> float:
         """Returns half the width of a motion's tube, in radians or metres."""
         return next(tube.rho for tube in self.tubes.motions if tube.id == motion_id)
+
+    def path(self, start: Array, goal: Array) -> tuple[str, Array] | None:
+        """Returns the motion in whose tube both the start and the goal are, (n,) each, and a path between them in it, (k, n); or None.
+
+        Of several motions it takes the one with the shortest path.
+        """
+        tubes, found = self.tubes, list[tuple[float, int, Array]]()
+        (ahead, t), (behind, u) = tubes.at(start), tubes.at(goal)
+        for motion in np.intersect1d(tubes.motion[ahead], tubes.motion[behind]).tolist():
+            i, j = (int(np.flatnonzero(tubes.motion[lines] == motion)[0]) for lines in (ahead, behind))
+            first, last, points = int(tubes.place[ahead[i]]), int(tubes.place[behind[j]]), tubes.motions[motion].path
+            forward = (first, t[i]) <= (last, u[j])
+            between = points[first + 1 : last + 1] if forward else points[last + 1 : first + 1][::-1]
+            path = np.concatenate([start[None], between, goal[None]])
+            found.append((float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()), motion, path))
+        if not found:
+            return None
+        _, motion, path = min(found, key=lambda one: one[:2])
+        return tubes.motions[motion].id, path
 
     def answer(self, start: Array, goal: Array, speed: Array, acceleration: Array) -> str | None:
         """Returns the id of a motion from the start to the goal, (n,) each, that keeps the limits, (n,) each; None where there is none."""

@@ -96,15 +96,23 @@ def _question(asked: Asked, body: PlanRequest) -> _Question:
 
 
 def _known(question: _Question) -> dict[str, Any] | None:
-    """Returns an earlier motion that answers the question."""
+    """Returns an earlier motion that answers the question, or a motion in the tube of one."""
     if len(question.points) > 1 or len(question.goals) != 1:
         return None
     limits = question.limits
-    motion_id = question.known.answer(question.points[0], question.goals[0], limits.speed, limits.acceleration)
-    if motion_id is None:
+    start, goal, known = question.points[0], question.goals[0], question.known
+    motion_id = known.answer(start, goal, limits.speed, limits.acceleration)
+    if motion_id is not None:
+        arrays = known.arrays[motion_id]
+        return _moved(motion_id, arrays["q"], arrays["t"], known.width(motion_id))
+    inside = known.path(start, goal)
+    if inside is None:
         return None
-    arrays = question.known.arrays[motion_id]
-    return _moved(motion_id, arrays["q"], arrays["t"], question.known.width(motion_id))
+    motion_id, path = inside
+    tube = {"proved": known.arrays[motion_id]["path"], "tube": known.width(motion_id)}
+    asked = {"path": path, **tube, "speed": limits.speed, "acceleration": limits.acceleration}
+    found = about_motions("timed_within", question.scene, asked)
+    return _moved(motion_id, found["q"], found["t"], known.width(motion_id)) if found else None
 
 
 def _searched(asked: Asked, question: _Question, body: PlanRequest) -> dict[str, Any]:

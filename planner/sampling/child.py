@@ -24,9 +24,10 @@ from certifier.proof.motion import Motion, Space
 from planner.poses.inverse import inverse
 from planner.poses.line import keeps, line
 from planner.sampling.ends import box, in_collision, outside_limits
-from planner.sampling.motion import Proved, prove
+from planner.sampling.motion import Proved, prove, within
 from planner.sampling.route import Route, route
 from planner.sampling.search import Search
+from planner.tubes import Tube
 
 PADDINGS = (2e-3, 2e-4, 0.0)
 """Metres that are added around every body, in one search after the other, until a motion is certified."""
@@ -102,6 +103,18 @@ def planned(payload: dict[str, Any], scene: Scene) -> dict[str, Any]:
             return _answer(proved)
         reason = "not_certified"
     return {"reason": reason}
+
+
+def timed_within(payload: dict[str, Any], scene: Scene) -> dict[str, Any]:
+    """Returns a motion in the tube of a proved one: ``q`` (K, n) and ``t`` (K,), or nothing. A child process runs this function.
+
+    Args:
+        payload: ``path`` (k, n), which is in the tube; ``proved`` (m, n), the path of the proved motion, and ``tube``, half the width about
+            it; ``speed`` and ``acceleration`` (n,), limits of every joint.
+    """
+    tube = Tube("", payload["proved"], payload["tube"])
+    found = within(scene, tube, payload["path"], payload["speed"], payload["acceleration"])
+    return {} if found is None else {"q": found[0], "t": found[1]}
 
 
 def _along(scene: Scene, search: Search, start: Array, payload: dict[str, Any]) -> dict[str, Any]:

@@ -76,6 +76,20 @@ def prove(
     return None
 
 
+def within(scene: Scene, tube: Tube, path: Array, speed: Array, acceleration: Array) -> tuple[Array, Array] | None:
+    """Returns configurations (K, n) and times (K,) of a motion from rest to rest along a path, (k, n); None where it leaves the tube."""
+    curve = timed(_fine(path), [], speed, acceleration, SPACING)
+    for found in (curve, _at_rest(path, speed, acceleration)):
+        if found is None:
+            continue
+        q, t = np.clip(found[0], *scene.own_limits), found[1]
+        if t[-1] > 0:
+            t = t * stretch(q, t, speed, acceleration)
+        if follows(tube, q):
+            return q, t
+    return None
+
+
 def _candidates(search: Search, route: Route, speed: Array, acceleration: Array) -> Iterator[tuple[Array, Array, Array]]:
     """Yields paths with configurations of motions along them and their times: first one with round corners, then one that stops there."""
     path = rounded(route.path, search.sees, route.kept)
@@ -84,9 +98,15 @@ def _candidates(search: Search, route: Route, speed: Array, acceleration: Array)
     found = timed(curve, through, speed, acceleration, SPACING)
     if found is not None:
         yield path, *found
-    parts = [timed(_fine(np.array(line)), [], speed, acceleration, SPACING) for line in pairwise(route.path)]
-    if all(part is not None for part in parts):
-        yield route.path, *_joined([part for part in parts if part is not None])
+    resting = _at_rest(route.path, speed, acceleration)
+    if resting is not None:
+        yield route.path, *resting
+
+
+def _at_rest(path: Array, speed: Array, acceleration: Array) -> tuple[Array, Array] | None:
+    """Returns a motion along a path, (k, n), that rests at every point of it: configurations (K, n) and times (K,)."""
+    parts = [timed(_fine(np.array(line)), [], speed, acceleration, SPACING) for line in pairwise(path)]
+    return _joined([part for part in parts if part is not None]) if all(part is not None for part in parts) else None
 
 
 def _fine(points: Array) -> Array:

@@ -149,8 +149,12 @@ def test_without_regions_a_motion_is_found_proved_and_kept(client: TestClient, s
     again = ask(client, [-0.5], [0.9])
     assert {**again, "proof": None} == {**found, "proof": None}
     slower = ask(client, [-0.5], [0.9], speed=0.5)
-    assert slower["motion"] != found["motion"]
+    assert (slower["motion"], slower["duration"] > found["duration"]) == (found["motion"], True)
     assert max(np.abs(np.diff(np.ravel(slower["q"])) / np.diff(slower["t"]))) <= 0.5
+    back = ask(client, [0.7], [-0.5 - found["tube"] / 2])
+    assert (back["motion"], back["q"][0], back["length"]) == (found["motion"], [0.7], pytest.approx(1.2 + found["tube"] / 2))
+    with database.read() as session:
+        assert len(motions.roll(session, scenes.find(session, "slider"))) == 1
 
 
 def test_what_is_kept_answers_questions_about_points_and_paths(client: TestClient, scene: Scene, database: Database) -> None:
@@ -167,11 +171,11 @@ def test_what_is_kept_answers_questions_about_points_and_paths(client: TestClien
 def test_the_oldest_motions_go(client: TestClient, scene: Scene, database: Database, environment: pytest.MonkeyPatch) -> None:
     environment.setenv("CIRIS_KEPT_MOTIONS", "2")
     settings.cache_clear()
-    first, second, third = (ask(client, [-0.5], [goal])["motion"] for goal in (0.1, 0.2, 0.3))
+    first, second, third = (ask(client, [-0.9 + goal], [goal])["motion"] for goal in (0.1, 0.5, 0.9))
     with database.read() as session:
         assert motions.roll(session, scenes.find(session, "slider")) == [second, third]
         assert session.scalar(select(func.count()).select_from(ProofRow)) == 2
-    assert ask(client, [-0.5], [0.1])["motion"] not in (first, second, third)
+    assert ask(client, [-0.8], [0.1])["motion"] not in (first, second, third)
 
 
 def test_a_motion_goes_through_what_is_asked_for_to_the_nearest_goal(client: TestClient, scene: Scene) -> None:

@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydrake.math import RollPitchYaw
 
 from certifier.model import WORLD, Pair
 from certifier.pair.collisions import in_collision
 from certifier.proof.motion import MotionProof, Space
 from certifier.scene import load_scene
+from certifier.scene.drake_model import build_diagram
 from certifier.seeding.free import Clearance
 from certifier.verify.file import verify_file
 from certifier.verify.motion import verify_motion
@@ -150,3 +152,51 @@ def test_a_motion_passes_by_closely():
         found = ask(scene, [-1.5], [1.5])
         assert "reason" not in found
         check(scene, found)
+
+
+def pose(q):
+    """The pose of the end of the iiwa at q, by Drake, as a goal."""
+    scene = load_scene(EXAMPLES / "iiwa_shelf" / "scene.yaml")
+    plant = build_diagram(scene).plant()
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, q)
+    X = plant.EvalBodyPoseInWorld(context, plant.GetBodyByName("iiwa/flange"))
+    return {"frame": "flange", "position": X.translation(), "rpy": RollPitchYaw(X.rotation()).vector()}
+
+
+HOME = np.array([0, 0.3, 0, -1.8, 0, 0.9, 0])
+EACH = {"speed": np.ones(7), "acceleration": np.full(7, 2.0), "seconds": 5.0}
+
+
+def test_a_pose_is_reached_where_drake_says_so():
+    scene = load_scene(EXAMPLES / "iiwa_shelf" / "scene.yaml")
+    there = pose(np.add(HOME, [0.5, 0.2, 0.1, 0.2, 0.1, -0.1, 0.3]))
+    found = planned({"points": HOME[None], "pose": there, **EACH}, scene)
+    check(scene, found)
+    reached = pose(found["q"][-1])
+    assert np.allclose(reached["position"], there["position"], atol=1e-8)
+    assert np.allclose(reached["rpy"], there["rpy"], atol=1e-7)
+    far = planned({"points": HOME[None], "pose": {**there, "position": np.array([3.0, 0, 0])}, **EACH}, scene)
+    assert (far["reason"], far["metres"] > 1) == ("unreachable", True)
+
+
+def test_the_tool_stays_on_a_line_where_drake_looks():
+    scene = load_scene(EXAMPLES / "iiwa_shelf" / "scene.yaml")
+    begin = pose(HOME)
+    end = begin["position"] + [0.02, 0.15, 0.1]
+    line = {"metres": 1e-3, "radians": 1e-2}
+    found = planned({"points": HOME[None], "pose": {"frame": "flange", "position": end, "rpy": None}, "line": line, **EACH}, scene)
+    check(scene, found)
+    plant = build_diagram(scene).plant()
+    context, body, way = plant.CreateDefaultContext(), plant.GetBodyByName("iiwa/flange"), end - begin["position"]
+    upright = RollPitchYaw(begin["rpy"]).ToRotationMatrix()
+    for a, b in pairwise(found["q"]):
+        for u in np.linspace(0, 1, 20):
+            plant.SetPositions(context, a + u * (b - a))
+            X = plant.EvalBodyPoseInWorld(context, body)
+            along = np.clip((X.translation() - begin["position"]) @ way / (way @ way), 0, 1)
+            assert np.linalg.norm(X.translation() - begin["position"] - along * way) <= line["metres"]
+            assert (upright.inverse() @ X.rotation()).ToAngleAxis().angle() <= line["radians"]
+    blocked = {"frame": "flange", "position": begin["position"] + [0.4, 0.0, 0.0], "rpy": None}
+    stop = planned({"points": HOME[None], "pose": blocked, "line": line, **EACH}, scene)
+    assert (stop["reason"], stop["how"], 0 < stop["part"] < 1) == ("line", "collision", True)
