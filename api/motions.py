@@ -10,7 +10,7 @@ import numpy as np
 from cachetools import LRUCache
 from fastapi import Depends, Request
 
-from certifier.model import Array
+from certifier.model import Array, Scene
 from db import motions
 from db.session import Database
 from planner.tubes import Tube, Tubes
@@ -78,10 +78,10 @@ class MotionsKept:
         self._shelves: LRUCache[str, _Shelf] = LRUCache(MOST)
         self._lock = Lock()
 
-    def of(self, db: Database, scene_id: str, n: int) -> Known:
-        """Returns the motions of a scene with n joints, as of a version that is no older than this call."""
+    def of(self, db: Database, scene_id: str, scene: Scene) -> Known:
+        """Returns the motions of a scene, as of a version that is no older than this call."""
         with self._lock:
-            shelf = self._shelves.setdefault(scene_id, _Shelf(Known(0, {}, Tubes(n, []))))
+            shelf = self._shelves.setdefault(scene_id, _Shelf(Known(0, {}, Tubes(scene.own_limits, []))))
         with shelf.lock, db.read() as session:
             version = motions.version(session, scene_id)
             if version != shelf.known.version:
@@ -90,7 +90,7 @@ class MotionsKept:
                 widths = {tube.id: tube.rho for tube in shelf.known.tubes.motions}
                 for motion_id, arrays, rho in motions.read(session, [motion_id for motion_id in ids if motion_id not in known]):
                     known[motion_id], widths[motion_id] = arrays, rho
-                tubes = Tubes(n, [Tube(motion_id, arrays["path"], widths[motion_id]) for motion_id, arrays in known.items()])
+                tubes = Tubes(scene.own_limits, [Tube(motion_id, arrays["path"], widths[motion_id]) for motion_id, arrays in known.items()])
                 shelf.known = Known(version, known, tubes)
             return shelf.known
 

@@ -91,7 +91,7 @@ def _question(asked: Asked, body: PlanRequest) -> _Question:
     points = [start, *(checks.point(scene, q, f"via[{i}]") for i, q in enumerate(body.via))]
     each = partial(checks.of_each_joint, scene)
     limits = Limits(each(body.speed, "speed"), each(body.acceleration, "acceleration"))
-    known = asked.motions.of(asked.db, scene_id, scene.n)
+    known = asked.motions.of(asked.db, scene_id, scene)
     return _Question(scene_id, scene, library, known, points, goals, ends, limits)
 
 

@@ -96,6 +96,8 @@ def plan(args: Namespace) -> int:
         print(f"{len(answer['q'])} configurations, {answer['length']:.4g} long in q, {answer['duration']:.4g} s; --json prints them")
         by = "lies in certified regions" if answer["motion"] is None else "is proved to be free of collision"
         print(f"all of the motion {by}, guarantee {answer['guarantee']}")
+        if proof is not None and written is None:
+            print("no proof file of exactly these numbers was found; the motion lies in the tube of the proved motion above")
         if written:
             print(f"proof: {written} (check it: ciris verify {written})")
     else:

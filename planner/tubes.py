@@ -20,7 +20,7 @@ from planner.boxes import BoxGrid
 _ROUNDED = 1e-14
 """What a few operations round is a smaller part of the largest number in them."""
 _INSIDE = 1e-12
-"""The times at which a motion enters and leaves a tube, from 0 to 1, are moved inside by this."""
+"""The times at which a motion enters and leaves a tube, from 0 to 1, are moved inside by this, and the tube is this part narrower."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,10 @@ class Tube:
 
 
 class Tubes:
-    """Holds the tubes of M straight lines. It never changes.
+    """Holds the tubes of M straight lines, as far as they are within the joint limits. It never changes.
+
+    Args:
+        limits: the lower and the upper limits of the joints, (n,) each, radians or metres. A proof about a tube goes beyond them.
 
     Attributes:
         motions: the tubes that were given.
@@ -41,8 +44,9 @@ class Tubes:
         place: (M,) number of the line within its tube's path.
     """
 
-    def __init__(self, n: int, motions: Sequence[Tube]) -> None:
-        self.motions = tuple(motions)
+    def __init__(self, limits: tuple[Array, Array], motions: Sequence[Tube]) -> None:
+        n = len(limits[0])
+        self._limits, self.motions = limits, tuple(motions)
         counts = [len(tube.path) - 1 for tube in motions]
         self.motion = np.repeat(np.arange(len(motions)), counts)
         self.place = np.concatenate([np.zeros(0, dtype=np.intp), *(np.arange(count) for count in counts)])
@@ -74,18 +78,21 @@ class Tubes:
 
     def _spans(self, lines: NDArray[np.intp], a: Array, b: Array) -> tuple[NDArray[np.bool_], Array, Array]:
         """Returns whether the motion is in the tubes for a while, (h,), from when to when, and when the lines are there, (h, 2) each."""
-        if not len(lines):
-            return np.zeros(0, dtype=bool), np.zeros((0, 2)), np.zeros((0, 2))
+        within = all(((self._limits[0] <= end) & (end <= self._limits[1])).all() for end in (a, b))
+        if not len(lines) or not within:
+            return np.zeros(len(lines), dtype=bool), np.zeros((len(lines), 2)), np.zeros((len(lines), 2))
         way, rho = self._end[lines] - self._begin[lines], self._rho[lines]
         here, step, moves = a - self._begin[lines], np.broadcast_to(b - a, way.shape), way != 0
         # At the time u of the motion, the line's time t is at least low + u rate and at most high + u rate, for every joint that it moves.
         pace = np.where(moves, way, 1.0)
-        sides = (here - rho) / pace, (here + rho) / pace
+        size = np.abs(a) + np.abs(b) + np.abs(self._begin[lines]) + np.abs(self._end[lines])
+        tight = rho * (1 - _INSIDE) - 2 * _ROUNDED * size  # so that the ends of the spans pass the check below
+        sides = (here - tight) / pace, (here + tight) / pace
         bound = [(np.minimum(*sides), -np.inf, 0.0), (np.maximum(*sides), np.inf, 1.0)]
         low, high = (np.column_stack([np.where(moves, side, none), np.full(len(lines), end)]) for side, none, end in bound)
         rate = np.column_stack([np.where(moves, step / pace, 0.0), np.zeros(len(lines))])
         # A joint that rests on the line bounds u alone.
-        at_rest = [(np.where(moves, -1.0, sign * here - rho), np.where(moves, 0.0, sign * step)) for sign in (1, -1)]
+        at_rest = [(np.where(moves, -1.0, sign * here - tight), np.where(moves, 0.0, sign * step)) for sign in (1, -1)]
         against = low[:, :, None] - high[:, None, :], rate[:, :, None] - rate[:, None, :]
         rows = [(alpha.reshape(len(lines), -1), beta.reshape(len(lines), -1)) for alpha, beta in (against, *at_rest)]
         first, last = _solved(*(np.concatenate(part, axis=1) for part in zip(*rows, strict=True)))
@@ -95,7 +102,6 @@ class Tubes:
             u = spans[:, k : k + 1]
             times[:, k] = np.clip(((low + u * rate).max(axis=1) + (high + u * rate).min(axis=1)) / 2, 0.0, 1.0)
             off = np.abs(here + u * step - times[:, k : k + 1] * way)
-            size = np.abs(a) + np.abs(b) + np.abs(self._begin[lines]) + np.abs(self._end[lines])
             inside &= (off + _ROUNDED * size <= rho).all(axis=1)
         return inside, spans, times
 
@@ -112,7 +118,8 @@ def _solved(alpha: Array, beta: Array) -> tuple[Array, Array]:
 
 def follows(tube: Tube, path: Array) -> bool:
     """Says whether a path, (k, n) and straight in q between its points, is proved to be in a tube."""
-    tubes = Tubes(path.shape[1], [tube])
+    anywhere = np.full(path.shape[1], np.inf)
+    tubes = Tubes((-anywhere, anywhere), [tube])
     return all(_covers(tubes.spans(a, b)[1]) for a, b in pairwise(path))
 
 

@@ -51,7 +51,7 @@ def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries, motions: K
     scene_id, scene, library = asked(db, libraries, body.scene)
     points = _points(scene, body.q, body.s)
     found = locate(library, points)
-    tubes = motions.of(db, scene_id, scene.n).tubes
+    tubes = motions.of(db, scene_id, scene).tubes
     q = np.array(body.q) if body.q is not None else scene.to_q(points)
     ends = np.searchsorted(found.point, np.arange(len(points) + 1)).tolist()
     containments = []
@@ -84,7 +84,7 @@ def cover_segments(body: SegmentRequest, db: Db, libraries: KeptLibraries, motio
     One that is straight in `q` is proved piece by piece, with bounds on what lies between, so one that only touches may not be proved.
     """
     scene_id, scene, library = asked(db, libraries, body.scene)
-    tubes = motions.of(db, scene_id, scene.n).tubes
+    tubes = motions.of(db, scene_id, scene).tubes
     given, name = (body.q, "q") if body.q is not None else (body.s or [], "s")
     segments = [
         _covering(library, tubes, scene, body.space, _waypoints(scene, body.space, ends, f"{name}[{i}]", name), [0.0, 1.0])
@@ -103,7 +103,7 @@ def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries, motions: Kep
     scene_id, scene, library = asked(db, libraries, body.scene)
     found = _curve(scene, body)
     times = body.times or (np.arange(len(found.controls) // found.degree + 1.0) if found.times is None else found.times).tolist()
-    tubes = motions.of(db, scene_id, scene.n).tubes
+    tubes = motions.of(db, scene_id, scene).tubes
     answer = _covering(library, tubes, scene, body.space, found.controls, times, found.degree)
     return PathResponse(scene=scene_id, version=library.version, regions=len(library), **dict(answer))
 

@@ -17,6 +17,10 @@ def points(count: int, n: int) -> st.SearchStrategy[np.ndarray]:
     return st.lists(st.lists(Numbers, min_size=n, max_size=n), min_size=count, max_size=count).map(np.array)
 
 
+def unlimited(n: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.full(n, -np.inf), np.full(n, np.inf)
+
+
 def inside(tube: Tube, line: int, q: np.ndarray) -> bool:
     """Whether q is in the tube about a line, in exact fractions: the times that the joints allow have one in common."""
     low, high = Fraction(0), Fraction(1)
@@ -34,7 +38,7 @@ def inside(tube: Tube, line: int, q: np.ndarray) -> bool:
 @given(points(4, 3), points(2, 3), st.floats(0.05, 1.0))
 def test_spans_are_in_the_tubes_and_nothing_else_is(path, ends, rho):
     tube = Tube("one", path, rho)
-    tubes = Tubes(3, [tube])
+    tubes = Tubes(unlimited(3), [tube])
     lines, spans = tubes.spans(*ends)
     found = dict(zip(tubes.place[lines].tolist(), spans.tolist(), strict=True))
     for line in range(3):
@@ -50,7 +54,7 @@ def test_spans_are_in_the_tubes_and_nothing_else_is(path, ends, rho):
 @given(points(3, 2), points(1, 2), st.floats(0.05, 1.0))
 def test_a_configuration_is_found_in_the_tubes_that_hold_it(path, q, rho):
     tube = Tube("one", path, rho)
-    tubes = Tubes(2, [Tube("far", path + 10, rho), tube])
+    tubes = Tubes(unlimited(2), [Tube("far", path + 10, rho), tube])
     lines, times = tubes.at(q[0])
     assert (tubes.motion[lines] == 1).all()
     for line in range(2):
@@ -75,6 +79,14 @@ def test_a_path_follows_a_tube_only_if_all_of_it_is_inside(path, rho, part):
 
 
 def test_no_motions_hold_nothing():
-    tubes = Tubes(2, [])
+    tubes = Tubes(unlimited(2), [])
     assert len(tubes) == 0
     assert len(tubes.at(np.zeros(2))[0]) == len(tubes.spans(np.zeros(2), np.ones(2))[0]) == 0
+
+
+def test_a_tube_ends_at_the_joint_limits():
+    tube = Tube("one", np.array([[0.0, 0.0], [1.0, 0.0]]), 0.2)
+    tubes = Tubes((np.array([-1.0, -0.1]), np.array([1.0, 0.1])), [tube])
+    assert len(tubes.at(np.array([0.5, 0.05]))[0]) == 1
+    assert len(tubes.at(np.array([0.5, 0.15]))[0]) == len(tubes.at(np.array([1.1, 0.0]))[0]) == 0
+    assert len(tubes.spans(np.array([0.5, 0.05]), np.array([0.5, 0.15]))[0]) == 0
