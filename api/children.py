@@ -54,7 +54,7 @@ def about_motions(function: str, scene: Scene, payload: dict[str, Any]) -> Any:
         CirisError: the function's own error, or what befell the process.
     """
     memory, kept = settings().child_memory_bytes, (scene.hash, _document(scene))
-    return run_in_child(f"{MOTIONS}:{function}", payload, timeout_s=MOTION_SECONDS, memory_bytes=memory, kept=kept)
+    return run_in_child(f"{MOTIONS}:{function}", payload, timeout_s=MOTION_SECONDS, memory_bytes=memory, kept=kept, fork=False)
 
 
 @lru_cache(maxsize=4)

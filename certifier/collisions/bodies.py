@@ -59,7 +59,7 @@ class Bodies(NamedTuple):
     levers: Array
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=16)
 def bodies_of(scene: Scene, padding: float = 0.0) -> Bodies:
     """Returns the arrays of a scene.
 

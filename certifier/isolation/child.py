@@ -29,13 +29,17 @@ STATUS = struct.Struct("i")
 """This says how a child ended, before its answer: 0, an exit status, or a signal with a minus."""
 AT_ONCE = 2
 """Number of nurseries of a module that are kept for its next calls."""
+MOST = 1000
+"""A nursery that has computed this many calls itself makes room for another one, whatever its libraries have left behind."""
 KEPT = 4
 """Number of texts that a nursery keeps, those that were named last."""
 _TAIL_BYTES = 2000
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
-def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes: int, kept: tuple[str, str] | None = None) -> Any:
+def run_in_child(
+    function: str, payload: Any, *, timeout_s: float, memory_bytes: int, kept: tuple[str, str] | None = None, fork: bool = True
+) -> Any:
     """Returns ``function(payload)``, computed by a child process that is killed when it takes too long or outlives this process.
 
     Args:
@@ -45,6 +49,8 @@ def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes:
         memory_bytes: limit of the child's address space in bytes.
         kept: a name, and a text that this program has written. The function gets what ``keep(text)`` of the module makes of it as a second
             argument. The nursery calls ``keep`` once for a name. So it reads a scene once for all calls about the scene.
+        fork: whether a fork of the nursery computes it. The nursery itself takes half the time where a call takes some milliseconds, and
+            what it has read of one call may be seen by the next. If it dies, the next call waits until another one has loaded the module.
 
     Raises:
         CirisError: the function's own error, of the class it was raised with; or ``child_timeout``, ``child_memory``, or
@@ -52,7 +58,7 @@ def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes:
     """
     module, _, name = function.partition(":")
     call = {"function": name, "payload": payload, "memory_bytes": int(memory_bytes), "directory": str(Path.cwd())}
-    call["kept"] = None if kept is None else kept[0]
+    call |= {"kept": None if kept is None else kept[0], "fork": fork}
     nursery = _free(module)
     try:
         status, answer = nursery.ask(encode(call), timeout_s, kept)
@@ -63,7 +69,11 @@ def run_in_child(function: str, payload: Any, *, timeout_s: float, memory_bytes:
         raise _death(nursery.process.returncode, nursery.tail(), memory_bytes) from None
     tail = nursery.tail()
     waiting = _idle.setdefault(module, [])
-    if len(waiting) < AT_ONCE:
+    nursery.computed += not fork
+    if nursery.computed >= MOST:
+        nursery.kill()
+        prepare(function)
+    elif len(waiting) < AT_ONCE:
         waiting.append(nursery)
     else:
         nursery.kill()
@@ -93,7 +103,7 @@ class _Nursery:
     """Holds a process that has loaded a module, and the connection to it."""
 
     def __init__(self, module: str) -> None:
-        self._kept: list[str] = []
+        self.computed, self._kept = 0, list[str]()
         self._connection, theirs = Pipe()
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
         root = str(Path(__file__).resolve().parents[2])

@@ -8,6 +8,7 @@ with it.
 from __future__ import annotations
 
 import ctypes
+import gc
 import importlib
 import json
 import os
@@ -35,7 +36,7 @@ _kept: dict[str, Any] = {}
 
 def main() -> None:
     connection = Connection(int(sys.argv[2]))
-    with _ending_with(connection):
+    with _ending_with(connection), _ending_with_parent():
         module = importlib.import_module(sys.argv[1])
         if hasattr(module, "warm_up"):
             module.warm_up()
@@ -44,19 +45,22 @@ def main() -> None:
             request = connection.recv_bytes()
             if request.startswith(KEEP):
                 _keep(module, **json.loads(request.removeprefix(KEEP)))
-            else:
-                connection.send_bytes(_call(module, connection, request))
+                continue
+            call = json.loads(request, object_hook=decode)
+            if call["fork"]:
+                connection.send_bytes(_forked(module, connection, call))
+                continue
+            resource.setrlimit(resource.RLIMIT_AS, (call["memory_bytes"], resource.RLIM_INFINITY))
+            with _ending_with(connection):
+                status, reply = _computed(module, call)
+            connection.send_bytes(STATUS.pack(status) + reply)
     except (EOFError, ConnectionError):
         return
 
 
 @contextmanager
 def _ending_with(connection: Connection) -> Iterator[None]:
-    """Ends this process at once when the other end of the connection is closed while the block runs, which may compile for a minute.
-
-    Linux' signal at the death of a parent comes even while native code keeps Python's threads waiting. But it comes when the *thread*
-    ends that started the process. That one waits while the nursery loads, and may be gone later.
-    """
+    """Ends this process at once when the other end of the connection is closed while the block runs."""
     loaded, done = os.pipe()
 
     def watch() -> None:
@@ -68,14 +72,26 @@ def _ending_with(connection: Connection) -> Iterator[None]:
 
     watching = threading.Thread(target=watch, daemon=True)
     watching.start()
+    try:
+        yield
+    finally:
+        os.close(done)
+        watching.join()  # this process forks, and has one thread then
+        os.close(loaded)
+
+
+@contextmanager
+def _ending_with_parent() -> Iterator[None]:
+    """Ends this process at once when its parent dies while the block runs, which may compile for a minute.
+
+    Linux' signal comes even while native code keeps Python's threads waiting. But it comes when the *thread* ends that started the process.
+    That one waits while the nursery loads, and may be gone later.
+    """
     _signal_at_death_of_parent(signal.SIGKILL)
     try:
         yield
     finally:
         _signal_at_death_of_parent(0)
-        os.close(done)
-        watching.join()  # this process forks, and has one thread then
-        os.close(loaded)
 
 
 def _signal_at_death_of_parent(number: int) -> None:
@@ -91,19 +107,20 @@ def _keep(module: ModuleType, name: str, text: str, gone: list[str]) -> None:
     _kept[name] = module.keep(text)
 
 
-def _call(module: ModuleType, connection: Connection, request: bytes) -> bytes:
-    """Forks a child for the request, and returns how the child ended and its answer.
+def _forked(module: ModuleType, connection: Connection, call: dict[str, Any]) -> bytes:
+    """Forks a child for a call, and returns how the child ended and its answer.
 
     Raises:
         EOFError: the asking process is gone, and so is the child.
     """
     reading, writing = os.pipe()
     nursery = os.getpid()
+    gc.freeze()  # so that collecting garbage in the child copies no page of this process
     child = os.fork()
     if child == 0:
         os.close(reading)
         connection.close()
-        os._exit(_answer(module, request, writing, nursery))
+        os._exit(_answer(module, call, writing, nursery))
     os.close(writing)
     answer, gone = bytearray(), False
     while len(answer) <= _MOST_WRITTEN:
@@ -121,26 +138,31 @@ def _call(module: ModuleType, connection: Connection, request: bytes) -> bytes:
     return STATUS.pack(os.waitstatus_to_exitcode(status)) + answer
 
 
-def _answer(module: ModuleType, request: bytes, writing: int, nursery: int) -> int:
+def _answer(module: ModuleType, call: dict[str, Any], writing: int, nursery: int) -> int:
     """Answers a call in the child, and returns the child's exit status."""
+    _confine(call["memory_bytes"], nursery)
+    status, reply = _computed(module, call)
+    with os.fdopen(writing, "wb") as answer:
+        answer.write(reply)
+    return status
+
+
+def _computed(module: ModuleType, call: dict[str, Any]) -> tuple[int, bytes]:
+    """Returns the exit status of a call, and its answer."""
     try:
-        call = json.loads(request, object_hook=decode)
-        _confine(call["memory_bytes"], nursery)
         os.chdir(call["directory"])
         try:
             given = [] if call["kept"] is None else [_kept[call["kept"]]]
             reply = {"result": getattr(module, call["function"])(call["payload"], *given)}
         except CirisError as error:
             reply = {"error": error.to_document(), "class": type(error).__name__ if type(error).__name__ in ERRORS else "CirisError"}
-        with os.fdopen(writing, "wb") as answer:
-            answer.write(encode(reply))
+        return 0, encode(reply)
     except BaseException:
         traceback.print_exc()
-        return 1
+        return 1, b""
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
-    return 0
 
 
 def _confine(memory_bytes: int, nursery: int) -> None:

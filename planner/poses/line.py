@@ -147,7 +147,7 @@ class _Way:
     def nearest(self, pose: Pose) -> float:
         """Returns the part of the line that a pose is nearest to: by its position, or by its turn where the position rests."""
         square = float(self._shift @ self._shift)
-        if square > 0:
+        if square > TIGHT**2:
             return float(np.clip((pose.position - self._here.position) @ self._shift / square, 0.0, 1.0))
         turn = times(pose.turn, self._here.turn * np.array([1.0, -1.0, -1.0, -1.0]))
         turned = 2 * float(np.arctan2(turn[1:] @ self._axis, turn[0]))

@@ -42,7 +42,10 @@ SHARE = 0.5
 def keep(text: str) -> Scene:
     """Returns the scene of a document, for all calls about it. The process that forks the children calls this function."""
     scene = Scene.from_document(json.loads(text))
-    bodies_of(scene)
+    middle = (scene.q_lower + scene.q_upper) / 2
+    for padding in PADDINGS:
+        bodies_of(scene, padding)
+    certify(scene, Motion(Space.Q, np.array([middle, middle])), tube=True)  # what it computes about the scene is kept as well
     return scene
 
 

@@ -15,7 +15,8 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from certifier.errors import RegionError
 from certifier.model import JointKind
 from planner.poses.inverse import inverse
-from planner.poses.line import line
+from planner.poses.line import keeps, line
+from tests.certifier.scenes import planar_arm
 from tests.planner.poses import arms
 
 ARMS = ("iiwa_shelf", "ur3e_bin", "gantry", "dual_ur3e", "endless")
@@ -205,3 +206,13 @@ def test_a_tolerance_below_rounding_is_refused(metres, radians, field):
     with pytest.raises(RegionError) as refused:
         line(arm.scene, arm.frame, STRETCHED, [0.5, 0, 0.5], metres=metres, radians=radians)
     assert (refused.value.code, refused.value.field) == ("tolerance", field)
+
+
+def test_a_motion_that_only_turns_the_frame_keeps_to_its_line():
+    scene = planar_arm(2)
+    start, goal = np.radians([-20.0, 10.0]), np.radians([-20.0, 40.0])
+    there = {"position": [np.cos(start[0]), np.sin(start[0]), 0.0], "rpy": [0.0, 0.0, goal.sum()]}
+    found = line(scene, "link2", start, **there, metres=1e-3, radians=1e-2)
+    assert found.reason is None
+    assert keeps(scene, "link2", start, **there, q=found.q, metres=1e-3, radians=1e-2)
+    assert not keeps(scene, "link2", start, **there, q=np.array([start, start + [0.02, 0.0], goal]), metres=1e-3, radians=1e-2)
