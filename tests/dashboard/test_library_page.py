@@ -248,6 +248,86 @@ def test_every_other_reason_is_said_in_words(page: Any, url: str, planar: Scene,
     assert words in page.locator(".planning .notice").text_content()
 
 
+def upload(page: Any, url: str, name: str, text: str) -> None:
+    page.goto(f"{url}/scenes/planar")
+    page.get_by_label("File", exact=True).set_input_files({"name": name, "mimeType": "text/plain", "buffer": text.encode()})
+
+
+FREE = [[-0.3, 0.1], [-0.6, 0.4], [-0.9, 0.2]]
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("path.json", json.dumps({"q": FREE, "t": [10.0, 10.5, 11.5]})),
+        ("path.csv", "t,j1,j2\r\n" + "".join(f"{t},{a},{b}\r\n" for t, (a, b) in zip((10.0, 10.5, 11.5), FREE, strict=True))),
+    ],
+)
+def test_a_path_from_a_file_is_certified_and_played(page: Any, url: str, planar: Scene, client: TestClient, name: str, text: str) -> None:
+    upload(page, url, name, text)
+    page.get_by_text("Certified.").wait_for()
+    verdict = client.post("/v1/planning/certify-path", json={"scene": "planar", "q": FREE, "clearance": True}).json()
+    said = page.locator(".upload .notice").text_content()
+    proved = float(said.split("at least ")[1].split(" mm")[0])
+    assert proved <= 1000 * verdict["clearance"] <= 1.02 * proved
+    assert "played as seconds" in page.locator(".upload").text_content()
+    page.get_by_label("speed").select_option("2")
+    page.get_by_role("button", name="Play", exact=True).press("Enter")
+    page.locator(".player output", has_text="1.50 s").wait_for()
+    shown = [float(field.input_value()) for field in page.locator(".library .sliders input[type=number]").all()]
+    assert shown == pytest.approx(np.rad2deg(FREE[-1]), abs=0.06)
+    page.get_by_role("button", name="Show where they are nearest").press("Enter")
+    nearest = verdict["nearest"]
+    assert f"with {nearest['a']} and {nearest['b']} painted" in page.locator(".robot canvas").get_attribute("aria-label")
+
+
+def test_the_first_contact_of_a_path_is_shown(page: Any, url: str, planar: Scene, client: TestClient) -> None:
+    q = [[-0.3, 0.1], [0.0, 0.1], [0.8, 0.1]]
+    upload(page, url, "path.csv", "".join(f"{a}, {b}\n" for a, b in q))
+    page.get_by_text("Not certified.").wait_for()
+    stop = client.post("/v1/planning/certify-path", json={"scene": "planar", "q": q}).json()["stop"]
+    said = page.locator(".upload .notice").text_content()
+    assert f"{stop['a']} and {stop['b']} touch. Their first contact is between waypoints 1 and 2" in said
+    shown = [float(field.input_value()) for field in page.locator(".library .sliders input[type=number]").all()]
+    assert shown == pytest.approx(np.rad2deg(stop["q"]), abs=0.06)
+    assert f"with {stop['a']} and {stop['b']} painted" in page.locator(".robot canvas").get_attribute("aria-label")
+    assert [part.get_attribute("class") for part in page.locator(".parts li").all()] == ["motion", "nothing"]
+    assert "1 in q" in page.locator(".upload").text_content()
+    time = page.get_by_label("Time, seconds")
+    time.focus()
+    time.press("End")
+    page.get_by_text("Now where nothing is proved").wait_for()
+    assert "painted" not in page.locator(".robot canvas").get_attribute("aria-label")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("path.npz", "", "neither .json nor .csv"),
+        ("path.json", "{", "It is no JSON"),
+        ("path.json", "[1]", "Its q must be a list of waypoints"),
+        ("path.json", '{"q": [[0, "1"]]}', "Its q must be a list of waypoints"),
+        ("path.json", '{"s": [[0, 0], [1, 1]]}', "This page takes waypoints q"),
+        ("path.json", '{"q": [[0, 0], [1, 1]], "t": [1, 1]}', "ascending numbers, one for each waypoint"),
+        ("path.json", '{"q": [[0, 0], [1, 1]], "t": [1]}', "ascending numbers, one for each waypoint"),
+        ("path.csv", "", "It is empty"),
+        ("path.csv", "s1,s2,t\n0,0,1\n", "so it holds s"),
+        ("path.csv", "0,0\n0,x\n", 'In waypoint 1, "x" is no number'),
+        ("path.csv", "0,0\n0\n", "Waypoint 1 has 1 numbers, and the first row has 2"),
+    ],
+)
+def test_a_file_without_a_path_is_refused(page: Any, url: str, planar: Scene, name: str, text: str, words: str) -> None:
+    upload(page, url, name, text)
+    page.locator(".upload .notice.bad", has_text=words).wait_for()
+
+
+def test_a_path_that_the_service_refuses_is_said_why(page: Any, url: str, planar: Scene, complaints: list[str]) -> None:
+    upload(page, url, "path.csv", "0,0,0\n1,1,1\n")
+    page.locator(".upload .notice.bad", has_text="2").wait_for()
+    assert ["422" in complaint for complaint in complaints] == [True]
+    complaints.clear()
+
+
 def test_numbers_that_make_no_sense_are_refused_where_they_are(opened: Any) -> None:
     plan(opened, "1, 2, 3", "0, 0")
     opened.get_by_text("Give 2 numbers for the start").wait_for()
@@ -271,6 +351,10 @@ def test_nothing_keeps_people_out(browser: Any, url: str, regions: list[str], ba
             page.get_by_text("2 components").wait_for()
             plan(page, degrees((-0.28, -0.1)), degrees((0.03, -0.1)))
             page.get_by_text("Now in region").wait_for()
+            page.get_by_label("Goal").select_option("arm/link2")
+            file = {"name": "path.json", "mimeType": "", "buffer": json.dumps({"q": FREE}).encode()}
+            page.get_by_label("File", exact=True).set_input_files(file)
+            page.get_by_text("Certified.").wait_for()
         assert barriers(page) == []
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     context.close()

@@ -5,12 +5,13 @@ import { positions } from "../common/kinematics";
 import { MomentText, touchingOf, useMoment } from "../common/moment";
 import type { Space } from "../common/polytope";
 import { Robot } from "../common/robot";
-import type { GraphResponse, PlanResponse, RegionConfigurations, SceneModel } from "../common/schema";
+import type { Approach, GraphResponse, PlanResponse, RegionConfigurations, SceneModel } from "../common/schema";
 import { Slice } from "../common/slice";
 import { Sliders } from "../common/sliders";
 import { coverage, type Coverage } from "./coverage";
 import { Graph } from "./graph";
 import { Planning } from "./plan";
+import { Upload } from "./upload";
 
 const ASK_AGAIN_MS = 1500;
 
@@ -34,6 +35,7 @@ function Library({ model }: { model: SceneModel }) {
   const [covered, setCovered] = useState<Coverage | null>(null);
   const [chosen, setChosen] = useState<string | null>(null);
   const [plan, setPlan] = useState<PlanResponse | null>(null);
+  const [pair, setPair] = useState<Approach | null>(null);
   const moment = useMoment(model.scene, q);
 
   useEffect(() => {
@@ -60,14 +62,22 @@ function Library({ model }: { model: SceneModel }) {
     setChosen(region);
     void get<RegionConfigurations>(`/v1/regions/${region}/configurations?samples=0`).then(({ center }) => setQ(center), (reason: unknown) => setGraphProblem(said(reason)));
   };
-  const touching = useMemo(() => touchingOf(model, moment), [moment, model]);
+  const showPair = (found: Approach): void => {
+    setPair(found);
+    setQ(found.q);
+  };
+  // A pair that was asked for is painted as long as the robot is there.
+  const touching = useMemo(
+    () => (pair?.q === q ? model.geometries.flatMap(({ name }, i) => (name === pair.a || name === pair.b ? i : [])) : touchingOf(model, moment)),
+    [moment, model, pair, q],
+  );
   const planned = useMemo(() => new Set(plan?.pieces.flatMap(({ region }) => region ?? []) ?? []), [plan]);
   const holding = useMemo(() => new Set(moment.regions), [moment]);
   return (
     <div class="library">
       <div class="views">
         <div>
-          <Robot model={model} q={q} touching={touching} label={`The robot of ${model.name}${touching.length ? ", in collision" : ""}`} />
+          <Robot model={model} q={q} touching={touching} label={`The robot of ${model.name}${pair?.q === q ? `, with ${pair.a} and ${pair.b} painted` : touching.length ? ", in collision" : ""}`} />
           <MomentText model={model} moment={moment} />
         </div>
         <Slice scene={model.scene} space={space} units={model.units} q={q} onPick={setQ} strongest={chosen} way={plan?.found ? plan.q : undefined} />
@@ -119,10 +129,16 @@ function Library({ model }: { model: SceneModel }) {
             </>
           )}
         </section>
-        <section aria-labelledby="h-plan">
-          <h2 id="h-plan">Plan a motion</h2>
-          <Planning model={model} names={names} q={q} onMove={setQ} plan={plan} onPlan={setPlan} />
-        </section>
+        <div>
+          <section aria-labelledby="h-plan">
+            <h2 id="h-plan">Plan a motion</h2>
+            <Planning model={model} names={names} q={q} onMove={setQ} plan={plan} onPlan={setPlan} />
+          </section>
+          <section aria-labelledby="h-upload">
+            <h2 id="h-upload">Upload a path</h2>
+            <Upload model={model} names={names} onMove={setQ} onPair={showPair} />
+          </section>
+        </div>
       </div>
     </div>
   );

@@ -14,7 +14,7 @@ export interface Motion {
 export interface Part {
   begin: number;
   end: number;
-  by: "region" | "motion" | "path" | "nothing";
+  by: "region" | "motion" | "nothing";
   said: ComponentChildren;
 }
 

@@ -1,0 +1,113 @@
+// A path from a file: certified, or shown where bodies first touch on it.
+import { useMemo, useState } from "preact/hooks";
+import { post, said } from "../common/api";
+import type { Approach, MotionResponse, SceneModel } from "../common/schema";
+import { Player, type Motion, type Part } from "./player";
+import { readPath, type Path } from "./waypoints";
+
+interface Props {
+  model: SceneModel;
+  names: string[];
+  onMove: (q: number[]) => void;
+  /** Moves the robot to where a pair of bodies is near or touches, and paints the two. */
+  onPair: (pair: Approach) => void;
+}
+
+interface Answered {
+  path: Path;
+  verdict: MotionResponse;
+}
+
+export function Upload({ model, names, onMove, onPair }: Props) {
+  const [asking, setAsking] = useState<string | null>(null);
+  const [problem, setProblem] = useState<string | null>(null);
+  const [answered, setAnswered] = useState<Answered | null>(null);
+  const ask = async (file: File | undefined): Promise<void> => {
+    if (!file) return;
+    setAnswered(null);
+    setProblem(null);
+    setAsking(file.name);
+    try {
+      const path = readPath(file.name, await file.text());
+      if (typeof path === "string") setProblem(`${file.name} holds no path. ${path}`);
+      else {
+        const verdict = await post<MotionResponse>("/v1/planning/certify-path", { scene: model.scene, q: path.q, clearance: true });
+        setAnswered({ path, verdict });
+        if (verdict.stop) onPair(verdict.stop);
+        else onMove(path.q[0]!);
+      }
+    } catch (reason) {
+      setProblem(said(reason));
+    }
+    setAsking(null);
+  };
+  return (
+    <div class="upload">
+      <p class="end">
+        <label for="upload-path">File</label>
+        <input id="upload-path" type="file" accept=".json,.csv,application/json,text/csv" disabled={asking !== null} aria-describedby="upload-says" onChange={(event) => void ask(event.currentTarget.files?.[0])} />
+      </p>
+      <p class="quiet small" id="upload-says">
+        A JSON file with <code>q</code>, one row for each waypoint, and perhaps <code>t</code>; or a CSV file with such rows. Positions are in radians and metres. The path is straight in q between waypoints.
+      </p>
+      <div role="status">
+        {asking && <p class="notice">Certifying {asking} …</p>}
+        {problem && <p class="notice bad">{problem}</p>}
+        {answered && <Verdict verdict={answered.verdict} onPair={onPair} />}
+      </div>
+      {answered && <Played {...answered} model={model} names={names} onMove={onMove} />}
+    </div>
+  );
+}
+
+function Verdict({ verdict: { outcome, stop, nearest, clearance, proved_distance }, onPair }: { verdict: MotionResponse; onPair: (pair: Approach) => void }) {
+  if (stop) {
+    const where = `between waypoints ${stop.piece} and ${stop.piece + 1}, ${(100 * stop.time).toFixed(1)} % of the way`;
+    return (
+      <div class="notice bad">
+        <p>
+          <strong>Not certified.</strong>{" "}
+          {outcome === "refuted" ? `${stop.a} and ${stop.b} touch. Their first contact is ${where}.` : outcome === "too_close" ? `${stop.a} and ${stop.b} are too close to tell, ${where}.` : `The path needs too many intervals. The search ended at ${stop.a} and ${stop.b}, ${where}.`}
+        </p>
+        <p><button type="button" onClick={() => onPair(stop)}>Show this place</button></p>
+      </div>
+    );
+  }
+  return (
+    <div class="notice">
+      <p><strong class="good">Certified.</strong> All along the path, the bodies of every pair are at least {atLeast(1000 * (clearance ?? proved_distance!))} mm apart, as proved. The scene's padding is around them.</p>
+      {nearest && <p><button type="button" onClick={() => onPair(nearest)}>Show where they are nearest</button></p>}
+    </div>
+  );
+}
+
+/** A number that is not negative in three digits, rounded down. */
+function atLeast(value: number): string {
+  const unit = value > 0 ? 10 ** (Math.floor(Math.log10(value)) - 2) : 1;
+  return Number((Math.floor(value / unit) * unit).toPrecision(3)).toString();
+}
+
+function Played({ path, verdict, model, names, onMove }: Answered & Omit<Props, "onPair">) {
+  const motion = useMemo(() => timed(path), [path]);
+  const parts = useMemo(() => partsOf(motion, verdict), [motion, verdict]);
+  return (
+    <>
+      <p class="quiet small">{path.t ? "The times of the file are played as seconds, from 0 on." : "The file has no times. The path is played at a speed of 1 in q, so not as your robot moves."}</p>
+      <Player motion={motion} parts={parts} names={names} units={model.units} onMove={onMove} />
+    </>
+  );
+}
+
+/** The path with times from 0 on: those of the file, or the length in q up to each waypoint. */
+function timed({ q, t }: Path): Motion {
+  let length = 0;
+  const times = t?.map((time) => time - t[0]!) ?? q.map((at, i) => (length += i === 0 ? 0 : Math.hypot(...at.map((value, joint) => value - q[i - 1]![joint]!))));
+  return { q, t: times };
+}
+
+function partsOf({ t }: Motion, { certified_to: to, stop }: MotionResponse): Part[] {
+  const end = t.at(-1)!;
+  if (!stop) return [{ begin: 0, end, by: "motion", said: "on the path, which is certified" }];
+  const until = to ? t[to.piece]! + to.time * (t[to.piece + 1]! - t[to.piece]!) : 0;
+  return [...(until > 0 ? [{ begin: 0, end: until, by: "motion", said: "on the part of the path that is certified" } as const] : []), { begin: until, end, by: "nothing", said: "where nothing is proved" }];
+}

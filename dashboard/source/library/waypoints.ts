@@ -1,0 +1,59 @@
+// Reads a path from a file, as `ciris certify-path --path` does: JSON, or CSV with a row for each waypoint. It takes waypoints q only.
+
+export interface Path {
+  /** (k, n), radians or metres. */
+  q: number[][];
+  /** When the robot is at each waypoint, ascending; null where the file does not say. */
+  t: number[] | null;
+}
+
+const Q_ONLY = "This page takes waypoints q. `ciris certify-path --path` takes waypoints s and curves as well.";
+
+/** Returns the path, or what is wrong with the file. */
+export function readPath(name: string, text: string): Path | string {
+  const kind = name.toLowerCase().split(".").at(-1);
+  const path = kind === "json" ? ofJson(text) : kind === "csv" ? ofCsv(text) : "It is neither .json nor .csv.";
+  if (typeof path === "string" || path.t === null) return path;
+  const ascending = path.t.length === path.q.length && path.t.every((time, i) => i === 0 || time > path.t![i - 1]!);
+  return ascending ? path : "Its t must be ascending numbers, one for each waypoint.";
+}
+
+function ofJson(text: string): Path | string {
+  let document: unknown;
+  try {
+    document = JSON.parse(text);
+  } catch {
+    return "It is no JSON.";
+  }
+  if (typeof document !== "object" || document === null) return "It must be an object with q, and perhaps t.";
+  const { q, t = null, ...others } = document as Record<string, unknown>;
+  if (["s", "bezier", "knots", "control_points"].some((other) => other in others)) return Q_ONLY;
+  if (!Array.isArray(q) || !q.every(areNumbers)) return "Its q must be a list of waypoints, each of them a list of numbers.";
+  if (t !== null && !areNumbers(t)) return "Its t must be a list of numbers.";
+  return { q, t };
+}
+
+function ofCsv(text: string): Path | string {
+  const rows = text.split(/\r\n|\r|\n/).filter((line) => line.trim() !== "").map((line) => line.split(",").map((cell) => cell.trim().replace(/^"(.*)"$/, "$1").trim()));
+  if (rows.length === 0) return "It is empty.";
+  const names = isNumber(rows[0]![0]!) ? [] : rows.shift()!;
+  const columns = names.length || rows[0]!.length;
+  const time = names.indexOf("t");
+  const others = names.filter((name) => name !== "t");
+  if (others.length > 0 && others.every((name) => name.startsWith("s"))) return `All columns have names that begin with s, so it holds s. ${Q_ONLY}`;
+  for (const [i, row] of rows.entries()) {
+    const wrong = row.find((cell) => !isNumber(cell));
+    if (wrong !== undefined) return `In waypoint ${i}, "${wrong}" is no number. Waypoints count from 0.`;
+    if (row.length !== columns) return `Waypoint ${i} has ${row.length} numbers, and the first row has ${columns}. Waypoints count from 0.`;
+  }
+  const numbers = rows.map((row) => row.map(Number));
+  return { q: numbers.map((row) => row.filter((_, i) => i !== time)), t: time < 0 ? null : numbers.map((row) => row[time]!) };
+}
+
+function isNumber(text: string): boolean {
+  return text !== "" && Number.isFinite(Number(text));
+}
+
+function areNumbers(value: unknown): value is number[] {
+  return Array.isArray(value) && value.every((one) => typeof one === "number");
+}
