@@ -79,7 +79,7 @@ def planning(page: Page) -> None:
     page.get_by_label("To", exact=True).fill("90, 50")
     page.get_by_label("Only in certified regions").check()
     page.get_by_role("button", name="Plan a motion").click()
-    page.get_by_text("Now in region").wait_for()
+    page.locator(".moment", has_text="in region").wait_for()
     page.get_by_label("Time, seconds").evaluate("field => { field.value = field.max / 2; field.dispatchEvent(new Event('input')); }")
 
 

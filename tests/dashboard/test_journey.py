@@ -62,7 +62,7 @@ def test_a_visit_from_a_job_to_a_plan(page: Any, url: str, planar: Scene, client
     page.get_by_role("link", name="planar").click()
     page.get_by_text("1 component").wait_for()
     plan(page, "-15, -7", "-25, -17")
-    page.get_by_text("Now in region").wait_for()
+    page.locator(".moment", has_text="in region").wait_for()
     assert page.locator(".moment a").get_attribute("href").rpartition("/")[2] in regions
     page.get_by_label("speed").select_option("2")
     page.get_by_role("button", name="Play", exact=True).click()

@@ -90,7 +90,7 @@ def test_what_touches_is_said_as_the_robot_moves(opened: Any) -> None:
 
 def test_a_plan_is_played_to_its_end_with_the_region_of_each_moment(opened: Any, regions: list[str], tmp_path: Path) -> None:
     plan(opened, degrees((-0.28, -0.1)), degrees((0.03, -0.1)))
-    opened.get_by_text("Now in region").wait_for()
+    opened.locator(".moment", has_text="in region").wait_for()
     assert regions[0][:8] in opened.locator(".moment").text_content()
     assert opened.locator(".edge.planned").count() == 1
     with opened.expect_download() as download:
@@ -103,8 +103,7 @@ def test_a_plan_is_played_to_its_end_with_the_region_of_each_moment(opened: Any,
     opened.get_by_role("button", name="Play", exact=True).wait_for(timeout=20000)
     assert regions[1][:8] in opened.locator(".moment").text_content()
     assert opened.locator(".player output").text_content() == f"{saved['t'][-1]:.2f} s"
-    shown = [float(field.input_value()) for field in opened.locator(".library .sliders input[type=number]").all()]
-    assert shown == pytest.approx(np.rad2deg(saved["q"][-1]), abs=0.06)
+    assert shown(opened) == pytest.approx(np.rad2deg(saved["q"][-1]), abs=0.06)
 
 
 @pytest.mark.parametrize(
@@ -135,13 +134,40 @@ def test_a_motion_needs_no_region_and_is_listed_with_what_proves_it(page: Any, u
     move(page, -50, 40)
     page.get_by_role("button", name="Set as goal").press("Enter")
     page.get_by_role("button", name="Plan a motion").press("Enter")
-    page.get_by_text("Now in the tube of the proved motion").wait_for()
+    page.locator(".moment", has_text="in the tube of the proved motion").wait_for()
     asked = {"scene": "planar", "start": np.deg2rad([-20, 10]).tolist(), "goal": np.deg2rad([-50, 40]).tolist()}
     motion = client.post("/v1/planning/plan", json=asked).json()["motion"]
     assert page.locator(".parts li.motion").count() == 1
     assert motion[:8] in page.locator(".parts").text_content()
     assert page.locator(".chart .part.motion").count() == 1
     page.locator(".said", has_text=f"In the tube of the proved motion {motion[:8]}").wait_for()
+
+
+def shown(page: Any) -> list[float]:
+    """The configuration of the robot, in degrees."""
+    return [float(field.input_value()) for field in page.locator(".library .sliders input[type=number]").all()]
+
+
+def test_a_link_is_dragged_and_the_rest_of_the_view_turns(page: Any, url: str, planar: Scene) -> None:
+    page.goto(f"{url}/scenes/planar")
+    canvas = page.locator(".robot canvas")
+    page.locator(".said", has_text="Free here").wait_for()
+    box = canvas.bounding_box()
+    middle, corner = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2), (box["x"] + 15, box["y"] + box["height"] - 15)
+    drag(page, middle, 70)
+    there = shown(page)
+    assert np.abs(there).max() > 5, "the view begins with its middle on the arm"
+    drag(page, corner, -70)
+    assert shown(page) == there, "no link is there"
+
+
+def drag(page: Any, at: tuple[float, float], down: float) -> None:
+    page.mouse.move(*at)
+    page.mouse.down()
+    page.mouse.move(at[0], at[1] + down, steps=5)
+    page.mouse.up()
+    page.mouse.move(*at)
+    page.wait_for_timeout(100)  # What moves after the button is up would move the robot by now.
 
 
 def test_a_goal_in_collision_is_moved_to_a_free_configuration_near_by(page: Any, url: str, planar: Scene) -> None:
@@ -152,7 +178,7 @@ def test_a_goal_in_collision_is_moved_to_a_free_configuration_near_by(page: Any,
     page.locator(".said", has_text="Free here").wait_for()
     assert page.get_by_label("To", exact=True).input_value() != "22, 15"
     page.get_by_role("button", name="Plan a motion").press("Enter")
-    page.get_by_text("Now in the tube of the proved motion").wait_for()
+    page.locator(".moment", has_text="in the tube of the proved motion").wait_for()
 
 
 @pytest.mark.parametrize("straight", [False, True])
@@ -170,7 +196,7 @@ def test_a_goal_may_be_the_pose_of_a_frame(page: Any, url: str, planar: Scene, s
     if straight:
         page.get_by_label("On a straight line").check()
     page.get_by_role("button", name="Plan a motion").press("Enter")
-    page.get_by_text("Now in the tube of the proved motion").wait_for()
+    page.locator(".moment", has_text="in the tube of the proved motion").wait_for()
     (asked,) = plans
     assert asked["pose"]["position"] == pytest.approx([np.cos(np.deg2rad(17)), -np.sin(np.deg2rad(17)), 0.0])
     assert asked["pose"]["rpy"] == pytest.approx([0.0, 0.0, np.deg2rad(8)])
@@ -178,8 +204,7 @@ def test_a_goal_may_be_the_pose_of_a_frame(page: Any, url: str, planar: Scene, s
     end = page.get_by_label("Time, seconds")
     end.focus()
     end.press("End")
-    shown = [float(field.input_value()) for field in page.locator(".library .sliders input[type=number]").all()]
-    assert shown == pytest.approx([-17, 25], abs=0.06)
+    assert shown(page) == pytest.approx([-17, 25], abs=0.06)
 
 
 def test_a_pose_out_of_reach_is_shown_how_near_the_robot_comes(page: Any, url: str, planar: Scene) -> None:
@@ -201,9 +226,9 @@ def test_roll_pitch_and_yaw_are_those_of_the_service(page: Any, url: str, databa
         scenes.add(session, wrist)
     page.goto(f"{url}/scenes/{wrist.name}")
     page.get_by_label("Goal").select_option("arm/link1")
-    shown = [np.deg2rad(float(page.get_by_label(f"{name}, degrees").input_value())) for name in ("roll", "pitch", "yaw")]
+    angles_shown = [np.deg2rad(float(page.get_by_label(f"{name}, degrees").input_value())) for name in ("roll", "pitch", "yaw")]
     frame = frame_of(wrist, "arm/link1")
-    at, expected = pose_of(np.zeros(3), shown).turn, pose_at(frame, np.zeros(wrist.n)).turn
+    at, expected = pose_of(np.zeros(3), angles_shown).turn, pose_at(frame, np.zeros(wrist.n)).turn
     assert abs(at @ expected) == pytest.approx(1.0, abs=1e-12)
 
 
@@ -233,6 +258,10 @@ LINE = {"part": 0.48, "joint": None, "a": None, "b": None}
         ({"reason": "not_certified"}, "none that can be certified"),
         ({"reason": "not_proved"}, "no motion was found that is proved to lie in them"),
         ({"reason": "pose_unreachable", "reached": {"q": [0.1, 0.2], "metres": 0.12, "radians": 0.5}}, "is off by 120 mm and 28.6°"),
+        (
+            {"reason": "pose_in_collision", "collision": {"where": "pose", "a": "one", "b": "two", "depth": 0.1, "free": None}},
+            "At one of them, one and two touch.No free configuration was found near by.",
+        ),
         ({"reason": "line_limit", "line": LINE | {"joint": "arm/joint2"}}, "for 48 % of the line. There arm/joint2 is at its limit"),
         ({"reason": "line_singular", "line": LINE}, "There the arm cannot move the frame on"),
         ({"reason": "line_tolerance", "line": LINE}, "There the line asks for segments that are too short"),
@@ -250,6 +279,10 @@ def test_every_other_reason_is_said_in_words(page: Any, url: str, planar: Scene,
 
 def upload(page: Any, url: str, name: str, text: str) -> None:
     page.goto(f"{url}/scenes/planar")
+    choose(page, name, text)
+
+
+def choose(page: Any, name: str, text: str) -> None:
     page.get_by_label("File", exact=True).set_input_files({"name": name, "mimeType": "text/plain", "buffer": text.encode()})
 
 
@@ -274,8 +307,7 @@ def test_a_path_from_a_file_is_certified_and_played(page: Any, url: str, planar:
     page.get_by_label("speed").select_option("2")
     page.get_by_role("button", name="Play", exact=True).press("Enter")
     page.locator(".player output", has_text="1.50 s").wait_for()
-    shown = [float(field.input_value()) for field in page.locator(".library .sliders input[type=number]").all()]
-    assert shown == pytest.approx(np.rad2deg(FREE[-1]), abs=0.06)
+    assert shown(page) == pytest.approx(np.rad2deg(FREE[-1]), abs=0.06)
     page.get_by_role("button", name="Show where they are nearest").press("Enter")
     nearest = verdict["nearest"]
     assert f"with {nearest['a']} and {nearest['b']} painted" in page.locator(".robot canvas").get_attribute("aria-label")
@@ -288,15 +320,14 @@ def test_the_first_contact_of_a_path_is_shown(page: Any, url: str, planar: Scene
     stop = client.post("/v1/planning/certify-path", json={"scene": "planar", "q": q}).json()["stop"]
     said = page.locator(".upload .notice").text_content()
     assert f"{stop['a']} and {stop['b']} touch. Their first contact is between waypoints 1 and 2" in said
-    shown = [float(field.input_value()) for field in page.locator(".library .sliders input[type=number]").all()]
-    assert shown == pytest.approx(np.rad2deg(stop["q"]), abs=0.06)
+    assert shown(page) == pytest.approx(np.rad2deg(stop["q"]), abs=0.06)
     assert f"with {stop['a']} and {stop['b']} painted" in page.locator(".robot canvas").get_attribute("aria-label")
     assert [part.get_attribute("class") for part in page.locator(".parts li").all()] == ["motion", "nothing"]
     assert "1 in q" in page.locator(".upload").text_content()
     time = page.get_by_label("Time, seconds")
     time.focus()
     time.press("End")
-    page.get_by_text("Now where nothing is proved").wait_for()
+    page.locator(".moment", has_text="where nothing is proved").wait_for()
     assert "painted" not in page.locator(".robot canvas").get_attribute("aria-label")
 
 
@@ -350,10 +381,9 @@ def test_nothing_keeps_people_out(browser: Any, url: str, regions: list[str], ba
         if path != "/scenes":
             page.get_by_text("2 components").wait_for()
             plan(page, degrees((-0.28, -0.1)), degrees((0.03, -0.1)))
-            page.get_by_text("Now in region").wait_for()
+            page.locator(".moment", has_text="in region").wait_for()
             page.get_by_label("Goal").select_option("arm/link2")
-            file = {"name": "path.json", "mimeType": "", "buffer": json.dumps({"q": FREE}).encode()}
-            page.get_by_label("File", exact=True).set_input_files(file)
+            choose(page, "path.json", json.dumps({"q": FREE}))
             page.get_by_text("Certified.").wait_for()
         assert barriers(page) == []
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")

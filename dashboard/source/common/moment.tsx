@@ -1,5 +1,5 @@
-// What is known of one configuration: what touches there, which regions and motions hold it, and which region is nearest. An answer counts for the
-// configuration that it was asked for, and for no other.
+// What is known of one configuration: what touches there, which regions and motions hold it, and which region is nearest. An answer
+// counts for the configuration that it was asked for, and for no other.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { post, said } from "./api";
 import type { ContactsResponse, ContainsResponse, Near, NearestResponse, SceneModel } from "./schema";

@@ -12,11 +12,13 @@ interface Props {
   touching?: number[];
   /** Configurations at which the links are drawn faintly as well. Give the same array again as long as it does not change. */
   ghosts?: number[][];
+  /** Is told the joint positions while somebody drags a link. */
+  onDrag?: (q: number[]) => void;
 }
 
 const NONE: number[][] = [];
 
-export function Robot({ model, q, label, touching = [], ghosts = NONE }: Props) {
+export function Robot({ model, q, label, touching = [], ghosts = NONE, onDrag }: Props) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const view = useRef<View | null>(null);
   const [failed, setFailed] = useState(false);
@@ -35,6 +37,9 @@ export function Robot({ model, q, label, touching = [], ghosts = NONE }: Props) 
   useEffect(() => view.current?.setPose(q), [model, q.join()]);
   useEffect(() => view.current?.colour(touching), [model, touching.join()]);
   useEffect(() => view.current?.setGhosts(ghosts), [model, ghosts]);
+  useEffect(() => {
+    if (view.current) view.current.onDrag = onDrag ?? null;
+  }, [model, onDrag]);
 
   const onKeyDown = (event: KeyboardEvent): void => {
     if (!event.ctrlKey && !event.metaKey && !event.altKey && view.current?.key(event.key)) event.preventDefault();
@@ -44,7 +49,7 @@ export function Robot({ model, q, label, touching = [], ghosts = NONE }: Props) 
       {failed ? (
         <p class="empty">This browser cannot draw the robot, because WebGL is off.</p>
       ) : (
-        <canvas ref={canvas} tabIndex={0} role="img" aria-label={`${label}. Arrow keys turn the view, plus and minus zoom, 0 goes back.`} onKeyDown={onKeyDown} />
+        <canvas ref={canvas} tabIndex={0} role="img" aria-label={`${label}. Arrow keys turn the view, plus and minus zoom, 0 goes back.${onDrag ? " A link can be dragged; the sliders do the same." : ""}`} onKeyDown={onKeyDown} />
       )}
     </figure>
   );

@@ -4,6 +4,7 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { ConvexGeometry } from "three/examples/jsm/geometries/ConvexGeometry.js";
 import { CONTACT, LINKS, onScheme, token } from "./colours";
 import { movingBodies, poses, type Matrix } from "./kinematics";
+import { pulled } from "./pull";
 import type { DrawnGeometry, SceneModel } from "./schema";
 
 const GHOST_OPACITY = 0.1;
@@ -50,6 +51,8 @@ interface Drawn {
 }
 
 export class View {
+  /** Is told the joint positions while somebody drags a link; null where links cannot be dragged. */
+  onDrag: ((q: number[]) => void) | null = null;
   private readonly renderer: three.WebGLRenderer;
   private readonly scene = new three.Scene();
   private readonly camera = new three.PerspectiveCamera(40, 1, 0.01, 100);
@@ -63,9 +66,11 @@ export class View {
   private home = { position: new three.Vector3(), target: new three.Vector3() };
   private asked = 0;
   private touching: number[] = [];
+  private q: number[];
 
   /** Throws where the browser cannot draw with WebGL. */
-  constructor(canvas: HTMLCanvasElement, model: SceneModel) {
+  constructor(canvas: HTMLCanvasElement, private readonly model: SceneModel) {
+    this.q = model.q_star;
     this.renderer = new three.WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.posesOf = poses(model);
@@ -83,6 +88,7 @@ export class View {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = false;
     this.controls.addEventListener("change", () => this.draw());
+    canvas.addEventListener("pointerdown", (event) => this.grab(event), { capture: true }); // before the controls, which turn the view
     this.scene.add(new three.HemisphereLight("#ffffff", "#8a8f98", 1.7));
     const sun = new three.DirectionalLight("#ffffff", 1.8);
     sun.position.set(2, -3, 5);
@@ -148,7 +154,34 @@ export class View {
     return true;
   }
 
+  /** Where a link is grabbed, the pointer pulls its point along, in a plane across the line of sight. */
+  private grab(down: PointerEvent): void {
+    if (!this.onDrag || down.button !== 0) return;
+    const canvas = this.renderer.domElement;
+    const ray = new three.Raycaster();
+    const aim = (event: PointerEvent): three.Raycaster => {
+      const { left, top, width, height } = canvas.getBoundingClientRect();
+      ray.setFromCamera(new three.Vector2((2 * (event.clientX - left)) / width - 1, 1 - (2 * (event.clientY - top)) / height), this.camera);
+      return ray;
+    };
+    const [hit] = aim(down).intersectObjects(this.drawn.map(({ mesh }) => mesh));
+    const link = this.drawn.find(({ mesh, colour }) => colour !== null && mesh === hit?.object);
+    if (!hit || !link) return;
+    down.stopImmediatePropagation();
+    canvas.setPointerCapture(down.pointerId);
+    const local = link.mesh.worldToLocal(hit.point.clone());
+    const pointAt = (q: number[]): three.Vector3 => local.clone().applyMatrix4(toMatrix4(this.posesOf(q).get(link.geometry.body)!));
+    const plane = new three.Plane().setFromNormalAndCoplanarPoint(this.camera.getWorldDirection(new three.Vector3()), hit.point);
+    const drag = (event: PointerEvent): void => {
+      const target = aim(event).ray.intersectPlane(plane, new three.Vector3());
+      if (target) this.onDrag?.(pulled(pointAt, this.q, target, this.model.q_lower, this.model.q_upper));
+    };
+    canvas.addEventListener("pointermove", drag);
+    canvas.addEventListener("lostpointercapture", () => canvas.removeEventListener("pointermove", drag), { once: true });
+  }
+
   setPose(q: number[]): void {
+    this.q = q;
     const found = this.posesOf(q);
     for (const { geometry, mesh } of this.drawn) {
       mesh.matrix.copy(toMatrix4(found.get(geometry.body)!));

@@ -74,7 +74,7 @@ export function Player({ motion, parts, names, units, onMove, children }: Props)
         <label>speed <select value={speed} onChange={(event) => setSpeed(Number(event.currentTarget.value))}>{[0.25, 0.5, 1, 2].map((factor) => <option value={factor} key={factor}>{factor}×</option>)}</select></label>
         {children}
       </div>
-      <p class="moment">Now {part.said}</p>
+      <p class="moment">At {time.toFixed(2)} s: {part.said}</p>
       <Curves motion={motion} parts={parts} names={names} units={units} time={time} />
       <ol class="parts">
         {parts.map(({ begin, end, by, said }) => (

@@ -42,7 +42,7 @@ function why(plan: PlanResponse, names: string[], units: ("rad" | "m")[]): strin
     case "pose_unreachable":
       return `No configuration was found at which the frame has this pose. The nearest one that was found is off by ${(1000 * reached!.metres).toPrecision(3)} mm and ${shown(reached!.radians, "rad")}.`;
     case "pose_in_collision":
-      return `Bodies touch at every configuration that was found for this pose. At one of them, ${collision!.a} and ${collision!.b} touch. The frame has another pose at the free configuration near by.`;
+      return `Bodies touch at every configuration that was found for this pose. At one of them, ${collision!.a} and ${collision!.b} touch.${collision!.free ? " At the free configuration near by, the frame has another pose." : ""}`;
     case "line_limit":
       return `${part} There ${line!.joint} is at its limit.`;
     case "line_singular":
