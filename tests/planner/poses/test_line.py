@@ -215,4 +215,4 @@ def test_a_motion_that_only_turns_the_frame_keeps_to_its_line():
     found = line(scene, "link2", start, **there, metres=1e-3, radians=1e-2)
     assert found.reason is None
     assert keeps(scene, "link2", start, **there, q=found.q, metres=1e-3, radians=1e-2)
-    assert not keeps(scene, "link2", start, **there, q=np.array([start, start + [0.02, 0.0], goal]), metres=1e-3, radians=1e-2)
+    assert not keeps(scene, "link2", start, **there, q=np.array([start, start + np.array([0.02, 0.0]), goal]), metres=1e-3, radians=1e-2)
