@@ -86,7 +86,8 @@ class MotionsKept:
             version = motions.version(session, scene_id)
             if version != shelf.known.version:
                 ids = motions.roll(session, scene_id)
-                known = {motion_id: arrays for motion_id, arrays in shelf.known.arrays.items() if motion_id in set(ids)}
+                there = set(ids)
+                known = {motion_id: arrays for motion_id, arrays in shelf.known.arrays.items() if motion_id in there}
                 widths = {tube.id: tube.rho for tube in shelf.known.tubes.motions}
                 for motion_id, arrays, rho in motions.read(session, [motion_id for motion_id in ids if motion_id not in known]):
                     known[motion_id], widths[motion_id] = arrays, rho

@@ -52,7 +52,7 @@ def nearest(args: Namespace) -> int:
 
 
 def plan(args: Namespace) -> int:
-    start, goals = _end(args.start, "--from"), [_end(text, "--to") for text in args.goals]
+    start, goals = _end(args.start, "--from"), [_end(text, "--to") for text in args.goal]
     job = request(args, JOB)
     if not args.grow:
         refuse_options(args, JOB, "grow")

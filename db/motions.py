@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import delete, select, update
+from sqlalchemy import delete, func, select, update
 from sqlalchemy.orm import Session
 
 from certifier.errors import CirisError
@@ -16,9 +16,12 @@ from db.ids import expanded
 from db.models import LibraryRow, MotionRow, SceneRow
 from db.session import insert_new
 
+SLACK = 10
+"""A scene may have this part more motions than are kept, before the oldest ones go."""
+
 
 def add(session: Session, scene_id: str, arrays: dict[str, Array], tube: float, proof: bytes, most: int) -> MotionRow:
-    """Stores a motion whose proof has been verified, and deletes the oldest ones of the scene beyond ``most``.
+    """Stores a motion whose proof has been verified. Where a scene has far more than ``most``, the oldest ones go, together.
 
     Args:
         arrays: as in :class:`db.models.MotionRow`.
@@ -35,8 +38,10 @@ def add(session: Session, scene_id: str, arrays: dict[str, Array], tube: float, 
     )
     session.add(motion)
     session.flush()
-    of_scene = select(MotionRow.id).where(MotionRow.scene_id == scene_id).order_by(MotionRow.number.desc())
-    _delete(session, session.scalars(of_scene.offset(most)).all())
+    mine = MotionRow.scene_id == scene_id
+    if (session.scalar(select(func.count()).select_from(MotionRow).where(mine)) or 0) > most + most // SLACK:
+        latest = select(MotionRow.id).where(mine).order_by(MotionRow.number.desc())
+        _delete(session, session.scalars(latest.offset(most)).all())
     return motion
 
 

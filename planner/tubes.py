@@ -9,13 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from certifier.model import Array
-from planner.boxes import BoxGrid
 
 _ROUNDED = 1e-14
 """What a few operations round is a smaller part of the largest number in them."""
@@ -54,14 +52,13 @@ class Tubes:
         self._end = np.concatenate([np.zeros((0, n)), *(tube.path[1:] for tube in motions)])
         self._rho = np.repeat([tube.rho for tube in motions], counts)[:, None]
         self._lower, self._upper = np.minimum(self._begin, self._end) - self._rho, np.maximum(self._begin, self._end) + self._rho
-        self._grid = BoxGrid(self._lower, self._upper)
 
     def __len__(self) -> int:
         return len(self.motions)
 
     def at(self, q: Array) -> tuple[NDArray[np.intp], Array]:
         """Returns the lines in whose tubes q, (n,), is proved to be, (h,), and the times on them, (h,) from 0 to 1."""
-        _, lines = self._grid.candidates(q[None])
+        lines = self._near(q, q)
         inside, _, times = self._spans(lines, q, q)
         return lines[inside], times[inside, 0]
 
@@ -71,10 +68,14 @@ class Tubes:
         Returns:
             The lines, (h,), and from when to when, (h, 2), from 0 to 1.
         """
-        lower, upper = np.minimum(a, b), np.maximum(a, b)
-        lines = np.flatnonzero(((self._lower <= upper) & (lower <= self._upper)).all(axis=1))
+        lines = self._near(a, b)
         inside, spans, _ = self._spans(lines, a, b)
         return lines[inside], spans[inside]
+
+    def _near(self, a: Array, b: Array) -> NDArray[np.intp]:
+        """Returns the lines whose boxes meet the box of the motion from a to b, (h,)."""
+        lower, upper = np.minimum(a, b), np.maximum(a, b)
+        return np.flatnonzero(((self._lower <= upper) & (lower <= self._upper)).all(axis=1))
 
     def _spans(self, lines: NDArray[np.intp], a: Array, b: Array) -> tuple[NDArray[np.bool_], Array, Array]:
         """Returns whether the motion is in the tubes for a while, (h,), from when to when, and when the lines are there, (h, 2) each."""
@@ -120,7 +121,23 @@ def follows(tube: Tube, path: Array) -> bool:
     """Says whether a path, (k, n) and straight in q between its points, is proved to be in a tube."""
     anywhere = np.full(path.shape[1], np.inf)
     tubes = Tubes((-anywhere, anywhere), [tube])
-    return all(_covers(tubes.spans(a, b)[1]) for a, b in pairwise(path))
+    within = _within(tube, path)
+    between = (within[:-1] & within[1:]).any(axis=1)  # the tube about a line is convex
+    return all(_covers(tubes.spans(path[k], path[k + 1])[1]) for k in np.flatnonzero(~between))
+
+
+def _within(tube: Tube, points: Array) -> NDArray[np.bool_]:
+    """Returns which of the points, (K, n), are in the tube about which line of its path, (K, k - 1)."""
+    begin, way = tube.path[:-1], np.diff(tube.path, axis=0)
+    here, moves = points[:, None] - begin, way != 0
+    pace = np.where(moves, way, 1.0)
+    one, other = (here - tube.rho) / pace, (here + tube.rho) / pace
+    low = np.where(moves, np.minimum(one, other), -np.inf).max(axis=2)
+    high = np.where(moves, np.maximum(one, other), np.inf).min(axis=2)
+    times = (np.clip(low, 0.0, 1.0) + np.clip(high, 0.0, 1.0)) / 2
+    size = 2 * np.abs(points)[:, None] + np.abs(begin) + np.abs(tube.path[1:])
+    found: NDArray[np.bool_] = (np.abs(here - times[:, :, None] * way) + _ROUNDED * size <= tube.rho).all(axis=2)
+    return found
 
 
 def _covers(spans: Array) -> bool:

@@ -57,7 +57,7 @@ def add(verbs: Any) -> None:
     plan.add_argument("--from", dest="start", metavar=JOINTS, required=True, help=f"where the motion begins: {of_end}")
     plan.add_argument(
         "--to",
-        dest="goals",
+        dest="goal",
         metavar=JOINTS,
         action="append",
         default=[],

@@ -35,8 +35,8 @@ GOALS = 8
 """A pose is reached by at most this many configurations, of which the motion goes to the cheapest."""
 WITHIN = 0.5
 """The path along a line takes this part of the tolerances."""
-SHARE = 0.5
-"""A search with padding takes this part of the time that is left at most."""
+SHARE = 0.04
+"""A search with padding takes this part of the time that is left at most: either it is quick, or the padding leaves no way."""
 
 
 def keep(text: str) -> Scene:

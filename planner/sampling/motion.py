@@ -19,6 +19,7 @@ from certifier.proof.motion import Motion, Space
 from planner.sampling.corners import rounded
 from planner.sampling.route import Route
 from planner.sampling.search import Search
+from planner.trajectory.straight import straight
 from planner.trajectory.stretch import stretch
 from planner.trajectory.timing import timed
 from planner.tubes import Tube, follows
@@ -98,15 +99,12 @@ def _candidates(search: Search, route: Route, speed: Array, acceleration: Array)
     found = timed(curve, through, speed, acceleration, SPACING)
     if found is not None:
         yield path, *found
-    resting = _at_rest(route.path, speed, acceleration)
-    if resting is not None:
-        yield route.path, *resting
+    yield route.path, *_at_rest(route.path, speed, acceleration)
 
 
-def _at_rest(path: Array, speed: Array, acceleration: Array) -> tuple[Array, Array] | None:
+def _at_rest(path: Array, speed: Array, acceleration: Array) -> tuple[Array, Array]:
     """Returns a motion along a path, (k, n), that rests at every point of it: configurations (K, n) and times (K,)."""
-    parts = [timed(_fine(np.array(line)), [], speed, acceleration, SPACING) for line in pairwise(path)]
-    return _joined([part for part in parts if part is not None]) if all(part is not None for part in parts) else None
+    return _joined([straight(a, b, speed, acceleration, SPACING) for a, b in pairwise(path)])
 
 
 def _fine(points: Array) -> Array:

@@ -15,6 +15,9 @@ from certifier.collisions.bodies import bodies_of
 from certifier.collisions.free import CLOSE, free_along, free_at
 from certifier.model import Array, Scene
 
+STEP, PART = 1.0, 0.05
+"""A tree grows by steps of at most this length in q, in radians and metres, or of this part of the box' diagonal where that is more."""
+
 util.setLogLevel(util.LOG_ERROR)
 util.RNG.setSeed(1)  # the same question has the same answer, as far as time allows
 
@@ -59,6 +62,7 @@ class Search:
         asked = base.ProblemDefinition(self._space)
         asked.setStartAndGoalStates(self._state(start), self._state(goal))
         planner = geometric.RRTConnect(self._space)
+        planner.setRange(max(STEP, PART * self._space.getMaximumExtent()))
         planner.setProblemDefinition(asked)
         planner.setup()
         planner.solve(in_time)

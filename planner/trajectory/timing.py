@@ -13,6 +13,7 @@ from pydrake.multibody.tree import PrismaticJoint, SpatialInertia
 from pydrake.trajectories import PiecewisePolynomial
 
 from certifier.model import Array
+from planner.trajectory.straight import straight
 from planner.trajectory.stretch import UP, stretch
 
 STILL = 1e-6
@@ -47,6 +48,8 @@ def timed(curve: Array, through: list[int], speed: Array, acceleration: Array, s
         return curve[[0, -1]], np.array([0.0, UP * _least(np.abs(curve[-1] - curve[0]), speed, acceleration)])
     along = _along(curve)
     moves = np.concatenate([[True], np.diff(along) > 0])
+    if moves.sum() < 3:
+        return straight(curve[0], curve[-1], speed, acceleration, spacing)
     path = PiecewisePolynomial.CubicWithContinuousSecondDerivatives(along[moves], curve[moves].T)
     unit = _least(np.abs(np.diff(curve, axis=0)).sum(axis=0), speed, acceleration)
     toppra = Toppra(path, _sliders(len(speed)), along[moves])
@@ -54,10 +57,12 @@ def timed(curve: Array, through: list[int], speed: Array, acceleration: Array, s
         no_more = np.minimum(limit, _FAST)
         add(-no_more, no_more)
     course = toppra.SolvePathParameterization()
-    if course is None:
+    if course is None or not np.isfinite(course.get_segment_times()).all():
         return None
     fine = np.linspace(course.start_time(), course.end_time(), MOST)
     reached = np.clip(course.vector_values(fine)[0], 0.0, along[-1])
+    if not np.isfinite(reached).all():
+        return None
     steps = np.abs(np.diff(path.vector_values(reached))).max() * (MOST - 1) / spacing
     t = np.linspace(fine[0], fine[-1], int(np.clip(np.ceil(steps) + 1, FEWEST, MOST)))
     when = np.interp(along[through], reached, fine)

@@ -6,6 +6,7 @@ import itertools
 import time
 from typing import Any
 
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import delete, exists, func, select, update
@@ -13,7 +14,7 @@ from sqlalchemy.orm import aliased
 
 from api.access import KEYS_SECONDS
 from certifier.model import Scene
-from db import jobs, keys, projects, regions, scenes, staging, webhooks
+from db import jobs, keys, motions, projects, regions, scenes, staging, webhooks
 from db.keys import Scope
 from db.models import JobRow, ProofRow, RegionRow, SceneRow
 from db.session import Database
@@ -52,8 +53,16 @@ def theirs(database: Database, scene: Scene, region: str) -> dict[str, str]:
         made = {name: keys.add(session, "admin", Scope.ADMIN, name) for name in ("default", "others")}
         scene_id = scenes.find(session, "slider")
         staging.stage(session, "slider", slider(posts=1))
+        motion = motions.add(session, scene_id, {"path": np.array([[0.0], [0.1]])}, 0.01, b"proof of a motion", 10).id
     time.sleep(KEYS_SECONDS)
-    return {"scene_id": scene_id, "job_id": job, "region_id": region, "key": made["default"], "stranger": made["others"]}
+    return {
+        "scene_id": scene_id,
+        "job_id": job,
+        "region_id": region,
+        "motion_id": motion,
+        "key": made["default"],
+        "stranger": made["others"],
+    }
 
 
 def bearer(key: str) -> dict[str, str]:

@@ -86,7 +86,7 @@ def test_so_does_the_refusal_of_a_polytopes_options(
         ("certify", ("slider", "--polytope=p.json"), CERTIFY),
         ("recertify", ("1f9b2a7c", "--scene=slider"), RECERTIFY),
         ("certify-path", ("slider", "--q=0", "--q=0.1", "--job"), JOB),
-        ("plan", ("slider", "--from=0", "--to=5", "--grow"), JOB),
+        ("plan", ("slider", "--from=0", "--to=5", "--regions-only", "--grow"), JOB),
     ],
 )
 def test_every_field_has_its_argument(command: str, arguments: tuple[str, ...], parts: tuple[Part, ...]) -> None:
@@ -175,5 +175,5 @@ def test_growing_between_two_ends_names_the_end_that_was_typed(ciris: Ciris, url
         raise RegionError("seed_in_collision", "two bodies overlap", field="options.connect[1]")
 
     monkeypatch.setattr("client.service.run", collides)
-    done = ciris("plan", "slider", "--from", "0", "--to", "0.5", "--grow", CIRIS_URL=url)
+    done = ciris("plan", "slider", "--from", "0", "--to", "0.5", "--regions-only", "--grow", CIRIS_URL=url)
     assert (done.status, done.error) == (2, "--to: two bodies overlap")

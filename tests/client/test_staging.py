@@ -19,7 +19,7 @@ def ask_on(url: str, done: threading.Event, found: list[tuple[str, int, bool]]) 
     """Asks about the name all the time, as planners do."""
     with Client(url) as client:
         while not done.wait(0.1):
-            plan = client.plan("planar-2dof", [0.02, 0.0], [-0.03, 0.05])
+            plan = client.plan({"scene": "planar-2dof", "start": [0.02, 0.0], "goal": [-0.03, 0.05], "regions_only": True})
             contained = client.contains("planar-2dof", [[0.02, 0.0]])
             found.append((plan["scene"], plan["regions"], plan["found"]))
             found.append((contained["scene"], contained["regions"], contained["points"][0]["inside"]))

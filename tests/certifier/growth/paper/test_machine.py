@@ -208,4 +208,4 @@ def test_points_that_cannot_be_contained_together_are_refused():
     seed = {"q": [0.0, 0.0], "contain": [[1.9, 0.1]], "method": "box", "half_width": 1e-3}
     with pytest.raises(CirisError) as refusal:
         grow(SCENE, GrowthOptions(seed=seed, paper=PaperOptions(max_rounds=0, pushes=0)))
-    assert refusal.value.code == "not_grown"
+    assert refusal.value.code == "contain_blocked"

@@ -1,0 +1,35 @@
+"""A straight line in q is given times here, from rest to rest: it speeds up, keeps its speed and slows down, all joints together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from certifier.model import Array
+from planner.trajectory.stretch import UP, stretch
+
+FEWEST = 9
+"""Least number of configurations of a line."""
+
+
+def straight(a: Array, b: Array, speed: Array, acceleration: Array, spacing: float) -> tuple[Array, Array]:
+    """Returns configurations q (k, n) on the line from a to b, (n,) each, and their times t (k,) in seconds.
+
+    Args:
+        speed, acceleration: (n,) limits of every joint, also for the differences of q.
+        spacing: no joint moves much farther between two configurations.
+    """
+    way = np.abs(b - a)
+    if not way.any():
+        return np.array([a, b]), np.zeros(2)
+    fastest, hardest = (float((limit[way > 0] / way[way > 0]).min()) for limit in (speed, acceleration))
+    rising = min(fastest / hardest, 1 / np.sqrt(hardest))  # how long it speeds up
+    total = rising + 1 / (hardest * rising)
+    count = max(FEWEST, int(np.ceil(fastest * total * way.max() / spacing)) + 1)
+    t = np.linspace(0.0, total, count)
+    up, down = np.minimum(t, rising), np.maximum(t - (total - rising), 0.0)
+    part = hardest * (up**2 / 2 + rising * (np.clip(t, rising, total - rising) - rising) + rising * down - down**2 / 2)
+    part = np.clip(part / part[-1], 0.0, 1.0)[:, None]
+    q = (1 - part) * a + part * b
+    q[0], q[-1] = a, b
+    t *= UP
+    return q, t * stretch(q, t, speed, acceleration)
