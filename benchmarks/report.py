@@ -296,7 +296,7 @@ def _plan(document: Document) -> list[str]:
             rows.append([name, f"{answered} of {part['asked']}", *times, length, str(found["collide"])])
         ratio = part["length_ratio"]
         solved = f"{part['answered_of_these']} of {part['ompl_solved']}"
-        said += [f"{what}:", _table(header, rows), f"Of those that OMPL solved, ciris answered {solved}."]
+        said += [f"{what}:", _table(header, rows), f"Of those that OMPL solved, we answered {solved}."]
         if ratio:
             said.append(f"Our length over OMPL's: median {ratio['p50']:.3f}.")
     again = document["again_seconds"]
