@@ -185,6 +185,7 @@ def test_a_configuration_in_collision_is_refused(planar: Scene) -> None:
     assert children(job.id) == []
 
 
+@pytest.mark.lengthy
 def test_a_cover_that_cannot_go_on_says_why(planar: Scene) -> None:
     """Its regions have no time, so none comes of them."""
     job = ended(cover(planar, seeds=[LEFT], coverage=0.5, at_once=1, regions=3, region_seconds=0.01))

@@ -116,6 +116,7 @@ def test_what_a_paused_worker_leaves_the_others_do(crew: Service, planar: Scene)
 
 def test_a_drained_worker_finishes_what_it_holds_and_ends_well(crew: Service, arm: tuple[Scene, np.ndarray]) -> None:
     scene, s = arm
+    abandoned = unacknowledged()  # those of workers that other tests have killed
     job = submit(scene, box_around(s, 0.05))
     held = eventually(lambda: [row.id for row in pairs_of(job) if row.state == "running"], "it holds something")
     ask(crew, "solve", WorkerState.PAUSED)
@@ -125,7 +126,7 @@ def test_a_drained_worker_finishes_what_it_holds_and_ends_well(crew: Service, ar
     assert row_of(crew, "solve") is None
     done = [row for row in pairs_of(job) if row.id in held]
     assert {(row.state, row.attempts) for row in done} == {("certified", 1)}
-    eventually(lambda: unacknowledged() == 0, "its messages are given back", 10)
+    eventually(lambda: unacknowledged() <= abandoned, "its messages are given back", 10)
     crew.start("solve-2")
     assert ended(job).outcome == "certified"
     assert not [event for event in events_of(job) if event.kind == "lost"], "nothing was taken from anybody"
