@@ -6,7 +6,6 @@ whose tube they are, a trajectory through regions by the regions.
 
 from __future__ import annotations
 
-import base64
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -25,9 +24,10 @@ from certifier.errors import RegionError
 from certifier.isolation.child import run_in_child
 from certifier.model import Array, Scene
 from certifier.outcome import Guarantee
-from db import motions, regions
+from db import regions
 from db.session import Database
 from db.settings import settings
+from jobs.moving import keep
 from planner.library import Library
 from planner.nearest import nearest
 from planner.trajectory.plan import Answer, Apart, Limits, Outside, Trajectory, Unproved, inner, plan
@@ -130,10 +130,7 @@ def _searched(asked: Asked, question: _Question, body: PlanRequest) -> dict[str,
     found = about_motions("planned", question.scene, payload)
     if "reason" in found:
         return {"found": False, **_why(found, body)}
-    arrays = {name: found[name] for name in ("path", "q", "t")} | {"speed": limits.speed, "acceleration": limits.acceleration}
-    proof, most = base64.b64decode(found["proof"]), settings().kept_motions
-    with asked.db.write() as session:
-        motion_id = motions.add(session, question.scene_id, arrays, found["tube"], proof, most).id
+    motion_id = keep(asked.db, question.scene_id, found, {"speed": limits.speed, "acceleration": limits.acceleration})
     return _moved(motion_id, found["q"], found["t"], found["tube"])
 
 

@@ -8,10 +8,11 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from ompl import base, geometric, util
+from ompl import geometric, util
 
 from certifier.model import Array, Scene
 from certifier.seeding.iris import checker
+from planner.sampling.search import positions, space_of, state_of
 
 RESOLUTION = 0.05
 """A straight line is looked at in steps of at most this length in q, in radians and metres: 2.9 degrees where one joint turns."""
@@ -22,26 +23,23 @@ class Ompl:
     """Plans in a scene, within its joint limits."""
 
     def __init__(self, scene: Scene) -> None:
-        self._checker, self._n = checker(scene), scene.n
-        space = base.RealVectorStateSpace()
-        for lower, upper in zip(scene.q_lower.tolist(), scene.q_upper.tolist(), strict=True):
-            space.addDimension(lower, upper)
-        self._setup = geometric.SimpleSetup(space)
-        self._setup.setStateValidityChecker(lambda state: self._checker.CheckConfigCollisionFree(self._q(state)))
+        self._checker = checker(scene)
+        self._setup = geometric.SimpleSetup(space_of(scene.q_lower, scene.q_upper))
         self._space = self._setup.getSpaceInformation()
+        self._setup.setStateValidityChecker(lambda state: self._checker.CheckConfigCollisionFree(positions(self._space, state)))
         self._space.setStateValidityCheckingResolution(RESOLUTION / self._space.getMaximumExtent())
 
     def plan(self, start: Array, goal: Array, seconds: float) -> tuple[Array | None, float]:
         """Returns a path, (k, n), between two free configurations, or None where none was found in time; and the seconds that it took."""
         begin = time.perf_counter()
         self._setup.clear()
-        self._setup.setStartAndGoalStates(self._state(start), self._state(goal))
+        self._setup.setStartAndGoalStates(state_of(self._space, start), state_of(self._space, goal))
         self._setup.setPlanner(geometric.RRTConnect(self._space))
         self._setup.solve(seconds)
         if not self._setup.haveExactSolutionPath():
             return None, time.perf_counter() - begin
         self._setup.simplifySolution()
-        path = np.array([self._q(state) for state in self._setup.getSolutionPath().getStates()])
+        path = np.array([positions(self._space, state) for state in self._setup.getSolutionPath().getStates()])
         return path, time.perf_counter() - begin
 
     def collides(self, path: Array, points: int) -> bool:
@@ -50,11 +48,3 @@ class Ompl:
         at = np.linspace(0.0, along[-1], points)
         q = np.column_stack([np.interp(at, along, joint) for joint in path.T])
         return not all(self._checker.CheckConfigsCollisionFree(list(q)))
-
-    def _state(self, q: Array) -> base.State:
-        state = self._space.allocState()
-        state[0 : self._n] = q.tolist()
-        return state
-
-    def _q(self, state: base.State) -> Array:
-        return np.array(state[0 : self._n])

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 from sqlalchemy import select
-from sqlalchemy.orm import InstrumentedAttribute, Session
+from sqlalchemy.orm import DeclarativeBase, InstrumentedAttribute, Session
 
 from certifier.errors import CirisError
 
+Row = TypeVar("Row", bound=DeclarativeBase)
 SHORTEST = 4
 """Least number of characters of an id that is given in short."""
 
@@ -25,3 +28,12 @@ def expanded(session: Session, column: InstrumentedAttribute[str], given: str) -
             "ambiguous_id", f"several ids begin with {given!r}", field=column.class_.__tablename__.rstrip("s"), hint="give more of it"
         )
     return found[0] if len(found) == 1 else given
+
+
+def found(session: Session, model: type[Row], given: str) -> Row | None:
+    """Returns the row with this id, or with the only id that begins like this; None where there is none.
+
+    Raises:
+        CirisError: ambiguous_id, when several ids begin with it.
+    """
+    return session.get(model, given) or session.get(model, expanded(session, model.id, given))  # type: ignore[attr-defined]

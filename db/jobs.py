@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session, aliased
 from certifier.errors import CirisError
 from certifier.outcome import Outcome
 from db import events, labels, leases, pages, traces, webhooks
-from db.ids import expanded
+from db.ids import found
 from db.models import GrowthRow, JobRow, SceneRow, StepRow
 from db.pages import Page
 from db.session import insert_new
@@ -152,7 +152,7 @@ def get(session: Session, job_id: str) -> JobRow:
     Raises:
         CirisError: job_not_found, or ambiguous_id.
     """
-    return _found(session.get(JobRow, job_id) or session.get(JobRow, expanded(session, JobRow.id, job_id)), job_id)
+    return _found(found(session, JobRow, job_id), job_id)
 
 
 def lock(session: Session, job_id: str) -> JobRow:

@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from certifier.errors import CirisError
 from certifier.model import Array
 from db import proofs
-from db.ids import expanded
+from db.ids import found
 from db.models import LibraryRow, MotionRow, SceneRow
 from db.session import insert_new
 
@@ -51,7 +51,7 @@ def get(session: Session, motion_id: str) -> MotionRow:
     Raises:
         CirisError: motion_not_found, or ambiguous_id.
     """
-    row = session.get(MotionRow, motion_id) or session.get(MotionRow, expanded(session, MotionRow.id, motion_id))
+    row = found(session, MotionRow, motion_id)
     if row is None:
         hint = "the service keeps the latest motions of a scene; plan again, or keep the proof (`ciris plan --out FILE`)"
         raise CirisError("motion_not_found", f"there is no motion {motion_id!r}", field="motion", hint=hint)

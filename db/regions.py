@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session, defer
 from certifier.errors import CirisError
 from certifier.model import StoredRegion
 from db import events, jobs, pages, proofs
-from db.ids import expanded
+from db.ids import found
 from db.models import IterationRow, JobRow, LibraryRow, RegionRow
 from db.pages import Page
 from db.session import insert_new
@@ -60,7 +60,7 @@ def get(session: Session, region_id: str) -> RegionRow:
     Raises:
         CirisError: region_not_found, or ambiguous_id.
     """
-    row = session.get(RegionRow, region_id) or session.get(RegionRow, expanded(session, RegionRow.id, region_id))
+    row = found(session, RegionRow, region_id)
     if row is None:
         hint = "`ciris region ls`, or `regions()` in Python, lists them"
         raise CirisError("region_not_found", f"there is no region {region_id!r}", field="region", hint=hint)

@@ -34,15 +34,21 @@ def scout(scene: Scene, scene_id: str, job_id: str) -> Scouted:
         RegionError: as :class:`planner.cover.look.Look`.
     """
 
+    state = state_of(job_id)
+    known = persistently(lambda: _known(scene, scene_id))
+    return _look(scene_id, job_id)(known, state)
+
+
+def state_of(job_id: str) -> CoverState:
+    """Returns what a cover that has begun remembers."""
+
     def read() -> CoverState:
         with database().read() as session:
             growth = jobs.growth(session, job_id)
-            assert growth is not None, "a cover has begun when it has a look at the scene"
+            assert growth is not None, "a cover has begun when it asks for a step"
             return stored.value(CoverState, growth)
 
-    state = persistently(read)
-    known = persistently(lambda: _known(scene, scene_id))
-    return _look(scene_id, job_id)(known, state)
+    return persistently(read)
 
 
 @lru_cache(maxsize=4)

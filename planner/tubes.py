@@ -59,8 +59,10 @@ class Tubes:
     def at(self, q: Array) -> tuple[NDArray[np.intp], Array]:
         """Returns the lines in whose tubes q, (n,), is proved to be, (h,), and the times on them, (h,) from 0 to 1."""
         lines = self._near(q, q)
-        inside, _, times = self._spans(lines, q, q)
-        return lines[inside], times[inside, 0]
+        if not self._permits(q):
+            lines = lines[:0]
+        inside, times = _within(self._begin[lines], self._end[lines], self._rho[lines], q[None, None])
+        return lines[inside[0]], times[0, inside[0]]
 
     def spans(self, a: Array, b: Array) -> tuple[NDArray[np.intp], Array]:
         """Returns in the tubes of which lines the straight motion in q from a to b, (n,) each, is proved to be for a while.
@@ -69,7 +71,9 @@ class Tubes:
             The lines, (h,), and from when to when, (h, 2), from 0 to 1.
         """
         lines = self._near(a, b)
-        inside, spans, _ = self._spans(lines, a, b)
+        if not (self._permits(a) and self._permits(b)):
+            lines = lines[:0]
+        inside, spans = self._spans(lines, a, b)
         return lines[inside], spans[inside]
 
     def _near(self, a: Array, b: Array) -> NDArray[np.intp]:
@@ -77,34 +81,31 @@ class Tubes:
         lower, upper = np.minimum(a, b), np.maximum(a, b)
         return np.flatnonzero(((self._lower <= upper) & (lower <= self._upper)).all(axis=1))
 
-    def _spans(self, lines: NDArray[np.intp], a: Array, b: Array) -> tuple[NDArray[np.bool_], Array, Array]:
-        """Returns whether the motion is in the tubes for a while, (h,), from when to when, and when the lines are there, (h, 2) each."""
-        within = all(((self._limits[0] <= end) & (end <= self._limits[1])).all() for end in (a, b))
-        if not len(lines) or not within:
-            return np.zeros(len(lines), dtype=bool), np.zeros((len(lines), 2)), np.zeros((len(lines), 2))
-        way, rho = self._end[lines] - self._begin[lines], self._rho[lines]
-        here, step, moves = a - self._begin[lines], np.broadcast_to(b - a, way.shape), way != 0
+    def _permits(self, q: Array) -> bool:
+        """Says whether q, (n,), is within the joint limits."""
+        return bool(((self._limits[0] <= q) & (q <= self._limits[1])).all())
+
+    def _spans(self, lines: NDArray[np.intp], a: Array, b: Array) -> tuple[NDArray[np.bool_], Array]:
+        """Returns whether the motion is in the tubes for a while, (h,), and from when to when, (h, 2)."""
+        if not len(lines):
+            return np.zeros(0, dtype=bool), np.zeros((0, 2))
+        begin, end, rho = self._begin[lines], self._end[lines], self._rho[lines]
+        here, step, way = a - begin, np.broadcast_to(b - a, begin.shape), end - begin
+        tight = rho * (1 - _INSIDE) - 4 * _ROUNDED * (np.abs(a) + np.abs(b) + np.abs(begin) + np.abs(end))  # the check at the end passes
+        moves = way != 0
         # At the time u of the motion, the line's time t is at least low + u rate and at most high + u rate, for every joint that it moves.
         pace = np.where(moves, way, 1.0)
-        size = np.abs(a) + np.abs(b) + np.abs(self._begin[lines]) + np.abs(self._end[lines])
-        tight = rho * (1 - _INSIDE) - 2 * _ROUNDED * size  # so that the ends of the spans pass the check below
         sides = (here - tight) / pace, (here + tight) / pace
         bound = [(np.minimum(*sides), -np.inf, 0.0), (np.maximum(*sides), np.inf, 1.0)]
-        low, high = (np.column_stack([np.where(moves, side, none), np.full(len(lines), end)]) for side, none, end in bound)
+        low, high = (np.column_stack([np.where(moves, side, none), np.full(len(lines), last)]) for side, none, last in bound)
         rate = np.column_stack([np.where(moves, step / pace, 0.0), np.zeros(len(lines))])
         # A joint that rests on the line bounds u alone.
         at_rest = [(np.where(moves, -1.0, sign * here - tight), np.where(moves, 0.0, sign * step)) for sign in (1, -1)]
         against = low[:, :, None] - high[:, None, :], rate[:, :, None] - rate[:, None, :]
         rows = [(alpha.reshape(len(lines), -1), beta.reshape(len(lines), -1)) for alpha, beta in (against, *at_rest)]
-        first, last = _solved(*(np.concatenate(part, axis=1) for part in zip(*rows, strict=True)))
-        spans = np.column_stack([first, last])
-        inside, times = first <= last, np.zeros_like(spans)
-        for k in (0, 1):
-            u = spans[:, k : k + 1]
-            times[:, k] = np.clip(((low + u * rate).max(axis=1) + (high + u * rate).min(axis=1)) / 2, 0.0, 1.0)
-            off = np.abs(here + u * step - times[:, k : k + 1] * way)
-            inside &= (off + _ROUNDED * size <= rho).all(axis=1)
-        return inside, spans, times
+        spans = np.column_stack(_solved(*(np.concatenate(part, axis=1) for part in zip(*rows, strict=True))))
+        ends = a + spans.T[:, :, None] * (b - a)
+        return (spans[:, 0] <= spans[:, 1]) & _within(begin, end, rho, ends)[0].all(axis=0), spans
 
 
 def _solved(alpha: Array, beta: Array) -> tuple[Array, Array]:
@@ -121,23 +122,27 @@ def follows(tube: Tube, path: Array) -> bool:
     """Says whether a path, (k, n) and straight in q between its points, is proved to be in a tube."""
     anywhere = np.full(path.shape[1], np.inf)
     tubes = Tubes((-anywhere, anywhere), [tube])
-    within = _within(tube, path)
+    within, _ = _within(tube.path[:-1], tube.path[1:], np.array(tube.rho), path[:, None])
     between = (within[:-1] & within[1:]).any(axis=1)  # the tube about a line is convex
     return all(_covers(tubes.spans(path[k], path[k + 1])[1]) for k in np.flatnonzero(~between))
 
 
-def _within(tube: Tube, points: Array) -> NDArray[np.bool_]:
-    """Returns which of the points, (K, n), are in the tube about which line of its path, (K, k - 1)."""
-    begin, way = tube.path[:-1], np.diff(tube.path, axis=0)
-    here, moves = points[:, None] - begin, way != 0
+def _within(begin: Array, end: Array, rho: Array, points: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Returns which points are in the tube about which line from ``begin`` to ``end``, (M, n) each, (K, M), and the lines' times, (K, M).
+
+    Args:
+        rho: (M, 1) half the widths, or one for all.
+        points: (K, M, n), or (K, 1, n) for the same points at all lines.
+    """
+    way, here = end - begin, points - begin
+    moves = way != 0
     pace = np.where(moves, way, 1.0)
-    one, other = (here - tube.rho) / pace, (here + tube.rho) / pace
-    low = np.where(moves, np.minimum(one, other), -np.inf).max(axis=2)
-    high = np.where(moves, np.maximum(one, other), np.inf).min(axis=2)
-    times = (np.clip(low, 0.0, 1.0) + np.clip(high, 0.0, 1.0)) / 2
-    size = 2 * np.abs(points)[:, None] + np.abs(begin) + np.abs(tube.path[1:])
-    found: NDArray[np.bool_] = (np.abs(here - times[:, :, None] * way) + _ROUNDED * size <= tube.rho).all(axis=2)
-    return found
+    one, other = (here - rho) / pace, (here + rho) / pace
+    low = np.where(moves, np.minimum(one, other), 0.0).max(axis=2, initial=0.0)
+    high = np.where(moves, np.maximum(one, other), 1.0).min(axis=2, initial=1.0)
+    times = np.clip((low + high) / 2, 0.0, 1.0)
+    size = 2 * np.abs(points) + np.abs(begin) + np.abs(end)
+    return (np.abs(here - times[:, :, None] * way) + _ROUNDED * size <= rho).all(axis=2), times
 
 
 def _covers(spans: Array) -> bool:

@@ -10,9 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from api.schemas.planning import MOTION, REGION, Answer, Distance, MotionId, Near, Piece, Q, RegionId, Uncovered
 from certifier.outcome import Guarantee
 from jobs.fields import Flag, Real, Request, SceneName, Vector
-
-SPEED, ACCELERATION = 1.0, 2.0
-"""Limits of every joint where a request gives none, in rad/s and rad/s² (or m/s and m/s²)."""
+from planner.trajectory.plan import ACCELERATION, SPEED
 
 SECONDS, MOST_SECONDS = 5.0, 50.0
 """How long a motion is searched for where a request does not say, and at most."""

@@ -22,6 +22,26 @@ util.setLogLevel(util.LOG_ERROR)
 util.RNG.setSeed(1)  # the same question has the same answer, as far as time allows
 
 
+def space_of(lower: Array, upper: Array) -> base.RealVectorStateSpace:
+    """Returns OMPL's space of the joint positions between two, (n,) each."""
+    space = base.RealVectorStateSpace()
+    for bounds in zip(lower.tolist(), upper.tolist(), strict=True):
+        space.addDimension(*bounds)
+    return space
+
+
+def state_of(space: base.SpaceInformation, q: Array) -> base.State:
+    """Returns OMPL's state of joint positions, (n,)."""
+    state = space.allocState()
+    state[0 : len(q)] = q.tolist()
+    return state
+
+
+def positions(space: base.SpaceInformation, state: base.State) -> Array:
+    """Returns the joint positions of a state, (n,)."""
+    return np.array(state[0 : space.getStateDimension()])
+
+
 class Search:
     """Searches in the joint space of a scene.
 
@@ -31,13 +51,10 @@ class Search:
     """
 
     def __init__(self, scene: Scene, lower: Array, upper: Array, padding: float = 0.0) -> None:
-        self._bodies, self._n = bodies_of(scene, padding), scene.n
+        self._bodies = bodies_of(scene, padding)
         self._order = np.arange(len(self._bodies.pairs))
-        space = base.RealVectorStateSpace()
-        for bounds in zip(lower.tolist(), upper.tolist(), strict=True):
-            space.addDimension(*bounds)
-        self._space = base.SpaceInformation(space)
-        self._space.setStateValidityChecker(lambda state: self.is_free(self._q(state)))
+        self._space = base.SpaceInformation(space_of(lower, upper))
+        self._space.setStateValidityChecker(lambda state: self.is_free(positions(self._space, state)))
         self._space.setMotionValidator(_Lines(self._space, self))
         self._space.setup()
 
@@ -60,7 +77,7 @@ class Search:
             return np.array([start, goal])
         in_time = base.PlannerTerminationCondition(lambda: time.monotonic() > until)
         asked = base.ProblemDefinition(self._space)
-        asked.setStartAndGoalStates(self._state(start), self._state(goal))
+        asked.setStartAndGoalStates(state_of(self._space, start), state_of(self._space, goal))
         planner = geometric.RRTConnect(self._space)
         planner.setRange(max(STEP, PART * self._space.getMaximumExtent()))
         planner.setProblemDefinition(asked)
@@ -70,17 +87,9 @@ class Search:
             return None
         found = asked.getSolutionPath()
         geometric.PathSimplifier(self._space).simplify(found, in_time)
-        points = np.array([self._q(state) for state in found.getStates()])
+        points = np.array([positions(self._space, state) for state in found.getStates()])
         points[0], points[-1] = start, goal
         return points
-
-    def _state(self, q: Array) -> base.State:
-        state = self._space.allocState()
-        state[0 : self._n] = q.tolist()
-        return state
-
-    def _q(self, state: base.State) -> Array:
-        return np.array(state[0 : self._n])
 
 
 class _Lines(base.MotionValidator):
@@ -88,7 +97,7 @@ class _Lines(base.MotionValidator):
 
     def __init__(self, space: base.SpaceInformation, search: Search) -> None:
         super().__init__(space)
-        self._search = search
+        self._space, self._search = space, search
 
     def checkMotion(self, a: base.State, b: base.State) -> bool:
-        return self._search.sees(self._search._q(a), self._search._q(b))
+        return self._search.sees(positions(self._space, a), positions(self._space, b))

@@ -22,6 +22,8 @@ from planner.overlap import Gap, components, gap
 from planner.trajectory.routes import Links, Route, Terminal, routes
 from planner.trajectory.stretch import stretch
 
+SPEED, ACCELERATION = 1.0, 2.0
+"""Limits of every joint where nobody gives others, in rad/s and rad/s² (or m/s and m/s²)."""
 ROUTES = 5
 """Number of routes for which curves are made; the shortest curve counts."""
 MARGIN = 1e-3

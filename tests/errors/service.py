@@ -110,7 +110,7 @@ def certify(t: Trial, **polytope: Any) -> None:
 
 
 def staged(t: Trial, name: str = "slider", posts: int = 1) -> None:
-    """Stages a slider with so many posts; the present one has two, and a region."""
+    """Stages a slider with this number of posts. The present one has two posts, and a region."""
     t.need("region")
     write(t, lambda session: staging.stage(session, name, slider(posts=posts)))
 

@@ -12,7 +12,7 @@ interface Props {
   touching?: number[];
   /** Configurations at which the links are drawn faintly as well. Give the same array again as long as it does not change. */
   ghosts?: number[][];
-  /** Is told the joint positions while somebody drags a link. */
+  /** Called with the joint positions while a link is dragged. */
   onDrag?: (q: number[]) => void;
 }
 

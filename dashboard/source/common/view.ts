@@ -51,7 +51,7 @@ interface Drawn {
 }
 
 export class View {
-  /** Is told the joint positions while somebody drags a link; null where links cannot be dragged. */
+  /** Called with the joint positions while a link is dragged; null where links cannot be dragged. */
   onDrag: ((q: number[]) => void) | null = null;
   private readonly renderer: three.WebGLRenderer;
   private readonly scene = new three.Scene();

@@ -66,7 +66,7 @@ def test_drake_numbers_s_by_bodies():
 
 
 def posts(count):
-    """A cart on rails along x with an arm of length 1 and a ball at its end, among so many posts around the rails."""
+    """A cart on rails along x with an arm of length 1 and a ball at its end, with this number of posts around the rails."""
     eye = np.eye(4)
     slide = Joint("slide", JointKind.PRISMATIC, "world", "cart", np.array([1.0, 0, 0]), eye, eye, 0, -2.0, 2.0)
     turn = Joint("turn", JointKind.REVOLUTE, "cart", "arm", np.array([0, 0, 1.0]), eye, eye, 1, -2.5, 2.5)
