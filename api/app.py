@@ -16,7 +16,7 @@ from api.access import Keyring
 from api.access_log import AccessLog
 from api.announce import Announcer
 from api.cells import OutlinesKept
-from api.children import AT_ONCE, ChildLimiter, expect_motions
+from api.children import AT_ONCE, ChildLimiter
 from api.libraries import Libraries
 from api.links import LinksKept
 from api.metrics import Requests
@@ -107,7 +107,6 @@ async def _lifespan(_app: FastAPI) -> AsyncIterator[None]:
     """Limits the threads that answer requests. Each has its connection to the database, so more threads would only wait for each other."""
     to_thread.current_default_thread_limiter().total_tokens = THREADS
     expect_bundles()
-    expect_motions()
     yield
 
 

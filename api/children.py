@@ -11,7 +11,7 @@ from anyio import CapacityLimiter, to_thread
 from fastapi import Depends, Request
 
 from certifier.errors import CirisError
-from certifier.isolation.child import prepare, run_in_child
+from certifier.isolation.child import run_in_child
 from certifier.model import Scene
 from db.settings import settings
 
@@ -40,11 +40,6 @@ class ChildLimiter:
         if self._limiter.statistics().tasks_waiting >= WAITING:
             raise CirisError("busy", "too many requests of this kind wait already", hint="try again in a while")
         return await to_thread.run_sync(function, *arguments, limiter=self._limiter)
-
-
-def expect_motions() -> None:
-    """Begins to load what the first question about a motion needs, without waiting."""
-    prepare(f"{MOTIONS}:planned")
 
 
 def about_motions(function: str, scene: Scene, payload: dict[str, Any]) -> Any:
