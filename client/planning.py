@@ -115,8 +115,8 @@ def _goal(args: Namespace, goals: list[list[float] | str]) -> Document:
                 raise CirisError("option", "it is about a pose", field=f"--{name}", hint="give --to-pose, or leave it out")
         return {"goal": goals[0]} if len(goals) == 1 else {"goals": goals}
     numbers = configuration(args.to_pose, "--to-pose")
-    if len(numbers) not in (3, 6):
-        hint = "give x, y and z in metres, then roll, pitch and yaw in radians"
+    if len(numbers) != 6 and not (args.line and len(numbers) == 3):
+        hint = "give x, y and z in metres, then roll, pitch and yaw in radians; x, y and z are enough with --line"
         raise CirisError("option", f"a pose has 6 numbers, not {len(numbers)}", field="--to-pose", hint=hint)
     if args.frame is None:
         raise CirisError("option", "it is not said of which frame the pose is", field="--frame", hint="name a body, such as tool0")

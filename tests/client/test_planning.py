@@ -163,6 +163,7 @@ def test_what_is_wrong_with_the_ends_is_said_in_words(ciris: Ciris, url: str, sc
         (("--to", "0.1", "--to-pose", "0,0,0,0,0,0"), "--to"),
         (("--to", "0.1", "--line"), "--line"),
         (("--to-pose", "0,0,0,0"), "--to-pose"),
+        (("--to-pose", "0,0,0", "--frame", "cart"), "--to-pose"),
         (("--to-pose", "0,0,0,0,0,0"), "--frame"),
         (("--to-pose", "0,0,0,0,0,0", "--frame", "cart", "--tolerance", "0.1"), "--tolerance"),
         (("--to", "0.1", "--to", "0123abcd"), "--to"),
