@@ -14,10 +14,11 @@ import numpy as np
 from benchmarks import catalogue, measure
 from benchmarks.measure import Progress
 from benchmarks.ompl import RESOLUTION, Ompl
-from certifier.collisions.bodies import bodies_of
 from certifier.collisions.free import free_at_all
+from certifier.collisions.seen import seen_of
 from certifier.kinematics import Kinematics
 from certifier.model import Array, Scene
+from certifier.motion.bodies import bodies_of
 from certifier.pair.collisions import in_collision
 from certifier.scene import load_scene
 from ciris.answers import Plan
@@ -86,14 +87,15 @@ def _tasks(scene: Scene, name: str, rng: np.random.Generator) -> list[tuple[Arra
     """Returns pairs of free configurations in narrow places, from each place to the next; none for a scene without tasks."""
     if name not in NARROW:
         return []
-    geometry, bodies, kinematics, order = scene.geometry(FINGER), bodies_of(scene), Kinematics.of(scene), np.arange(len(scene.pairs))
+    geometry, kinematics = scene.geometry(FINGER), Kinematics.of(scene)
+    known, order = (bodies_of(scene), seen_of(scene)), np.arange(len(scene.pairs))
     found: dict[str, list[Array]] = {place: [] for place in NARROW[name]}
     while min(map(len, found.values())) < TASKS:
         q = rng.uniform(scene.q_lower, scene.q_upper, (DRAWN, scene.n))
         at = kinematics.points("world", geometry.body, geometry.vertices, scene.to_s(q))
         for place, (least, largest) in NARROW[name].items():
             inside = q[((at >= np.array(least)) & (at <= np.array(largest))).all(axis=(1, 2))]
-            found[place] += list(inside[free_at_all(bodies, inside, order)])
+            found[place] += list(inside[free_at_all(*known, inside, order)])
     places = list(found.values())
     return [(places[i % len(places)][i], places[(i + 1) % len(places)][i]) for i in range(TASKS)]
 

@@ -418,7 +418,7 @@ class LibraryRow(Base):
 
 
 class MotionRow(Owned, Base):
-    """A motion that was planned in a scene and proved, with a tube about it. ``proof_digest`` names the proof."""
+    """A motion that was planned in a scene and proved, with a tube about it. ``proof_digest`` names the proof, without the scene."""
 
     __tablename__ = "motions"
     __table_args__ = (UniqueConstraint("scene_id", "number"), _proofs_of("motions"))

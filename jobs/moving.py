@@ -49,4 +49,4 @@ def keep(db: Database, scene_id: str, found: dict[str, Any], limits: dict[str, A
     """
     arrays = {name: found[name] for name in ("path", "q", "t")} | limits
     with db.write() as session:
-        return motions.add(session, scene_id, arrays, found["tube"], base64.b64decode(found["proof"]), settings().kept_motions).id
+        return motions.add(session, scene_id, arrays, found["tube"], base64.b64decode(found["planes"]), settings().kept_motions).id

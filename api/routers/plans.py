@@ -14,7 +14,8 @@ from api.links import KeptLinks
 from api.motions import KeptMotions
 from api.schemas.planning import MOTION
 from api.schemas.plans import PlanRequest, PlanResponse
-from db import motions, proofs
+from certifier.proof.container import with_scene
+from db import motions, proofs, scenes
 
 router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ])
 
@@ -38,6 +39,7 @@ def download_kept_proof(
     """Returns the proof of a motion that the service keeps: of the path in whose tube it is. `ciris verify` checks the file offline."""
     with db.read() as session:
         motion = motions.get(session, motion_id)
-        data = proofs.get(session, motion.proof_digest)
+        planes = proofs.get(session, motion.proof_digest)
+    data = with_scene(planes, scenes.load(db, motion.scene_id))
     headers = {"Content-Disposition": f'attachment; filename="{motion.id}.proof"'}
     return Response(data, media_type="application/octet-stream", headers=headers)

@@ -12,8 +12,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from certifier.collisions.bodies import Bodies
+from certifier.collisions.seen import Seen
 from certifier.model import Array
+from certifier.motion.bodies import Bodies, place, place_links
 from certifier.motion.nearest import separation
 
 CLOSE = 1e-6
@@ -23,38 +24,9 @@ _FIRST = np.array([1.0, 0.5, 0.25, 0.75])
 
 
 @njit(cache=True)
-def place_links(bodies: Bodies, q: Array, R: Array, p: Array) -> None:
-    """Fills in the links' rotations R, (L, 3, 3), and positions p, (L, 3), in the world at joint positions q, (n,)."""
-    R[0] = np.eye(3)
-    p[0] = 0.0
-    X = np.empty((3, 3))
-    for link in range(1, len(bodies.parents)):
-        parent, value, u = bodies.parents[link], q[bodies.joints[link]], bodies.axes[link]
-        fixed, offset = bodies.rotations[link], bodies.offsets[link]
-        for i in range(3):
-            a, b, d = R[parent, i, 0], R[parent, i, 1], R[parent, i, 2]
-            p[link, i] = p[parent, i] + a * offset[0] + b * offset[1] + d * offset[2]
-            for j in range(3):
-                X[i, j] = a * fixed[0, j] + b * fixed[1, j] + d * fixed[2, j]
-        if bodies.slides[link]:
-            for i in range(3):
-                p[link, i] += value * (X[i, 0] * u[0] + X[i, 1] * u[1] + X[i, 2] * u[2])
-                for j in range(3):
-                    R[link, i, j] = X[i, j]
-        else:
-            c, s = np.cos(value), np.sin(value)
-            x, y, z, v = u[0], u[1], u[2], 1.0 - c
-            for i in range(3):
-                a, b, d = X[i, 0], X[i, 1], X[i, 2]
-                R[link, i, 0] = a * (c + v * x * x) + b * (v * x * y + s * z) + d * (v * x * z - s * y)
-                R[link, i, 1] = a * (v * x * y - s * z) + b * (c + v * y * y) + d * (v * y * z + s * x)
-                R[link, i, 2] = a * (v * x * z + s * y) + b * (v * y * z - s * x) + d * (c + v * z * z)
-
-
-@njit(cache=True)
-def _far(bodies: Bodies, pair: int, R: Array, p: Array, more: float) -> bool:
+def _far(bodies: Bodies, seen: Seen, pair: int, R: Array, p: Array, more: float) -> bool:
     """Says whether the balls around a pair's geometries are more than ``more`` metres apart."""
-    a, b = bodies.pairs[pair, 0], bodies.pairs[pair, 1]
+    a, b = seen.pairs[pair, 0], seen.pairs[pair, 1]
     here, there = bodies.links[a], bodies.links[b]
     square = 0.0
     for i in range(3):
@@ -62,42 +34,25 @@ def _far(bodies: Bodies, pair: int, R: Array, p: Array, more: float) -> bool:
         for k in range(3):
             apart += R[here, i, k] * bodies.centers[a, k] - R[there, i, k] * bodies.centers[b, k]
         square += apart * apart
-    least = bodies.sizes[a] + bodies.sizes[b] + bodies.reaches[pair] + more
+    least = bodies.sizes[a] + bodies.sizes[b] + seen.reaches[pair] + more
     return square > least * least
 
 
 @njit(cache=True)
-def _place(bodies: Bodies, pair: int, R: Array, p: Array, points: Array) -> None:
-    """Fills in where the vertices of b are in the frame of the link of a, (W, 3)."""
-    a, b = bodies.pairs[pair, 0], bodies.pairs[pair, 1]
-    here, there, begin = bodies.links[a], bodies.links[b], bodies.first[b]
-    Q, t = np.empty((3, 3)), np.empty(3)
-    for i in range(3):
-        t[i] = 0.0
-        for k in range(3):
-            t[i] += R[here, k, i] * (p[there, k] - p[here, k])
-            Q[i, k] = R[here, 0, i] * R[there, 0, k] + R[here, 1, i] * R[there, 1, k] + R[here, 2, i] * R[there, 2, k]
-    for v in range(len(points)):
-        x, y, z = bodies.vertices[begin + v, 0], bodies.vertices[begin + v, 1], bodies.vertices[begin + v, 2]
-        for i in range(3):
-            points[v, i] = Q[i, 0] * x + Q[i, 1] * y + Q[i, 2] * z + t[i]
-
-
-@njit(cache=True)
-def _distance(bodies: Bodies, pair: int, R: Array, p: Array) -> float:
+def _distance(bodies: Bodies, seen: Seen, pair: int, R: Array, p: Array) -> float:
     """Returns how far a pair's padded bodies are apart, metres; 0 or less where they touch."""
-    a, b = bodies.pairs[pair, 0], bodies.pairs[pair, 1]
+    a, b = seen.pairs[pair, 0], seen.pairs[pair, 1]
     points = np.empty((bodies.first[b + 1] - bodies.first[b], 3))
-    _place(bodies, pair, R, p, points)
-    return separation(bodies.vertices[bodies.first[a] : bodies.first[a + 1]], points, np.empty(3)) - bodies.reaches[pair]
+    place(bodies, b, bodies.links[a], R, p, points)
+    return separation(bodies.vertices[bodies.first[a] : bodies.first[a + 1]], points, np.empty(3)) - seen.reaches[pair]
 
 
 @njit(cache=True)
-def _touches(bodies: Bodies, q: Array, R: Array, p: Array, order: np.ndarray) -> bool:
+def _touches(bodies: Bodies, seen: Seen, q: Array, R: Array, p: Array, order: np.ndarray) -> bool:
     """Says whether a pair touches at q, whose links' poses are filled in. A pair that does comes first in ``order``."""
     place_links(bodies, q, R, p)
     for k in range(len(order)):
-        if not _far(bodies, order[k], R, p, 0.0) and _distance(bodies, order[k], R, p) <= 0.0:
+        if not _far(bodies, seen, order[k], R, p, 0.0) and _distance(bodies, seen, order[k], R, p) <= 0.0:
             _to_front(order, k)
             return True
     return False
@@ -112,28 +67,28 @@ def _to_front(order: np.ndarray, k: int) -> None:
 
 
 @njit(cache=True)
-def free_at(bodies: Bodies, q: Array, order: np.ndarray) -> bool:
+def free_at(bodies: Bodies, seen: Seen, q: Array, order: np.ndarray) -> bool:
     """Says whether no pair touches at joint positions q, (n,).
 
     Args:
         order: (P,) the pairs in the order in which they are looked at. One that touches is moved to the front.
     """
     links = len(bodies.parents)
-    return not _touches(bodies, q, np.empty((links, 3, 3)), np.empty((links, 3)), order)
+    return not _touches(bodies, seen, q, np.empty((links, 3, 3)), np.empty((links, 3)), order)
 
 
 @njit(cache=True)
-def free_at_all(bodies: Bodies, q: Array, order: np.ndarray) -> np.ndarray:
+def free_at_all(bodies: Bodies, seen: Seen, q: Array, order: np.ndarray) -> np.ndarray:
     """Says at which of the joint positions q, (N, n), no pair touches; (N,). For ``order`` see :func:`free_at`."""
     links = len(bodies.parents)
     R, p, found = np.empty((links, 3, 3)), np.empty((links, 3)), np.empty(len(q), dtype=np.bool_)
     for i in range(len(q)):
-        found[i] = not _touches(bodies, q[i], R, p, order)
+        found[i] = not _touches(bodies, seen, q[i], R, p, order)
     return found
 
 
 @njit(cache=True)
-def free_along(bodies: Bodies, q0: Array, q1: Array, order: np.ndarray, close: float) -> bool:
+def free_along(bodies: Bodies, seen: Seen, q0: Array, q1: Array, order: np.ndarray, close: float) -> bool:
     """Says whether no pair touches on the straight line in q from q0 to q1, (n,) each.
 
     Args:
@@ -143,7 +98,7 @@ def free_along(bodies: Bodies, q0: Array, q1: Array, order: np.ndarray, close: f
     links, way = len(bodies.parents), q1 - q0
     middle, middle_p = np.empty((links, 3, 3)), np.empty((links, 3))
     for time in _FIRST:
-        if _touches(bodies, q0 + time * way, middle, middle_p, order):
+        if _touches(bodies, seen, q0 + time * way, middle, middle_p, order):
             return False
     start, start_p, end, end_p = np.empty((links, 3, 3)), np.empty((links, 3)), np.empty((links, 3, 3)), np.empty((links, 3))
     place_links(bodies, q0, start, start_p)
@@ -153,22 +108,23 @@ def free_along(bodies: Bodies, q0: Array, q1: Array, order: np.ndarray, close: f
     normal, other, stack = np.empty(3), np.empty(3), np.empty(64)
     for k in range(len(order)):
         pair = order[k]
-        moved, bent = _bounds(bodies, pair, way)
-        if _far(bodies, pair, middle, middle_p, moved / 2.0):
+        moved, bent = _bounds(seen, pair, way)
+        if _far(bodies, seen, pair, middle, middle_p, moved / 2.0):
             continue
-        a, b, reach = bodies.pairs[pair, 0], bodies.pairs[pair, 1], bodies.reaches[pair]
+        a, b, reach = seen.pairs[pair, 0], seen.pairs[pair, 1], seen.reaches[pair]
         A, W = bodies.vertices[bodies.first[a] : bodies.first[a + 1]], bodies.first[b + 1] - bodies.first[b]
+        frame = bodies.links[a]
         B = np.empty((2 * W, 3))  # first where b is at the beginning of an interval, then where it is at the end
-        _place(bodies, pair, start, start_p, B[:W])
+        place(bodies, b, frame, start, start_p, B[:W])
         t0, top = 0.0, 1
         stack[0] = 1.0
         while top:
             t1 = stack[top - 1]
             if t1 == 1.0:
-                _place(bodies, pair, end, end_p, B[W:])
+                place(bodies, b, frame, end, end_p, B[W:])
             else:
                 place_links(bodies, q0 + t1 * way, R, p)
-                _place(bodies, pair, R, p, B[W:])
+                place(bodies, b, frame, R, p, B[W:])
             if separation(A, B, normal) > reach + (t1 - t0) ** 2 / 8.0 * bent:
                 B[:W] = B[W:]
                 t0, top = t1, top - 1
@@ -182,15 +138,15 @@ def free_along(bodies: Bodies, q0: Array, q1: Array, order: np.ndarray, close: f
 
 
 @njit(cache=True)
-def _bounds(bodies: Bodies, pair: int, way: Array) -> tuple[float, float]:
-    """Returns bounds of the speed and the acceleration of the vertices of b in the link of a on a line, metres."""
+def _bounds(seen: Seen, pair: int, way: Array) -> tuple[float, float]:
+    """Returns bounds of the speed and the acceleration of the vertices that move on a line, metres."""
     moved, bent, turning = 0.0, 0.0, 0.0
-    for c in range(bodies.begins[pair], bodies.begins[pair + 1]):
-        rate = abs(way[bodies.chains[c]])
-        moved += bodies.levers[c] * rate
-        if bodies.sliding[c]:
+    for c in range(seen.begins[pair], seen.begins[pair + 1]):
+        rate = abs(way[seen.joints[c]])
+        moved += seen.levers[c] * rate
+        if seen.slides[c]:
             bent += 2.0 * turning * rate
         else:
-            bent += bodies.levers[c] * rate * (rate + 2.0 * turning)
+            bent += seen.levers[c] * rate * (rate + 2.0 * turning)
             turning += rate
     return moved, bent

@@ -6,6 +6,7 @@ import base64
 import json
 import time
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from certifier.outcome import Guarantee, Outcome
 from certifier.proof.container import with_scene
 from certifier.proof.motion import Motion, MotionProof, Space
 from certifier.verify import uncovered
-from certifier.verify.motion import MotionStatement, verify_motion
+from certifier.verify.motion import MotionStatement, MotionVerifier
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class MotionVerdict:
 
     Attributes:
         statement: what is proved of the motion, or of its beginning; None where nothing is.
-        proof: the file that proves it, with the scene; None where there is none.
+        planes: the file that proves it, without the scene; None where there is none.
         stop: where the motion first touches or comes too close; None where all of it is certified.
         nearest: where the padded bodies come closest, where the statement's gap is a tight bound of this; None where nobody asked, where
             there is a stop, and where it takes too many intervals.
@@ -41,13 +42,18 @@ class MotionVerdict:
     scene: Scene
     motion: Motion
     statement: MotionStatement | None
-    proof: bytes | None
+    planes: bytes | None
     stop: Stop | None
     nearest: Approach | None
     padding: float
     intervals: int
     seconds: float
     verify_seconds: float
+
+    @property
+    def proof(self) -> bytes | None:
+        """Returns the file that proves it, with the scene."""
+        return None if self.planes is None else with_scene(self.planes, self.scene)
 
     @property
     def outcome(self) -> Outcome:
@@ -108,13 +114,18 @@ def certify(scene: Scene, motion: Motion, tube: bool = False, padding: float = 0
     if found.proof is None:
         return MotionVerdict(scene, motion, None, None, found.stop, None, padding, 0, searched - start, 0.0)
     data = found.proof.to_bytes()
-    statement = verify_motion(MotionProof.from_bytes(data, scene))
+    statement = _verifier(scene).verify(MotionProof.from_bytes(data, scene))
     if statement.gap < 2 * padding:
         problem = f"the proof shows that the bodies are {statement.gap} m apart, and the padding of the request asks for {2 * padding} m"
         raise ProofError("proof_motion", problem, field="padding", hint="ask for a little less")
     verified = time.perf_counter()
-    proof, intervals, seconds = with_scene(data, scene), len(found.proof.ends), (verified - start, verified - searched)
-    return MotionVerdict(scene, motion, statement, proof, found.stop, found.nearest, padding, intervals, *seconds)
+    seconds = verified - start, verified - searched
+    return MotionVerdict(scene, motion, statement, data, found.stop, found.nearest, padding, len(found.proof.ends), *seconds)
+
+
+@lru_cache(maxsize=4)
+def _verifier(scene: Scene) -> MotionVerifier:
+    return MotionVerifier(scene)
 
 
 def keep(text: str) -> Scene:
@@ -135,8 +146,8 @@ def certify_in_child(payload: dict[str, Any], scene: Scene) -> dict[str, Any]:
     motion = motion_of(scene, payload, Space(payload["space"]) if payload["space"] else None)
     padding = padding_of(payload.get("padding", 0.0))
     verdict = certify(scene, motion, payload["tube"], padding, payload.get("clearance", False))
-    proof = base64.b64encode(verdict.proof).decode() if verdict.proof and payload["prove"] else None
-    return {**verdict.document(), "proof": proof}
+    proof = verdict.proof if payload["prove"] else None
+    return {**verdict.document(), "proof": proof and base64.b64encode(proof).decode()}
 
 
 def swing() -> Scene:

@@ -1,4 +1,4 @@
-"""The closest approach of a pair along a motion: a compiled branch and bound over intervals of time.
+"""The closest approach of the pairs along a motion: a compiled branch and bound over intervals of time.
 
 Nothing here is trusted: the search looks for planes that prove nearly as large a distance, and the verifier checks them.
 """
@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from certifier.model import Array
-from certifier.motion.chains import Side
-from certifier.motion.intervals import NARROWEST, RESOLUTION, acceleration, bound_rates, evaluate, gap_along, moved, place, positions
+from certifier.motion.curve import bound_rates
+from certifier.motion.intervals import NARROWEST, RESOLUTION, Ground, apart_at_first, gap_along, see, sizes, widening
 from certifier.motion.nearest import separation
+from certifier.motion.views import acceleration, moved
 
 SHARE, METRES = 0.1, 1e-4
 """A clearance is proved to this part of itself, and to this many metres, whichever is less."""
@@ -28,63 +28,60 @@ def proved_of(distance: float) -> float:
 
 
 @njit(cache=True)
-def approach(
-    a: Side,
-    b: Side,
-    controls: Array,
-    hulls: Array,
-    inexact: tuple[float, float],
-    turns: Array,
-    q_star: Array,
-    reach: float,
-    rho: float,
-    least: float,
-) -> tuple[float, int, float]:
-    """Returns the least distance of the padded bodies along a motion, less what a tube takes of it, or ``least`` if it is less.
+def closest(ground: Ground, rho: float) -> tuple[float, int, int, float, float]:
+    """Returns the least distance of padded bodies along a motion, less what a tube takes of it, in metres.
+
+    Args:
+        rho: the tube, radians or metres.
+
+    Returns:
+        the distance; the pair, the piece and the time where it occurs, with a piece of -1 where no pair is; and what the tube takes of it.
+        No distance is less than :func:`proved_of` it, but for rounding.
+    """
+    first = np.array([apart_at_first(ground, pair) for pair in range(len(ground.chosen))])
+    least, nearest, where, when, taken = np.inf, -1, -1, 0.0, 0.0
+    for pair in np.argsort(first):
+        found, piece, time = _closest(ground, pair, rho, least)
+        if piece >= 0:
+            least, nearest, where, when, taken = found, pair, piece, time, rho * widening(ground, pair)
+    return least, nearest, where, when, taken
+
+
+@njit(cache=True)
+def _closest(ground: Ground, pair: int, rho: float, least: float) -> tuple[float, int, float]:
+    """Returns the least distance of a pair along a motion, less what a tube takes of it, or ``least`` if it is less.
 
     An interval is left aside where a plane shows a little more than :func:`proved_of` the least distance that is known. Otherwise it is
     halved.
 
-    Args:
-        controls, hulls, inexact, turns, q_star, reach, rho: as for certifier.motion.intervals.divide.
-        least: metres; what is not less is of no interest.
-
     Returns:
-        the distance in metres, and the piece and the time where it occurs; the piece is -1 where it is ``least``. No distance is less than
-        :func:`proved_of` it, but for rounding.
+        the distance in metres, and the piece and the time where it occurs; the piece is -1 where it is ``least``.
     """
-    n, V, W = controls.shape[2], len(a.vertices), len(b.vertices)
+    views, curve, levers = ground.views, ground.curve, ground.levers
+    side_a, side_b = views.sides[ground.chosen[pair]]
+    n, (V, W) = curve.controls.shape[2], sizes(ground.bodies, pair)
     # The vertices of the interval's beginning come first, then those of its end.
-    A, B, X, Y = np.empty((2 * V, 3)), np.empty((2 * W, 3)), np.empty((3, 4)), np.empty((3, 4))
+    A, B = np.empty((2 * V, 3)), np.empty((2 * W, 3))
     q, rates, changes, normal, other, stack = np.empty(n), np.empty(n), np.empty(n), np.zeros(3), np.empty(3), np.empty(64)
     here, there = np.empty((3, n)), np.empty((3, n))
+    taken = ground.bodies.reaches[pair] + rho * widening(ground, pair)
     where, when = -1, 0.0
-    for piece in range(len(controls)):
+    for piece in range(len(curve.controls)):
         t0, top = 0.0, 1
         stack[0] = 1.0
-        taken = reach
-        for side in (a, b):
-            for k in range(len(side.chain.joints)):
-                taken += rho * side.levers[piece, k]
-        evaluate(controls[piece], 0.0, here)
-        positions(here[0], turns, q_star, q)
-        place(a, q, X, Y, A[:V])
-        place(b, q, X, Y, B[:W])
+        see(ground, pair, piece, 0.0, here, q, A[:V], B[:W])
         while top:
             t1 = stack[top - 1]
-            evaluate(controls[piece], t1, there)
-            positions(there[0], turns, q_star, q)
-            place(a, q, X, Y, A[V:])
-            place(b, q, X, Y, B[W:])
-            bound_rates(here, there, hulls[piece], t1 - t0, inexact, turns, rates, changes)
-            bent = acceleration(a, a.levers[piece], rates, changes) + acceleration(b, b.levers[piece], rates, changes)
+            see(ground, pair, piece, t1, there, q, A[V:], B[W:])
+            bound_rates(curve, piece, here, there, t1 - t0, rates, changes)
+            bent = acceleration(views, side_a, levers, rates, changes) + acceleration(views, side_b, levers, rates, changes)
             need = taken + (t1 - t0) ** 2 / 8.0 * bent + proved_of(least) + ROOM
             settled = gap_along(normal, A, B) > need or separation(A, B, normal) > need
             if not settled:
                 now, then = separation(A[:V], B[:W], other) - taken, separation(A[V:], B[W:], other) - taken
                 if min(now, then) < least:
                     where, when, least = piece, t0 if now < then else t1, min(now, then)
-                reached = moved(a, a.levers[piece], rates) + moved(b, b.levers[piece], rates)
+                reached = moved(views, side_a, levers, rates) + moved(views, side_b, levers, rates)
                 settled = t1 - t0 <= NARROWEST or (t1 - t0) * reached <= RESOLUTION
             if settled:
                 A[:V] = A[V:]

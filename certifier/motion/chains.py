@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from certifier.kinematics import Kinematics, rigid_inverse
-from certifier.model import Array, Geometry, JointKind
+from certifier.model import Array, JointKind
 
 
 class Chain(NamedTuple):
@@ -31,20 +31,21 @@ class Chain(NamedTuple):
     slides: np.ndarray
 
 
-class Side(NamedTuple):
-    """A side is one body of a pair, as its planes' frame sees it.
+class Lengths(NamedTuple):
+    """Holds the lengths on a chain, in metres, from which levers follow.
 
     Attributes:
-        chain: from the planes' frame to the body.
-        vertices: (V, 3) metres in the body's frame.
-        levers: (P, m) for every piece of the motion, how far a vertex can be from each joint's axis at most, in metres; 1 for a
-            prismatic joint. A change of the joint's position moves no vertex farther than by the lever times the change.
-        size: metres, the sum of all lengths on the way from the frame to a vertex: what rounding is a part of.
+        offsets: (m,) of the fixed pose before each joint.
+        across: (m,) of the part of it that is across the axis of the joint before; 0 for the first joint.
+        tail: how far a vertex is from the origin of the last joint's frame at most.
+        tail_across: how far a vertex is from the last joint's axis at most; 0 where there is no joint.
+        size: the sum of all lengths on the way from the frame to a vertex, but for what prismatic joints add.
     """
 
-    chain: Chain
-    vertices: Array
-    levers: Array
+    offsets: Array
+    across: Array
+    tail: float
+    tail_across: float
     size: float
 
 
@@ -75,46 +76,41 @@ def chain(kinematics: Kinematics, frame: str, body: str) -> Chain:
     )
 
 
-def side(chain: Chain, geometry: Geometry, reaches: Array) -> Side:
-    """Returns a geometry's side.
+def lengths(chain: Chain, vertices: Array) -> Lengths:
+    """Returns the lengths on a chain to vertices, (V, 3) metres in the body's frame."""
+    offsets, across = np.linalg.norm(chain.offsets, axis=1), np.zeros(len(chain.joints))
+    across[1:] = np.linalg.norm(np.cross(chain.axes[:-1], chain.offsets[1:-1]), axis=1)
+    tails = vertices @ chain.rotations[-1].T + chain.offsets[-1]
+    return Lengths(
+        offsets[:-1],
+        across,
+        float(np.linalg.norm(tails, axis=1).max()),
+        float(np.linalg.norm(np.cross(chain.axes[-1], tails), axis=1).max()) if len(across) else 0.0,
+        float(offsets.sum() + np.linalg.norm(vertices, axis=1).max()),
+    )
+
+
+@njit(cache=True)
+def fill_levers(
+    joints: np.ndarray, slides: np.ndarray, offsets: Array, across: Array, tail: float, tail_across: float, reaches: Array, levers: Array
+) -> float:
+    """Fills in the levers of a chain, (m,), and returns how far its prismatic joints slide together at most, metres.
+
+    A lever says how far a vertex can be from a joint's axis at most, in metres, and is 1 for a prismatic joint. A change of the joint's
+    position moves no vertex farther than by the lever times the change.
 
     Args:
-        reaches: (P, n) for every piece, how far each joint's position is from 0 at most.
+        joints, slides: of the chain.
+        offsets, across, tail, tail_across: its lengths.
+        reaches: (n,) how far each joint's position is from 0 at most.
     """
-    vertices = np.ascontiguousarray(geometry.vertices)
-    levers = np.ones((len(reaches), len(chain.joints)))
-    return Side(chain, vertices, levers, _measure(chain, vertices, reaches, levers))
-
-
-@njit(cache=True)
-def _measure(chain: Chain, vertices: Array, reaches: Array, levers: Array) -> float:
-    """Fills in the levers of revolute joints and returns the size of a side."""
-    m, longest, across, size = len(chain.joints), 0.0, 0.0, 0.0
-    for v in range(len(vertices)):
-        tail = chain.rotations[m] @ vertices[v] + chain.offsets[m]
-        longest = max(longest, _length(tail))
-        size = max(size, _length(vertices[v]))
-        if m:
-            across = max(across, _length(np.cross(chain.axes[m - 1], tail)))
-    for k in range(m + 1):
-        size += _length(chain.offsets[k])
-    farthest = 0.0
-    for piece in range(len(reaches)):
-        # Behind a joint come a fixed offset, of which only the part across the axis counts, and what is behind the next joint.
-        lever, behind, slid = across, longest, 0.0
-        for k in range(m - 1, -1, -1):
-            if chain.slides[k]:
-                behind += reaches[piece, chain.joints[k]]
-                slid += reaches[piece, chain.joints[k]]
-            else:
-                levers[piece, k] = lever
-            if k:
-                lever = _length(np.cross(chain.axes[k - 1], chain.offsets[k])) + behind
-            behind += _length(chain.offsets[k])
-        farthest = max(farthest, slid)
-    return size + farthest
-
-
-@njit(cache=True)
-def _length(p: Array) -> float:
-    return np.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+    # Behind a joint come a fixed offset, of which only the part across the axis counts, and what is behind the next joint.
+    lever, behind, slid = tail_across, tail, 0.0
+    for k in range(len(joints) - 1, -1, -1):
+        levers[k] = 1.0 if slides[k] else lever
+        if slides[k]:
+            behind += reaches[joints[k]]
+            slid += reaches[joints[k]]
+        lever = across[k] + behind
+        behind += offsets[k]
+    return slid

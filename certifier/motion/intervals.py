@@ -1,16 +1,20 @@
-"""The search for planes of one pair: compiled loops over intervals of time that are halved until one plane is enough for each.
+"""The search for planes: compiled loops over the pairs, and for each over intervals of time, halved until one plane is enough for each.
 
 Nothing here is trusted: the verifier checks the planes (certifier.verify.motion).
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
 from certifier.model import Array
-from certifier.motion.chains import Side
+from certifier.motion.bodies import Bodies, place
+from certifier.motion.curve import Curve, Poses, bound_rates, evaluate, pose
 from certifier.motion.nearest import separation
+from certifier.motion.views import Views, acceleration, moved
 
 DONE, CONTACT, NARROW, MANY = range(4)
 """How the search for a pair ends: it is apart all along; it touches; an interval is too narrow to be halved; there are too many."""
@@ -20,114 +24,55 @@ NARROWEST = 2.0**-40
 """No interval is narrower than this part of its piece."""
 SHRINK = 0.98
 """A tube is this part of what the bodies' distance allows, so that intervals need not become too short."""
+ROUNDED = 2.0**-41
+"""The planes leave this part of the bodies' sizes, for every joint and two more, for what the verifier rounds."""
+_FIRST = 1 << 10
+"""At first there is room for this many intervals of all pairs."""
 
 
-@njit(cache=True)
-def place(side: Side, q: Array, X: Array, Y: Array, points: Array) -> None:
-    """Fills in where the vertices are in the planes' frame, (V, 3), at positions q; X and Y, (3, 4), are overwritten."""
-    chain = side.chain
-    X[:, :3], X[:, 3] = chain.rotations[0], chain.offsets[0]
-    for k in range(len(chain.joints)):
-        u, value = chain.axes[k], q[chain.joints[k]]
-        if chain.slides[k]:
-            for i in range(3):
-                X[i, 3] += value * (X[i, 0] * u[0] + X[i, 1] * u[1] + X[i, 2] * u[2])
-        else:
-            c, s = np.cos(value), np.sin(value)
-            x, y, z, v = u[0], u[1], u[2], 1.0 - c
-            for i in range(3):
-                a, b, d = X[i, 0], X[i, 1], X[i, 2]
-                X[i, 0] = a * (c + v * x * x) + b * (v * x * y + s * z) + d * (v * x * z - s * y)
-                X[i, 1] = a * (v * x * y - s * z) + b * (c + v * y * y) + d * (v * y * z + s * x)
-                X[i, 2] = a * (v * x * z + s * y) + b * (v * y * z - s * x) + d * (c + v * z * z)
-        R, p = chain.rotations[k + 1], chain.offsets[k + 1]
-        for i in range(3):
-            a, b, d = X[i, 0], X[i, 1], X[i, 2]
-            X[i, 3] += a * p[0] + b * p[1] + d * p[2]
-            for j in range(3):
-                Y[i, j] = a * R[0, j] + b * R[1, j] + d * R[2, j]
-        X[:, :3] = Y[:, :3]
-    for v in range(len(side.vertices)):
-        p = side.vertices[v]
-        for i in range(3):
-            points[v, i] = X[i, 0] * p[0] + X[i, 1] * p[1] + X[i, 2] * p[2] + X[i, 3]
+class Ground(NamedTuple):
+    """Holds what all pairs share in the search for planes of a motion.
 
-
-@njit(cache=True)
-def acceleration(side: Side, levers: Array, rates: Array, changes: Array) -> float:
-    """Returns a bound of every vertex' acceleration, in metres, for bounds of the joints' rates and of the rates' changes, (n,)."""
-    chain, turning, total = side.chain, 0.0, 0.0
-    for k in range(len(chain.joints)):
-        rate = rates[chain.joints[k]]
-        if chain.slides[k]:
-            total += 2.0 * turning * rate + changes[chain.joints[k]]
-        else:
-            total += levers[k] * (rate * (rate + 2.0 * turning) + changes[chain.joints[k]])
-            turning += rate
-    return total
-
-
-@njit(cache=True)
-def moved(side: Side, levers: Array, rates: Array) -> float:
-    """Returns how far joints that move by this much, (n,), move a vertex at most."""
-    total = 0.0
-    for k in range(len(side.chain.joints)):
-        total += levers[k] * rates[side.chain.joints[k]]
-    return total
-
-
-@njit(cache=True)
-def positions(coordinates: Array, turns: Array, q_star: Array, q: Array) -> None:
-    """Fills in the joint positions that coordinates, (n,), stand for.
-
-    Args:
-        turns: (n,) whether the coordinate is the tangent of half an angle from q*.
-        q_star: (n,) 0 for a motion in q.
+    Attributes:
+        levers, lengths: of the views (certifier.motion.views.levers_of).
+        chosen: (P,) the choice of every pair, in whose frame its planes are constant.
     """
-    for i in range(len(q)):
-        q[i] = q_star[i] + (2.0 * np.arctan(coordinates[i]) if turns[i] else coordinates[i])
+
+    bodies: Bodies
+    views: Views
+    curve: Curve
+    poses: Poses
+    levers: Array
+    lengths: Array
+    chosen: np.ndarray
 
 
-@njit(cache=True)
-def evaluate(controls: Array, time: float, at: Array) -> None:
-    """Fills in the coordinates, their rates and the rates' changes, (3, n), at a time of a piece, (m + 1, n). Source: de Casteljau."""
-    m, steps = len(controls) - 1, np.empty(len(controls))
-    for i in range(controls.shape[1]):
-        at[2, i] = 0.0
-        for k in range(m + 1):
-            steps[k] = controls[k, i]
-        for left in range(m, 0, -1):
-            if left == 2:
-                at[2, i] = m * (m - 1) * ((steps[2] - steps[1]) - (steps[1] - steps[0]))
-            elif left == 1:
-                at[1, i] = m * (steps[1] - steps[0])
-            for k in range(left):
-                steps[k] += time * (steps[k + 1] - steps[k])
-        at[0, i] = steps[0]
+class Planes(NamedTuple):
+    """Holds I intervals with a plane each, one after the other.
 
-
-@njit(cache=True)
-def bound_rates(
-    here: Array, there: Array, hull: Array, width: float, inexact: tuple[float, float], turns: Array, rates: Array, changes: Array
-) -> None:
-    """Fills in bounds of |dq/dt| and |d2q/dt2| in an interval of a piece; for tangents of half angles, q = q* + 2 atan(x).
-
-    Args:
-        here, there: (3, n) as :func:`evaluate` fills them in, at both ends of the interval.
-        hull: (4, n) bounds of the first four derivatives on the whole piece.
-        inexact: what the verifier adds to rates and to changes for what they may be wrong by.
+    Attributes:
+        ends: (I,) the times at which they end.
+        normals: (I, 3) unit vectors from b to a.
     """
-    bulge = width * width / 8.0
-    for i in range(len(rates)):
-        rate = min(hull[0, i], max(abs(here[1, i]), abs(there[1, i])) + bulge * hull[2, i] + inexact[0])
-        change = min(hull[1, i], max(abs(here[2, i]), abs(there[2, i])) + bulge * hull[3, i] + inexact[1])
-        rates[i], changes[i] = rate, change
-        if turns[i]:
-            x0, x1, off = here[0, i], there[0, i], bulge * change
-            least = 0.0 if x0 * x1 <= 0.0 else max(0.0, min(abs(x0), abs(x1)) - off)
-            norm = 1.0 + least * least
-            rates[i] = 2.0 * rate / norm
-            changes[i] = 2.0 * change / norm + 4.0 * rate * rate * (max(abs(x0), abs(x1)) + off) / (norm * norm)
+
+    ends: Array
+    normals: Array
+
+
+class End(NamedTuple):
+    """Says how the search for a pair ends.
+
+    Attributes:
+        piece, t0, t1: the piece where it does, and the beginning and the end of the interval there.
+        distance: how far the padded bodies are apart beyond what they have to, in metres, at the beginning or, for a contact, where they
+            touch.
+    """
+
+    how: int
+    piece: int
+    t0: float
+    t1: float
+    distance: float
 
 
 @njit(cache=True)
@@ -142,109 +87,210 @@ def gap_along(normal: Array, A: Array, B: Array) -> float:
 
 
 @njit(cache=True)
-def clearance(a: Side, b: Side, q: Array) -> float:
-    """Returns the distance of two bodies without their radii at positions q, in metres; 0 or less where they meet."""
-    A, B, X, Y = np.empty((len(a.vertices), 3)), np.empty((len(b.vertices), 3)), np.empty((3, 4)), np.empty((3, 4))
-    place(a, q, X, Y, A)
-    place(b, q, X, Y, B)
-    return separation(A, B, np.empty(3))
+def choose(views: Views, levers: Array, rates: Array, changes: Array, chosen: np.ndarray) -> None:
+    """Fills in the choice of every pair, (P,), from whose frame the accelerations look least.
+
+    Args:
+        rates, changes: (n,) bounds for all of the motion.
+    """
+    for pair in range(len(chosen)):
+        least = np.inf
+        for choice in range(views.first[pair], views.first[pair + 1]):
+            bent = 0.0
+            for view in views.sides[choice]:
+                bent += acceleration(views, view, levers, rates, changes)
+            if bent < least:
+                least, chosen[pair] = bent, choice
 
 
 @njit(cache=True)
-def divide(
-    a: Side,
-    b: Side,
-    controls: Array,
-    hulls: Array,
-    inexact: tuple[float, float],
-    turns: Array,
-    q_star: Array,
-    reach: float,
-    slack: float,
+def see(ground: Ground, pair: int, piece: int, time: float, at: Array, q: Array, A: Array, B: Array) -> None:
+    """Fills in where a pair's vertices are in their frame at a time of a piece, A (V, 3) and B (W, 3).
+
+    Args:
+        at: (3, n) gets what certifier.motion.curve.evaluate fills in.
+        q: (n,) is overwritten.
+    """
+    (a, b), frame = ground.bodies.pairs[pair], ground.views.frames[ground.chosen[pair]]
+    evaluate(ground.curve.controls[piece], time, at)
+    slot = pose(ground.bodies, ground.curve, ground.poses, piece, time, at[0], q)
+    place(ground.bodies, a, frame, ground.poses.R[slot], ground.poses.p[slot], A)
+    place(ground.bodies, b, frame, ground.poses.R[slot], ground.poses.p[slot], B)
+
+
+@njit(cache=True)
+def sizes(bodies: Bodies, pair: int) -> tuple[int, int]:
+    """Returns how many vertices the geometries of a pair have."""
+    a, b = bodies.pairs[pair]
+    return bodies.first[a + 1] - bodies.first[a], bodies.first[b + 1] - bodies.first[b]
+
+
+@njit(cache=True)
+def apart_at_first(ground: Ground, pair: int) -> float:
+    """Returns the distance of a pair's padded bodies at the beginning of the motion, in metres; 0 or less where they meet."""
+    n, (V, W) = ground.curve.controls.shape[2], sizes(ground.bodies, pair)
+    A, B = np.empty((V, 3)), np.empty((W, 3))
+    see(ground, pair, 0, 0.0, np.empty((3, n)), np.empty(n), A, B)
+    return separation(A, B, np.empty(3)) - ground.bodies.reaches[pair]
+
+
+@njit(cache=True)
+def widening(ground: Ground, pair: int) -> float:
+    """Returns how much a pair's distance changes at most where every joint moves by 1, in metres."""
+    views, total = ground.views, 0.0
+    for view in views.sides[ground.chosen[pair]]:
+        for k in range(views.begins[view], views.begins[view + 1]):
+            total += ground.levers[k]
+    return total
+
+
+@njit(cache=True)
+def widest(ground: Ground, kept: float) -> float:
+    """Returns a tube beyond which the bodies' distances at the beginning do not let any be, radians or metres; infinity for no limit.
+
+    Args:
+        kept: how far apart the padded bodies have to be, metres.
+    """
+    rho = np.inf
+    for pair in range(len(ground.chosen)):
+        wide = widening(ground, pair)
+        if wide > 0.0:
+            rho = min(rho, (apart_at_first(ground, pair) - kept) / wide)
+    return rho
+
+
+@njit(cache=True)
+def _slack(ground: Ground, pair: int, reach: float) -> float:
+    """Returns how many metres a pair's planes have to leave for what the verifier rounds, and for what is rounded here."""
+    views, choice = ground.views, ground.chosen[pair]
+    joints, size, way = 2, 0.0, views.ways[views.frames[choice]]
+    for k in range(2):
+        view = views.sides[choice, k]
+        joints += views.begins[view + 1] - views.begins[view]
+        size += ground.lengths[view]
+        way += views.ways[ground.bodies.links[ground.bodies.pairs[pair, k]]]
+    largest = np.abs(ground.curve.controls).max()
+    return ROUNDED * (reach + joints * size * (1.0 + largest)) + 2.0**-46 * way
+
+
+@njit(cache=True)
+def _with_room(planes: Planes, found: int) -> Planes:
+    """Returns planes, the first of which are those found so far, with room for one more at least."""
+    if found < len(planes.ends):
+        return planes
+    more = Planes(np.empty(2 * found), np.empty((2 * found, 3)))
+    more.ends[:found], more.normals[:found] = planes.ends, planes.normals
+    return more
+
+
+@njit(cache=True)
+def _divide(
+    ground: Ground,
+    pair: int,
+    kept: float,
     rho: float,
     shrinks: bool,
     until: tuple[int, float],
-    ends: Array,
-    normals: Array,
-    counts: Array,
-) -> tuple[int, int, float, float, float, float]:
+    planes: Planes,
+    first: int,
+    most: int,
+    counts: np.ndarray,
+) -> tuple[End, float, Planes, int]:
     """Divides the motion into intervals with a plane each, from its beginning on, until it ends or the pair touches.
 
     Args:
-        controls: (P, m + 1, n) control points of the pieces.
-        hulls: (P, 4, n) bounds of the first four derivatives of the coordinates on every piece.
-        inexact: as for :func:`bound_rates`.
-        turns, q_star: as for :func:`positions`.
-        reach: the radii and paddings of both bodies, and the distance that they have to keep beyond these, metres.
-        slack: metres that the planes have to leave for what the verifier rounds.
-        rho: the tube, radians or metres.
-        shrinks: whether the tube becomes smaller where it has to.
-        until: the number of the piece and the time in it at which the search ends.
-        ends, normals: (I,), (I, 3); they are filled in.
+        kept, rho, shrinks, until: as for :func:`divide`, which has the last one from the pairs before.
+        planes: gets those of the pair from ``first`` on, at most ``most``.
         counts: (P,) is filled in.
 
     Returns:
-        how it ends; the piece where it does; the beginning and the end of the interval there; how far the bodies are apart beyond
-        ``reach`` at its beginning or, for a contact, where they touch; and rho at the end.
+        how it ends; rho at the end; the planes, and how many there are.
     """
-    n, V, W = controls.shape[2], len(a.vertices), len(b.vertices)
+    views, curve, levers = ground.views, ground.curve, ground.levers
+    side_a, side_b = views.sides[ground.chosen[pair]]
+    n, (V, W) = curve.controls.shape[2], sizes(ground.bodies, pair)
     # The vertices of the interval's beginning come first, then those of its end.
-    A, B, X, Y = np.empty((2 * V, 3)), np.empty((2 * W, 3)), np.empty((3, 4)), np.empty((3, 4))
+    A, B = np.empty((2 * V, 3)), np.empty((2 * W, 3))
     q, rates, changes, normal, other, stack = np.empty(n), np.empty(n), np.empty(n), np.zeros(3), np.empty(3), np.empty(64)
     here, there = np.empty((3, n)), np.empty((3, n))
-    found = 0
-    for piece in range(len(controls)):
+    found, reach, wide = first, ground.bodies.reaches[pair] + kept, widening(ground, pair)
+    slack = _slack(ground, pair, reach)
+    for piece in range(len(curve.controls)):
         t0, top = 0.0, 1
         stack[0] = 1.0
-        widening = 0.0
-        for k in range(len(a.chain.joints)):
-            widening += a.levers[piece, k]
-        for k in range(len(b.chain.joints)):
-            widening += b.levers[piece, k]
-        evaluate(controls[piece], 0.0, here)
-        positions(here[0], turns, q_star, q)
-        place(a, q, X, Y, A[:V])
-        place(b, q, X, Y, B[:W])
+        see(ground, pair, piece, 0.0, here, q, A[:V], B[:W])
         while top:
             t1 = stack[top - 1]
-            evaluate(controls[piece], t1, there)
-            positions(there[0], turns, q_star, q)
-            place(a, q, X, Y, A[V:])
-            place(b, q, X, Y, B[W:])
-            bound_rates(here, there, hulls[piece], t1 - t0, inexact, turns, rates, changes)
-            bent = acceleration(a, a.levers[piece], rates, changes) + acceleration(b, b.levers[piece], rates, changes)
+            see(ground, pair, piece, t1, there, q, A[V:], B[W:])
+            bound_rates(curve, piece, here, there, t1 - t0, rates, changes)
+            bent = acceleration(views, side_a, levers, rates, changes) + acceleration(views, side_b, levers, rates, changes)
             need = reach + slack + (t1 - t0) ** 2 / 8.0 * bent
-            apart = gap_along(normal, A, B) > need + rho * widening
+            apart = gap_along(normal, A, B) > need + rho * wide
             if not apart:
                 gap = separation(A, B, normal)
-                if gap <= need + rho * widening and shrinks:
+                if gap <= need + rho * wide and shrinks:
                     for known in (separation(A[:V], B[:W], other) - reach, separation(A[V:], B[W:], other) - reach):
-                        if known > RESOLUTION and widening > 0.0:
-                            rho = min(rho, SHRINK * known / widening)
-                apart = gap > need + rho * widening
+                        if known > RESOLUTION and wide > 0.0:
+                            rho = min(rho, SHRINK * known / wide)
+                apart = gap > need + rho * wide
             if apart:
-                if found == len(ends):
-                    return MANY, piece, t0, t1, separation(A[:V], B[:W], other) - reach, rho
-                ends[found], normals[found] = t1, normal
+                if found - first == most:
+                    return End(MANY, piece, t0, t1, separation(A[:V], B[:W], other) - reach), rho, planes, found
+                planes = _with_room(planes, found)
+                planes.ends[found], planes.normals[found] = t1, normal
                 found += 1
                 counts[piece] += 1
                 if piece == until[0] and t1 >= until[1]:
-                    return DONE, piece, t0, t1, 0.0, rho
+                    return End(DONE, piece, t0, t1, 0.0), rho, planes, found
                 A[:V] = A[V:]
                 B[:W] = B[W:]
                 here[:] = there
                 t0, top = t1, top - 1
                 continue
-            reached = moved(a, a.levers[piece], rates) + moved(b, b.levers[piece], rates)
+            reached = moved(views, side_a, levers, rates) + moved(views, side_b, levers, rates)
             narrow = t1 - t0 <= NARROWEST
             if narrow or (t1 - t0) * reached <= RESOLUTION:
                 now, then = separation(A[:V], B[:W], other) - reach, separation(A[V:], B[W:], other) - reach
                 if now <= RESOLUTION:
-                    return CONTACT, piece, t0, t0, now, rho
+                    return End(CONTACT, piece, t0, t0, now), rho, planes, found
                 if then <= RESOLUTION:
-                    return CONTACT, piece, t0, t1, then, rho
+                    return End(CONTACT, piece, t0, t1, then), rho, planes, found
                 if narrow:
-                    return NARROW, piece, t0, t1, now, rho
+                    return End(NARROW, piece, t0, t1, now), rho, planes, found
             stack[top] = (t0 + t1) / 2.0
             top += 1
-    return DONE, len(controls) - 1, 1.0, 1.0, 0.0, rho
+    return End(DONE, len(curve.controls) - 1, 1.0, 1.0, 0.0), rho, planes, found
+
+
+@njit(cache=True)
+def divide(
+    ground: Ground, kept: float, rho: float, shrinks: bool, most: int, counts: np.ndarray
+) -> tuple[int, End, tuple[int, float], float, Planes]:
+    """Divides the motion for all pairs, for each of them up to where one before it touches.
+
+    Args:
+        kept: the distance that the padded bodies have to keep, metres.
+        rho: the tube, radians or metres.
+        shrinks: whether the tube becomes smaller where it has to.
+        most: how many intervals there may be more than pieces of all pairs.
+        counts: (pairs, pieces) of 0; it gets the numbers of intervals.
+
+    Returns:
+        the pair that touches first, or -1, and how it ends; the piece and the time in it up to which all pairs have planes; rho at the end;
+        the planes of all pairs, one after the other.
+    """
+    pieces = len(ground.curve.controls)
+    until, certified = (pieces - 1, 1.0), (pieces - 1, 1.0)
+    planes, found = Planes(np.empty(_FIRST), np.empty((_FIRST, 3))), 0
+    stopped, stop = -1, End(DONE, pieces - 1, 1.0, 1.0, 0.0)
+    for pair in range(len(ground.chosen)):
+        first = found
+        end, rho, planes, found = _divide(ground, pair, kept, rho, shrinks, until, planes, first, most + pieces, counts[pair])
+        most -= max(0, found - first - pieces)
+        if end.how != DONE:
+            if (end.piece, end.t0) < certified:
+                certified = (end.piece, end.t0)
+            time = end.t1 if end.how == CONTACT else end.t0
+            if stopped < 0 or (end.piece, time) < (stop.piece, stop.t1 if stop.how == CONTACT else stop.t0):
+                until, stopped, stop = (end.piece, end.t1), pair, end
+    return stopped, stop, certified, rho, Planes(planes.ends[:found].copy(), planes.normals[:found].copy())

@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from certifier.kinematics import Kinematics
-from certifier.model import Array, Geometry, Pair, Scene
-from certifier.motion.approach import approach, proved_of
-from certifier.motion.chains import Side, chain, side
-from certifier.motion.intervals import CONTACT, DONE, MANY, acceleration, clearance, divide, positions
+from certifier.model import Pair, Scene
+from certifier.motion.approach import closest, proved_of
+from certifier.motion.bodies import bodies_of
+from certifier.motion.curve import curve_of, poses_of
+from certifier.motion.intervals import CONTACT, MANY, Ground, Planes, choose, divide, widest
+from certifier.motion.views import levers_of, views_of
 from certifier.outcome import Outcome
 from certifier.proof import limits
-from certifier.proof.motion import Motion, MotionProof, Space
+from certifier.proof.motion import Motion, MotionProof
 
-FIRST = 1 << 10
-"""At first there is room for at most this many intervals of a pair."""
 OUTCOMES = {CONTACT: Outcome.REFUTED, MANY: Outcome.INCONCLUSIVE}
-ROUNDED = 2.0**-41
-"""The planes leave this part of the bodies' sizes, for every joint and two more, for what the verifier rounds."""
-
-
-INEXACT = 2.0**-44
-"""Bounds of a polynomial's derivatives leave this part of its control points, more for higher degrees, for what the verifier rounds."""
 
 
 @dataclass(frozen=True)
@@ -88,35 +79,17 @@ def search(scene: Scene, motion: Motion, tube: bool = False, padding: float = 0.
     return searched.tightened(found, kept) if clearance else found
 
 
-class _Part(NamedTuple):
-    """Holds the result for a pair: how :func:`divide` ends, and its ends, normals and counts of intervals."""
-
-    how: int
-    piece: int
-    t0: float
-    t1: float
-    distance: float
-    rho: float
-    ends: Array
-    normals: Array
-    counts: np.ndarray
-
-
 class _Search:
-    """Keeps what the pairs share."""
+    """Keeps what the runs of a search share."""
 
     def __init__(self, scene: Scene, motion: Motion) -> None:
-        self._scene, self._motion, self._kinematics = scene, motion, Kinematics.of(scene)
-        in_s = motion.space is Space.S
-        self._turns = scene.revolute & in_s
-        self._q_star = scene.q_star if in_s else np.zeros(scene.n)
-        self._controls = np.ascontiguousarray(motion.bezier)
-        self._farthest = np.abs(self._controls + self._q_star).max(axis=1)  # of joints that slide, to whose positions alone it matters
-        self._inexact = [INEXACT * motion.degree * (motion.degree - 1) ** k * float(np.abs(motion.controls).max()) for k in (1, 2, 3)]
-        self._hulls = self._bounds()
-        self._curve = self._controls, self._hulls, (self._inexact[0], self._inexact[1])
-        self._sides: dict[tuple[str, str], Side] = {}
-        self._frames: dict[tuple[str, str], str] = {}
+        self._scene, self._motion = scene, motion
+        self._bodies, self._views, self._curve = bodies_of(scene), views_of(scene), curve_of(scene, motion)
+        self._poses = poses_of(self._bodies, self._curve)
+        self._farthest = np.abs(self._curve.controls + self._curve.q_star).max(axis=(0, 1))  # of slides, to whose levers alone it matters
+        rates, changes = self._curve.hulls[:, :2].max(axis=0) * np.where(self._curve.turns, 2.0, 1.0)
+        self._chosen = np.empty(len(scene.pairs), dtype=np.int64)
+        choose(self._views, levers_of(self._views, self._farthest)[0], rates, changes, self._chosen)
 
     def run(self, kept: float, rho: float = 0.0, shrinks: bool = True) -> Found:
         """Returns the result of the search.
@@ -126,23 +99,15 @@ class _Search:
             rho: the width of the tube at first, radians or metres.
             shrinks: whether the tube becomes smaller where it has to.
         """
-        scene, parts, stop = self._scene, [], None
-        self._sides.clear()
-        until, certified = (self._motion.pieces - 1, 1.0), (self._motion.pieces - 1, 1.0)
-        left = limits.INTERVALS - self._motion.pieces * len(scene.pairs)
-        for pair, a, b, frame in self._pairs():
-            sides = self._side(frame, a, rho), self._side(frame, b, rho)
-            part = self._divide(sides, self._reach(a, b) + kept, rho, shrinks and rho > 0, until, left)
-            parts.append(part)
-            rho = part.rho
-            left -= max(0, len(part.ends) - self._motion.pieces)
-            if part.how != DONE:
-                time = part.t1 if part.how == CONTACT else part.t0
-                certified = min(certified, (part.piece, part.t0))
-                if stop is None or (part.piece, time) < (stop.piece, stop.time):
-                    until = part.piece, part.t1
-                    stop = Stop(pair, part.piece, time, part.distance + kept, OUTCOMES.get(part.how, Outcome.TOO_CLOSE))
-        return Found(self._proof(parts, certified, rho), stop)
+        pairs, pieces = self._scene.pairs, self._motion.pieces
+        counts = np.zeros((len(pairs), pieces), dtype=np.int32)
+        most = limits.INTERVALS - pieces * len(pairs)
+        pair, end, certified, rho, planes = divide(self._ground(rho), kept, rho, shrinks and rho > 0, most, counts)
+        proof = self._proof(counts, planes, certified, rho)
+        if pair < 0:
+            return Found(proof, None)
+        time = end.t1 if end.how == CONTACT else end.t0
+        return Found(proof, Stop(pairs[pair], end.piece, time, end.distance + kept, OUTCOMES.get(end.how, Outcome.TOO_CLOSE)))
 
     def tightened(self, found: Found, kept: float) -> Found:
         """Returns a proof that shows nearly the least distance, with the same tube, and where the bodies come closest.
@@ -152,86 +117,11 @@ class _Search:
             kept: the distance that it has to show at least, metres.
         """
         rho = found.proof.rho if found.proof else 0.0
-        nearest, least = self._nearest(rho)
+        least, pair, piece, time, taken = closest(self._ground(rho), rho)
         tight = self.run(max(kept, proved_of(least), 0.0), rho, shrinks=False)
-        return found if tight.stop else Found(tight.proof, None, nearest)
-
-    def _nearest(self, rho: float) -> tuple[Approach | None, float]:
-        """Returns where the padded bodies come closest, and how close, in metres, less what a tube takes of it."""
-        start = self._start()
-        sides = {pair: (self._side(frame, a, rho), self._side(frame, b, rho)) for pair, a, b, frame in self._pairs()}
-        reaches = {pair: self._reach(a, b) for pair, a, b, _ in self._pairs()}
-        first = {pair: clearance(*two, start) - reaches[pair] for pair, two in sides.items()}
-        nearest, least = None, np.inf
-        for pair in sorted(first, key=first.__getitem__):
-            a, b = sides[pair]
-            found, piece, time = approach(a, b, *self._curve, self._turns, self._q_star, reaches[pair], rho, least)
-            if piece >= 0:
-                taken = rho * float(a.levers[piece].sum() + b.levers[piece].sum())
-                nearest, least = Approach(pair, piece, time, found + taken), found
-        return nearest, least
-
-    def _reach(self, a: Geometry, b: Geometry) -> float:
-        """Returns the radii and the scene's paddings of two bodies, metres."""
-        return a.radius + b.radius + 2 * self._scene.padding
-
-    def _start(self) -> Array:
-        """Returns the joint positions at the beginning of the motion, (n,)."""
-        q = np.empty(self._scene.n)
-        positions(self._motion.controls[0], self._turns, self._q_star, q)
-        return q
-
-    def _proof(self, parts: list[_Part], certified: tuple[int, float], rho: float) -> MotionProof | None:
-        """Returns the proof of the motion up to a piece and a time of it, to which all parts reach; None for no time at all."""
-        piece, end = certified if certified[1] > 0 else (certified[0] - 1, 1.0)
-        if piece < 0:
-            return None
-        number = {body: i for i, body in enumerate(self._scene.bodies)}
-        frames = np.array([number[frame] for *_, frame in self._pairs()], dtype=np.int32)
-        counts = np.array([part.counts[: piece + 1] for part in parts], dtype=np.int32)
-        kept = []
-        for part, row in zip(parts, counts, strict=True):
-            before = int(row[:piece].sum())
-            row[piece] = 1 + np.searchsorted(part.ends[before : before + row[piece]], end)
-            kept.append(before + int(row[piece]))
-        ends = np.concatenate([part.ends[:k] for part, k in zip(parts, kept, strict=True)])
-        normals = np.concatenate([part.normals[:k] for part, k in zip(parts, kept, strict=True)])
-        return MotionProof(self._scene, self._motion.beginning(piece + 1), end, rho, frames, counts, ends, normals)
-
-    def _pairs(self) -> Iterator[tuple[Pair, Geometry, Geometry, str]]:
-        """Yields every pair with its geometries and the body in whose frame its planes are constant."""
-        for pair in self._scene.pairs:
-            a, b = self._scene.geometry(pair.a), self._scene.geometry(pair.b)
-            if (a.body, b.body) not in self._frames:
-                self._frames[a.body, b.body] = self._frame(a, b)
-            yield pair, a, b, self._frames[a.body, b.body]
-
-    def _frame(self, a: Geometry, b: Geometry) -> str:
-        """Returns the body between two others from which their accelerations look least."""
-        farthest = self._farthest.max(axis=0, keepdims=True)
-        rates, changes = self._hulls[:, :2].max(axis=0) * np.where(self._turns, 2.0, 1.0)
-        moving = dict.fromkeys(self._kinematics.rigid_root(body) for body in self._kinematics.bodies_between(a.body, b.body))
-
-        def bent(frame: str) -> float:
-            sides = (side(chain(self._kinematics, frame, geometry.body), geometry, farthest) for geometry in (a, b))
-            return sum(acceleration(side, side.levers[0], rates, changes) for side in sides)
-
-        return min(moving, key=bent)
-
-    def _side(self, frame: str, geometry: Geometry, rho: float) -> Side:
-        """Returns a side whose levers hold in a tube of rho, or of a larger one that was asked about before."""
-        key = frame, geometry.name
-        if key not in self._sides:
-            self._sides[key] = side(chain(self._kinematics, frame, geometry.body), geometry, self._farthest + rho)
-        return self._sides[key]
-
-    def _bounds(self) -> Array:
-        """Returns bounds of the first four derivatives of the coordinates on every piece, (P, 4, n), as much larger as the verifier's."""
-        steps, bounds = self._controls, []
-        for k in range(4):
-            steps = (self._motion.degree - k) * np.diff(steps, axis=1)
-            bounds.append(np.abs(steps).max(axis=1, initial=0.0) + (self._inexact[k - 1] if k else 0.0))
-        return np.ascontiguousarray(np.stack(bounds, axis=1))
+        if tight.stop:
+            return found
+        return Found(tight.proof, None, Approach(self._scene.pairs[pair], piece, time, least + taken) if piece >= 0 else None)
 
     def widest(self, kept: float) -> float:
         """Returns a tube beyond which the bodies' distances at the beginning do not let any be, radians or metres.
@@ -239,28 +129,32 @@ class _Search:
         Args:
             kept: how far apart the padded bodies have to be, metres.
         """
-        q, widest = self._start(), np.inf
-        for _, a, b, frame in self._pairs():
-            sides = self._side(frame, a, 0.0), self._side(frame, b, 0.0)
-            levers = sum(side.levers[0].sum() for side in sides)
-            gap = clearance(*sides, q) - self._reach(a, b) - kept
-            if levers > 0:
-                widest = min(widest, gap / levers)
-        return float(np.clip(widest, 0.0, np.pi))
+        return float(np.clip(widest(self._ground(0.0), kept), 0.0, np.pi))
 
-    def _divide(self, sides: tuple[Side, Side], reach: float, rho: float, shrinks: bool, until: tuple[int, float], most: int) -> _Part:
-        """Divides the motion for a pair, as :func:`divide` does, with ``most`` more intervals than there are pieces at most."""
-        a, b = sides
-        joints = len(a.chain.joints) + len(b.chain.joints)
-        slack = ROUNDED * (reach + (joints + 2) * (a.size + b.size) * (1 + float(np.abs(self._controls).max())))
-        most += self._motion.pieces
-        room = min(FIRST, most)
-        while True:
-            ends, normals, counts = np.empty(room), np.empty((room, 3)), np.zeros(self._motion.pieces, dtype=np.int32)
-            how, piece, t0, t1, distance, left = divide(
-                a, b, *self._curve, self._turns, self._q_star, reach, slack, rho, shrinks, until, ends, normals, counts
-            )
-            if how != MANY or room == most:
-                total = counts.sum()
-                return _Part(how, piece, t0, t1, distance, left, ends[:total], normals[:total], counts)
-            room = min(room * 16, most)
+    def _ground(self, rho: float) -> Ground:
+        """Returns what the pairs share, with levers that hold in a tube of rho."""
+        levers, lengths = levers_of(self._views, self._farthest + rho)
+        return Ground(self._bodies, self._views, self._curve, self._poses, levers, lengths, self._chosen)
+
+    def _proof(self, counts: np.ndarray, planes: Planes, certified: tuple[int, float], rho: float) -> MotionProof | None:
+        """Returns the proof of the motion up to a piece and a time of it, to which all pairs have planes; None for no time at all.
+
+        Args:
+            counts: (pairs, pieces) how many planes there are.
+        """
+        piece, end = certified if certified[1] > 0 else (certified[0] - 1, 1.0)
+        if piece < 0:
+            return None
+        ends, per_piece = planes.ends, counts.ravel()
+        of = np.repeat(np.tile(np.arange(counts.shape[1]), len(counts)), per_piece)
+        starts = np.concatenate([[0.0], ends[:-1]])
+        first = np.cumsum(per_piece) - per_piece
+        starts[first[per_piece > 0]] = 0.0
+        kept = (of < piece) | ((of == piece) & (starts < end))
+        pair = np.repeat(np.arange(len(counts)), counts.sum(axis=1))
+        counts = np.zeros((len(counts), piece + 1), dtype=np.int32)
+        np.add.at(counts, (pair[kept], of[kept]), 1)
+        frames = self._views.frames[self._chosen]
+        normals = np.einsum("ijk,ik->ij", self._bodies.turned[frames[pair[kept]]], planes.normals[kept])
+        bodies = self._bodies.roots[frames].astype(np.int32)
+        return MotionProof(self._scene, self._motion.beginning(piece + 1), end, rho, bodies, counts, ends[kept], normals)

@@ -16,9 +16,9 @@ size of a vertex is the sum of all lengths on the way to it: |v|, that of each o
 - n'(R v + p) is computed as (R'n)'v + n'p with three products each, rounded by 15 u of |n| times the size.
 
 All that is a part of the size, (m + 3) (2^-44 + the angles' error) of it to first order, times |n|. Terms of higher order are a part of
-that which is below 2^-9, because error() ensures that the whole is below 2^-10; twice the angles' error has room for it. That no two
-lengths are put together first is what makes this hold where they cancel. What is done with less of them, as n'R'v with the length of R v +
-offset, is wrong by a part of their sum nevertheless.
+that which is below 2^-9, because certifier.verify.sides ensures that the whole is below 2^-10; twice the angles' error has room for it.
+That no two lengths are put together first is what makes this hold where they cancel. What is done with less of them, as n'R'v with the
+length of R v + offset, is wrong by a part of their sum nevertheless.
 
 What a slide is wrong by is added as it is: it moves what is behind it by that. The 2^-199 of offsets and rotations, and the 2^-1074 by
 which products that underflow are wrong, are multiplied by 2^30 m at most and by fewer than 2^14 numbers. The least size is 2^-100 m, a part
@@ -29,12 +29,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from certifier.errors import ProofError
 from certifier.model import Array
 
 UP = 1 + 2.0**-40
@@ -73,68 +71,13 @@ class Chain:
     rotations: Array
     offsets: Array
 
-    @cached_property
-    def _lengths(self) -> Array:
-        """Returns the lengths of the offsets, (m + 1,), rounded upwards."""
-        return _lengths(self.offsets)
-
-    @cached_property
-    def _across(self) -> Array:
-        """Returns how far the offset behind each joint but the last one leads from the joint's axis, (m - 1,), rounded upwards."""
-        return _across(self.axes[:-1], self.offsets[1:-1])
-
     def reach(self, vertices: Array) -> Reach:
         """Returns how far vertices, (V, 3) metres in the body's frame, reach."""
-        tails, farthest = vertices @ self.rotations[-1].T + self.offsets[-1], float(_lengths(vertices).max())
+        tails, farthest = vertices @ self.rotations[-1].T + self.offsets[-1], float(lengths(vertices).max())
         # What is rounded in the tails: their numbers' 2^-52 and fewer than 2^4 roundings.
-        rounded = 2.0**-45 * (farthest + float(self._lengths[-1]))
-        across = float(_across(self.axes[-1:], tails).max()) + rounded if len(self.joints) else 0.0
-        return Reach(float(_lengths(tails).max()) + rounded, across, farthest)
-
-    def levers(self, reach: Reach, slid: Array) -> Array:
-        """Returns how far vertices can be from the joints' axes, in metres, rounded upwards.
-
-        These bound motion. They may be much less than :meth:`sizes`, because a body's frame may be far from the body.
-
-        Args:
-            reach: of the vertices.
-            slid: (K, m) how far each joint's position is from 0 at most, metres; only that of a prismatic joint matters.
-
-        Returns:
-            (K, m) distances from the axes, 1 for a prismatic joint. A change of one position moves no vertex farther than by the joint's
-            lever times the change.
-        """
-        slide = slid * self.slides
-        levers = np.empty_like(slide)
-        levers[:, -1:] = reach.across
-        # Behind joint k come the offset across its axis, the slide of joint k + 1, all lengths behind that, and the tail.
-        behind = np.cumsum((slide + self._lengths[:-1])[:, :0:-1], axis=1)[:, ::-1]
-        levers[:, :-1] = self._across + slide[:, 1:] + reach.tail
-        levers[:, :-2] += behind[:, 1:]
-        return np.where(self.slides, 1.0, levers * UP)
-
-    def sizes(self, reach: Reach, slid: Array) -> Array:
-        """Returns the sum of all lengths on the way to the farthest vertex, (K,) metres, rounded upwards: what rounding is a part of.
-
-        No two of the lengths are put together first, as what cancels in their sum does not cancel in what is rounded. The arguments are
-        those of :meth:`levers`.
-        """
-        found: Array = (reach.vertices + self._lengths.sum() + (slid * self.slides).sum(axis=1)) * UP
-        return found
-
-    def error(self, size: Array, inexact: float) -> Array:
-        """Returns by how many metres a vertex' position, of sizes as :meth:`sizes` returns them, is wrong at most.
-
-        Args:
-            inexact: by how much the joints' positions are wrong at most, in radians or metres.
-
-        Raises:
-            ProofError: it is too large for the bound to hold.
-        """
-        part = (len(self.joints) + 3) * (2.0**-44 + 2 * inexact)
-        if not part < 2.0**-10:
-            raise ProofError("proof_too_large", "the positions of the motion are too large for doubles to tell where the bodies are")
-        return size * part + int(self.slides.sum()) * inexact
+        rounded = 2.0**-45 * (farthest + float(lengths(self.offsets[-1:])[0]))
+        from_axis = float(across(self.axes[-1:], tails).max()) + rounded if len(self.joints) else 0.0
+        return Reach(float(lengths(tails).max()) + rounded, from_axis, farthest)
 
 
 def poses(chains: Sequence[Chain], which: np.ndarray, at: np.ndarray, q: Array, cosines: Array, sines: Array) -> tuple[Array, Array]:
@@ -180,16 +123,16 @@ def _times(R: Array, by: Array) -> Array:
     return found
 
 
-def _lengths(points: Array) -> Array:
+def lengths(points: Array) -> Array:
     """Returns the lengths of points, (V, 3), rounded upwards; what underflows is less than what is added."""
     found: Array = np.sqrt((points**2).sum(axis=1)) * UP + 2.0**-100
     return found
 
 
-def _across(axes: Array, points: Array) -> Array:
+def across(axes: Array, points: Array) -> Array:
     """Returns the distances of points, (V, 3), from the lines along axes through 0, (V, 3) or one for all, rounded upwards."""
     products = axes[:, [1, 2, 0]] * points[:, [2, 0, 1]] - axes[:, [2, 0, 1]] * points[:, [1, 2, 0]]
-    return _lengths(products) + 2.0**-45 * _lengths(points)
+    return lengths(products) + 2.0**-45 * lengths(points)
 
 
 def _skew(axes: Array) -> Array:

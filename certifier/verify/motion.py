@@ -17,7 +17,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,25 +24,17 @@ from certifier.errors import ProofError
 from certifier.model import Array, Scene
 from certifier.proof import limits
 from certifier.proof.motion import Motion, MotionProof
-from certifier.verify.chains import UP, Chain, Reach, poses
+from certifier.verify.chains import UP, poses
 from certifier.verify.decimals import exactly, rounded_down
-from certifier.verify.kinematics import ExactKinematics
 from certifier.verify.pieces import Pieces
-from certifier.verify.places import Places
 from certifier.verify.scene import check_scene
+from certifier.verify.sides import Known, Sides
 from certifier.verify.uncovered import not_covered
 
 BLOCK = 1 << 14
 """At most this many intervals are looked at together."""
 PRODUCTS = 1 << 20
 """At most this many vertices, each at one time, are looked at together."""
-RUNS = 1 << 10
-"""At most this many pairs are looked at together, each with its chains."""
-
-Way = tuple[str, str]
-"""A frame and a body, from which and to which a chain leads."""
-_Side = tuple[str, str, str]
-"""A frame, a body, and a geometry of the body."""
 
 
 @dataclass(frozen=True)
@@ -86,22 +77,44 @@ class MotionStatement:
         ]
 
 
+class MotionVerifier:
+    """Checks proofs about motions in one scene. What it computes about the scene is kept for the next proof.
+
+    Args:
+        scene: it must not change.
+
+    Raises:
+        ProofError: the model makes no sense.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        check_scene(scene)
+        self._scene, self._known = scene, Known(scene)
+
+    def verify(self, proof: MotionProof) -> MotionStatement:
+        """Checks a proof about a motion in the scene and returns what it proves.
+
+        Raises:
+            ProofError: the proof does not hold.
+        """
+        if proof.scene is not self._scene:
+            raise ProofError("proof_motion", "the proof is about another scene")
+        proof.check_shapes()
+        _check_motion(proof)
+        _check_intervals(proof)
+        gap = min(_Check(proof, self._known).gaps(), default=np.inf)
+        if not 0 < gap < np.inf:
+            raise ProofError("proof_motion", "the scene has no pair to keep apart")
+        return MotionStatement(self._scene, proof.motion, proof.end, proof.rho, float(gap))
+
+
 def verify_motion(proof: MotionProof) -> MotionStatement:
     """Checks a proof about a motion and returns what it proves.
 
     Raises:
         ProofError: the proof does not hold.
     """
-    scene = proof.scene
-    check_scene(scene)
-    proof.check_shapes()
-    _check_motion(proof)
-    _check_intervals(proof)
-    check = _Check(proof)
-    gap = min(check.gaps(), default=np.inf)
-    if not 0 < gap < np.inf:
-        raise ProofError("proof_motion", "the scene has no pair to keep apart")
-    return MotionStatement(scene, proof.motion, proof.end, proof.rho, float(gap))
+    return MotionVerifier(proof.scene).verify(proof)
 
 
 def _check_motion(proof: MotionProof) -> None:
@@ -141,30 +154,19 @@ def _starts(proof: MotionProof) -> Array:
     return starts
 
 
-class _Run(NamedTuple):
-    """Holds intervals of one pair that follow each other in the file, from one number up to another."""
-
-    pair: int
-    first: int
-    last: int
-
-
 class _Check:
     """Checks the intervals of all pairs, some at a time. Those that need the same chain at the same time share its pose."""
 
-    def __init__(self, proof: MotionProof) -> None:
-        self._proof, self._scene = proof, proof.scene
-        self._places, self._pieces = Places(proof.scene), Pieces(proof.scene, proof.motion, proof.rho)
-        self._known: dict[_Side, tuple[Reach, tuple[Array, Array]]] = {}
+    def __init__(self, proof: MotionProof, known: Known) -> None:
+        self._proof, self._scene, self._known = proof, proof.scene, known
+        self._pieces = Pieces(proof.scene, proof.motion, proof.rho)
+        number = {geometry.name: i for i, geometry in enumerate(self._scene.geometries)}
+        self._pairs = np.array([(number[pair.a], number[pair.b]) for pair in self._scene.pairs], dtype=np.int64).reshape(-1, 2).T
+        self._frames = proof.frames.astype(np.int64)
         self._starts = _starts(proof)
-        per_pair = proof.counts.sum(axis=1, dtype=np.int64)
-        self._first = np.cumsum(per_pair) - per_pair
-        self._count = per_pair
-        self._piece = np.repeat(np.tile(np.arange(proof.motion.pieces), len(per_pair)), proof.counts.reshape(-1))
-        self._bodies = [
-            (scene_frame, self._scene.geometry(pair.a).body, self._scene.geometry(pair.b).body)
-            for scene_frame, pair in zip((self._scene.bodies[i] for i in proof.frames), self._scene.pairs, strict=True)
-        ]
+        self._count = proof.counts.sum(axis=1, dtype=np.int64)
+        self._pair = np.repeat(np.arange(len(self._count)), self._count)
+        self._piece = np.repeat(np.tile(np.arange(proof.motion.pieces), len(self._count)), proof.counts.reshape(-1))
 
     def gaps(self) -> Iterator[float]:
         """Yields, for some intervals at a time, how far the padded bodies are apart in them at least, in metres.
@@ -172,130 +174,81 @@ class _Check:
         Raises:
             ProofError: one of the planes does not keep them apart, or it takes too long to see whether they do.
         """
+        if not len(self._count):
+            return
         self._check_cost()
-        for runs in self._blocks():
-            yield self._gap(runs)
+        sides, of = self._known.sides(np.tile(self._frames, 2), self._pairs.reshape(-1))
+        of = of.reshape(2, -1)
+        rank = np.empty(len(self._count), dtype=np.int64)
+        rank[np.lexsort(sides.ways[of])] = np.arange(len(rank))
+        order = np.argsort(rank[self._pair], kind="stable")  # intervals of pairs that are seen alike follow each other
+        most = max(1, BLOCK // self._proof.motion.degree)
+        for i in range(0, len(order), most):
+            rows = order[i : i + most]
+            yield self._gap(sides, of[:, self._pair[rows]], rows)
 
     def _check_cost(self) -> None:
-        kinematics, joints, cost = ExactKinematics.by_joint(self._scene), dict[tuple[str, ...], int](), 0
-        for i, (pair, bodies) in enumerate(zip(self._scene.pairs, self._bodies, strict=True)):
-            if bodies not in joints:
-                joints[bodies] = sum(len(kinematics.path(bodies[0], body)) for body in bodies[1:])
-            vertices = sum(len(self._scene.geometry(name).vertices) for name in (pair.a, pair.b))
-            cost += int(self._count[i]) * (vertices + limits.JOINT_COST * joints[bodies] + self._scene.n * self._proof.motion.degree**2)
-        if cost > limits.SWEPT:
+        scene, proof = self._scene, self._proof
+        vertices = np.array([len(geometry.vertices) for geometry in scene.geometries])[self._pairs].sum(axis=0)
+        joints = self._known.joints(np.tile(self._frames, 2), self._pairs.reshape(-1)).reshape(2, -1).sum(axis=0)
+        cost = self._count * (vertices + limits.JOINT_COST * joints + scene.n * proof.motion.degree**2)
+        if float(cost.sum(dtype=float)) > limits.SWEPT:
             raise ProofError("proof_too_large", "the intervals have more vertices, behind more joints, than are checked")
 
-    def _blocks(self) -> Iterator[list[_Run]]:
-        """Yields all intervals, some at a time; those of pairs with the same bodies follow each other."""
-        most = max(1, BLOCK // self._proof.motion.degree)
-        runs, room = list[_Run](), most
-        for i in sorted(range(len(self._bodies)), key=lambda i: self._bodies[i]):
-            first, last = int(self._first[i]), int(self._first[i] + self._count[i])
-            while first < last:
-                then = min(last, first + room)
-                runs.append(_Run(i, first, then))
-                first, room = then, room - (then - first)
-                if not room or len(runs) == RUNS:
-                    yield runs
-                    runs, room = [], most
-        if runs:
-            yield runs
+    def _gap(self, sides: Sides, of: np.ndarray, rows: np.ndarray) -> float:
+        """Returns how far the padded bodies are apart at least in I intervals.
 
-    def _gap(self, runs: list[_Run]) -> float:
-        """Returns how far the padded bodies are apart at least in some intervals."""
+        Args:
+            of: (2, I) the sides of a and of b.
+            rows: (I,) the numbers of the intervals in the proof.
+        """
         proof = self._proof
-        rows = np.concatenate([np.arange(run.first, run.last) for run in runs])
         normals, piece, t0, t1 = proof.normals[rows], self._piece[rows], self._starts[rows], proof.ends[rows]
-        ways = [[(frame, body) for body in bodies] for frame, *bodies in (self._bodies[run.pair] for run in runs)]
-        chains = {way: self._places.chain(*way) for two in ways for way in two}
-        turned, at = self._reached(runs, ways, chains, piece, np.array([t0, t1]), normals)
-        rates, changes = self._pieces.rates(piece, t0, t1)
-        needed, ends = np.empty((2, len(rows))), np.empty((2, len(rows)))
-        for (*way, name), k, own in self._sides(runs, ways):
-            geometry, chain = self._scene.geometry(name), chains[way[0], way[1]]
-            levers, error = self._moved(chain, (way[0], way[1], name), piece[own])
-            ends[k, own] = _least(turned[k, :, own].swapaxes(0, 1), at[k, :, own].T, geometry.vertices)
-            bent = _acceleration(chain, levers, rates[own], changes[own])
-            needed[k, own] = geometry.radius + (t1 - t0)[own] ** 2 / 8 * bent + proof.rho * levers.sum(axis=1) + error
+        own = sides.of(of.reshape(-1))
+        slid = own.slid(np.tile(self._pieces.slid[piece], (2, 1)))
+        levers, error = own.levers(slid), own.errors(own.sizes(slid), self._pieces.inexact)
+        rates, changes = (np.tile(bounds, (2, 1)) for bounds in self._pieces.rates(piece, t0, t1))
+        bent = np.tile((t1 - t0) ** 2 / 8, 2) * own.accelerations(levers, rates, changes)
+        needed = (own.radii + bent + proof.rho * levers.sum(axis=1) + error).reshape(2, -1)
         needs = 2 * self._scene.padding + needed.sum(axis=0)
+        ends = self._ends(sides, of, piece, np.array([t0, t1]), normals)
         gaps = ends.sum(axis=0) / (np.linalg.norm(normals, axis=1) * UP) - needs * UP
         worst = int(gaps.argmin())
         if not gaps[worst] > 0:
-            a, b = self._names(runs[int(np.searchsorted(np.cumsum([run.last - run.first for run in runs]), worst, side="right"))])
-            problem = f"piece {piece[worst]}, time {t0[worst]:.6g} to {t1[worst]:.6g}: the plane does not keep {a} and {b} apart"
-            raise ProofError("proof_motion", problem)
+            pair = self._scene.pairs[self._pair[rows[worst]]]
+            where = f"piece {piece[worst]}, time {t0[worst]:.6g} to {t1[worst]:.6g}"
+            raise ProofError("proof_motion", f"{where}: the plane does not keep {pair.a} and {pair.b} apart")
         return float(gaps[worst] / UP)
 
-    def _sides(self, runs: list[_Run], ways: list[list[Way]]) -> Iterator[tuple[_Side, np.ndarray, np.ndarray]]:
-        """Yields every geometry that intervals have on a side, as a frame sees it, with these sides, (K,) 0 or 1, and intervals, (K,)."""
-        number: dict[_Side, int] = {}
-        which = [
-            [number.setdefault((*way, name), len(number)) for way, name in zip(two, self._names(run), strict=True)]
-            for run, two in zip(runs, ways, strict=True)
-        ]
-        of_intervals = np.repeat(np.array(which).T, [run.last - run.first for run in runs], axis=1)
-        order = np.argsort(of_intervals.ravel(), kind="stable")
-        last = np.cumsum(np.bincount(of_intervals.ravel(), minlength=len(number)))
-        for side, places in zip(number, np.split(order, last[:-1]), strict=True):
-            yield side, *np.divmod(places, of_intervals.shape[1])
-
-    def _moved(self, chain: Chain, side: _Side, piece: np.ndarray) -> tuple[Array, Array]:
-        """Returns the levers and the bound of what is rounded of a side on pieces, (K, m) and (K,), or one row for all of them."""
-        if side not in self._known:
-            reach = chain.reach(self._scene.geometry(side[2]).vertices)
-            self._known[side] = reach, self._bounds(chain, reach, self._pieces.slid[:1])
-        reach, bounds = self._known[side]
-        return self._bounds(chain, reach, self._pieces.slid[piece]) if chain.slides.any() else bounds
-
-    def _bounds(self, chain: Chain, reach: Reach, slid: Array) -> tuple[Array, Array]:
-        """Returns the levers, (K, m), and the bound of what is rounded, (K,) metres, for slides (K, n)."""
-        own = slid[:, chain.joints]
-        return chain.levers(reach, own), chain.error(chain.sizes(reach, own), self._pieces.inexact)
-
-    def _names(self, run: _Run) -> tuple[str, str]:
-        pair = self._scene.pairs[run.pair]
-        return pair.a, pair.b
-
-    def _reached(
-        self, runs: list[_Run], ways: list[list[Way]], chains: dict[Way, Chain], piece: np.ndarray, times: Array, normals: Array
-    ) -> tuple[Array, Array]:
-        """Returns R'n and n'p of both bodies, (2, 2, I, 3) and (2, 2, I), at both times of I intervals, with n reversed for the second one.
+    def _ends(self, sides: Sides, of: np.ndarray, piece: np.ndarray, times: Array, normals: Array) -> Array:
+        """Returns the least of n'(R v + p) over the vertices v of both bodies, with n reversed for the second one, (2, I), at both times.
 
         Args:
-            ways: of each run, the frame and the body of either side.
             times: (2, I).
         """
         # A number with a piece as its real and a time as its imaginary part, as numbers of this kind are sorted and compared exactly.
         moments, at = np.unique(piece + 1j * times, return_inverse=True)
-        known = sorted(chains, key=lambda way: -len(chains[way].joints))
-        number = {way: i for i, way in enumerate(known)}
-        lengths = [run.last - run.first for run in runs]
-        which = np.repeat(np.array([[number[two[k]] for two in ways] for k in (0, 1)]), lengths, axis=1)
-        rows, own = np.unique(which[:, None] * len(moments) + at.reshape(times.shape), return_inverse=True)
+        ways = np.unique(sides.ways[of])
+        ways = ways[np.argsort([-len(self._known.chains[way].joints) for way in ways], kind="stable")]
+        number = np.empty(len(self._known.chains), dtype=np.int64)
+        number[ways] = np.arange(len(ways))
+        asked, own = np.unique(number[sides.ways[of]][:, None] * len(moments) + at.reshape(times.shape), return_inverse=True)
         positions = self._pieces.positions(moments.real.astype(np.int64), moments.imag)
-        R, p = poses([chains[way] for way in known], rows // len(moments), rows % len(moments), *positions)
+        R, p = poses([self._known.chains[way] for way in ways], asked // len(moments), asked % len(moments), *positions)
         own = own.reshape(2, *times.shape)
         signed = np.array([normals, -normals])[:, None]
-        return np.einsum("seijk,seij->seik", R[own], np.broadcast_to(signed, (2, *times.shape, 3))), (p[own] * signed).sum(axis=-1)
+        turned = np.einsum("seijk,seij->seik", R[own], np.broadcast_to(signed, (2, *times.shape, 3))).swapaxes(1, 2).reshape(-1, 2, 3)
+        moved = (p[own] * signed).sum(axis=-1).swapaxes(1, 2).reshape(-1, 2)
+        geometry, found = sides.geometries[of].reshape(-1), np.empty(of.size)
+        order = np.argsort(geometry, kind="stable")
+        for some in np.split(order, np.flatnonzero(np.diff(geometry[order])) + 1):
+            found[some] = _least(turned[some], moved[some], self._scene.geometries[geometry[some[0]]].vertices)
+        return found.reshape(of.shape)
 
 
 def _least(rows: Array, at: Array, vertices: Array) -> Array:
-    """Returns the least of n'(R v + p), (I,), at both ends of intervals, for R'n (2, I, 3), n'p (2, I) and vertices (V, 3)."""
+    """Returns the least of n'(R v + p), (K,), at both ends of intervals, for R'n (K, 2, 3), n'p (K, 2) and vertices (V, 3)."""
     most = max(1, PRODUCTS // (2 * len(vertices)))
-    parts = [(rows[:, i : i + most] @ vertices.T).min(axis=2) for i in range(0, rows.shape[1], most)]
-    return (np.concatenate(parts, axis=1) + at).min(axis=0)
-
-
-def _acceleration(chain: Chain, levers: Array, rates: Array, changes: Array) -> Array:
-    """Returns a bound of the acceleration of every vertex, (I,), from levers (I, m) or (1, m), rates and changes (I, n), rounded upwards.
-
-    Joints i and then k on the path contribute twice the product of their rates times the lever of k, where i is revolute, and nothing where
-    it is prismatic; a revolute joint alone contributes its lever times the square of its rate, and every joint its lever times its change.
-    Nothing here is negative, so what is rounded is a part of it that UP makes good.
-    """
-    rates, changes = rates[:, chain.joints], changes[:, chain.joints]
-    turning = np.zeros_like(rates)  # of the revolute joints before each one
-    np.cumsum(np.where(chain.slides, 0.0, rates)[:, :-1], axis=1, out=turning[:, 1:])
-    total = levers * (2 * turning * rates + np.where(chain.slides, 0.0, rates**2) + changes)
-    return total.sum(axis=1) * UP
+    parts = [(rows[i : i + most] @ vertices.T).min(axis=2) for i in range(0, len(rows), most)]
+    found: Array = (np.concatenate(parts) + at).min(axis=1)
+    return found

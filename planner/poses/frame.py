@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike
 
 from certifier.errors import RegionError, close_matches
 from certifier.kinematics import Kinematics
-from certifier.model import Array, Geometry, Scene
-from certifier.motion.chains import chain, side
+from certifier.model import Array, Scene
+from certifier.motion.chains import chain, fill_levers, lengths
 from certifier.positions import check_magnitude
 
 SHOWN = 8
@@ -79,9 +79,12 @@ def frame_of(scene: Scene, name: str) -> Frame:
         raise RegionError("fixed_frame", f"no joint moves the frame {body}", field="frame", hint=_one_of(_moved(scene)))
     lower, upper = scene.own_limits
     farthest = np.where(scene.revolute, 0.0, np.maximum(np.abs(lower), np.abs(upper)))
-    measured = side(found, Geometry("", body, np.zeros((1, 3)), 0.0, {}), farthest[None])
+    levers = np.empty(len(found.joints))
+    measured = lengths(found, np.zeros((1, 3)))
+    chained = found.joints, found.slides, measured.offsets, measured.across, measured.tail, measured.tail_across
+    size = measured.size + fill_levers(*chained, farthest, levers)
     turns = np.array([_quaternion(R) for R in found.rotations])
-    return Frame(turns, found.offsets, found.axes, found.joints, found.slides, measured.levers[0], lower, upper, measured.size or 1.0)
+    return Frame(turns, found.offsets, found.axes, found.joints, found.slides, levers, lower, upper, size or 1.0)
 
 
 def pose_of(position: ArrayLike, rpy: ArrayLike) -> Pose:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from certifier.collisions.bodies import bodies_of
+from certifier.collisions.seen import seen_of
 from certifier.jobs.motion import certify, swing
 from certifier.jobs.motion import certify_in_child as certify_in_child
 from certifier.model import Array, Scene
@@ -44,7 +44,7 @@ def keep(text: str) -> Scene:
     scene = Scene.from_document(json.loads(text))
     middle = (scene.q_lower + scene.q_upper) / 2
     for padding in PADDINGS:
-        bodies_of(scene, padding)
+        seen_of(scene, padding)
     certify(scene, Motion(Space.Q, np.array([middle, middle])), tube=True)  # what it computes about the scene is kept as well
     return scene
 
@@ -59,8 +59,8 @@ def planned(payload: dict[str, Any], scene: Scene) -> dict[str, Any]:
             search.
 
     Returns:
-        ``q`` (K, n), ``t`` (K,); the ``path`` (k, n), with the ``tube`` about it in which q is, and their ``proof`` in base 64. Or a
-        ``reason``:
+        ``q`` (K, n), ``t`` (K,); the ``path`` (k, n), with the ``tube`` about it in which q is; and the ``planes`` that prove it, a file
+        without the scene in base 64. Or a ``reason``:
 
         - ``outside_limits`` or ``in_collision``, with ``where``, which is ``start``, ``via[i]``, ``goal[i]`` or ``pose``, and the
           attributes of OutsideLimits or InCollision;
@@ -142,9 +142,9 @@ def _along(scene: Scene, search: Search, start: Array, payload: dict[str, Any]) 
 def _answer(proved: Proved) -> dict[str, Any]:
     verdict = proved.verdict
     assert verdict.statement is not None
-    assert verdict.proof is not None
-    proof = base64.b64encode(verdict.proof).decode()
-    return {"q": proved.q, "t": proved.t, "path": proved.path, "tube": verdict.statement.rho, "proof": proof}
+    assert verdict.planes is not None
+    planes = base64.b64encode(verdict.planes).decode()
+    return {"q": proved.q, "t": proved.t, "path": proved.path, "tube": verdict.statement.rho, "planes": planes}
 
 
 def _wrong(scene: Scene, search: Search, points: list[Array], goals: list[Array]) -> dict[str, Any] | None:

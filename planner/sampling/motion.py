@@ -108,7 +108,12 @@ def _at_rest(path: Array, speed: Array, acceleration: Array) -> tuple[Array, Arr
 
 
 def _fine(points: Array) -> Array:
-    """Returns points on the lines between points, (m, n), in which no joint moves by more than FINE from one to the next."""
+    """Returns points on the lines between points, (m, n), in which no joint moves by more than FINE from one to the next.
+
+    One line alone remains as it is: it needs no curve.
+    """
+    if len(points) == 2:
+        return points
     parts = [points[:1]]
     for a, b in pairwise(points):
         u = np.linspace(0, 1, max(1, int(np.ceil(np.abs(b - a).max() / FINE))) + 1)[1:, None]

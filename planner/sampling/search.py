@@ -11,9 +11,10 @@ import time
 import numpy as np
 from ompl import base, geometric, util
 
-from certifier.collisions.bodies import bodies_of
 from certifier.collisions.free import CLOSE, free_along, free_at
+from certifier.collisions.seen import seen_of
 from certifier.model import Array, Scene
+from certifier.motion.bodies import bodies_of
 
 STEP, PART = 1.0, 0.05
 """A tree grows by steps of at most this length in q, in radians and metres, or of this part of the box' diagonal where that is more."""
@@ -51,8 +52,8 @@ class Search:
     """
 
     def __init__(self, scene: Scene, lower: Array, upper: Array, padding: float = 0.0) -> None:
-        self._bodies = bodies_of(scene, padding)
-        self._order = np.arange(len(self._bodies.pairs))
+        self._bodies, self._seen = bodies_of(scene), seen_of(scene, padding)
+        self._order = np.arange(len(scene.pairs))
         self._space = base.SpaceInformation(space_of(lower, upper))
         self._space.setStateValidityChecker(lambda state: self.is_free(positions(self._space, state)))
         self._space.setMotionValidator(_Lines(self._space, self))
@@ -60,11 +61,11 @@ class Search:
 
     def is_free(self, q: Array) -> bool:
         """Says whether no pair touches at joint positions q, (n,)."""
-        return bool(free_at(self._bodies, q, self._order))
+        return bool(free_at(self._bodies, self._seen, q, self._order))
 
     def sees(self, a: Array, b: Array) -> bool:
         """Says whether no pair touches on the straight line in q from a to b, (n,) each."""
-        return bool(free_along(self._bodies, a, b, self._order, CLOSE))
+        return bool(free_along(self._bodies, self._seen, a, b, self._order, CLOSE))
 
     def path(self, start: Array, goal: Array, until: float) -> Array | None:
         """Returns a path, (k, n), straight in q between its rows and free of collisions; None where none was found in time.

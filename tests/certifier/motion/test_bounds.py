@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from certifier.kinematics import Kinematics
-from certifier.model import JointKind
-from certifier.motion import chains as ours
-from certifier.motion.intervals import acceleration, place
+from certifier.model import JointKind, Pair
+from certifier.motion.bodies import bodies_of, place, place_links
+from certifier.motion.views import acceleration, levers_of, views_of
 from certifier.proof.motion import Motion, Space
 from certifier.verify.chains import poses
 from certifier.verify.kinematics import ExactKinematics, exact
-from certifier.verify.motion import _acceleration
 from certifier.verify.pieces import Pieces
 from certifier.verify.places import Places
+from certifier.verify.sides import Known
 from certifier.verify.volume import placed
 from tests.certifier.motions import coordinates
 from tests.certifier.scenes import box, random_tree
@@ -32,7 +33,9 @@ def random_case(seed):
     rng = np.random.default_rng(seed)
     tree = random_tree(seed, bodies=8) if seed % 3 else random_tree(seed, (JointKind.REVOLUTE,), bodies=5)
     frame, body = rng.choice(tree.bodies, 2, replace=False)
-    shape = box("shape", body, (0.3, 0.2, 0.1), tuple(rng.normal(size=3)))
+    shape = box("shape", str(body), (0.3, 0.2, 0.1), tuple(rng.normal(size=3)))
+    other = box("other", str(frame), (0.1, 0.1, 0.1))
+    tree = replace(tree, geometries=(shape, other), pairs=(Pair("shape", "other"),))
     space = Space.S if seed % 2 else Space.Q
     size = rng.choice([0.01, 0.5, 3.0])
     degree = (1, 2, 3, 7)[seed // 2 % 4]
@@ -44,15 +47,27 @@ def positions(tree, motion, piece, times):
     return (x, tree.to_q(x)) if motion.space is Space.S else (tree.to_s(x), x)
 
 
-def bounds(tree, frame, body, shape, motion, rho=0.0, t0=0.0, t1=1.0):
+def verified_side(tree, frame):
+    """The side of the tree's first geometry, as the verifier has it."""
+    sides, own = Known(tree).sides(np.array([tree.bodies.index(frame)]), np.zeros(1, np.int64))
+    return sides.of(own)
+
+
+def bounds(tree, frame, motion, rho=0.0, t0=0.0, t1=1.0):
     """Levers, and the bounds of the acceleration in a part of each piece, as the verifier and as the search computes them."""
-    check, chain = Pieces(tree, motion, rho), Places(tree).chain(frame, body)
+    check, side = Pieces(tree, motion, rho), verified_side(tree, frame)
     pieces = np.arange(motion.pieces)
     rates, changes = check.rates(pieces, np.full(len(pieces), t0), np.full(len(pieces), t1))
-    levers = chain.levers(chain.reach(shape.vertices), check.slid[:, chain.joints])
-    side = ours.side(ours.chain(Kinematics.of(tree), frame, body), shape, check.slid)
-    searched = [acceleration(side, side.levers[k], rates[k], changes[k]) for k in pieces]
-    return chain, levers, _acceleration(chain, levers, rates, changes), side, searched
+    of_each = side.of(np.zeros(len(pieces), np.int64))
+    levers = of_each.levers(of_each.slid(check.slid))
+    views = views_of(tree)
+    view = int(views.sides[-1, 0])  # the last choice is the frame of the second geometry's link
+    own, searched = slice(*views.begins[view : view + 2]), []
+    for k in pieces:
+        ours, _ = levers_of(views, check.slid[k])
+        assert ours[own] == pytest.approx(levers[k], rel=1e-8)
+        searched.append(acceleration(views, view, ours, rates[k], changes[k]))
+    return levers, of_each.accelerations(levers, rates, changes), searched
 
 
 @pytest.mark.parametrize("seed", range(60))
@@ -60,18 +75,23 @@ def test_no_vertex_leaves_its_chord_farther_than_the_bound_says(seed):
     tree, frame, body, shape, motion = random_case(seed)
     kinematics = Kinematics.of(tree)
     t0, t1 = np.sort(np.random.default_rng(seed).uniform(size=2)) if seed % 5 else (0.0, 1.0)
-    chain, levers, bent, side, searched = bounds(tree, frame, body, shape, motion, 0.0, t0, t1)
-    assert side.levers == pytest.approx(levers, rel=1e-8)
+    levers, bent, searched = bounds(tree, frame, motion, 0.0, t0, t1)
+    bodies = bodies_of(tree)
+    R, at = np.empty((len(bodies.parents), 3, 3)), np.empty((len(bodies.parents), 3))
     for piece in range(motion.pieces):
         s, q = positions(tree, motion, piece, t0 + TIMES * (t1 - t0))
         p = kinematics.points(frame, body, shape.vertices, s)
         chord = p[:1] + TIMES[:, None, None] * (p[-1:] - p[:1])
         assert np.linalg.norm(p - chord, axis=2).max() <= (t1 - t0) ** 2 * bent[piece] / 8 + 1e-12
         assert searched[piece] == pytest.approx(bent[piece], rel=1e-6, abs=1e-12)
-        found, X, Y = np.empty_like(p[0]), np.empty((3, 4)), np.empty((3, 4))
-        place(side, q[7], X, Y, found)
-        assert found == pytest.approx(p[7], abs=1e-9)
-    assert len(chain.joints) == len(kinematics.chain(frame, body))
+        found = np.empty_like(p[0])
+        place_links(bodies, q[7], R, at)
+        place(bodies, 0, bodies.links[1], R, at, found)
+        link = bodies.links[1]
+        of_root = kinematics.points(tree.bodies[bodies.roots[link]], body, shape.vertices, s[7:8])[0]
+        moved = found @ bodies.turned[link].T
+        assert np.diff(moved, axis=0) == pytest.approx(np.diff(of_root, axis=0), abs=1e-9)
+    assert levers.shape[1] == len(kinematics.chain(frame, body))
 
 
 def test_the_bound_of_one_joint_is_reached():
@@ -81,7 +101,7 @@ def test_the_bound_of_one_joint_is_reached():
     for seed in range(60):
         tree, frame, body, shape, motion = random_case(seed)
         if len(Kinematics.of(tree).chain(frame, body)) == 1 and motion.degree == 1:
-            *_, searched = bounds(tree, frame, body, shape, motion)
+            *_, searched = bounds(tree, frame, motion)
             p = Kinematics.of(tree).points(frame, body, shape.vertices, positions(tree, motion, 0, TIMES)[0])
             second = np.linalg.norm(np.diff(p, 2, axis=0), axis=2).max() * len(TIMES) ** 2
             ratios.append(second / max(searched[0], 1e-12))
@@ -92,7 +112,7 @@ def test_the_bound_of_one_joint_is_reached():
 def test_no_vertex_moves_farther_in_a_tube_than_the_levers_say(seed):
     tree, frame, body, shape, motion = random_case(seed)
     kinematics, rng, rho = Kinematics.of(tree), np.random.default_rng(seed), 0.2
-    _, levers, *_ = bounds(tree, frame, body, shape, motion, rho)
+    levers, *_ = bounds(tree, frame, motion, rho)
     _, q = positions(tree, motion, 0, rng.uniform(size=300))
     near = q + rng.choice([-rho, rho], q.shape)
     p, moved = (kinematics.points(frame, body, shape.vertices, tree.to_s(x)) for x in (q, near))
@@ -136,7 +156,8 @@ def test_positions_are_as_exact_as_is_said(seed):
     """Against exact fractions, in s."""
     tree, frame, body, shape, motion = random_case(2 * seed + 1)
     check, chain = Pieces(tree, motion, 0.0), Places(tree).chain(frame, body)
-    size = chain.sizes(chain.reach(shape.vertices), check.slid[:, chain.joints])
+    side = verified_side(tree, frame)
+    error = side.errors(side.sizes(side.slid(check.slid.max(axis=0, keepdims=True))), check.inexact)[0]
     pieces, times = np.array([0, 1, 0, 1, 1]), np.array([0.0, 1.0, 0.3, 0.7, 1e-9])
     R, p = poses([chain], np.zeros(5, np.int64), np.arange(5), *check.positions(pieces, times))
     for k, (piece, time) in enumerate(zip(pieces, times, strict=True)):
@@ -147,8 +168,8 @@ def test_positions_are_as_exact_as_is_said(seed):
         X = [[x / X[3][3] for x in row] for row in X]
         for v in shape.vertices:
             truth = np.array([float(int(x.p) / int(x.q)) for x in placed(X, tuple(map(exact, v)))])
-            assert np.linalg.norm(R[k] @ v + p[k] - truth) <= chain.error(size, check.inexact).max()
-    assert chain.error(size, check.inexact).max() < 1e-10
+            assert np.linalg.norm(R[k] @ v + p[k] - truth) <= error
+    assert error < 1e-10
 
 
 @pytest.mark.parametrize("degree", [2, 3, 6, 15])

@@ -18,7 +18,7 @@ from certifier.outcome import Outcome
 from certifier.proof import limits
 from certifier.proof.motion import Motion, Space
 from certifier.verify.file import verify_file
-from certifier.verify.motion import MotionStatement
+from certifier.verify.motion import MotionStatement, MotionVerifier
 from tests.certifier.motions import POST, TIP, distances, positions, raised, swing
 from tests.certifier.scenes import planar_arm, two_arms
 
@@ -132,7 +132,7 @@ def test_a_proof_that_shows_less_than_the_padding_is_not_handed_out(monkeypatch)
     motion = given(scene, [[-1.0], [1.0]], Space.Q)
     weak = search(scene, motion)
     monkeypatch.setattr("certifier.jobs.motion.search", lambda *arguments: weak)
-    monkeypatch.setattr("certifier.jobs.motion.verify_motion", lambda proof: MotionStatement(scene, motion, 1.0, 0.0, 0.09))
+    monkeypatch.setattr(MotionVerifier, "verify", lambda self, proof: MotionStatement(scene, motion, 1.0, 0.0, 0.09))
     with pytest.raises(ProofError) as refusal:
         certify(scene, motion, padding=0.0499)
     assert (refusal.value.code, refusal.value.field) == ("proof_motion", "padding")

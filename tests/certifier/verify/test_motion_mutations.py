@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from certifier.verify import motion
-from certifier.verify.chains import Chain
+from certifier.verify.sides import Sides
 from tests.certifier.verify.fuzz_motion import Campaign, case
 from tests.certifier.verify.motion_mutations import KINDS, changed_bytes, changed_meaning, valid
 from tests.certifier.verify.motion_oracle import MotionFile
@@ -64,7 +63,7 @@ def test_a_case_is_made_again_from_its_number():
 
 
 def test_the_oracle_finds_what_a_verifier_without_a_bound_of_accelerations_would_accept(monkeypatch):
-    monkeypatch.setattr(motion, "_acceleration", lambda chain, levers, rates, changes: np.zeros(len(rates)))
+    monkeypatch.setattr(Sides, "accelerations", lambda self, levers, rates, changes: np.zeros(len(rates)))
     rng, campaign = np.random.default_rng(0), Campaign()
     changed = (changed_meaning(valid()[rng.integers(len(valid()))], rng) for _ in range(400))
     wrong = next(wrong for kind, data in changed if (wrong := campaign.judge(kind, data)))
@@ -73,7 +72,7 @@ def test_the_oracle_finds_what_a_verifier_without_a_bound_of_accelerations_would
 
 def test_the_oracle_finds_an_overlap_that_only_rounding_hides(monkeypatch):
     """2e-10 m deep, with a body's frame a million metres off its joint."""
-    monkeypatch.setattr(Chain, "sizes", lambda self, reach, slid: np.full(len(slid), 1.0))
+    monkeypatch.setattr(Sides, "sizes", lambda self, slid: np.full(len(slid), 1.0))
     wrong = Campaign().judge("far", far_proof())
     assert wrong is not None
     assert "apart at most" in wrong

@@ -19,6 +19,7 @@ from certifier.verify.motion import verify_motion
 from certifier.verify.pieces import Pieces
 from certifier.verify.places import Places
 from certifier.verify.scene import check_scene
+from certifier.verify.sides import Known
 from tests.certifier.scenes import box, pose
 
 CASES = 40
@@ -128,11 +129,13 @@ def wrong_by(seed: int):
             p = [sum((X[i][k] * arb(exact(vertex[k])) for k in range(3)), X[i][3]) for i in range(3)]
             truth = sum((arb(exact(a)) * b for a, b in zip(normal, p, strict=True)), arb(0))
             off = max(off, float(abs(arb(exact(value)) - truth).upper()))
-    slid = pieces.slid[:, chain.joints]
-    bound = float(chain.error(chain.sizes(chain.reach(v), slid), pieces.inexact)[0])
+    sides, own = Known(scene).sides(np.array([scene.bodies.index(frame)]), none)  # of the first geometry, whose vertices are v
+    side = sides.of(own)
+    slid = side.slid(pieces.slid)
+    bound = float(side.errors(side.sizes(slid), pieces.inexact)[0])
     tails = np.linalg.norm(v @ chain.rotations[-1].T + chain.offsets[-1], axis=1).max()
-    short = tails + np.linalg.norm(chain.offsets[:-1], axis=1).sum() + (slid * chain.slides).sum()
-    return off / float(np.linalg.norm(normal)), bound, float(chain.error(np.array([short]), pieces.inexact)[0])
+    short = tails + np.linalg.norm(chain.offsets[:-1], axis=1).sum() + slid.sum()
+    return off / float(np.linalg.norm(normal)), bound, float(side.errors(np.array([short]), pieces.inexact)[0])
 
 
 def campaign(seeds) -> int:

@@ -13,6 +13,7 @@ from pydrake.math import RollPitchYaw
 
 from certifier.model import WORLD, Pair
 from certifier.pair.collisions import in_collision
+from certifier.proof.container import with_scene
 from certifier.proof.motion import MotionProof, Space
 from certifier.scene import load_scene
 from certifier.scene.drake_model import build_diagram
@@ -35,7 +36,7 @@ def ask(scene, points, goals, seconds=5.0, speed=1.0, acceleration=2.0):
 def check(scene, found, speed=1.0, acceleration=2.0):
     """What holds of every motion that is found."""
     q, t = found["q"], found["t"]
-    data = base64.b64decode(found["proof"])
+    data = with_scene(base64.b64decode(found["planes"]), scene)
     assert verify_file(data).scene.hash == scene.hash
     statement = verify_motion(MotionProof.from_bytes(data, scene))
     assert (statement.motion.space, statement.end, statement.rho) == (Space.Q, 1.0, found["tube"])

@@ -1,4 +1,4 @@
-"""A scene's links, geometries and pairs as arrays, for the compiled loops of this room.
+"""A scene's links, geometries and pairs as arrays, for the compiled loops about motions and collisions.
 
 A link is a body with all bodies that are welded to it. Its frame is that of the joint that moves it, so its pose is
 
@@ -13,10 +13,10 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
-from certifier.kinematics import Kinematics, rigid_inverse
-from certifier.model import WORLD, Array, Geometry, JointKind, Scene
-from certifier.motion.chains import Side, chain, side
+from certifier.kinematics import rigid_inverse
+from certifier.model import WORLD, Array, JointKind, Scene
 
 
 class Bodies(NamedTuple):
@@ -28,16 +28,14 @@ class Bodies(NamedTuple):
         slides: (L,) whether that joint is prismatic.
         axes: (L, 3) unit vectors along the joints' axes.
         rotations, offsets: (L, 3, 3) and (L, 3) of the fixed poses X_PF, metres.
+        roots: (L,) number among the scene's bodies of the one that the link's joint moves.
+        turned: (L, 3, 3) rotations of the links' frames in the frames of these bodies.
         vertices: (V, 3) metres, in the frames of their links.
         first: (G + 1,) where each geometry's vertices begin, and V.
         links: (G,) the link of each geometry.
         centers, sizes: (G, 3) and (G,) of balls that contain the vertices, metres, in the links' frames.
-        pairs: (P, 2) numbers of the geometries a and b. The motion of b is looked at from the link of a.
+        pairs: (P, 2) numbers of the geometries a and b.
         reaches: (P,) the radii and the padding of both geometries, metres.
-        begins: (P + 1,) where each pair's joints begin in the arrays below, and their length.
-        chains: (J,) position indices of the joints between a and b.
-        sliding: (J,) whether each of them is prismatic.
-        levers: (J,) how far a vertex of b moves at most where the joint moves by 1: metres, and 1 for a prismatic joint.
     """
 
     parents: np.ndarray
@@ -46,6 +44,8 @@ class Bodies(NamedTuple):
     axes: Array
     rotations: Array
     offsets: Array
+    roots: np.ndarray
+    turned: Array
     vertices: Array
     first: np.ndarray
     links: np.ndarray
@@ -53,19 +53,11 @@ class Bodies(NamedTuple):
     sizes: Array
     pairs: np.ndarray
     reaches: Array
-    begins: np.ndarray
-    chains: np.ndarray
-    sliding: np.ndarray
-    levers: Array
 
 
 @lru_cache(maxsize=16)
-def bodies_of(scene: Scene, padding: float = 0.0) -> Bodies:
-    """Returns the arrays of a scene.
-
-    Args:
-        padding: metres that are added around every body, beyond the scene's padding.
-    """
+def bodies_of(scene: Scene) -> Bodies:
+    """Returns the arrays of a scene."""
     tree = _Tree(scene)
     vertices, centers, sizes = [], [], []
     for geometry in scene.geometries:
@@ -74,8 +66,6 @@ def bodies_of(scene: Scene, padding: float = 0.0) -> Bodies:
         centers.append((vertices[-1].min(axis=0) + vertices[-1].max(axis=0)) / 2)
         sizes.append(np.linalg.norm(vertices[-1] - centers[-1], axis=1).max())
     number = {geometry.name: i for i, geometry in enumerate(scene.geometries)}
-    kinematics = Kinematics.of(scene)
-    seen = [_seen(kinematics, scene.geometry(pair.a), scene.geometry(pair.b)) for pair in scene.pairs]
     poses = np.array(tree.poses)
     return Bodies(
         parents=np.array(tree.parents),
@@ -84,17 +74,15 @@ def bodies_of(scene: Scene, padding: float = 0.0) -> Bodies:
         axes=np.array(tree.axes),
         rotations=np.ascontiguousarray(poses[:, :3, :3]),
         offsets=np.ascontiguousarray(poses[:, :3, 3]),
+        roots=np.array([scene.bodies.index(body) for body in tree.roots]),
+        turned=np.array([tree.inside[body][:3, :3].T for body in tree.roots]),
         vertices=np.concatenate([np.zeros((0, 3)), *vertices]),
         first=np.concatenate([[0], np.cumsum([len(each) for each in vertices], dtype=np.int64)]),
         links=np.array([tree.links[geometry.body] for geometry in scene.geometries], dtype=np.int64),
         centers=np.array(centers).reshape(-1, 3),
         sizes=np.array(sizes),
-        pairs=np.array([(number[a.name], number[b.name]) for a, b, _ in seen], dtype=np.int64).reshape(-1, 2),
-        reaches=np.array([a.radius + b.radius + 2 * (scene.padding + padding) for a, b, _ in seen]),
-        begins=np.concatenate([[0], np.cumsum([len(one.chain.joints) for _, _, one in seen], dtype=np.int64)]),
-        chains=np.concatenate([np.zeros(0, dtype=np.int64), *(one.chain.joints for _, _, one in seen)]),
-        sliding=np.concatenate([np.zeros(0, dtype=np.bool_), *(one.chain.slides for _, _, one in seen)]),
-        levers=np.concatenate([np.zeros(0), *(one.levers[0] for _, _, one in seen)]),
+        pairs=np.array([(number[pair.a], number[pair.b]) for pair in scene.pairs], dtype=np.int64).reshape(-1, 2),
+        reaches=np.array([sum(scene.geometry(name).radius for name in (pair.a, pair.b)) + 2 * scene.padding for pair in scene.pairs]),
     )
 
 
@@ -103,7 +91,7 @@ class _Tree:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self.links, self.inside = {WORLD: 0}, {WORLD: np.eye(4)}
+        self.links, self.inside, self.roots = {WORLD: 0}, {WORLD: np.eye(4)}, [WORLD]
         self.parents, self.joints, self.slides = [0], [0], [False]
         self.axes, self.poses = [np.zeros(3)], [np.eye(4)]
         for body in scene.bodies:
@@ -122,15 +110,58 @@ class _Tree:
         self.links[body] = len(self.parents)
         self.inside[body] = rigid_inverse(joint.X_BM)
         self.parents.append(self.links[joint.parent])
+        self.roots.append(body)
         self.joints.append(joint.index)
         self.slides.append(joint.kind is JointKind.PRISMATIC)
         self.axes.append(joint.axis)
         self.poses.append(pose)
 
 
-def _seen(kinematics: Kinematics, a: Geometry, b: Geometry) -> tuple[Geometry, Geometry, Side]:
-    """Returns a pair's geometries, that one second from whose partner its motion has the smaller bound, and its side."""
-    scene = kinematics.scene
-    farthest = np.maximum(np.abs(scene.own_limits[0]), np.abs(scene.own_limits[1]))[None]
-    sides = [(one, other, side(chain(kinematics, one.body, other.body), other, farthest)) for one, other in ((a, b), (b, a))]
-    return min(sides, key=lambda found: float(found[2].levers.sum()))
+@njit(cache=True)
+def place_links(bodies: Bodies, q: Array, R: Array, p: Array) -> None:
+    """Fills in the links' rotations R, (L, 3, 3), and positions p, (L, 3), in the world at joint positions q, (n,)."""
+    R[0] = np.eye(3)
+    p[0] = 0.0
+    X = np.empty((3, 3))
+    for link in range(1, len(bodies.parents)):
+        parent, value, u = bodies.parents[link], q[bodies.joints[link]], bodies.axes[link]
+        fixed, offset = bodies.rotations[link], bodies.offsets[link]
+        for i in range(3):
+            a, b, d = R[parent, i, 0], R[parent, i, 1], R[parent, i, 2]
+            p[link, i] = p[parent, i] + a * offset[0] + b * offset[1] + d * offset[2]
+            for j in range(3):
+                X[i, j] = a * fixed[0, j] + b * fixed[1, j] + d * fixed[2, j]
+        if bodies.slides[link]:
+            for i in range(3):
+                p[link, i] += value * (X[i, 0] * u[0] + X[i, 1] * u[1] + X[i, 2] * u[2])
+                for j in range(3):
+                    R[link, i, j] = X[i, j]
+        else:
+            c, s = np.cos(value), np.sin(value)
+            x, y, z, v = u[0], u[1], u[2], 1.0 - c
+            for i in range(3):
+                a, b, d = X[i, 0], X[i, 1], X[i, 2]
+                R[link, i, 0] = a * (c + v * x * x) + b * (v * x * y + s * z) + d * (v * x * z - s * y)
+                R[link, i, 1] = a * (v * x * y - s * z) + b * (c + v * y * y) + d * (v * y * z + s * x)
+                R[link, i, 2] = a * (v * x * z + s * y) + b * (v * y * z - s * x) + d * (c + v * z * z)
+
+
+@njit(cache=True)
+def place(bodies: Bodies, geometry: int, frame: int, R: Array, p: Array, points: Array) -> None:
+    """Fills in where a geometry's vertices are in the frame of a link, (W, 3), for the links' poses R, p of :func:`place_links`."""
+    link, begin = bodies.links[geometry], bodies.first[geometry]
+    if link == frame:
+        for v in range(len(points)):
+            for i in range(3):
+                points[v, i] = bodies.vertices[begin + v, i]
+        return
+    Q, t = np.empty((3, 3)), np.empty(3)
+    for i in range(3):
+        t[i] = 0.0
+        for k in range(3):
+            t[i] += R[frame, k, i] * (p[link, k] - p[frame, k])
+            Q[i, k] = R[frame, 0, i] * R[link, 0, k] + R[frame, 1, i] * R[link, 1, k] + R[frame, 2, i] * R[link, 2, k]
+    for v in range(len(points)):
+        x, y, z = bodies.vertices[begin + v, 0], bodies.vertices[begin + v, 1], bodies.vertices[begin + v, 2]
+        for i in range(3):
+            points[v, i] = Q[i, 0] * x + Q[i, 1] * y + Q[i, 2] * z + t[i]
