@@ -26,7 +26,7 @@ class Ompl:
         self._checker = checker(scene)
         self._setup = geometric.SimpleSetup(space_of(scene.q_lower, scene.q_upper))
         self._space = self._setup.getSpaceInformation()
-        self._setup.setStateValidityChecker(lambda state: self._checker.CheckConfigCollisionFree(positions(self._space, state)))
+        self._setup.setStateValidityChecker(lambda state: self._checker.CheckConfigCollisionFree(positions(state, scene.n)))
         self._space.setStateValidityCheckingResolution(RESOLUTION / self._space.getMaximumExtent())
 
     def plan(self, start: Array, goal: Array, seconds: float) -> tuple[Array | None, float]:
@@ -39,7 +39,7 @@ class Ompl:
         if not self._setup.haveExactSolutionPath():
             return None, time.perf_counter() - begin
         self._setup.simplifySolution()
-        path = np.array([positions(self._space, state) for state in self._setup.getSolutionPath().getStates()])
+        path = np.array([positions(state, len(start)) for state in self._setup.getSolutionPath().getStates()])
         return path, time.perf_counter() - begin
 
     def collides(self, path: Array, points: int) -> bool:

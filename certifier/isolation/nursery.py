@@ -40,6 +40,7 @@ def main() -> None:
         module = importlib.import_module(sys.argv[1])
         if hasattr(module, "warm_up"):
             module.warm_up()
+    gc.freeze()  # what is loaded stays: collecting garbage need not look at it, nor copy its pages in a child
     try:
         while True:
             request = connection.recv_bytes()
@@ -105,6 +106,7 @@ def _keep(module: ModuleType, name: str, text: str, gone: list[str]) -> None:
     for former in gone:
         del _kept[former]
     _kept[name] = module.keep(text)
+    gc.freeze()
 
 
 def _forked(module: ModuleType, connection: Connection, call: dict[str, Any]) -> bytes:
@@ -115,7 +117,6 @@ def _forked(module: ModuleType, connection: Connection, call: dict[str, Any]) ->
     """
     reading, writing = os.pipe()
     nursery = os.getpid()
-    gc.freeze()  # so that collecting garbage in the child copies no page of this process
     child = os.fork()
     if child == 0:
         os.close(reading)

@@ -79,7 +79,7 @@ def prove(
 
 def within(scene: Scene, tube: Tube, path: Array, speed: Array, acceleration: Array) -> tuple[Array, Array] | None:
     """Returns configurations (K, n) and times (K,) of a motion from rest to rest along a path, (k, n); None where it leaves the tube."""
-    curve = timed(_fine(path), [], speed, acceleration, SPACING)
+    curve = timed(*_fine(path), speed, acceleration, SPACING, straight_between=True)
     for found in (curve, _at_rest(path, speed, acceleration)):
         if found is None:
             continue
@@ -94,9 +94,7 @@ def within(scene: Scene, tube: Tube, path: Array, speed: Array, acceleration: Ar
 def _candidates(search: Search, route: Route, speed: Array, acceleration: Array) -> Iterator[tuple[Array, Array, Array]]:
     """Yields paths with configurations of motions along them and their times: first one with round corners, then one that stops there."""
     path = rounded(route.path, search.sees, route.kept)
-    curve = _fine(path)
-    through = [int(i) for i in np.flatnonzero((curve[:, None] == route.path[list(route.kept)]).all(axis=2).any(axis=1))]
-    found = timed(curve, through, speed, acceleration, SPACING)
+    found = timed(*_fine(path), speed, acceleration, SPACING, straight_between=True)
     if found is not None:
         yield path, *found
     yield route.path, *_at_rest(route.path, speed, acceleration)
@@ -107,18 +105,21 @@ def _at_rest(path: Array, speed: Array, acceleration: Array) -> tuple[Array, Arr
     return _joined([straight(a, b, speed, acceleration, SPACING) for a, b in pairwise(path)])
 
 
-def _fine(points: Array) -> Array:
+def _fine(points: Array) -> tuple[Array, list[int]]:
     """Returns points on the lines between points, (m, n), in which no joint moves by more than FINE from one to the next.
 
     One line alone remains as it is: it needs no curve.
+
+    Returns:
+        The points, (M, n), and the numbers of those that were given, without the first and the last.
     """
     if len(points) == 2:
-        return points
+        return points, []
     parts = [points[:1]]
     for a, b in pairwise(points):
         u = np.linspace(0, 1, max(1, int(np.ceil(np.abs(b - a).max() / FINE))) + 1)[1:, None]
         parts.append((1 - u) * a + u * b)
-    return np.concatenate(parts)
+    return np.concatenate(parts), (np.cumsum([len(part) for part in parts])[1:-1] - 1).tolist()
 
 
 def _joined(parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:

@@ -38,9 +38,9 @@ def state_of(space: base.SpaceInformation, q: Array) -> base.State:
     return state
 
 
-def positions(space: base.SpaceInformation, state: base.State) -> Array:
+def positions(state: base.State, n: int) -> Array:
     """Returns the joint positions of a state, (n,)."""
-    return np.array(state[0 : space.getStateDimension()])
+    return np.array(state[0:n])
 
 
 class Search:
@@ -53,11 +53,7 @@ class Search:
 
     def __init__(self, scene: Scene, lower: Array, upper: Array, padding: float = 0.0) -> None:
         self._bodies, self._seen = bodies_of(scene), seen_of(scene, padding)
-        self._order = np.arange(len(scene.pairs))
-        self._space = base.SpaceInformation(space_of(lower, upper))
-        self._space.setStateValidityChecker(lambda state: self.is_free(positions(self._space, state)))
-        self._space.setMotionValidator(_Lines(self._space, self))
-        self._space.setup()
+        self._order, self._box = np.arange(len(scene.pairs)), (lower, upper)
 
     def is_free(self, q: Array) -> bool:
         """Says whether no pair touches at joint positions q, (n,)."""
@@ -77,28 +73,32 @@ class Search:
         if self.sees(start, goal):
             return np.array([start, goal])
         in_time = base.PlannerTerminationCondition(lambda: time.monotonic() > until)
-        asked = base.ProblemDefinition(self._space)
-        asked.setStartAndGoalStates(state_of(self._space, start), state_of(self._space, goal))
-        planner = geometric.RRTConnect(self._space)
-        planner.setRange(max(STEP, PART * self._space.getMaximumExtent()))
+        space, n = base.SpaceInformation(space_of(*self._box)), len(start)  # nothing that OMPL calls may hold it: it would never be freed
+        space.setStateValidityChecker(lambda state: self.is_free(positions(state, n)))
+        space.setMotionValidator(_Lines(space, n, self))
+        space.setup()
+        asked = base.ProblemDefinition(space)
+        asked.setStartAndGoalStates(state_of(space, start), state_of(space, goal))
+        planner = geometric.RRTConnect(space)
+        planner.setRange(max(STEP, PART * space.getMaximumExtent()))
         planner.setProblemDefinition(asked)
         planner.setup()
         planner.solve(in_time)
         if not asked.hasExactSolution():
             return None
         found = asked.getSolutionPath()
-        geometric.PathSimplifier(self._space).simplify(found, in_time)
-        points = np.array([positions(self._space, state) for state in found.getStates()])
+        geometric.PathSimplifier(space).simplify(found, in_time)
+        points = np.array([positions(state, n) for state in found.getStates()])
         points[0], points[-1] = start, goal
         return points
 
 
 class _Lines(base.MotionValidator):
-    """Answers OMPL's question whether a straight line is free."""
+    """Answers OMPL's question whether a straight line is free, in n joint positions."""
 
-    def __init__(self, space: base.SpaceInformation, search: Search) -> None:
+    def __init__(self, space: base.SpaceInformation, n: int, search: Search) -> None:
         super().__init__(space)
-        self._space, self._search = space, search
+        self._n, self._search = n, search
 
     def checkMotion(self, a: base.State, b: base.State) -> bool:
-        return self._search.sees(positions(self._space, a), positions(self._space, b))
+        return self._search.sees(positions(a, self._n), positions(b, self._n))

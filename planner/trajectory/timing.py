@@ -22,6 +22,8 @@ much shorter than all of it.
 """
 FEWEST, MOST = 17, 4000
 """Least and largest number of configurations of a trajectory."""
+NEAR = 0.25
+"""Points that a motion has to go through are at least this part of a step apart in time."""
 _FAST = 1e6
 """No joint need be faster: Toppra has its numbers in units in which the whole motion lasts about 1."""
 
@@ -31,7 +33,9 @@ def length(curve: Array) -> float:
     return float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum())
 
 
-def timed(curve: Array, through: list[int], speed: Array, acceleration: Array, spacing: float) -> tuple[Array, Array] | None:
+def timed(
+    curve: Array, through: list[int], speed: Array, acceleration: Array, spacing: float, straight_between: bool = False
+) -> tuple[Array, Array] | None:
     """Returns configurations q (k, n) of a curve at about equal steps of time, and their times t (k,) in seconds.
 
     None where Toppra finds none.
@@ -43,6 +47,7 @@ def timed(curve: Array, through: list[int], speed: Array, acceleration: Array, s
             nearer to each other than half a step, the first.
         speed, acceleration: (n,) limits of every joint.
         spacing: no joint moves much farther between two configurations, unless there would be more than MOST of them.
+        straight_between: whether the configurations are on the straight lines between the points, and not on the spline.
     """
     if length(curve) <= STILL:
         return curve[[0, -1]], np.array([0.0, UP * _least(np.abs(curve[-1] - curve[0]), speed, acceleration)])
@@ -66,13 +71,23 @@ def timed(curve: Array, through: list[int], speed: Array, acceleration: Array, s
     steps = np.abs(np.diff(path.vector_values(reached))).max() * (MOST - 1) / spacing
     t = np.linspace(fine[0], fine[-1], int(np.clip(np.ceil(steps) + 1, FEWEST, MOST)))
     when = np.interp(along[through], reached, fine)
-    apart = np.diff(when, prepend=-np.inf) >= t[1] / 2
-    places = np.rint(when[apart] / t[1]).astype(int)
-    t[places] = when[apart]
-    q = path.vector_values(np.clip(course.vector_values(t)[0], 0.0, along[-1])).T
-    q[places], q[0], q[-1], t[0], t[-1] = curve[through][apart], curve[0], curve[-1], fine[0], fine[-1]
+    kept = _apart(when, t[1] * NEAR)
+    t = t[np.abs(t[:, None] - when[None, kept]).min(axis=1, initial=np.inf) >= t[1] / 2]
+    t = np.unique(np.concatenate([fine[:1], t, when[kept], fine[-1:]]))
+    reached = np.clip(course.vector_values(t)[0], 0.0, along[-1])
+    q = np.column_stack([np.interp(reached, along, joint) for joint in curve.T]) if straight_between else path.vector_values(reached).T
+    q[np.searchsorted(t, when[kept])], q[0], q[-1] = curve[through][kept], curve[0], curve[-1]
     t *= unit
     return q, t * stretch(q, t, speed, acceleration)
+
+
+def _apart(times: Array, least: float) -> list[int]:
+    """Returns the numbers of times, (m,) ascending, each of which is later by ``least`` than the one before that is among them."""
+    kept: list[int] = []
+    for i, time in enumerate(times.tolist()):
+        if not kept or time - times[kept[-1]] >= least:
+            kept.append(i)
+    return kept
 
 
 def _least(way: Array, speed: Array, acceleration: Array) -> float:

@@ -89,7 +89,7 @@ def test_a_proof_takes_what_is_shared_in_any_order():
 
 
 def test_what_is_computed_is_linear_in_the_file(monkeypatch):
-    """Every joint's frames once, and what a geometry reaches once for each chain to it, however many intervals and blocks of them there are."""
+    """Every joint's frames once, and how far a geometry reaches once for each chain to it, however many intervals and blocks there are."""
     tree = random_tree(1, bodies=6)
     shapes = tuple(ball(f"{body}/ball{i}", body, 0.01, (i, 0.0, 0.0)) for body in tree.bodies for i in range(4))
     pairs = tuple(Pair(*sorted((a.name, b.name))) for a in shapes for b in shapes if a.body < b.body)
