@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from threading import Lock
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from cachetools import LRUCache
@@ -20,22 +20,39 @@ MOST = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
-    """Holds the proved motions of a scene.
+class Kept:
+    """A proved motion.
 
     Attributes:
-        version: counts their changes.
-        arrays: id -> the arrays of each, as db.models.MotionRow has them, the latest last.
-        tubes: the tubes about them, in the same order.
+        number: of the motion; later ones have larger numbers.
+        arrays: as db.models.MotionRow has them.
+        tube: half the width of the tube about it, radians or metres.
     """
 
-    version: int
-    arrays: dict[str, dict[str, Any]]
-    tubes: Tubes
+    number: int
+    arrays: dict[str, Array]
+    tube: float
 
-    def width(self, motion_id: str) -> float:
-        """Returns half the width of a motion's tube, in radians or metres."""
-        return next(tube.rho for tube in self.tubes.motions if tube.id == motion_id)
+
+class Known:
+    """Holds the proved motions of a scene. It never changes.
+
+    Args:
+        limits: the lower and the upper limits of the joints, (n,) each, radians or metres.
+        version: counts the changes of the scene's motions.
+        motions: id -> motion, the latest last.
+
+    Attributes:
+        tubes: the tubes about the motions, in the same order.
+    """
+
+    def __init__(self, limits: tuple[Array, Array], version: int, motions: dict[str, Kept]) -> None:
+        self.version, self.motions = version, motions
+        self.tubes = Tubes(limits, [Tube(motion_id, kept.arrays["path"], kept.tube) for motion_id, kept in motions.items()])
+        self._between: dict[tuple[bytes, bytes], list[str]] = {}
+        for motion_id, kept in motions.items():
+            q = kept.arrays["q"]
+            self._between.setdefault((_key(q[0]), _key(q[-1])), []).append(motion_id)
 
     def path(self, start: Array, goal: Array) -> tuple[str, Array] | None:
         """Returns the motion in whose tube both the start and the goal are, (n,) each, and a path between them in it, (k, n); or None.
@@ -58,11 +75,16 @@ class Known:
 
     def answer(self, start: Array, goal: Array, speed: Array, acceleration: Array) -> str | None:
         """Returns the id of a motion from the start to the goal, (n,) each, that keeps the limits, (n,) each; None where there is none."""
-        for motion_id, arrays in reversed(self.arrays.items()):
-            ends = (arrays["q"][0] == start).all() and (arrays["q"][-1] == goal).all()
-            if ends and (arrays["speed"] <= speed).all() and (arrays["acceleration"] <= acceleration).all():
+        for motion_id in reversed(self._between.get((_key(start), _key(goal)), [])):
+            arrays = self.motions[motion_id].arrays
+            if (arrays["speed"] <= speed).all() and (arrays["acceleration"] <= acceleration).all():
                 return motion_id
         return None
+
+
+def _key(q: Array) -> bytes:
+    """Returns what is the same for equal joint positions, (n,), alone."""
+    return (q + 0.0).tobytes()  # -0.0 is 0.0
 
 
 @dataclass
@@ -81,18 +103,14 @@ class MotionsKept:
     def of(self, db: Database, scene_id: str, scene: Scene) -> Known:
         """Returns the motions of a scene, as of a version that is no older than this call."""
         with self._lock:
-            shelf = self._shelves.setdefault(scene_id, _Shelf(Known(0, {}, Tubes(scene.own_limits, []))))
+            shelf = self._shelves.setdefault(scene_id, _Shelf(Known(scene.own_limits, 0, {})))
         with shelf.lock, db.read() as session:
             version = motions.version(session, scene_id)
             if version != shelf.known.version:
-                ids = motions.roll(session, scene_id)
-                there = set(ids)
-                known = {motion_id: arrays for motion_id, arrays in shelf.known.arrays.items() if motion_id in there}
-                widths = {tube.id: tube.rho for tube in shelf.known.tubes.motions}
-                for motion_id, arrays, rho in motions.read(session, [motion_id for motion_id in ids if motion_id not in known]):
-                    known[motion_id], widths[motion_id] = arrays, rho
-                tubes = Tubes(scene.own_limits, [Tube(motion_id, arrays["path"], widths[motion_id]) for motion_id, arrays in known.items()])
-                shelf.known = Known(version, known, tubes)
+                oldest, latest = motions.oldest(session, scene_id), max((kept.number for kept in shelf.known.motions.values()), default=0)
+                known = {motion_id: kept for motion_id, kept in shelf.known.motions.items() if kept.number >= oldest}
+                known |= {row.id: Kept(row.number, row.arrays, row.tube) for row in motions.since(session, scene_id, latest)}
+                shelf.known = Known(scene.own_limits, version, known)
             return shelf.known
 
 

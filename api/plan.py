@@ -103,16 +103,17 @@ def _known(question: _Question) -> dict[str, Any] | None:
     start, goal, known = question.points[0], question.goals[0], question.known
     motion_id = known.answer(start, goal, limits.speed, limits.acceleration)
     if motion_id is not None:
-        arrays = known.arrays[motion_id]
-        return _moved(motion_id, arrays["q"], arrays["t"], known.width(motion_id))
+        kept = known.motions[motion_id]
+        return _moved(motion_id, kept.arrays["q"], kept.arrays["t"], kept.tube)
     inside = known.path(start, goal)
     if inside is None:
         return None
     motion_id, path = inside
-    tube = {"proved": known.arrays[motion_id]["path"], "tube": known.width(motion_id)}
+    kept = known.motions[motion_id]
+    tube = {"proved": kept.arrays["path"], "tube": kept.tube}
     asked = {"path": path, **tube, "speed": limits.speed, "acceleration": limits.acceleration}
     found = about_motions("timed_within", question.scene, asked)
-    return _moved(motion_id, found["q"], found["t"], known.width(motion_id)) if found else None
+    return _moved(motion_id, found["q"], found["t"], kept.tube) if found else None
 
 
 def _searched(asked: Asked, question: _Question, body: PlanRequest) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 from uuid import uuid4
 
 from sqlalchemy import delete, func, select, update
@@ -63,21 +62,21 @@ def version(session: Session, scene_id: str) -> int:
     return session.scalar(select(LibraryRow.motions).where(LibraryRow.scene_id == scene_id)) or 0
 
 
-def roll(session: Session, scene_id: str) -> list[str]:
-    """Returns the ids of the motions that a scene has, in the order of their numbers."""
-    return list(session.scalars(select(MotionRow.id).where(MotionRow.scene_id == scene_id).order_by(MotionRow.number)))
+def oldest(session: Session, scene_id: str) -> int:
+    """Returns the number of the oldest motion that a scene has; the oldest ones go first. Without any, it is beyond all numbers so far."""
+    first = session.scalar(select(func.min(MotionRow.number)).where(MotionRow.scene_id == scene_id))
+    return version(session, scene_id) + 1 if first is None else first
 
 
-def read(session: Session, ids: Sequence[str]) -> list[tuple[str, dict[str, Any], float]]:
-    """Returns id, arrays and tube of these motions, by their numbers; those that are gone are left out."""
-    columns = select(MotionRow.id, MotionRow.arrays, MotionRow.tube)
-    rows = session.execute(columns.where(MotionRow.id.in_(ids)).order_by(MotionRow.number))
-    return [(row.id, row.arrays, row.tube) for row in rows]
+def since(session: Session, scene_id: str, number: int) -> list[MotionRow]:
+    """Returns the motions of a scene with larger numbers, by their numbers."""
+    mine = select(MotionRow).where(MotionRow.scene_id == scene_id, MotionRow.number > number)
+    return list(session.scalars(mine.order_by(MotionRow.number)))
 
 
 def delete_all(session: Session, scene_id: str) -> None:
     """Deletes the motions of a scene, and their proofs unless somebody else has them."""
-    _delete(session, roll(session, scene_id))
+    _delete(session, session.scalars(select(MotionRow.id).where(MotionRow.scene_id == scene_id)).all())
 
 
 def _delete(session: Session, ids: Sequence[str]) -> None:

@@ -29,8 +29,10 @@ STATUS = struct.Struct("i")
 """This says how a child ended, before its answer: 0, an exit status, or a signal with a minus."""
 AT_ONCE = 2
 """Number of nurseries of a module that are kept for its next calls."""
-MOST = 1000
-"""A nursery that has computed this many calls itself makes room for another one, whatever its libraries have left behind."""
+MOST, MORE = 1000, 100
+"""A nursery that has computed this many calls itself makes room for another one, whatever its libraries have left behind. It computes more,
+while the other one loads.
+"""
 KEPT = 4
 """Number of texts that a nursery keeps, those that were named last."""
 _TAIL_BYTES = 2000
@@ -71,9 +73,8 @@ def run_in_child(
     waiting = _idle.setdefault(module, [])
     nursery.computed += not fork
     if nursery.computed >= MOST:
-        nursery.kill()
-        prepare(function)
-    elif len(waiting) < AT_ONCE:
+        nursery = _renewed(nursery, module)
+    if len(waiting) < AT_ONCE:
         waiting.append(nursery)
     else:
         nursery.kill()
@@ -99,11 +100,23 @@ def _free(module: str) -> _Nursery:
     return _Nursery(module)
 
 
+def _renewed(nursery: _Nursery, module: str) -> _Nursery:
+    """Returns what computes the next call, where a nursery has computed many: itself, until another one has had time to load."""
+    if nursery.next is None:
+        nursery.next = _Nursery(module)
+    if nursery.computed < MOST + MORE:
+        return nursery
+    renewed, nursery.next = nursery.next, None
+    nursery.kill()
+    return renewed
+
+
 class _Nursery:
     """Holds a process that has loaded a module, and the connection to it."""
 
     def __init__(self, module: str) -> None:
         self.computed, self._kept = 0, list[str]()
+        self.next: _Nursery | None = None
         self._connection, theirs = Pipe()
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
         root = str(Path(__file__).resolve().parents[2])
@@ -144,7 +157,9 @@ class _Nursery:
         return STATUS.unpack_from(reply)[0], reply[STATUS.size :]
 
     def kill(self) -> None:
-        """Ends the process with its children."""
+        """Ends the process with its children, and the one that was to follow it."""
+        if self.next is not None:
+            self.next.kill()
         if self.process.poll() is None:
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()

@@ -154,7 +154,7 @@ def test_without_regions_a_motion_is_found_proved_and_kept(client: TestClient, s
     back = ask(client, [0.7], [-0.5 - found["tube"] / 2])
     assert (back["motion"], back["q"][0], back["length"]) == (found["motion"], [0.7], pytest.approx(1.2 + found["tube"] / 2))
     with database.read() as session:
-        assert len(motions.roll(session, scenes.find(session, "slider"))) == 1
+        assert len([row.id for row in motions.since(session, scenes.find(session, "slider"), 0)]) == 1
 
 
 def test_what_is_kept_answers_questions_about_points_and_paths(client: TestClient, scene: Scene, database: Database) -> None:
@@ -173,7 +173,7 @@ def test_the_oldest_motions_go(client: TestClient, scene: Scene, database: Datab
     settings.cache_clear()
     first, second, third = (ask(client, [-0.9 + goal], [goal])["motion"] for goal in (0.1, 0.5, 0.9))
     with database.read() as session:
-        assert motions.roll(session, scenes.find(session, "slider")) == [second, third]
+        assert [row.id for row in motions.since(session, scenes.find(session, "slider"), 0)] == [second, third]
         assert session.scalar(select(func.count()).select_from(ProofRow)) == 2
     assert ask(client, [-0.8], [0.1])["motion"] not in (first, second, third)
 
