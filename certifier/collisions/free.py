@@ -19,8 +19,8 @@ from certifier.motion.nearest import separation
 
 CLOSE = 1e-6
 """Bodies that are nearer than about this, in metres, on a line may count as touching."""
-_FIRST = np.array([1.0, 0.5, 0.25, 0.75])
-"""Most lines that touch something do so at one of these times."""
+STEPS = 16
+"""The links' poses are kept at this many equal steps of a line."""
 
 
 @njit(cache=True)
@@ -96,35 +96,33 @@ def free_along(bodies: Bodies, seen: Seen, q0: Array, q1: Array, order: np.ndarr
         close: pairs that come nearer than about this, in metres, may count as touching.
     """
     links, way = len(bodies.parents), q1 - q0
-    middle, middle_p = np.empty((links, 3, 3)), np.empty((links, 3))
-    for time in _FIRST:
-        if _touches(bodies, seen, q0 + time * way, middle, middle_p, order):
-            return False
-    start, start_p, end, end_p = np.empty((links, 3, 3)), np.empty((links, 3)), np.empty((links, 3, 3)), np.empty((links, 3))
-    place_links(bodies, q0, start, start_p)
-    place_links(bodies, q1, end, end_p)
-    place_links(bodies, q0 + 0.5 * way, middle, middle_p)
-    R, p = np.empty((links, 3, 3)), np.empty((links, 3))
-    normal, other, stack = np.empty(3), np.empty(3), np.empty(64)
+    # The links' poses at the times k / STEPS are computed once for all pairs; those at other times come last.
+    R, p, known = np.empty((STEPS + 2, links, 3, 3)), np.empty((STEPS + 2, links, 3)), np.zeros(STEPS + 2, dtype=np.bool_)
+    middle = STEPS // 2  # most lines that touch something do so there as well
+    known[middle] = True
+    if _touches(bodies, seen, q0 + 0.5 * way, R[middle], p[middle], order):
+        return False
+    place_links(bodies, q0, R[0], p[0])
+    normal, other, stack, moving = np.empty(3), np.empty(3), np.empty(64), np.empty((2 * len(bodies.vertices), 3))
     for k in range(len(order)):
         pair = order[k]
         moved, bent = _bounds(seen, pair, way)
-        if _far(bodies, seen, pair, middle, middle_p, moved / 2.0):
+        if _far(bodies, seen, pair, R[middle], p[middle], moved / 2.0):
             continue
         a, b, reach = seen.pairs[pair, 0], seen.pairs[pair, 1], seen.reaches[pair]
-        A, W = bodies.vertices[bodies.first[a] : bodies.first[a + 1]], bodies.first[b + 1] - bodies.first[b]
-        frame = bodies.links[a]
-        B = np.empty((2 * W, 3))  # first where b is at the beginning of an interval, then where it is at the end
-        place(bodies, b, frame, start, start_p, B[:W])
+        A, W, frame = bodies.vertices[bodies.first[a] : bodies.first[a + 1]], bodies.first[b + 1] - bodies.first[b], bodies.links[a]
+        B = moving[: 2 * W]  # first where b is at the beginning of an interval, then where it is at the end
+        place(bodies, b, frame, R[0], p[0], B[:W])
         t0, top = 0.0, 1
         stack[0] = 1.0
         while top:
             t1 = stack[top - 1]
-            if t1 == 1.0:
-                place(bodies, b, frame, end, end_p, B[W:])
-            else:
-                place_links(bodies, q0 + t1 * way, R, p)
-                place(bodies, b, frame, R, p, B[W:])
+            kept = t1 * STEPS == np.floor(t1 * STEPS)
+            slot = int(t1 * STEPS) if kept else STEPS + 1
+            if not (kept and known[slot]):
+                place_links(bodies, q0 + t1 * way, R[slot], p[slot])
+                known[slot] = kept
+            place(bodies, b, frame, R[slot], p[slot], B[W:])
             if separation(A, B, normal) > reach + (t1 - t0) ** 2 / 8.0 * bent:
                 B[:W] = B[W:]
                 t0, top = t1, top - 1

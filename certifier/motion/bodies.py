@@ -155,13 +155,12 @@ def place(bodies: Bodies, geometry: int, frame: int, R: Array, p: Array, points:
             for i in range(3):
                 points[v, i] = bodies.vertices[begin + v, i]
         return
-    Q, t = np.empty((3, 3)), np.empty(3)
+    x, y, z = p[link, 0] - p[frame, 0], p[link, 1] - p[frame, 1], p[link, 2] - p[frame, 2]
     for i in range(3):
-        t[i] = 0.0
-        for k in range(3):
-            t[i] += R[frame, k, i] * (p[link, k] - p[frame, k])
-            Q[i, k] = R[frame, 0, i] * R[link, 0, k] + R[frame, 1, i] * R[link, 1, k] + R[frame, 2, i] * R[link, 2, k]
-    for v in range(len(points)):
-        x, y, z = bodies.vertices[begin + v, 0], bodies.vertices[begin + v, 1], bodies.vertices[begin + v, 2]
-        for i in range(3):
-            points[v, i] = Q[i, 0] * x + Q[i, 1] * y + Q[i, 2] * z + t[i]
+        a, b, d = R[frame, 0, i], R[frame, 1, i], R[frame, 2, i]
+        u = a * R[link, 0, 0] + b * R[link, 1, 0] + d * R[link, 2, 0]
+        v = a * R[link, 0, 1] + b * R[link, 1, 1] + d * R[link, 2, 1]
+        w = a * R[link, 0, 2] + b * R[link, 1, 2] + d * R[link, 2, 2]
+        moved = a * x + b * y + d * z
+        for k in range(len(points)):
+            points[k, i] = u * bodies.vertices[begin + k, 0] + v * bodies.vertices[begin + k, 1] + w * bodies.vertices[begin + k, 2] + moved
