@@ -24,13 +24,17 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 ROOMS = Path(__file__).parent
-FIRST = ("workers", "client", "docs", "benchmarks")
-"""Rooms whose tests wait for processes. Their files come first, so that short ones fill the end of a run in parallel."""
+WAITING = ("workers", "client", "docs", "benchmarks")
+"""Rooms whose tests wait for processes."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    def turn(item: pytest.Item) -> int:
-        room = item.path.relative_to(ROOMS).parts[0]
-        return FIRST.index(room) if room in FIRST else len(FIRST)
-
-    items.sort(key=turn)
+    """Spreads the files that wait among those that compute, so that a run in parallel does some of both at any time."""
+    files: dict[Path, list[pytest.Item]] = {}
+    for item in items:
+        files.setdefault(item.path, []).append(item)
+    kinds: dict[bool, list[Path]] = {True: [], False: []}
+    for file in files:
+        kinds[file.relative_to(ROOMS).parts[0] in WAITING].append(file)
+    place = {file: (i + 0.5) / len(kind) for kind in kinds.values() for i, file in enumerate(kind)}
+    items[:] = [item for file in sorted(files, key=place.__getitem__) for item in files[file]]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
+import secrets
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -233,10 +233,12 @@ def _fix(held: Mapping[str, Any]) -> list[str]:
 @contextmanager
 def _scene_file(text: str, directory: Path) -> Iterator[Path]:
     """Yields a scene file with this text, which is there for so long."""
-    with tempfile.NamedTemporaryFile("w", suffix=".yaml", prefix=".draft-", dir=directory, encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        yield Path(file.name)
+    path = directory / f".draft-{secrets.token_hex(8)}.yaml"
+    try:  # the name is known before the file is there: whatever signal comes, the file goes
+        path.write_text(text, encoding="utf-8")
+        yield path
+    finally:
+        path.unlink(missing_ok=True)
 
 
 def _loaded(text: str, directory: Path) -> Scene:

@@ -7,6 +7,7 @@ the last ones in the last column. So columns before the first joint of a short c
 from __future__ import annotations
 
 from collections.abc import Sequence
+from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
@@ -116,7 +117,7 @@ class Sides(NamedTuple):
 
 
 class Known:
-    """Keeps what has been computed about a scene: chains, and sides."""
+    """Keeps what has been computed about a scene: chains, and sides. Several threads may ask at once."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._places, self._kinematics = scene, Places(scene), ExactKinematics.by_joint(scene)
@@ -126,6 +127,7 @@ class Known:
         self._lengths: dict[tuple[int, int], int] = {}
         self._sides: dict[tuple[int, int], int] = {}
         self._made: list[Sides] = []
+        self._lock = Lock()
         self._all: Sides | None = None
         self.chains: list[Chain] = []
 
@@ -137,10 +139,11 @@ class Known:
     def sides(self, frames: np.ndarray, geometries: np.ndarray) -> tuple[Sides, np.ndarray]:
         """Returns all sides that are known, and the numbers of those of geometries, (K,), as frames, (K,) numbers of bodies, see them."""
         asked, where = np.unique(frames * len(self._body) + geometries, return_inverse=True)
-        number = np.array([self._side(*divmod(side, len(self._body))) for side in asked.tolist()])
-        if self._all is None or len(self._all.ways) < len(self._made):
-            self._all = _joined(self._made)
-        return self._all, number[where]
+        with self._lock:
+            number = np.array([self._side(*divmod(side, len(self._body))) for side in asked.tolist()])
+            if self._all is None or len(self._all.ways) < len(self._made):
+                self._all = _joined(self._made)
+            return self._all, number[where]
 
     def _joints(self, frame: int, body: int) -> int:
         if (frame, body) not in self._lengths:

@@ -53,7 +53,9 @@ def theirs(database: Database, scene: Scene, region: str) -> dict[str, str]:
         made = {name: keys.add(session, "admin", Scope.ADMIN, name) for name in ("default", "others")}
         scene_id = scenes.find(session, "slider")
         staging.stage(session, "slider", slider(posts=1))
-        motion = motions.add(session, scene_id, {"path": np.array([[0.0], [0.1]])}, 0.01, b"proof of a motion", 10).id
+        q, each = np.array([[0.0], [0.1]]), np.ones(1)
+        arrays = {"path": q, "q": q, "t": np.array([0.0, 1.0]), "speed": each, "acceleration": each}
+        motion = motions.add(session, scene_id, arrays, 0.01, b"proof of a motion", 10).id
     time.sleep(KEYS_SECONDS)
     return {
         "scene_id": scene_id,

@@ -99,7 +99,7 @@ def test_regions_come_to_cover_a_scene_and_each_is_proved(planar: Scene) -> None
     assert abs(value - found["coverage"]["value"]) < 4 * found["coverage"]["stderr"] + 0.01
 
 
-@pytest.mark.lengthy
+@pytest.mark.slow
 def test_configurations_are_connected(planar: Scene) -> None:
     job = ended(cover(planar, connect=[LEFT, RIGHT]))
     assert (job.state, job.outcome) == ("succeeded", "certified")

@@ -25,7 +25,7 @@ from tests.certifier.motions import swing
 from tests.workers.service import Service, ended, events_of, eventually
 from workers.app import send_coordinate
 
-pytestmark = pytest.mark.usefixtures("service")
+pytestmark = [pytest.mark.usefixtures("service"), pytest.mark.lengthy]
 
 FREE = [[0.2, -0.4], [-0.4, 0.3]]
 LAPS = 600
@@ -71,7 +71,6 @@ def long(laps: int = LAPS) -> dict[str, Any]:
     return {"q": to_and_fro.tolist(), "tube": True}
 
 
-@pytest.mark.lengthy
 def test_a_motion_is_certified_as_by_a_plain_call_and_its_proof_holds(client: TestClient, planar: Scene) -> None:
     job_id = asked(client, planar, q=FREE, tube=True)
     job = ended(job_id)
@@ -88,7 +87,6 @@ def test_a_motion_is_certified_as_by_a_plain_call_and_its_proof_holds(client: Te
     assert told == [("motion", "open"), ("motion", "done")]
 
 
-@pytest.mark.lengthy
 def test_a_contact_is_an_answer(client: TestClient) -> None:
     job = ended(asked(client, swing(-0.01), s=[[-0.5], [0.6]], space="q"))
     assert (job.state, job.outcome, job.error) == ("succeeded", "refuted", None)
@@ -107,7 +105,6 @@ def test_a_motion_that_begins_in_contact_has_no_proof(client: TestClient) -> Non
     assert (refused.status_code, refused.json()["code"]) == (404, "proof_not_found")
 
 
-@pytest.mark.lengthy
 def test_another_worker_begins_again_when_one_is_killed(client: TestClient, planar: Scene) -> None:
     job_id = asked(client, planar, **long())
     os.kill(int((running(job_id).worker or "").rsplit(":", 2)[1]), signal.SIGKILL)
@@ -119,7 +116,6 @@ def test_another_worker_begins_again_when_one_is_killed(client: TestClient, plan
     assert verify_file(client.get(f"/v1/jobs/{job_id}/motion/proof").content).kind == "motion"
 
 
-@pytest.mark.lengthy
 def test_cancelling_ends_the_search(client: TestClient, planar: Scene) -> None:
     def cancelled(job_id: str) -> JobRow:
         running(job_id)
@@ -136,7 +132,6 @@ def test_cancelling_ends_the_search(client: TestClient, planar: Scene) -> None:
     assert (again.options, again.state) == (job.options, "cancelled")
 
 
-@pytest.mark.lengthy
 def test_the_deadline_ends_the_search_without_a_verdict(client: TestClient, planar: Scene) -> None:
     job_id = submit(planar, long(60 * LAPS), seconds=1.0)
     job = ended(job_id, seconds=30)

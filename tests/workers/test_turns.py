@@ -125,6 +125,7 @@ def left_of(job_id: str, *, outlines: bool = False) -> dict[int, int]:
         return {row.pair_index: row.iteration for row in rows}
 
 
+@pytest.mark.lengthy
 def test_a_whole_job_keeps_what_its_last_round_left_and_nothing_in_the_end() -> None:
     job_id = submit(in_the_way(), WHOLE)
     coordinate(job_id)
@@ -154,6 +155,7 @@ def test_a_whole_job_keeps_what_its_last_round_left_and_nothing_in_the_end() -> 
     check_record(job_id)
 
 
+@pytest.mark.lengthy
 def test_a_whole_job_that_is_cancelled_leaves_outlines_alone() -> None:
     job_id = begun_whole_job()
     before = left_of(job_id, outlines=True)
@@ -164,6 +166,7 @@ def test_a_whole_job_that_is_cancelled_leaves_outlines_alone() -> None:
     assert (job_of(job_id).state, left_of(job_id), left_of(job_id, outlines=True)) == ("cancelled", {}, before)
 
 
+@pytest.mark.lengthy
 def test_a_whole_job_ends_at_its_deadline_with_its_best_region() -> None:
     job_id = submit(in_the_way(), WHOLE)
     while not any(row.label == "cells" and row.state == "certified" for row in iterations_of(job_id)):
@@ -181,6 +184,7 @@ def test_a_whole_job_ends_at_its_deadline_with_its_best_region() -> None:
     assert job.region_id is not None
 
 
+@pytest.mark.lengthy
 def test_a_whole_job_ends_when_nothing_is_known_of_a_failure() -> None:
     """There is nothing to cut off for a pair that kills its process, so another round would end as this one."""
     job_id = begun_whole_job()
@@ -200,6 +204,7 @@ def test_pairs_that_are_certified_cell_by_cell_need_not_fit_the_forecast() -> No
         assert [job_of(job_id).state for job_id in job_ids] == ["failed", "running"]
 
 
+@pytest.mark.lengthy
 @pytest.mark.parametrize(("upper", "outcome"), [(0.3, "certified"), (0.3999, "too_close"), (0.45, "refuted")])
 def test_a_polytope_is_decided_cell_by_cell(upper: float, outcome: str) -> None:
     """The slider touches the post at s = 0.4."""

@@ -85,7 +85,7 @@ def test_a_proposal_keeps_clear_of_what_growth_will_part(monkeypatch):
     assert knowing.kept > unknowing.kept
 
 
-@pytest.mark.parametrize("fails", ["raises", "returns the domain"])
+@pytest.mark.parametrize("fails", ["raises", pytest.param("returns the domain", marks=pytest.mark.slow)])
 def test_a_polytope_beside_coarse_volumes_that_drake_fails_to_find_is_left_out(monkeypatch, fails):
     """The one without them is the answer, with its last round, and a warning says why. Drake returns the domain where the first faces lose
     the centre."""

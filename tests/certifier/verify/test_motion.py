@@ -48,13 +48,13 @@ def swung_past(proof: MotionProof) -> float:
 
 @pytest.mark.parametrize("space", Space)
 @pytest.mark.parametrize("degree", [1, 3])
-def test_of_thousands_of_single_changes_none_is_accepted_that_is_not_true(space, degree):
+def test_of_hundreds_of_single_changes_none_is_accepted_that_is_not_true(space, degree):
     """The motion passes at a millimetre. A changed plane or time says the same of it; a changed motion or scene is sampled."""
     scene = swing(1e-3)
     points = np.array([[-1.0], [0.3], [-0.2]] if degree == 1 else [[-1.0], [0.6], [-0.4], [0.2], [-0.9], [0.5], [-0.2]])
     found = search(scene, Motion(space, points if space is Space.Q else scene.to_s(points), degree)).proof
     rng, accepted, untrue = np.random.default_rng(0), 0, 0
-    for _ in range(2000):
+    for _ in range(1000):
         kind = rng.choice(["normals", "ends", "counts", "controls", "degree", "swapped", "padding", "radius", "rho", "end", "dropped"])
         proof = found
         if kind in ("normals", "ends", "counts"):
@@ -87,8 +87,8 @@ def test_of_thousands_of_single_changes_none_is_accepted_that_is_not_true(space,
         if not refused(proof):
             accepted += 1
             assert free, kind
-    assert accepted > 100
-    assert untrue > 200
+    assert accepted > 50
+    assert untrue > 100
 
 
 def test_a_pair_is_not_left_out():
