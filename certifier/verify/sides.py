@@ -121,8 +121,8 @@ class Known:
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._places, self._kinematics = scene, Places(scene), ExactKinematics.by_joint(scene)
-        self._bodies = {body: i for i, body in enumerate(scene.bodies)}
-        self._body = np.array([self._bodies[geometry.body] for geometry in scene.geometries], dtype=np.int64)
+        bodies = {body: i for i, body in enumerate(scene.bodies)}
+        self._body = np.array([bodies[geometry.body] for geometry in scene.geometries], dtype=np.int64)
         self._ways: dict[tuple[int, int], int] = {}
         self._lengths: dict[tuple[int, int], int] = {}
         self._sides: dict[tuple[int, int], int] = {}
@@ -153,7 +153,7 @@ class Known:
     def _way(self, frame: int, body: int) -> int:
         if (frame, body) not in self._ways:
             self.chains.append(self._places.chain(self._scene.bodies[frame], self._scene.bodies[body]))
-            self._ways[frame, body] = len(self._ways)
+            self._ways[frame, body] = len(self.chains) - 1
         return self._ways[frame, body]
 
     def _side(self, frame: int, geometry: int) -> int:
@@ -161,7 +161,7 @@ class Known:
             way = self._way(frame, int(self._body[geometry]))
             shape = self._scene.geometries[geometry]
             self._made.append(_side(way, geometry, shape.radius, self.chains[way], shape.vertices))
-            self._sides[frame, geometry] = len(self._sides)
+            self._sides[frame, geometry] = len(self._made) - 1
         return self._sides[frame, geometry]
 
 
