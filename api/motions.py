@@ -74,10 +74,14 @@ class Known:
         return tubes.motions[motion].id, path
 
     def answer(self, start: Array, goal: Array, speed: Array, acceleration: Array) -> str | None:
-        """Returns the id of a motion from the start to the goal, (n,) each, that keeps the limits, (n,) each; None where there is none."""
+        """Returns the id of the motion that answered the same question: from the start to the goal, with the limits, (n,) each; or None.
+
+        One that had to go through other configurations, or along a line, answers no question without them.
+        """
         for motion_id in reversed(self._between.get((_key(start), _key(goal)), [])):
             arrays = self.motions[motion_id].arrays
-            if (arrays["speed"] <= speed).all() and (arrays["acceleration"] <= acceleration).all():
+            same = (arrays["speed"] == speed).all() and (arrays["acceleration"] == acceleration).all()
+            if same and arrays.get("direct", np.zeros(1)).all():
                 return motion_id
         return None
 

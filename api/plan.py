@@ -20,7 +20,7 @@ from api.links import LinksKept
 from api.motions import Known, MotionsKept
 from api.schemas.planning import Piece
 from api.schemas.plans import BeyondLimit, Collision, LineStop, PlanGap, PlanRequest, PlanResponse, Reached, Reason
-from certifier.errors import RegionError
+from certifier.errors import CirisError, RegionError
 from certifier.isolation.child import run_in_child
 from certifier.model import Array, Scene
 from certifier.outcome import Guarantee
@@ -96,7 +96,7 @@ def _question(asked: Asked, body: PlanRequest) -> _Question:
 
 
 def _known(question: _Question) -> dict[str, Any] | None:
-    """Returns an earlier motion that answers the question, or a motion in the tube of one."""
+    """Returns an earlier motion that answered the same question, or a motion in the tube of one where no straight line is free."""
     if len(question.points) > 1 or len(question.goals) != 1:
         return None
     limits = question.limits
@@ -128,10 +128,16 @@ def _searched(asked: Asked, question: _Question, body: PlanRequest) -> dict[str,
         "acceleration": limits.acceleration,
         "seconds": body.seconds,
     }
-    found = about_motions("planned", question.scene, payload)
+    try:
+        found = about_motions("planned", question.scene, payload)
+    except CirisError as error:
+        error.field = f"pose.{error.field}" if body.pose is not None and error.field else error.field
+        raise
     if "reason" in found:
         return {"found": False, **_why(found, body)}
-    motion_id = keep(asked.db, question.scene_id, found, {"speed": limits.speed, "acceleration": limits.acceleration})
+    direct = np.array([not body.via and body.line is None])
+    known_by = {"speed": limits.speed, "acceleration": limits.acceleration, "direct": direct}
+    motion_id = keep(asked.db, question.scene_id, found, known_by)
     return _moved(motion_id, found["q"], found["t"], found["tube"])
 
 
@@ -196,8 +202,13 @@ def _optimise(payload: dict[str, Any]) -> dict[str, Any] | None:
 
 
 def _proof(scene: Scene, q: list[list[float]]) -> str | None:
-    """Returns a proof file about a motion, in base 64."""
-    found = about_motions("certify_in_child", scene, {"q": q, "space": None, "tube": False, "prove": True})
+    """Returns a proof file about exactly a motion, in base 64; None where none is found, or it has too many configurations for one."""
+    try:
+        found = about_motions("certify_in_child", scene, {"q": q, "space": None, "tube": False, "prove": True})
+    except CirisError as error:
+        if error.code != "motion_too_long":
+            raise
+        return None
     proof: str | None = found["proof"] if found["outcome"] == "certified" else None
     return proof
 

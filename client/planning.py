@@ -223,8 +223,8 @@ def _why_not(answer: dict[str, Any]) -> str:
     """Returns in words why there is no motion."""
     gap, stop, reason = answer["gap"], answer["uncovered"], answer["reason"]
     if limit := answer["limit"]:
-        bounds = " ".join(f"{word} {limit[side]:g}" for word, side in (("from", "lower"), ("to", "upper")) if limit[side] is not None)
-        return f"{_field(limit['where'])}: joint {limit['joint']} is at {limit['value']:g}, and its limits are {bounds}"
+        bounds = " ".join(f"{word} {limit[side]:.10g}" for word, side in (("from", "lower"), ("to", "upper")) if limit[side] is not None)
+        return f"{_field(limit['where'])}: joint {limit['joint']} is at {limit['value']:.10g}, and its limits are {bounds}"
     if touching := answer["collision"]:
         how = "overlap" if touching["depth"] is None else f"overlap by {at_least_mm(touching['depth'])}"
         free = f"; free near by: {_place(touching['free'])}" if touching["free"] else ""
@@ -235,7 +235,7 @@ def _why_not(answer: dict[str, Any]) -> str:
     if stop_at := answer["line"]:
         why = {
             "line_limit": f"joint {stop_at['joint']} is at its limit",
-            "line_singular": "the arm cannot move the frame on: it is stretched, or axes are in line",
+            "line_singular": "the arm cannot move the frame on: it is stretched, axes are in line, or it has too few joints",
             "line_tolerance": "the tolerance needs segments that are too short; --tolerance allows more",
             "line_collision": f"{stop_at['a']} and {stop_at['b']} touch",
         }[reason]

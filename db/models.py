@@ -432,7 +432,8 @@ class MotionRow(Owned, Base):
     """What the scene's library counted as its motions when this one was added. The oldest ones go first."""
     arrays: Mapped[Arrays]
     """``path`` (k, n), the configurations that the proof is about, straight in q between them; ``q`` (K, n) and ``t`` (K,), the motion with
-    its times, which is in the tube; ``speed`` and ``acceleration`` (n,), the limits that it keeps."""
+    its times, which is in the tube; ``speed`` and ``acceleration`` (n,), the limits that it keeps; ``direct`` (1,), whether it was asked
+    for from start to goal alone."""
     tube: Mapped[float]
     """Half the width of the tube, in radians or metres."""
     proof_digest: Mapped[str] = mapped_column(ForeignKey("proofs.digest"), index=True)

@@ -36,7 +36,7 @@ def move(scene: Scene, scene_id: str, job_id: str) -> Moved:
         found = in_child(PLANNED, asked, kept)
         if "reason" in found:
             continue
-        keep(database(), scene_id, found, limits)
+        keep(database(), scene_id, found, limits | {"direct": np.array([True])})
         pairs.append((0, i))
     return Moved(tuple(pairs))
 
@@ -45,7 +45,7 @@ def keep(db: Database, scene_id: str, found: dict[str, Any], limits: dict[str, A
     """Keeps a motion that planner.sampling.child.planned has found, and returns its id.
 
     Args:
-        limits: ``speed`` and ``acceleration`` (n,), which it keeps.
+        limits: ``speed`` and ``acceleration`` (n,), which it keeps; and ``direct``, whether it was asked for from start to goal alone.
     """
     arrays = {name: found[name] for name in ("path", "q", "t")} | limits
     with db.write() as session:

@@ -132,7 +132,7 @@ class Reason(StrEnum):
     LINE_LIMIT = "line_limit"
     """A joint is at its limit on the line; `line` says which, and where."""
     LINE_SINGULAR = "line_singular"
-    """The arm cannot move the frame on along the line: it is stretched, or axes are in line."""
+    """The arm cannot move the frame on along the line: it is stretched, axes are in line, or it has too few joints."""
     LINE_TOLERANCE = "line_tolerance"
     """The tolerances need segments that are too short."""
     LINE_COLLISION = "line_collision"

@@ -234,7 +234,7 @@ def _divide(
                             rho = min(rho, SHRINK * known / wide)
                 apart = gap > need + rho * wide
             if apart:
-                if found - first == most:
+                if found - first >= most:
                     return End(MANY, piece, t0, t1, separation(A[:V], B[:W], other) - reach), rho, planes, found
                 planes = _with_room(planes, found)
                 planes.ends[found], planes.normals[found] = t1, normal

@@ -58,14 +58,28 @@ def _malformed(problem: str, where: str | None = None) -> ProofError:
 
 
 def pack(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> bytes:
-    """Returns the bytes of the file; the same content gives the same bytes."""
+    """Returns the bytes of the file; the same content gives the same bytes.
+
+    A file that would be deflated to less than its limits allow is stored as it is.
+    """
+    members = {HEADER: json.dumps(header, sort_keys=True).encode(), **{f"{name}.npy": npy(a) for name, a in arrays.items()}}
+    data = _zipped(members, zipfile.ZIP_DEFLATED)
+    return _zipped(members, zipfile.ZIP_STORED) if sum(map(len, members.values())) > _most(data) else data
+
+
+def _zipped(members: dict[str, bytes], kind: int) -> bytes:
+    """Returns a zip of files, in which those that are worth it are stored in this way."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
-        members = {HEADER: json.dumps(header, sort_keys=True).encode(), **{f"{name}.npy": npy(a) for name, a in arrays.items()}}
         for name, content in members.items():
-            kind = zipfile.ZIP_DEFLATED if len(content) >= WORTH_DEFLATING else zipfile.ZIP_STORED
-            archive.writestr(zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), content, kind)
+            own = kind if len(content) >= WORTH_DEFLATING else zipfile.ZIP_STORED
+            archive.writestr(zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), content, own)
     return buffer.getvalue()
+
+
+def _most(data: bytes) -> int:
+    """Returns how many bytes a file may unpack to."""
+    return min(limits.UNPACKED_BYTES, limits.FREE_BYTES + limits.RATIO * len(data))
 
 
 def npy(array: np.ndarray) -> bytes:
@@ -174,7 +188,7 @@ def _check_members(archive: zipfile.ZipFile, data: bytes) -> None:
     if sum(_LOCAL + len(name) + info.compress_size for name, info in members.items()) != archive.start_dir:
         raise _malformed("its members do not lie one after the other, or hold more than the directory says")
     total = sum(info.file_size for info in members.values())
-    if total > min(limits.UNPACKED_BYTES, limits.FREE_BYTES + limits.RATIO * len(data)):
+    if total > _most(data):
         most = f"{limits.UNPACKED_BYTES} or {limits.RATIO} times what it takes"
         raise ProofError("proof_too_large", f"the proof file unpacks to {total} bytes, more than {most}")
     if members[HEADER].file_size > limits.HEADER_BYTES:

@@ -35,6 +35,8 @@ GOALS = 8
 """A pose is reached by at most this many configurations, of which the motion goes to the cheapest."""
 WITHIN = 0.5
 """The path along a line takes this part of the tolerances."""
+LONGER = 1.02
+"""A path that is longer than this many times the straight line is a detour."""
 SHARE = 0.04
 """A search with padding takes this part of the time that is left at most: either it is quick, or the padding leaves no way."""
 
@@ -111,10 +113,16 @@ def planned(payload: dict[str, Any], scene: Scene) -> dict[str, Any]:
 def timed_within(payload: dict[str, Any], scene: Scene) -> dict[str, Any]:
     """Returns a motion in the tube of a proved one: ``q`` (K, n) and ``t`` (K,), or nothing. A child process runs this function.
 
+    It returns nothing as well where the path is a detour, and the straight line from its start to its end is free.
+
     Args:
         payload: ``path`` (k, n), which is in the tube; ``proved`` (m, n), the path of the proved motion, and ``tube``, half the width about
             it; ``speed`` and ``acceleration`` (n,), limits of every joint.
     """
+    path = payload["path"]
+    detour = np.linalg.norm(np.diff(path, axis=0), axis=1).sum() > LONGER * np.linalg.norm(path[-1] - path[0])
+    if detour and Search(scene, *box(scene, list(path)), PADDINGS[0]).sees(path[0], path[-1]):
+        return {}
     tube = Tube("", payload["proved"], payload["tube"])
     found = within(scene, tube, payload["path"], payload["speed"], payload["acceleration"])
     return {} if found is None else {"q": found[0], "t": found[1]}

@@ -15,12 +15,13 @@ import numpy as np
 from certifier.jobs.motion import MotionVerdict, certify
 from certifier.model import Array, Scene
 from certifier.outcome import Outcome
+from certifier.proof import limits
 from certifier.proof.motion import Motion, Space
 from planner.sampling.corners import rounded
 from planner.sampling.route import Route
 from planner.sampling.search import Search
 from planner.trajectory.straight import straight
-from planner.trajectory.stretch import stretch
+from planner.trajectory.stretch import stretched
 from planner.trajectory.timing import timed
 from planner.tubes import Tube, follows
 
@@ -64,11 +65,12 @@ def prove(
     """
     for path, q, t in _candidates(search, route, speed, acceleration):
         q = np.clip(q, *scene.own_limits)
-        if t[-1] > 0:
-            t = t * stretch(q, t, speed, acceleration)
+        t = stretched(q, t, speed, acceleration)
         if not accepts(q):
             continue
         for certified in (path, q):
+            if (len(certified) - 1) * len(scene.pairs) > limits.INTERVALS:
+                break
             verdict = certify(scene, Motion(Space.Q, certified), tube=True)
             if verdict.outcome is not Outcome.CERTIFIED or verdict.statement is None:
                 break
@@ -84,8 +86,7 @@ def within(scene: Scene, tube: Tube, path: Array, speed: Array, acceleration: Ar
         if found is None:
             continue
         q, t = np.clip(found[0], *scene.own_limits), found[1]
-        if t[-1] > 0:
-            t = t * stretch(q, t, speed, acceleration)
+        t = stretched(q, t, speed, acceleration)
         if follows(tube, q):
             return q, t
     return None

@@ -72,6 +72,9 @@ class Search:
         """
         if self.sees(start, goal):
             return np.array([start, goal])
+        lower, upper = self._box
+        if not ((lower <= goal) & (goal <= upper)).all():
+            return None
         in_time = base.PlannerTerminationCondition(lambda: time.monotonic() > until)
         space, n = base.SpaceInformation(space_of(*self._box)), len(start)  # nothing that OMPL calls may hold it: it would never be freed
         space.setStateValidityChecker(lambda state: self.is_free(positions(state, n)))

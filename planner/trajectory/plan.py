@@ -20,7 +20,7 @@ from planner.motion.space import Space
 from planner.nearest import project
 from planner.overlap import Gap, components, gap
 from planner.trajectory.routes import Links, Route, Terminal, routes
-from planner.trajectory.stretch import stretch
+from planner.trajectory.stretch import stretched
 
 SPEED, ACCELERATION = 1.0, 2.0
 """Limits of every joint where nobody gives others, in rad/s and rad/s² (or m/s and m/s²)."""
@@ -127,9 +127,7 @@ def plan(library: Library, scene: Scene, links: Links, start: Array | int, goal:
         q = q + turns
         if not isinstance(start, int):
             q[slice(None) if t[-1] == 0 else 0] = start
-        if t[-1] > 0:
-            # Far from q* the turns have rounded the differences.
-            t = t * stretch(q, t, limits.speed, limits.acceleration)
+        t = stretched(q, t, limits.speed, limits.acceleration)  # far from q* the turns have rounded the differences
         covering = follow(library, scene, Space.Q, q, t.tolist())
         return Trajectory(q, t, covering.stretches) if covering.uncovered is None else Unproved(covering.uncovered)
 

@@ -14,7 +14,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from certifier.model import Array
 from planner.trajectory.straight import straight
-from planner.trajectory.stretch import UP, stretch
+from planner.trajectory.stretch import UP, stretched
 
 STILL = 1e-6
 """A curve that is no longer than this is as good as a point, because solvers are not more exact; and so is a part of a curve that is so
@@ -77,8 +77,7 @@ def timed(
     reached = np.clip(course.vector_values(t)[0], 0.0, along[-1])
     q = np.column_stack([np.interp(reached, along, joint) for joint in curve.T]) if straight_between else path.vector_values(reached).T
     q[np.searchsorted(t, when[kept])], q[0], q[-1] = curve[through][kept], curve[0], curve[-1]
-    t *= unit
-    return q, t * stretch(q, t, speed, acceleration)
+    return q, stretched(q, t * unit, speed, acceleration)
 
 
 def _apart(times: Array, least: float) -> list[int]:

@@ -168,6 +168,17 @@ def test_what_is_kept_answers_questions_about_points_and_paths(client: TestClien
     assert (beyond["covered"], beyond["uncovered"]["q"]) == (False, [pytest.approx(-0.5 - motion["tube"])])
 
 
+def test_a_kept_motion_makes_no_later_answer_worse(client: TestClient, scene: Scene) -> None:
+    """Not its slower limits, and not its detour, whichever was asked first."""
+    slow = ask(client, [-0.5], [0.9], speed=0.01)
+    fast = ask(client, [-0.5], [0.9], speed=1.0)
+    assert slow["duration"] > 100 > 5 > fast["duration"]
+    detour = client.post("/v1/planning/plan", json={"scene": "slider", "start": [-0.3], "goal": [0.2], "via": [[0.8]]}).json()
+    assert detour["length"] == pytest.approx(1.7)
+    for start in (-0.3, -0.29):
+        assert ask(client, [start], [0.2])["length"] == pytest.approx(0.2 - start)
+
+
 def test_the_oldest_motions_go(client: TestClient, scene: Scene, database: Database, environment: pytest.MonkeyPatch) -> None:
     environment.setenv("CIRIS_KEPT_MOTIONS", "2")
     settings.cache_clear()

@@ -9,7 +9,8 @@ import pytest
 
 from certifier.jobs.motion import certify
 from certifier.motion.given import given
-from certifier.proof.motion import Space
+from certifier.outcome import Outcome
+from certifier.proof.motion import Motion, Space
 from certifier.verify.file import verify_file
 from tests.certifier.motions import distances, swing
 from tests.certifier.scenes import planar_arm, two_arms
@@ -50,3 +51,18 @@ def test_waypoints_are_taken_from_one_space_to_the_other():
     assert np.allclose(in_s.waypoints, scene.to_s(q), rtol=1e-14)
     assert np.allclose(given(scene, in_s.waypoints, Space.S, Space.Q).waypoints, q, rtol=1e-14)
     assert certify(scene, in_s).outcome is certify(scene, given(scene, q, Space.Q)).outcome
+
+
+def test_a_motion_that_rests_for_long_is_certified():
+    """Its proof repeats itself, and is more than RATIO times smaller when it is deflated."""
+    scene = two_arms(apart=7.0)
+    verdict = certify(scene, given(scene, [*[[0.3] * 6] * 3000, [-0.4] * 6], Space.Q))
+    assert verdict.outcome is Outcome.CERTIFIED
+    assert verify_file(verdict.proof).kind == "motion"
+
+
+def test_a_motion_of_more_pieces_than_a_proof_may_have_is_inconclusive(monkeypatch):
+    monkeypatch.setattr("certifier.proof.limits.INTERVALS", 20)
+    scene = two_arms(apart=7.0)
+    verdict = certify(scene, Motion(Space.Q, np.linspace([0.3] * 6, [-0.4] * 6, 30)), tube=True)
+    assert (verdict.outcome, verdict.proof) == (Outcome.INCONCLUSIVE, None)

@@ -77,6 +77,15 @@ def test_the_same_question_has_the_same_answer():
     assert np.array_equal(ask(scene, [0, 0], [0.3, 0.2])["q"], straight["q"])
 
 
+@pytest.mark.parametrize(("speed", "acceleration"), [(1e6, 1.0), (1e6, 1e-6), (1e-6, 1e6), (1e4, 2.0), (1e6, 1e6)])
+def test_a_limit_that_is_never_reached_costs_nothing(speed, acceleration):
+    scene = load_scene(EXAMPLES / "planar_2dof" / "scene.yaml")
+    for points in ([[0, 0]], [[0, 0], [-0.2, 0.3]]):  # a straight line, and one with a corner
+        found = ask(scene, points, [0.3, 0.2], speed=speed, acceleration=acceleration)
+        check(scene, found, speed, acceleration)
+        assert len(found["q"]) < 100
+
+
 def test_the_motion_goes_through_what_it_is_asked_to():
     scene = load_scene(EXAMPLES / "planar_2dof" / "scene.yaml")
     via = [[-0.4, 0.3], [0.2, -0.5]]
