@@ -19,8 +19,8 @@ pytest_plugins = ["tests.services", "tests.skips"]
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Many tests wait for processes, so there are more of pytest than there are cores."""
-    return len(os.sched_getaffinity(0)) + 2
+    """Many tests wait for processes, so there is one more of pytest than there are cores."""
+    return len(os.sched_getaffinity(0)) + 1
 
 
 ROOMS = Path(__file__).parent

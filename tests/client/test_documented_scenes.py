@@ -19,7 +19,11 @@ def test_every_documented_scene_is_grown() -> None:
     assert sorted(command.split()[1] for command in GROWN) == sorted(name for name in FILES.values() if name.endswith(".yaml"))
 
 
-@pytest.mark.parametrize("command", GROWN)
+def is_long(command: str) -> bool:
+    return "two_arms" in command or "mobile" in command
+
+
+@pytest.mark.parametrize("command", [pytest.param(text, marks=pytest.mark.slow) if is_long(text) else text for text in GROWN])
 def test_a_documented_scene_has_a_verified_region(command: str, ciris: Ciris, tmp_path: Path) -> None:
     for text, name in FILES.items():
         (tmp_path / name).write_text(text)

@@ -36,6 +36,7 @@ def test_the_scenes_have_every_format_and_are_read_as_drake_reads_them(tmp_path)
     assert written >= {*FORMATS, "obj"}
 
 
+@pytest.mark.slow
 def test_drake_agrees_with_a_small_region_and_not_with_all_that_is_within_the_limits(tmp_path):
     """A box about a free configuration is certified, and the search finds contacts in a region that is too large."""
     rng = np.random.default_rng(11)

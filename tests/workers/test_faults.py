@@ -31,6 +31,7 @@ def test_points_that_no_region_can_hold_together_fail_the_job_at_once(planar: Sc
     assert (job.state, job.error["code"], job.error["field"]) == ("failed", "contain_blocked", "seed.contain[0]")
 
 
+@pytest.mark.slow
 def test_a_pair_that_kills_its_process_every_time_ends_as_an_error(arm: tuple[Scene, np.ndarray]) -> None:
     scene, s = arm
     job_id = submit(scene, box_around(s, 0.01))

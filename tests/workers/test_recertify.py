@@ -62,7 +62,7 @@ def test_a_region_of_a_changed_scene_is_the_same_by_the_service_and_without_it(g
     assert 0 < said["kept"]["value"] < 1
 
 
-@pytest.mark.lengthy
+@pytest.mark.slow
 def test_what_did_not_change_is_carried_over_and_a_seed_in_contact_revokes_the_region(grown: tuple[RegionRow, bytes]) -> None:
     row, _ = grown
     job = ended(

@@ -34,6 +34,8 @@ from workers import webhooks as delivering
 from workers.addresses import is_public, resolve
 from workers.troubles import Troubles
 
+pytestmark = pytest.mark.lengthy
+
 SECRET = "whsec_" + base64.b64encode(bytes(range(32))).decode()
 
 

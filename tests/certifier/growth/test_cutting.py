@@ -194,6 +194,7 @@ def tangent(polytope, points):
     return normal, float((points @ normal).min())
 
 
+@pytest.mark.slow
 def test_less_volume_is_lost_than_by_planes_tangent_to_the_inscribed_ellipsoid():
     """By volume in q over random polytopes and corners: at the mean, and at most of them."""
     scene, ours, theirs = planar_arm(3, limit=2.5), [], []

@@ -340,7 +340,7 @@ def example(name):
     return path, load_scene(path), yaml.safe_load((path.parent / "seed.yaml").read_text())["q"]
 
 
-@pytest.mark.parametrize(("name", "half"), [("planar_2dof", 0.4), ("arm_3dof", 0.5)])
+@pytest.mark.parametrize(("name", "half"), [("planar_2dof", 0.4), pytest.param("arm_3dof", 0.5, marks=pytest.mark.slow)])
 def test_a_region_of_an_example_is_verified_contains_what_it_has_to_and_is_free(name, half):
     path, scene, q = example(name)
     contain = (np.array(q) + 0.02).tolist()
