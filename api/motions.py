@@ -107,7 +107,9 @@ class MotionsKept:
     def of(self, db: Database, scene_id: str, scene: Scene) -> Known:
         """Returns the motions of a scene, as of a version that is no older than this call."""
         with self._lock:
-            shelf = self._shelves.setdefault(scene_id, _Shelf(Known(scene.own_limits, 0, {})))
+            if scene_id not in self._shelves:
+                self._shelves[scene_id] = _Shelf(Known(scene.own_limits, 0, {}))
+            shelf = self._shelves[scene_id]
         with shelf.lock, db.read() as session:
             version = motions.version(session, scene_id)
             if version != shelf.known.version:

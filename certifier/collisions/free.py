@@ -16,6 +16,7 @@ from certifier.collisions.seen import Seen
 from certifier.model import Array
 from certifier.motion.bodies import Bodies, place, place_links
 from certifier.motion.nearest import separation
+from certifier.motion.views import acceleration, moved
 
 CLOSE = 1e-6
 """Bodies that are nearer than about this, in metres, on a line may count as touching."""
@@ -96,6 +97,7 @@ def free_along(bodies: Bodies, seen: Seen, q0: Array, q1: Array, order: np.ndarr
         close: pairs that come nearer than about this, in metres, may count as touching.
     """
     links, way = len(bodies.parents), q1 - q0
+    rates, changes = np.abs(way), np.zeros(len(way))
     # The links' poses at the times k / STEPS are computed once for all pairs; those at other times come last.
     R, p, known = np.empty((STEPS + 2, links, 3, 3)), np.empty((STEPS + 2, links, 3)), np.zeros(STEPS + 2, dtype=np.bool_)
     middle = STEPS // 2  # most lines that touch something do so there as well
@@ -106,8 +108,9 @@ def free_along(bodies: Bodies, seen: Seen, q0: Array, q1: Array, order: np.ndarr
     normal, other, stack, moving = np.empty(3), np.empty(3), np.empty(64), np.empty((2 * len(bodies.vertices), 3))
     for k in range(len(order)):
         pair = order[k]
-        moved, bent = _bounds(seen, pair, way)
-        if _far(bodies, seen, pair, R[middle], p[middle], moved / 2.0):
+        view = seen.moving[pair]
+        distance, bent = moved(seen.views, view, seen.levers, rates), acceleration(seen.views, view, seen.levers, rates, changes)
+        if _far(bodies, seen, pair, R[middle], p[middle], distance / 2.0):
             continue
         a, b, reach = seen.pairs[pair, 0], seen.pairs[pair, 1], seen.reaches[pair]
         A, W, frame = bodies.vertices[bodies.first[a] : bodies.first[a + 1]], bodies.first[b + 1] - bodies.first[b], bodies.links[a]
@@ -127,24 +130,9 @@ def free_along(bodies: Bodies, seen: Seen, q0: Array, q1: Array, order: np.ndarr
                 B[:W] = B[W:]
                 t0, top = t1, top - 1
                 continue
-            if separation(A, B[W:], other) <= reach or (t1 - t0) * moved <= close:
+            if separation(A, B[W:], other) <= reach or (t1 - t0) * distance <= close:
                 _to_front(order, k)
                 return False
             stack[top] = (t0 + t1) / 2.0
             top += 1
     return True
-
-
-@njit(cache=True)
-def _bounds(seen: Seen, pair: int, way: Array) -> tuple[float, float]:
-    """Returns bounds of the speed and the acceleration of the vertices that move on a line, metres."""
-    moved, bent, turning = 0.0, 0.0, 0.0
-    for c in range(seen.begins[pair], seen.begins[pair + 1]):
-        rate = abs(way[seen.joints[c]])
-        moved += seen.levers[c] * rate
-        if seen.slides[c]:
-            bent += 2.0 * turning * rate
-        else:
-            bent += seen.levers[c] * rate * (rate + 2.0 * turning)
-            turning += rate
-    return moved, bent

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from certifier.model import Array, Scene
 from certifier.motion.bodies import bodies_of
-from certifier.motion.views import levers_of, views_of
+from certifier.motion.views import Views, levers_of, views_of
 
 
 class Seen(NamedTuple):
@@ -18,17 +19,15 @@ class Seen(NamedTuple):
     Attributes:
         pairs: (P, 2) numbers of the geometry that rests and of the one that moves. It is the way round with the smaller levers.
         reaches: (P,) the radii and the padding of both geometries, metres.
-        begins: (P + 1,) where each pair's joints begin in the arrays below, and their length.
-        joints: (J,) position indices of the joints between both.
-        slides: (J,) whether each of them is prismatic.
-        levers: (J,) how far a vertex moves at most where the joint moves by 1: metres, and 1 for a prismatic joint.
+        moving: (P,) the view of the geometry that moves, from the link of the other one.
+        views: of the scene.
+        levers: (J,) of all joints of the views, for positions within the joints' limits.
     """
 
     pairs: np.ndarray
     reaches: Array
-    begins: np.ndarray
-    joints: np.ndarray
-    slides: np.ndarray
+    moving: np.ndarray
+    views: Views
     levers: Array
 
 
@@ -42,17 +41,14 @@ def seen_of(scene: Scene, padding: float = 0.0) -> Seen:
     bodies, views = bodies_of(scene), views_of(scene)
     lower, upper = scene.own_limits
     levers, _ = levers_of(views, np.maximum(np.abs(lower), np.abs(upper)))
-    # A pair's first choice is the frame of a, and its last one that of b.
-    seen = [(views.sides[first, 1], views.sides[last, 0]) for first, last in zip(views.first[:-1], views.first[1:] - 1, strict=True)]
-    joints = [[slice(views.begins[view], views.begins[view + 1]) for view in two] for two in seen]
-    turned = [bool(levers[b].sum() > levers[a].sum()) for b, a in joints]
-    chosen = [two[which] for two, which in zip(joints, turned, strict=True)]
-    index = np.concatenate([np.zeros(0, dtype=np.int64), *(np.arange(own.start, own.stop) for own in chosen)])
+    widths = np.array([levers[first:last].sum() for first, last in pairwise(views.begins)])
+    # A pair's first choice is the frame of a, in which b moves, and its last one that of b, in which a moves.
+    moving = np.column_stack([views.sides[views.first[:-1], 1], views.sides[views.first[1:] - 1, 0]]).reshape(-1, 2)
+    turned = widths[moving[:, 0]] > widths[moving[:, 1]]
     return Seen(
-        pairs=np.array([pair[::-1] if swap else pair for pair, swap in zip(bodies.pairs, turned, strict=True)]).reshape(-1, 2),
+        pairs=np.where(turned[:, None], bodies.pairs[:, ::-1], bodies.pairs),
         reaches=bodies.reaches + 2 * padding,
-        begins=np.concatenate([[0], np.cumsum([own.stop - own.start for own in chosen], dtype=np.int64)]),
-        joints=views.joints[index],
-        slides=views.slides[index],
-        levers=levers[index],
+        moving=np.where(turned, moving[:, 1], moving[:, 0]),
+        views=views,
+        levers=levers,
     )

@@ -160,8 +160,7 @@ class _Check:
     def __init__(self, proof: MotionProof, known: Known) -> None:
         self._proof, self._scene, self._known = proof, proof.scene, known
         self._pieces = Pieces(proof.scene, proof.motion, proof.rho)
-        number = {geometry.name: i for i, geometry in enumerate(self._scene.geometries)}
-        self._pairs = np.array([(number[pair.a], number[pair.b]) for pair in self._scene.pairs], dtype=np.int64).reshape(-1, 2).T
+        self._pairs = known.pairs
         self._frames = proof.frames.astype(np.int64)
         self._starts = _starts(proof)
         self._count = proof.counts.sum(axis=1, dtype=np.int64)
@@ -189,9 +188,8 @@ class _Check:
 
     def _check_cost(self) -> None:
         scene, proof = self._scene, self._proof
-        vertices = np.array([len(geometry.vertices) for geometry in scene.geometries])[self._pairs].sum(axis=0)
         joints = self._known.joints(np.tile(self._frames, 2), self._pairs.reshape(-1)).reshape(2, -1).sum(axis=0)
-        cost = self._count * (vertices + limits.JOINT_COST * joints + scene.n * proof.motion.degree**2)
+        cost = self._count * (self._known.vertices + limits.JOINT_COST * joints + scene.n * proof.motion.degree**2)
         if float(cost.sum(dtype=float)) > limits.SWEPT:
             raise ProofError("proof_too_large", "the intervals have more vertices, behind more joints, than are checked")
 

@@ -117,12 +117,21 @@ class Sides(NamedTuple):
 
 
 class Known:
-    """Keeps what has been computed about a scene: chains, and sides. Several threads may ask at once."""
+    """Keeps what has been computed about a scene: chains, and sides. Several threads may ask at once.
+
+    Attributes:
+        pairs: (2, P) the numbers of the geometries a and b of every pair.
+        vertices: (P,) how many vertices both have.
+        chains: those that were asked about, by their numbers.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._places, self._kinematics = scene, Places(scene), ExactKinematics.by_joint(scene)
         bodies = {body: i for i, body in enumerate(scene.bodies)}
         self._body = np.array([bodies[geometry.body] for geometry in scene.geometries], dtype=np.int64)
+        number = {geometry.name: i for i, geometry in enumerate(scene.geometries)}
+        self.pairs = np.array([(number[pair.a], number[pair.b]) for pair in scene.pairs], dtype=np.int64).reshape(-1, 2).T
+        self.vertices = np.array([len(geometry.vertices) for geometry in scene.geometries], dtype=np.int64)[self.pairs].sum(axis=0)
         self._ways: dict[tuple[int, int], int] = {}
         self._lengths: dict[tuple[int, int], int] = {}
         self._sides: dict[tuple[int, int], int] = {}

@@ -81,8 +81,8 @@ def prove(
 
 def within(scene: Scene, tube: Tube, path: Array, speed: Array, acceleration: Array) -> tuple[Array, Array] | None:
     """Returns configurations (K, n) and times (K,) of a motion from rest to rest along a path, (k, n); None where it leaves the tube."""
-    curve = timed(*_fine(path), speed, acceleration, SPACING, straight_between=True)
-    for found in (curve, _at_rest(path, speed, acceleration)):
+    for make in (_on_curve, _at_rest):
+        found = make(path, speed, acceleration)
         if found is None:
             continue
         q, t = np.clip(found[0], *scene.own_limits), found[1]
@@ -95,10 +95,15 @@ def within(scene: Scene, tube: Tube, path: Array, speed: Array, acceleration: Ar
 def _candidates(search: Search, route: Route, speed: Array, acceleration: Array) -> Iterator[tuple[Array, Array, Array]]:
     """Yields paths with configurations of motions along them and their times: first one with round corners, then one that stops there."""
     path = rounded(route.path, search.sees, route.kept)
-    found = timed(*_fine(path), speed, acceleration, SPACING, straight_between=True)
+    found = _on_curve(path, speed, acceleration)
     if found is not None:
         yield path, *found
     yield route.path, *_at_rest(route.path, speed, acceleration)
+
+
+def _on_curve(path: Array, speed: Array, acceleration: Array) -> tuple[Array, Array] | None:
+    """Returns a motion along a path, (k, n), that rests at its ends alone: configurations (K, n) and times (K,); or None."""
+    return timed(*_fine(path), speed, acceleration, SPACING, straight_between=True)
 
 
 def _at_rest(path: Array, speed: Array, acceleration: Array) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ from certifier.model import Array
 from planner.trajectory.stretch import UP, stretched
 
 FEWEST, MOST = 9, 4000
-"""Least and largest number of configurations of a line."""
+"""Least number of configurations of a line, and largest number of those of any trajectory."""
 
 
 def straight(a: Array, b: Array, speed: Array, acceleration: Array, spacing: float) -> tuple[Array, Array]:

@@ -13,15 +13,15 @@ from pydrake.multibody.tree import PrismaticJoint, SpatialInertia
 from pydrake.trajectories import PiecewisePolynomial
 
 from certifier.model import Array
-from planner.trajectory.straight import straight
+from planner.trajectory.straight import MOST, straight
 from planner.trajectory.stretch import UP, stretched
 
 STILL = 1e-6
 """A curve that is no longer than this is as good as a point, because solvers are not more exact; and so is a part of a curve that is so
 much shorter than all of it.
 """
-FEWEST, MOST = 17, 4000
-"""Least and largest number of configurations of a trajectory."""
+FEWEST = 17
+"""Least number of configurations of a curve."""
 NEAR = 0.25
 """Points that a motion has to go through are at least this part of a step apart in time."""
 _FAST = 1e6

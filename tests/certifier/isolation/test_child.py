@@ -44,6 +44,9 @@ def sleep(payload):
 def broken(payload):
     raise ValueError("a bug")
 
+def whoami(payload):
+    return {"pid": os.getpid()}
+
 calls = 0
 
 def count(payload):
@@ -71,8 +74,8 @@ def call(tmp_path, monkeypatch):
     (tmp_path / "child_functions.py").write_text(FUNCTIONS)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
 
-    def call(name, payload=None, timeout_s=30.0, memory_bytes=2 * GIB):
-        return run_in_child(f"child_functions:{name}", payload, timeout_s=timeout_s, memory_bytes=memory_bytes)
+    def call(name, payload=None, timeout_s=30.0, memory_bytes=2 * GIB, fork=True):
+        return run_in_child(f"child_functions:{name}", payload, timeout_s=timeout_s, memory_bytes=memory_bytes, fork=fork)
 
     return call
 
@@ -187,6 +190,15 @@ def test_what_was_prepared_answers_the_first_call(call):
     prepare("child_functions:count")
     assert call("count")["nursery"] == waiting[-1]
     assert [nursery.process.pid for nursery in child._idle["child_functions"]] == waiting
+
+
+def test_a_nursery_that_has_computed_much_goes_on_until_another_has_loaded(call, monkeypatch):
+    monkeypatch.setattr(child, "MOST", 2)
+    monkeypatch.setattr(child, "MORE", 2)
+    (own,) = {call("whoami", fork=False)["pid"] for _ in range(4)}
+    (following,) = {call("whoami", fork=False)["pid"] for _ in range(2)}
+    assert following != own
+    assert not alive(own)
 
 
 def test_a_fork_of_this_process_has_nurseries_of_its_own(call):
