@@ -23,6 +23,10 @@ from typing import Any
 from certifier.errors import CirisError, RegionError, SceneError
 
 ERRORS = {cls.__name__: cls for cls in (CirisError, SceneError, RegionError)}
+LOADED = b"loaded"
+"""A nursery says this when it has loaded its module."""
+LOADING_S = 600.0
+"""Loading may take this long where functions are compiled for the first time, on a machine that does much else."""
 KEEP = b"keep"
 """A message that begins so is no call: it gives a text to keep."""
 STATUS = struct.Struct("i")
@@ -47,7 +51,7 @@ def run_in_child(
     Args:
         function: ``"package.module:name"``.
         payload: JSON-able data; NumPy arrays are allowed anywhere in it, as in the result.
-        timeout_s: wall-clock limit in seconds.
+        timeout_s: wall-clock limit in seconds, without what a new nursery takes to load the module.
         memory_bytes: limit of the child's address space in bytes.
         kept: a name, and a text that this program has written. The function gets what ``keep(text)`` of the module makes of it as a second
             argument. The nursery calls ``keep`` once for a name. So it reads a scene once for all calls about the scene.
@@ -117,6 +121,7 @@ class _Nursery:
     def __init__(self, module: str) -> None:
         self.computed, self._kept = 0, list[str]()
         self.next: _Nursery | None = None
+        self._loaded = False
         self._connection, theirs = Pipe()
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
         root = str(Path(__file__).resolve().parents[2])
@@ -144,17 +149,29 @@ class _Nursery:
         self._log.seek(0)
         self._log.truncate()
         try:
+            if not self._loaded:
+                self._answer(LOADING_S)
+                self._loaded = True
             if kept is not None and kept[0] not in self._kept:
                 self._kept, gone = [*self._kept[1 - KEPT :], kept[0]], self._kept[: 1 - KEPT]
                 self._connection.send_bytes(KEEP + encode({"name": kept[0], "text": kept[1], "gone": gone}))
             self._connection.send_bytes(request)
-            if not self._connection.poll(timeout_s):
-                raise TimeoutError
-            reply = self._connection.recv_bytes()
+            reply = self._answer(timeout_s)
         except BaseException:
             self.kill()
             raise
         return STATUS.unpack_from(reply)[0], reply[STATUS.size :]
+
+    def _answer(self, timeout_s: float) -> bytes:
+        """Returns what the nursery says next.
+
+        Raises:
+            TimeoutError: it has said nothing in time.
+            EOFError, ConnectionError: it has ended.
+        """
+        if not self._connection.poll(timeout_s):
+            raise TimeoutError
+        return self._connection.recv_bytes()
 
     def kill(self) -> None:
         """Ends the process with its children, and the one that was to follow it."""

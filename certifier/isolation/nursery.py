@@ -1,8 +1,8 @@
 """``python -m certifier.isolation.nursery MODULE FD`` loads a module once and forks a child for every call of one of its functions.
 
-If the module has a function ``warm_up()``, it is called once, to load what the first call would otherwise load. The calls, and texts to
-keep for them, come over the connection FD from certifier.isolation.child. When that connection is closed, the nursery ends, and its child
-with it.
+If the module has a function ``warm_up()``, it is called once, to load what the first call would otherwise load. Then the nursery says that
+it has loaded. The calls, and texts to keep for them, come over the connection FD from certifier.isolation.child. When that connection is
+closed, the nursery ends, and its child with it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from types import ModuleType
 from typing import Any
 
 from certifier.errors import CirisError
-from certifier.isolation.child import ERRORS, KEEP, STATUS, decode, encode
+from certifier.isolation.child import ERRORS, KEEP, LOADED, STATUS, decode, encode
 
 _PR_SET_PDEATHSIG = 1
 _MOST_WRITTEN = 2**28
@@ -42,6 +42,7 @@ def main() -> None:
             module.warm_up()
     gc.freeze()  # what is loaded stays: collecting garbage need not look at it, nor copy its pages in a child
     try:
+        connection.send_bytes(LOADED)
         while True:
             request = connection.recv_bytes()
             if request.startswith(KEEP):

@@ -51,7 +51,7 @@ class Poses(NamedTuple):
 def curve_of(scene: Scene, motion: Motion) -> Curve:
     """Returns the arrays of a motion."""
     in_s = motion.space is Space.S
-    controls = np.ascontiguousarray(motion.bezier)
+    controls = np.array(motion.bezier, order="C")  # a copy: arrays that are read-only would have all compiled again
     largest = float(np.abs(motion.controls).max())
     inexact = [INEXACT * motion.degree * (motion.degree - 1) ** k * largest for k in (1, 2, 3)]
     steps, hulls = controls, []
