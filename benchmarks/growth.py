@@ -30,7 +30,7 @@ from certifier.jobs.reference import Reference
 from certifier.jobs.share import SampledProposal
 from certifier.model import Array, Scene
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid, volume, volume_in_q
-from certifier.seeding.iris import checker
+from certifier.seeding.drake_iris import checker
 from certifier.seeding.options import SeedOptions
 from certifier.seeding.propose import check_seed
 from certifier.verify.region import verify_region

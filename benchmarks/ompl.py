@@ -11,7 +11,7 @@ import numpy as np
 from ompl import geometric, util
 
 from certifier.model import Array, Scene
-from certifier.seeding.iris import checker
+from certifier.seeding.drake_iris import checker
 from planner.sampling.search import positions, space_of, state_of
 
 RESOLUTION = 0.05

@@ -55,32 +55,34 @@ class PaperOptions(TypedDict, total=False):
 class GrowOptions(JobOptions, total=False):
     """Options of jobs of the kind ``grow``."""
 
-    method: Literal["iris_np2", "iris_zo", "limits", "box"]
-    """Source of the first polytope: Drake's IRIS (``iris_np2``, ``iris_zo``). With the papers' algorithm, also the joint limits
-    (``limits``) or a box around the seed (``box``). Default: ``iris_np2``.
+    method: Literal["iris", "iris_np2", "iris_zo", "limits", "box"]
+    """Source of the first polytope: IRIS (``iris``), or for comparison Drake's (``iris_np2``, ``iris_zo``), which takes minutes. The
+    papers' algorithm can also begin with the joint limits (``limits``) or a box around the seed (``box``). Default: ``iris``.
     """
     contain: ArrayLike
     """(n,) or (k, n). More configurations (joint positions) that the region must contain, such as where it meets another region."""
     half_width: float
     """Half the edge length of the first polytope, in s; the method ``box`` needs it. 0.1 is about 11 degrees of a joint."""
     iris_epsilon: float
-    """IRIS adds faces until at most this fraction of the volume in s is in collision. Values below 0.01 apply only to the last round.
-    Default: 0.001.
+    """IRIS adds faces until at most this fraction of the polytope's volume is in collision: in q, or in s for Drake's IRIS. Default:
+    0.001.
     """
     iris_delta: float
     """Probability that a larger fraction than that is in collision. Default: 0.05."""
     iris_iterations: int
-    """Most alternations of IRIS between faces and ellipsoid. If balls around a hand join the scene, IRIS repeats them. Default: 3."""
+    """Most alternations of IRIS between faces and ellipsoid. Default: 8."""
     iris_face_rounds: int
     """Most rounds of new faces within each alternation of IRIS. Default: 20."""
     iris_tolerance: float
-    """IRIS ends when the ellipsoid's volume grows by less than this fraction. Default: 0.02."""
+    """IRIS ends when the ellipsoid's volume grows by less than this fraction. Default: 0.05."""
     iris_margin: float
     """Distance in s between IRIS' faces and the collisions that it finds. Default: 0.01."""
     iris_random_seed: int
     """Seed of the random choices of IRIS only. Another seed gives another proposal. Default: the seed of every random choice."""
     iris_tries: int
-    """IRIS makes at most this many proposals, each with its own random seed, and growth takes the best. Default: 2."""
+    """IRIS makes this many proposals, each with its own random seed, and growth takes the one of which it is likely to keep most.
+    Default: 1.
+    """
     cells: int
     """Most cells of a pair in each stage. After that, new faces cut off the cells that are still undecided. Default: 6000."""
     stages: int

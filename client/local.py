@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from certifier.errors import CirisError, SceneError
 from certifier.growth.options import CertifyOptions, GrowthOptions, RecertifyOptions
+from certifier.isolation.child import prepare
 from certifier.jobs.options import JobOptions
 from certifier.model import Scene
 from certifier.options import Options, read, table
+from certifier.seeding import PROPOSE
 from ciris.documents import Document
 from client import verdicts
 from client.cores import cores
@@ -53,6 +55,8 @@ def grow(scene: str, asked: Document, screen: Screen, watch: bool, keep: Callabl
         asked: the seed and the options of the request.
         keep: writes the proof of a region of the scene with this name; it is called for regions that are certified before the last one too.
     """
+    check_is_file(scene)
+    prepare(PROPOSE)  # which loads beside the scene
     loaded = load(scene)
     from certifier.jobs import local
 

@@ -21,6 +21,7 @@ from certifier.model import Scene
 from certifier.outcome import Outcome
 from certifier.pair.forecast import PairCost, forecast
 from certifier.pair.result import Weakness
+from certifier.seeding import PROPOSE
 from certifier.seeding.proposal import Proposal
 from certifier.step.step import step as polytope_step
 from certifier.step.stepped import Stepped
@@ -36,8 +37,6 @@ from jobs.former import former_of
 from jobs.kind import Done, Held, Kind, Turn, in_child, report_of
 from jobs.scenes import load_scene
 from workers.app import send_work
-
-SEEDING = "certifier.seeding.propose:propose_in_child"
 
 
 class Growing(Kind):
@@ -82,7 +81,7 @@ class Growing(Kind):
 
     def do(self, claim: steps.Claim, scene: Scene) -> Done:
         if claim.kind == Propose.kind:
-            return Done(in_child(SEEDING, {"scene": scene.to_document(), "seed": claim.input["seed"]}))
+            return Done(in_child(PROPOSE, {"scene": scene.to_document(), "seed": claim.input["seed"]}))
         return _accept(claim, scene) if claim.kind == ACCEPT else _step(claim, scene)
 
     def failure(self, finish: Finish, error: dict[str, Any] | None) -> dict[str, Any] | None:

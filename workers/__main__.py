@@ -57,9 +57,9 @@ def main() -> None:
         die_with_parent(parent=worker)
         database.cache_clear()
         if queue == SOLVE:
-            from jobs.growing import SEEDING
+            from certifier.seeding import PROPOSE
 
-            prepare(SEEDING)
+            prepare(PROPOSE)
         traces.configure(queue)
 
     @worker_process_shutdown.connect(weak=False)

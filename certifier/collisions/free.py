@@ -68,6 +68,24 @@ def _to_front(order: np.ndarray, k: int) -> None:
 
 
 @njit(cache=True)
+def distance_at(bodies: Bodies, seen: Seen, pair: int, q: Array, R: Array, p: Array) -> float:
+    """Returns how far a pair's padded bodies are apart at joint positions q, (n,), metres; 0 or less where they touch.
+
+    Args:
+        R, p: (L, 3, 3) and (L, 3) are overwritten.
+    """
+    place_links(bodies, q, R, p)
+    return _distance(bodies, seen, pair, R, p)
+
+
+@njit(cache=True)
+def touching_at(bodies: Bodies, seen: Seen, q: Array, order: np.ndarray) -> int:
+    """Returns the first pair that is found to touch at joint positions q, (n,), or -1. For ``order`` see :func:`free_at`."""
+    links = len(bodies.parents)
+    return order[0] if _touches(bodies, seen, q, np.empty((links, 3, 3)), np.empty((links, 3)), order) else -1
+
+
+@njit(cache=True)
 def free_at(bodies: Bodies, seen: Seen, q: Array, order: np.ndarray) -> bool:
     """Says whether no pair touches at joint positions q, (n,).
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 from certifier.model import Array, Scene
+from certifier.polytopes.cutting import lost_together
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,6 @@ class Obstacle:
     def at(cls, stage: int, s: Array | None, *, contact: bool, faces: int | None = None, lost: float | None = None) -> Obstacle:
         """Returns what one round has cut off; ``s`` is (n,)."""
         return cls(stage, 1, faces, lost, None if s is None else tuple(map(float, s)), contact)
-
-
-def lost_together(*shares: float) -> float:
-    """Returns the share that is lost when each of these is lost of what those before it have left."""
-    return 1 - math.prod(1 - share for share in shares)
 
 
 def joined(known: dict[int, Obstacle], found: dict[int, Obstacle]) -> dict[int, Obstacle]:

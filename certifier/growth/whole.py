@@ -1,4 +1,4 @@
-"""The whole proposal is certified cell by cell, and what cannot be is cut off by faces that lose least (certifier.growth.cutting).
+"""The whole proposal is certified cell by cell, and what cannot be is cut off by faces that lose least (certifier.polytopes.cutting).
 
 One round looks at a fixed number of cells of every pair that is not certified yet. Then faces are added where bodies touch, or come too
 close. What is proved stays proved, because the polytope only shrinks. The rounds go on until every pair is certified. When the effort is
@@ -16,8 +16,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from certifier.growth.actions import Certify, Finish, Outcomes, Transition
-from certifier.growth.cutting import BARELY, Cut, cut, samples_of
-from certifier.growth.obstacles import Obstacle, joined, lost_together
+from certifier.growth.obstacles import Obstacle, joined
 from certifier.growth.options import MOST_CELLS
 from certifier.growth.pairs import by_joints, joints_between
 from certifier.growth.state import GrowthState, Start, Whole
@@ -25,6 +24,7 @@ from certifier.model import Array, Polytope, Scene
 from certifier.outcome import Outcome, combine
 from certifier.pair.result import Weakness
 from certifier.partition.together import THIN, Together, together
+from certifier.polytopes.cutting import BARELY, Cut, cut, lost_together, samples_of
 from certifier.polytopes.proved import ProvedBox
 from certifier.polytopes.pushed import pushed
 

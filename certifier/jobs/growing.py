@@ -46,6 +46,11 @@ def late(state: GrowthState | None, certified: bool) -> Finish:
     return Finish(Outcome.INCONCLUSIVE, at_deadline("" if state is None or state.start is None else state.start.hindrance))
 
 
+def out_of_time() -> CirisError:
+    """Returns the error of a growth whose time has run out before there was a proposal."""
+    return refusal(DEADLINE, late=True)
+
+
 def failure(state: GrowthState | None, report: Failed) -> CirisError | None:
     """Returns what has ended a growth in words about what users gave; None where a region remains."""
     if state is not None and state.best is not None:

@@ -8,14 +8,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from certifier import stored
 from certifier.errors import CirisError
 from certifier.growth.actions import Action, Candidate, Certify, Failed, Finish, Outcomes, Propose, Report, Step, Transition
 from certifier.growth.options import GrowthOptions
 from certifier.growth.pairs import alike
 from certifier.growth.state import GrowthState
+from certifier.isolation.child import run_in_child
 from certifier.jobs.driver import drive
 from certifier.jobs.former import Former
-from certifier.jobs.growing import REST, Account, Certified, decided, failure, late, make_region, refused
+from certifier.jobs.growing import REST, Account, Certified, decided, failure, late, make_region, out_of_time, refused
 from certifier.jobs.pairs import part_certifier
 from certifier.jobs.parallel import side_by_side
 from certifier.jobs.region import Region
@@ -26,14 +28,17 @@ from certifier.outcome import Guarantee, Outcome, combine
 from certifier.pair.result import PairResult
 from certifier.proof.region import RegionProof
 from certifier.proof.separation import digest
-from certifier.seeding.options import SeedOptions
-from certifier.seeding.propose import propose
+from certifier.seeding import PROPOSE
+from certifier.seeding.proposal import Proposal
 from certifier.step.step import step
 
 Tell = Callable[[str, dict[str, Any]], None]
 """Hears of what happens, as the events of the service say it (docs/architecture.md): their kind and their data."""
 Deliver = Callable[[Region], None]
 """Takes a region that has been verified, while a larger one may still come."""
+
+LONGEST_S, MEMORY_BYTES = 7 * 86400.0, 2**36
+"""A proposal is given up after this time without a deadline, or when it needs more memory."""
 
 
 def _silent(kind: str, data: dict[str, Any]) -> None:
@@ -164,7 +169,7 @@ class _Memory:
                 return self._certify(action)
             if isinstance(action, Propose):
                 self.tell("step", {"kind": "propose", "state": "running", "seconds": None})
-                found = propose(self.scene, SeedOptions.from_document(action.seed))
+                found = self._proposed(action)
                 self.seeding_seconds = found.info["seconds"]
                 self.tell("step", {"kind": "propose", "state": "done", "seconds": self.seeding_seconds})
                 return found
@@ -172,6 +177,15 @@ class _Memory:
             return step(self.scene, action.polytope, self.proofs(self.candidate), action.contain, self._tell_note)
         except CirisError as error:
             return Failed(error)
+
+    def _proposed(self, action: Propose) -> Proposal:
+        """Makes a proposal in a child process, which ends with the deadline: Drake's IRIS does not hear of it, nor of interrupts."""
+        left = LONGEST_S if self.deadline_s is None else max(self.deadline_s - self.seconds, 0.0)
+        payload = {"scene": self.scene.to_document(), "seed": action.seed}
+        try:
+            return stored.value(Proposal, run_in_child(PROPOSE, payload, timeout_s=left, memory_bytes=MEMORY_BYTES))
+        except CirisError as error:
+            raise out_of_time() if error.code == "child_timeout" else error from None
 
     def _certify(self, action: Certify) -> Outcomes:
         carried = None if self.former is None else self.former.carried

@@ -6,7 +6,10 @@ is (hit-and-run along the coordinate axes, Smith, Operations Research 1984).
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numba import njit
 
 from certifier.coordinates import ConfigurationSpace
 from certifier.model import Array, Polytope
@@ -44,17 +47,42 @@ def uniform_in_q(polytope: Polytope, space: ConfigurationSpace, chains: int, eac
 
 def _walk(polytope: Polytope, space: ConfigurationSpace, s: Array, rounds: int, rng: np.random.Generator) -> Array:
     """Returns the chains s (k, n) after that many rounds over all axes."""
-    s = s.copy()
-    axes = [(i, space.of(i), column, column > 0, column < 0) for i, column in enumerate(polytope.C.T)]
-    for _ in range(rounds):
-        # The slack is computed anew in every round, so that rounding does not add up.
-        slack = np.maximum(polytope.d - s @ polytope.C.T, 0)
-        for i, joint, column, up, down in axes:
-            least = s[:, i] + (slack[:, down] / column[down]).max(axis=1)
-            most = s[:, i] + (slack[:, up] / column[up]).min(axis=1)
-            place = rng.random(len(s))
-            begin, end = joint.offset(least), joint.offset(most)
-            new = np.minimum(np.maximum(joint.at_offset(begin + (end - begin) * place), least), most)
-            slack = np.maximum(slack - np.outer(new - s[:, i], column), 0)
-            s[:, i] = new
-    return s
+    walked = s.copy()
+    _rounds(np.ascontiguousarray(polytope.C.T), polytope.d, space.revolute, rng.random((len(s), rounds, s.shape[1])), walked)
+    return walked
+
+
+@njit(cache=True)
+def _rounds(columns: Array, d: Array, revolute: np.ndarray, places: Array, s: Array) -> None:
+    """Moves the chains s (k, n) along each axis in turn, to a place in [0, 1) of its interval in q.
+
+    Args:
+        columns: (n, m) the transpose of C.
+        places: (k, rounds, n).
+    """
+    slack = np.empty(len(d))
+    for chain in range(len(s)):
+        for turn in range(places.shape[1]):
+            # The slack is computed anew in every round, so that rounding does not add up.
+            slack[:] = d
+            for i in range(len(columns)):
+                slack -= s[chain, i] * columns[i]
+            for i in range(len(columns)):
+                column, here = columns[i], s[chain, i]
+                least, most = -np.inf, np.inf
+                for j in range(len(d)):
+                    room = max(slack[j], 0.0)
+                    if column[j] > 0.0:
+                        most = min(most, room / column[j])
+                    elif column[j] < 0.0:
+                        least = max(least, room / column[j])
+                least, most, place = here + least, here + most, places[chain, turn, i]
+                if revolute[i]:
+                    begin, end = math.atan(least), math.atan(most)
+                    there = math.tan(begin + (end - begin) * place)
+                else:
+                    there = least + (most - least) * place
+                there = min(max(there, least), most)
+                for j in range(len(d)):
+                    slack[j] -= (there - here) * column[j]
+                s[chain, i] = there

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from certifier.model import Array, Box, Polytope, Scene
-from certifier.polytopes.polytope import bound_multipliers, bounds
+from certifier.polytopes.polytope import bound_multipliers, bounds, drop_redundant
 
 CLEAN = 1e-8
 """Coefficients of a face are tiny if leaving them out moves the face by this part of its distance from the points to keep, or less."""
@@ -73,6 +73,20 @@ class ProvedBox(Box):
         pad = np.zeros((len(self.mid), width - self.Y_lower.shape[1]))
         padded = (np.concatenate([Y[:, :place], pad, Y[:, place:]], axis=1) for Y in (self.Y_lower, self.Y_upper))
         return replace(self, **dict(zip(("Y_lower", "Y_upper"), padded, strict=True)))
+
+
+def needed_faces(scene: Scene, C: Array, d: Array, keep: Array) -> tuple[Array, Array]:
+    """Returns the faces that are needed beside the joint limits, without their tiny coefficients.
+
+    Args:
+        C, d: (m, n), (m,) the faces, |c_j| = 1.
+        keep: (k, n) points that stay inside, k >= 1.
+
+    Raises:
+        RegionError: as :func:`certifier.polytopes.polytope.chebyshev_center`.
+    """
+    needed = drop_redundant(scene.polytope(C, d), fixed=2 * scene.n)[: -2 * scene.n]
+    return cleaned(C[needed], d[needed], scene.s_lower, scene.s_upper, keep)
 
 
 def cleaned(C: Array, d: Array, lower: Array, upper: Array, keep: Array) -> tuple[Array, Array]:

@@ -14,10 +14,12 @@ from certifier.positions import check_magnitude
 class Method(StrEnum):
     """The method says where a proposal comes from."""
 
+    IRIS = "iris"
+    """IRIS makes the polytope, and faces that lose least cut its colliding corners off."""
     IRIS_NP2 = "iris_np2"
-    """Drake's IrisNp2 makes the polytope."""
+    """Drake's IrisNp2 makes the polytope, for comparison."""
     IRIS_ZO = "iris_zo"
-    """Drake's IrisZo makes the polytope: it solves no nonlinear programs and gives more faces."""
+    """Drake's IrisZo makes the polytope, for comparison."""
     LIMITS = "limits"
     """The joint limits are the polytope; what cannot be certified is cut off pair by pair, by faces in the pair's joints alone."""
     BOX = "box"
@@ -26,7 +28,7 @@ class Method(StrEnum):
     """The given C and d are the polytope."""
 
 
-IRIS = (Method.IRIS_NP2, Method.IRIS_ZO)
+IRIS = (Method.IRIS, Method.IRIS_NP2, Method.IRIS_ZO)
 OF_PAPER = (Method.LIMITS, Method.BOX)
 """Only the papers' algorithm makes a region of these."""
 _GIVE = {"half_width": "give it in s, such as 0.1: about 11 degrees on each side of a joint near q*"}
@@ -42,9 +44,9 @@ class SeedOptions:
 
     method: Method | None = option(
         None,
-        "Source of the first polytope: Drake's IRIS (`iris_np2`, `iris_zo`). With the papers' algorithm, also the joint limits (`limits`) "
-        "or a box around the seed (`box`).",
-        otherwise="`iris_np2`",
+        "Source of the first polytope: IRIS (`iris`), or for comparison Drake's (`iris_np2`, `iris_zo`), which takes minutes. The papers' "
+        "algorithm can also begin with the joint limits (`limits`) or a box around the seed (`box`).",
+        otherwise="`iris`",
     )
     q: tuple[float, ...] | None = option(None, "The seed: joint positions in radians or metres, in position order.")
     contain: tuple[tuple[float, ...], ...] = option(
@@ -62,15 +64,15 @@ class SeedOptions:
     )
     epsilon: float = option(
         0.001,
-        "IRIS adds faces until at most this fraction of the volume in s is in collision. Values below 0.01 apply only to the last round.",
+        "IRIS adds faces until at most this fraction of the polytope's volume is in collision: in q, or in s for Drake's IRIS.",
         argument="iris-epsilon",
         above=0,
         below=1,
     )
     delta: float = option(0.05, "Probability that a larger fraction than that is in collision.", argument="iris-delta", above=0, below=1)
     max_iterations: int = option(
-        3,
-        "Most alternations of IRIS between faces and ellipsoid. If balls around a hand join the scene, IRIS repeats them.",
+        8,
+        "Most alternations of IRIS between faces and ellipsoid.",
         argument="iris-iterations",
         least=1,
         greatest=1000,
@@ -83,7 +85,7 @@ class SeedOptions:
         greatest=1000,
     )
     tolerance: float = option(
-        0.02, "IRIS ends when the ellipsoid's volume grows by less than this fraction.", argument="iris-tolerance", above=0
+        0.05, "IRIS ends when the ellipsoid's volume grows by less than this fraction.", argument="iris-tolerance", above=0
     )
     margin: float = option(0.01, "Distance in s between IRIS' faces and the collisions that it finds.", argument="iris-margin", above=0)
     random_seed: int | None = option(
@@ -95,8 +97,8 @@ class SeedOptions:
         greatest=IRIS_SEEDS - 1,
     )
     tries: int = option(
-        2,
-        "IRIS makes at most this many proposals, each with its own random seed, and growth takes the best.",
+        1,
+        "IRIS makes this many proposals, each with its own random seed, and growth takes the one of which it is likely to keep most.",
         argument="iris-tries",
         least=1,
         greatest=1000,
@@ -115,13 +117,13 @@ class SeedOptions:
         """
         options = read(cls, document, "seed")
         method, given = options.method, {name for name, value in document.items() if value is not None}
-        needed = {Method.POLYTOPE: ("C", "d"), Method.BOX: ("q", "half_width")}.get(method or Method.IRIS_NP2, ("q",))
+        needed = {Method.POLYTOPE: ("C", "d"), Method.BOX: ("q", "half_width")}.get(method or Method.IRIS, ("q",))
         idle = {"C", "d", "center", "half_width", "q"} - {*needed} - ({"center"} if method is Method.POLYTOPE else set())
         for name in needed:
             if name not in given:
-                raise _refuse(name, f"the method {method or Method.IRIS_NP2} needs {name}", "missing_option", _GIVE.get(name, "give it"))
+                raise _refuse(name, f"the method {method or Method.IRIS} needs {name}", "missing_option", _GIVE.get(name, "give it"))
         for name in sorted(idle & given):
-            raise _refuse(name, f"the method {method or Method.IRIS_NP2} has no use for {name}", hint="leave it out")
+            raise _refuse(name, f"the method {method or Method.IRIS} has no use for {name}", hint="leave it out")
         if method is not None and method not in IRIS:
             for one in table(SeedOptions):
                 if one.argument.startswith("iris-") and one.name != "random_seed" and getattr(options, one.name) != one.default:

@@ -53,7 +53,7 @@ def propose(scene: Scene, options: SeedOptions) -> Proposal:
             ``contain``; ``seeding_failed`` with Drake's words.
     """
     start = time.perf_counter()
-    method = options.method or Method.IRIS_NP2
+    method = options.method or Method.IRIS
     checked = [check_seed(scene, q, f"seed.contain[{i}]") for i, q in enumerate(options.contain)]
     contain = scene.to_s(off_limits(scene, options.contain)) if options.contain else np.zeros((0, scene.n))
     if method is Method.POLYTOPE:

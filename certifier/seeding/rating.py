@@ -10,7 +10,7 @@ from certifier.partition.parted import touched
 from certifier.polytopes.ellipsoid import volume, volume_in_q
 from certifier.polytopes.gibbs import uniform_in_q
 
-CHAINS, EACH = 400, 50
+CHAINS, EACH = 400, 20
 """A proposal is looked at in this many samples of this many chains."""
 LOST = 2.0
 """Growth loses about this many times the root of the share that is touched (docs/trials.md)."""

@@ -1,8 +1,7 @@
 """IRIS is tried with several random seeds, and the proposal is taken of which a growth is likely to keep most.
 
 Which collisions IRIS happens to find decides where its faces lie. So another random seed may result in a proposal that is twice as large.
-Or growth may lose only a fifth of what it loses of the first proposal (docs/trials.md). The tries end early with a proposal that a growth
-is likely to keep nearly whole.
+Or growth may lose only a fifth of what it loses of the first proposal (docs/trials.md).
 """
 
 from __future__ import annotations
@@ -14,12 +13,9 @@ import numpy as np
 
 from certifier.errors import RegionError
 from certifier.model import Array, Scene
-from certifier.seeding.iris import Termination, iris
-from certifier.seeding.options import IRIS_SEEDS, SeedOptions
+from certifier.seeding.iris import iris
+from certifier.seeding.options import IRIS_SEEDS, Method, SeedOptions
 from certifier.seeding.rating import Rating, rated
-
-LITTLE = 0.0002
-"""A proposal of which this share is touched, or less, is taken at once, unless IRIS ended because it would have lost the seed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +34,6 @@ class _Try:
     rating: Rating
 
     @property
-    def will_do(self) -> bool:
-        whole = self.account["termination"] != Termination.SEED_CUT_OFF
-        return self.holds and whole and self.rating.touched <= LITTLE
-
-    @property
     def worth(self) -> tuple[bool, float, float]:
         return self.holds, self.rating.kept, -self.rating.touched
 
@@ -57,11 +48,11 @@ def best_of_tries(scene: Scene, points: Array, options: SeedOptions) -> tuple[Ar
         points: (k, n) points in s, the seed first. Whether they are inside remains to be checked.
 
     Raises:
-        RegionError: no try resulted in a region; the error is that of the first try, as :func:`certifier.seeding.iris.iris` raises it.
+        RegionError: no try resulted in a region; the error is that of the first try.
     """
     first = options.random_seed or 0
     if options.tries == 1:
-        C, d, account = iris(scene, points, replace(options, random_seed=first))
+        C, d, account = _iris(scene, points, replace(options, random_seed=first))
         return C, d, {**account, "random_seed": first, "tries": 1}
     others = np.random.SeedSequence(first).generate_state(options.tries - 1) % IRIS_SEEDS
     tries: list[_Try] = []
@@ -71,18 +62,23 @@ def best_of_tries(scene: Scene, points: Array, options: SeedOptions) -> tuple[Ar
             tries.append(_tried(scene, points, replace(options, random_seed=random_seed)))
         except RegionError as error:
             failures.append(error)
-            continue
-        if tries[-1].will_do:
-            break
     if not tries:
         raise failures[0]
     best = max(tries, key=lambda one: one.worth)
     warnings = [*best.account["warnings"], *(f"another try failed: {error}" for error in failures)]
-    return best.C, best.d, {**best.account, "warnings": warnings, "tries": len(tries) + len(failures)}
+    return best.C, best.d, {**best.account, "warnings": warnings, "tries": options.tries}
+
+
+def _iris(scene: Scene, points: Array, options: SeedOptions) -> tuple[Array, Array, dict[str, Any]]:
+    if options.method is Method.IRIS:
+        return iris(scene, points, options)
+    from certifier.seeding.drake_iris import drake_iris  # loading Drake's planning takes a second
+
+    return drake_iris(scene, points, options)
 
 
 def _tried(scene: Scene, points: Array, options: SeedOptions) -> _Try:
-    C, d, account = iris(scene, points, options)
+    C, d, account = _iris(scene, points, options)
     holds = bool((d[:, None] > C @ points.T).all())
     rating = rated(scene, scene.polytope(C, d), points)
     return _Try(C, d, {**account, "random_seed": options.random_seed}, holds, rating)

@@ -49,7 +49,7 @@ UNTESTED = {
     "certifier/scene/parse.py:joint_of": "a joint that the strict readers let through; none is known",
     "certifier/scene/parse.py:read_models": "geometry that Drake leaves out and the strict readers let through; none is known",
     "certifier/scene/tree.py:_outward": "a loop of joints that Drake takes",
-    "certifier/seeding/iris.py:iris": "numbers that IRIS cannot do with",
+    "certifier/seeding/drake_iris.py:drake_iris": "numbers that IRIS cannot do with",
     "certifier/seeding/propose.py:_refuse_hindered": "a seed so near to contact that IRIS finds no polytope around it",
     "certifier/seeding/propose.py:propose": "IRIS cutting off its own seed",
     "client/bench.py:bench": "an installed wheel",

@@ -9,8 +9,8 @@ from pydrake.geometry import Role
 from certifier.model import Pair
 from certifier.scene.contacts import touching
 from certifier.scene.drake_model import build_diagram, drake_name, geometry_name, scene_name
+from certifier.seeding.drake_iris import drake_iris
 from certifier.seeding.free import Clearance
-from certifier.seeding.iris import iris
 from certifier.seeding.options import Method, SeedOptions
 from tests.certifier.scene.test_load import assert_same_kinematics, original
 from tests.certifier.scene.workshop import parsed, write
@@ -55,5 +55,5 @@ def test_a_region_grows_beside_a_model_in_a_model(path):
     assert (apart, nearest) == (pytest.approx(0.2), pair)
     assert list(touching(scene, [np.zeros(scene.n)])) == [set()]
     options = SeedOptions(Method.IRIS_NP2, max_iterations=1, max_iterations_separating_planes=3)
-    C, d, _ = iris(scene, np.zeros((1, scene.n)), options)
+    C, d, _ = drake_iris(scene, np.zeros((1, scene.n)), options)
     assert (C @ np.zeros(scene.n) < d).all()

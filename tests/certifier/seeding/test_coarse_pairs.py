@@ -12,10 +12,10 @@ from certifier.pair.collisions import in_collision
 from certifier.partition.hulls import gaps
 from certifier.partition.parted import parted
 from certifier.polytopes.gibbs import uniform_in_q
-from certifier.seeding import coarse_pairs, iris
+from certifier.seeding import coarse_pairs, iris, trim
 from certifier.seeding.coarse_pairs import Shape, coarse_pairs_of, with_coarse_pairs
-from certifier.seeding.iris import Termination, checker
-from certifier.seeding.options import Method, SeedOptions
+from certifier.seeding.drake_iris import checker
+from certifier.seeding.options import SeedOptions
 from certifier.seeding.rating import rated
 
 
@@ -71,7 +71,7 @@ def test_nothing_joins_where_growth_parts_the_geometries_themselves(name):
 def test_a_proposal_keeps_clear_of_what_growth_will_part(monkeypatch):
     """Where IRIS knows the balls, they touch in less of its polytope, and of what is likely to be kept there is no less."""
     scene, q = catalogue.scene("iiwa_shelf"), tuple(catalogue.seed("iiwa_shelf"))
-    points, options = scene.to_s(q)[None], SeedOptions(Method.IRIS_NP2, q=q, max_iterations=1)
+    points, options = scene.to_s(q)[None], SeedOptions(q=q)
 
     def rating():
         C, d, _ = iris.iris(scene, points, options)
@@ -79,57 +79,11 @@ def test_a_proposal_keeps_clear_of_what_growth_will_part(monkeypatch):
         return rated(scene, scene.polytope(C, d), points)
 
     knowing = rating()
-    monkeypatch.setattr(iris, "coarse_pairs_of", lambda *_: {})
+    for module in (iris, trim):
+        monkeypatch.setattr(module, "coarse_pairs_of", lambda *_: {})
     unknowing = rating()
     assert knowing.touched < unknowing.touched
     assert knowing.kept > unknowing.kept
-
-
-@pytest.mark.parametrize("fails", ["raises", pytest.param("returns the domain", marks=pytest.mark.slow)])
-def test_a_polytope_beside_coarse_volumes_that_drake_fails_to_find_is_left_out(monkeypatch, fails):
-    """The one without them is the answer, with its last round, and a warning says why. Drake returns the domain where the first faces lose
-    the centre."""
-    scene, q = catalogue.scene("iiwa_shelf"), tuple(catalogue.seed("iiwa_shelf"))
-    points, options = scene.to_s(q)[None], SeedOptions(Method.IRIS_NP2, q=q, max_iterations=1, epsilon=0.005)
-    grow, beside = iris._Iris.grow, []
-
-    def alone(self, domain, *given):
-        if self._scene is scene:
-            return grow(self, domain, *given)
-        beside.append(given)
-        if fails == "raises":
-            raise RuntimeError("no such luck")
-        return domain, {"termination": Termination.SEED_CUT_OFF, "iterations": 1, "epsilon": given[1], "guarantee": "none", "warnings": []}
-
-    monkeypatch.setattr(iris._Iris, "grow", alone)
-    C, d, account = iris.iris(scene, points, options)
-    assert len(beside) == 2, "the alternation, and a last round"
-    assert sum(warning.startswith("the polytope was left as it was: ") for warning in account["warnings"]) == 2
-    assert account["epsilon"] == 0.005
-    assert account["iterations"] == 1
-    monkeypatch.setattr(iris, "coarse_pairs_of", lambda *_: {})
-    without = iris.iris(scene, points, options)
-    assert np.array_equal(C, without[0])
-    assert np.array_equal(d, without[1])
-
-
-def test_where_drake_fails_in_the_last_round_the_polytope_before_it_is_the_answer(monkeypatch):
-    scene, q = catalogue.scene("ur3e_bin"), tuple(catalogue.seed("ur3e_bin"))
-    points = scene.to_s(q)[None]
-    grow = iris._Iris.grow
-
-    def once(self, domain, start, epsilon, *given):
-        if epsilon < 0.01:
-            raise RuntimeError("no such luck")
-        return grow(self, domain, start, epsilon, *given)
-
-    monkeypatch.setattr(iris._Iris, "grow", once)
-    coarse = iris.iris(scene, points, SeedOptions(Method.IRIS_NP2, q=q, max_iterations=1, epsilon=0.01))
-    C, d, account = iris.iris(scene, points, SeedOptions(Method.IRIS_NP2, q=q, max_iterations=1, epsilon=0.005))
-    assert np.array_equal(C, coarse[0])
-    assert np.array_equal(d, coarse[1])
-    assert account["epsilon"] == 0.01
-    assert account["warnings"][-1] == "the polytope was left as it was: no such luck"
 
 
 def test_a_capsule_without_length_is_a_ball_to_drake(hand):
@@ -144,24 +98,3 @@ def test_a_capsule_without_length_is_a_ball_to_drake(hand):
     touching = ~np.array(checker(alone).CheckConfigsCollisionFree(list(scene.to_q(samples))), dtype=bool)
     assert (touching == in_collision(alone, samples)).all()
     assert 0 < touching.sum() < len(touching)
-
-
-def test_where_volumes_would_cost_the_seed_the_last_round_does_without_them(monkeypatch):
-    """The answer is the one of a scene without them."""
-    scene, q = catalogue.scene("iiwa_shelf"), tuple(catalogue.seed("iiwa_shelf"))
-    points, options = scene.to_s(q)[None], SeedOptions(Method.IRIS_NP2, q=q, max_iterations=1, epsilon=0.005)
-    refined, rounds = iris._refined, []
-
-    def lost(drake, region, account, *rest):
-        rounds.append(drake._scene is scene)
-        return refined(drake, region, account, *rest) if drake._scene is scene else (region, account)
-
-    monkeypatch.setattr(iris, "_again", lambda drake, scene, region, account, *_: (region, account))
-    monkeypatch.setattr(iris, "_refined", lost)
-    C, d, account = iris.iris(scene, points, options)
-    assert rounds == [False, True]
-    assert account["epsilon"] == 0.005
-    monkeypatch.setattr(iris, "coarse_pairs_of", lambda *_: {})
-    alone = iris.iris(scene, points, options)
-    assert np.array_equal(C, alone[0])
-    assert np.array_equal(d, alone[1])

@@ -71,7 +71,7 @@ def test_seeds_that_are_refused(q, code, words):
     assert error.value.field.startswith("seed.q")
 
 
-@pytest.mark.parametrize("method", [Method.IRIS_NP2, Method.BOX, Method.LIMITS])
+@pytest.mark.parametrize("method", [Method.IRIS, Method.BOX, Method.LIMITS])
 @pytest.mark.parametrize("q", [(2.0, 0.2), pytest.param((-2.0, 2.5), marks=pytest.mark.slow), (2.0 + 5e-10, -2.5 - 5e-10)])
 def test_a_seed_on_a_limit_is_moved_inside_by_a_hair(method, q):
     scene = crane()
@@ -133,7 +133,7 @@ def test_only_the_scenes_pairs_count():
     check_seed(crane(pairs=()), [1.5, math.pi / 2])
 
 
-@pytest.mark.parametrize("method", [Method.IRIS_NP2, Method.IRIS_ZO])
+@pytest.mark.parametrize("method", [Method.IRIS, Method.IRIS_NP2, Method.IRIS_ZO])
 @pytest.mark.parametrize("padding", [0.0, 0.05])
 def test_iris_keeps_its_statistical_promise(method, padding):
     """A uniform sample of the region, and trigonometry: at most epsilon of it is in collision. Mixed joints, q* off zero."""
@@ -157,10 +157,10 @@ def test_iris_keeps_its_statistical_promise(method, padding):
 
 def test_pairs_that_are_ignored_do_not_bound_the_region():
     scene = crane(pairs=())
-    proposal = propose(scene, SeedOptions(Method.IRIS_ZO, q=(0.3, 0.2)))
+    proposal = propose(scene, SeedOptions(Method.IRIS, q=(0.3, 0.2)))
     assert len(proposal.d) == 0
     one = crane(pairs=("behind",))
-    region = one.polytope(*_faces(propose(one, SeedOptions(Method.IRIS_ZO, q=(0.5, 0.5)))))
+    region = one.polytope(*_faces(propose(one, SeedOptions(Method.IRIS, q=(0.5, 0.5)))))
     assert (clearance(crane(pairs=("ahead",)), uniform(region)) < 0).any()
 
 
@@ -186,12 +186,12 @@ def test_iris_that_gave_up_claims_nothing():
 
 
 def test_iris_stops_at_the_tolerance():
-    info = propose(crane(), SeedOptions(Method.IRIS_NP2, q=(0.3, 0.2), max_iterations=50, tolerance=0.5)).info
+    info = propose(crane(), SeedOptions(q=(0.3, 0.2), max_iterations=50, tolerance=0.5)).info
     assert info["termination"] == "tolerance"
     assert info["iterations"] < 50
 
 
-@pytest.mark.parametrize("method", [Method.IRIS_NP2, Method.IRIS_ZO, Method.BOX])
+@pytest.mark.parametrize("method", [Method.IRIS, Method.IRIS_NP2, Method.IRIS_ZO, Method.BOX])
 def test_what_has_to_be_contained_is(method):
     """Far from the seed, and near to the ball, where IRIS by itself would not go."""
     scene, contain = crane(), ((-1.5, -0.3), (0.2, 0.5))
@@ -277,7 +277,7 @@ def test_options_that_are_refused_name_the_field(document, field):
 @given(
     st.builds(
         SeedOptions,
-        method=st.sampled_from([Method.IRIS_NP2, Method.IRIS_ZO, Method.BOX]),
+        method=st.sampled_from([Method.IRIS, Method.IRIS_NP2, Method.IRIS_ZO, Method.BOX]),
         q=st.lists(st.floats(-3, 3), min_size=1).map(tuple),
         half_width=st.floats(1e-6, 10),
         epsilon=st.floats(1e-6, 0.5),

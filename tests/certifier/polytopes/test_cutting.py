@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from certifier.growth.cutting import BARELY, cut
 from certifier.model import JointKind
+from certifier.polytopes.cutting import BARELY, cut
 from certifier.polytopes.ellipsoid import inscribed_ellipsoid
 from certifier.polytopes.gibbs import uniform_in_q
 from tests.certifier.scenes import planar_arm

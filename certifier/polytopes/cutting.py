@@ -7,14 +7,15 @@ the polytope that are uniform in q as few as possible lie beyond. "As few" is re
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from cachetools import LRUCache, cached
+from scipy import sparse
 from scipy.optimize import linprog
 
-from certifier.growth.obstacles import lost_together
 from certifier.model import Array, Polytope, Scene
 from certifier.polytopes.gibbs import uniform_in_q
 from certifier.polytopes.proved import cleaned
@@ -44,6 +45,11 @@ LEAST_ROOM = 1e-6
 """A face is not put nearer to a point to keep than this, in standard deviations. Nearer ones would halve their distance again and again."""
 BARELY = 1e-6
 """A point that is beyond a face by less than this is on it, as far as rounding can tell."""
+
+
+def lost_together(*shares: float) -> float:
+    """Returns the share that is lost when each of these is lost of what those before it have left."""
+    return 1 - math.prod(1 - share for share in shares)
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,13 +234,10 @@ def _face(beyond: Array, keep: Array, samples: Array, scale: Array) -> tuple[Arr
 def _hinge(far: Array, near: Array, rest: Array) -> tuple[Array, float] | None:
     """Returns a face (k,), offset with ``far`` beyond it, ``near`` before it, and few of ``rest`` (h, k) beyond it; None without one."""
     h, k = rest.shape
-    A = np.block(
-        [
-            [-far, np.ones((len(far), 1)), np.zeros((len(far), h))],
-            [near, -np.ones((len(near), 1)), np.zeros((len(near), h))],
-            [rest, -np.ones((h, 1)), -np.eye(h)],
-        ]
-    )
+    points = np.concatenate([-far, near, rest])
+    offset = np.concatenate([np.ones(len(far)), -np.ones(len(near) + h)])
+    losses = sparse.vstack([sparse.csc_array((len(far) + len(near), h)), -sparse.eye_array(h, format="csc")])
+    A = sparse.hstack([sparse.csc_array(np.column_stack([points, offset])), losses], format="csc")
     b = np.concatenate([np.zeros(len(far)), -np.ones(len(near)), np.full(h, -MARGIN)])
     bounds = [(None, None)] * (k + 1) + [(0, None)] * h
     found = linprog(np.concatenate([np.zeros(k + 1), np.ones(h)]), A_ub=A, b_ub=b, bounds=bounds, method="highs")
