@@ -18,7 +18,7 @@ from certifier.scene.load import load_scene
 from certifier.seeding.limits import check_limits
 from certifier.verify.uncovered import unlisted
 from client import output
-from client.inputs import configuration
+from client.local import positions_of
 from client.seeds import seed_file, seed_of
 
 COSTLIEST = 5
@@ -82,6 +82,7 @@ def scene_check(args: Namespace) -> int:
     print(f"{scene.name}: {scene.n} joints, {len(scene.geometries)} geometries, {len(scene.pairs)} pairs, {len(scene.ignored)} ignored")
     print()
     output.print_table(("joint", "kind", "lower", "upper", "q*", "q", ""), _joints(scene, q), right="lower upper q* q")
+    output.print_configurations(scene.configurations)
     print()
     for warning in scene.warnings:
         print(f"warning: {warning}")
@@ -106,7 +107,7 @@ def _configuration(scene: Scene, args: Namespace) -> tuple[np.ndarray, str]:
     if args.q is None and not seed.is_file():
         inside = 1e-3 * (scene.q_upper - scene.q_lower)
         return scene.q_star.clip(scene.q_lower + inside, scene.q_upper - inside), "q*"
-    q = configuration(args.q) if args.q is not None else seed_of(args.path, None)
+    q = positions_of(scene, seed_of(args.path, args.q), "--q" if args.q is not None else seed.name)
     if len(q) != scene.n:
         names = ", ".join(joint.name for joint in scene.moving)
         field = seed.name if args.q is None else "--q"
@@ -133,6 +134,7 @@ def _document(scene: Scene, q: np.ndarray, bad: list[list[str]], costs: list[Pai
             for j, c in zip(scene.moving, scene.q_star, strict=True)
         ],
         "q": q.tolist(),
+        "configurations": {name: dict(positions) for name, positions in scene.configurations.items()},
         "touching": bad,
         "warnings": list(scene.warnings),
         "substitutions": [
