@@ -38,7 +38,10 @@ def packages_of(model: Path, given: Mapping[str, Path], environment: Mapping[str
         if not places or not places[0].is_dir():
             looked = "above it, in a workspace around it, in AMENT_PREFIX_PATH or in ROS_PACKAGE_PATH"
             message = f"{model.name} names the package {name}, which is not {'there' if name in given else looked}"
-            raise SceneError("scene_package", message, hint=f"say where it is: --package {name}=DIRECTORY")
+            rest = [path.partition("/")[2] for path in written if path.startswith(f"{name}/")]
+            like = next((above for above in model.absolute().parents for path in rest if path and (above / path).is_file()), None)
+            there = f"{name}={like}, where such a file is" if like else f"{name}=DIRECTORY"
+            raise SceneError("scene_package", message, hint=f"say where it is: --package {there}")
         found[name] = places[0].absolute()
         others = [place for place in places[1:] if place.resolve() != places[0].resolve()]
         if others:

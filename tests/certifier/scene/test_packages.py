@@ -104,6 +104,16 @@ def test_a_manifest_that_cannot_be_read_is_that_of_no_package(tmp_path: Path) ->
     assert packages_of(file, {}, {}) == ({"tools": good}, [])
 
 
+def test_a_directory_with_the_file_is_proposed_and_not_taken(tmp_path: Path) -> None:
+    file = model(tmp_path / "robots/arm/urdf", "tools/meshes")
+    for proposed in ("DIRECTORY", f"{tmp_path / 'robots'}, where such a file is"):
+        with pytest.raises(SceneError) as refused:
+            packages_of(file, {}, {})
+        assert refused.value.hint == f"say where it is: --package tools={proposed}"
+        (tmp_path / "robots/meshes").mkdir(exist_ok=True)
+        (tmp_path / "robots/meshes/m.obj").touch()
+
+
 def test_a_name_is_no_pattern(tmp_path: Path) -> None:
     package(tmp_path / "ws/share/tools")
     with pytest.raises(SceneError):
