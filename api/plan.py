@@ -18,6 +18,7 @@ from api.children import about_motions
 from api.libraries import Libraries
 from api.links import LinksKept
 from api.motions import Known, MotionsKept
+from api.named import with_positions
 from api.schemas.planning import Piece
 from api.schemas.plans import BeyondLimit, Collision, LineStop, PlanGap, PlanRequest, PlanResponse, Reached, Reason
 from certifier.errors import CirisError, RegionError
@@ -63,9 +64,12 @@ def answer(asked: Asked, body: PlanRequest) -> PlanResponse:
     """Answers a request.
 
     Raises:
-        CirisError: wrong_length, number_too_large, region_not_found, ambiguous_id, region_elsewhere, or what befell a child process.
+        CirisError: wrong_length, number_too_large, region_not_found, ambiguous_id, region_elsewhere, what api.named
+            raises, or what befell a child process.
     """
-    question = _question(asked, body)
+    scene_id, scene, library = answers.asked(asked.db, asked.libraries, body.scene)
+    body = with_positions(asked.db, scene_id, scene, body)
+    question = _question(asked, body, scene_id, scene, library)
     of_scene: dict[str, Any] = {"scene": question.scene_id, "version": question.library.version, "regions": len(question.library)}
     found = None if body.regions_only else _known(question)
     complete = True
@@ -81,8 +85,7 @@ def answer(asked: Asked, body: PlanRequest) -> PlanResponse:
     return PlanResponse(**of_scene, complete=complete, **found)
 
 
-def _question(asked: Asked, body: PlanRequest) -> _Question:
-    scene_id, scene, library = answers.asked(asked.db, asked.libraries, body.scene)
+def _question(asked: Asked, body: PlanRequest, scene_id: str, scene: Scene, library: Library) -> _Question:
     end = partial(_end, asked.db, scene, library)
     given = [("start", body.start), *([] if body.goal is None else [("goal", body.goal)])]
     ends = [end(one, field) for field, one in given]

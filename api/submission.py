@@ -13,6 +13,7 @@ from urllib.parse import urlsplit
 from sqlalchemy.orm import Session
 
 from api.access import Caller
+from api.named import with_positions
 from certifier.errors import CirisError
 from db import clock, jobs, scenes, webhooks
 from db.models import JobRow
@@ -45,6 +46,7 @@ def checked(db: Database, body: JobRequest, where: str = "") -> Checked:
         with db.read() as session:
             scene_id = scenes.find(session, body.scene)
         scene = scenes.load(db, scene_id)
+        body = with_positions(db, scene_id, scene, body)
         options = KINDS[body.kind].options(body, scene, db)
         if body.webhook is not None:
             check_webhook(body.webhook)

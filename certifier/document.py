@@ -67,6 +67,12 @@ class Node:
             raise CirisError("document", f"{_shown(unknown)} has no meaning here", field=self.where or None)
         return {name: Node(value, f"{self.where}.{name}".lstrip(".")) for name, value in self.value.items()}
 
+    def members(self) -> dict[str, Node]:
+        """Returns the members of an object, whatever their names are."""
+        if not isinstance(self.value, dict):
+            self.refuse("an object")
+        return {name: Node(value, f"{self.where}.{name}".lstrip(".")) for name, value in self.value.items()}
+
     def items(self, most: int | None = None) -> list[Node]:
         """Returns the items of a list that has at most ``most`` of them."""
         if not isinstance(self.value, list):

@@ -20,6 +20,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from certifier.configurations import Configurations, is_configuration_name
 from certifier.coordinates import ConfigurationSpace
 from certifier.document import LARGEST, Node
 from certifier.errors import CirisError, RegionError, SceneError
@@ -137,6 +138,7 @@ class Scene(ConfigurationSpace):
         warnings: lint findings, sentences for people.
         provenance: how the scene was made (directives, package roots, Drake's version, how far hulls reach beyond their meshes); not part
             of the hash.
+        configurations: the named configurations: positions of joints by their full names, radians or metres; not part of the hash.
     """
 
     name: str
@@ -149,6 +151,7 @@ class Scene(ConfigurationSpace):
     padding: float = 0.0
     warnings: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
+    configurations: Configurations = field(default_factory=dict)
     revolute: NDArray[np.bool_] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -258,11 +261,13 @@ class Scene(ConfigurationSpace):
 
     def to_document(self) -> dict[str, Any]:
         """Returns the scene as JSON-able data, whose keys are stable (docs/architecture.md)."""
-        return {**self._content(), "name": self.name, "hash": self.hash, "warnings": list(self.warnings), "provenance": self.provenance}
+        document = {**self._content(), "name": self.name, "hash": self.hash, "warnings": list(self.warnings), "provenance": self.provenance}
+        named = {name: dict(positions) for name, positions in self.configurations.items()}
+        return document | ({"configurations": named} if named else {})
 
     @cached_property
     def hash(self) -> str:
-        """Returns the SHA-256 over everything that a proof depends on, which the scene's name and its provenance are not."""
+        """Returns the SHA-256 over everything that a proof depends on, which its name, provenance and configurations are not."""
         text = json.dumps(self._content(), sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -319,7 +324,7 @@ def _read(document: Any) -> Scene:
         message = f"the scene's schema version is not {SCHEMA_VERSION}"
         raise SceneError("scene_schema", message, field="schema_version", hint=_STORED)
     content = ("schema_version", "name", "joints", "bodies", "geometries", "pairs", "ignored", "q_star", "padding")
-    scene = Node(document).fields(*content, optional=("hash", "warnings", "provenance"))
+    scene = Node(document).fields(*content, optional=("hash", "warnings", "provenance", "configurations"))
     return Scene(
         name=scene["name"].text(),
         joints=tuple(_joint(joint) for joint in scene["joints"].items()),
@@ -331,7 +336,18 @@ def _read(document: Any) -> Scene:
         padding=float(scene["padding"].number()),
         warnings=tuple(warning.text() for warning in scene["warnings"].items()) if "warnings" in scene else (),
         provenance=scene["provenance"].free() if "provenance" in scene else {},
+        configurations=_configurations(scene["configurations"], scene["joints"]) if "configurations" in scene else {},
     )
+
+
+def _configurations(node: Node, joints: Node) -> Configurations:
+    moving = tuple(joint["name"] for joint in joints.value if joint["index"] is not None)
+    found = {}
+    for name, positions in node.members().items():
+        if not is_configuration_name(name):
+            node.refuse("an object of configurations by their names")
+        found[name] = {joint: float(value.number()) for joint, value in positions.fields(optional=moving).items()}
+    return found
 
 
 def _joint(node: Node) -> Joint:

@@ -63,6 +63,7 @@ class Option:
         choices: the texts of a choice.
         cls: the dataclass of a group, or the enumeration of a choice that has one.
         most: largest number of items of points or paths; None for any.
+        positions: whether points and paths are joint positions, in the place of which configurations may be named.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Option:
     choices: tuple[str, ...] = ()
     cls: type | None = None
     most: int | None = None
+    positions: bool = True
 
     @property
     def described(self) -> str:

@@ -34,7 +34,7 @@ class Tolerance(TypedDict, total=False):
 def grow_request(scene: str, q: ArrayLike, options: GrowOptions) -> Document:
     """Returns the request of a job that grows a region around q, (n,)."""
     asked = asked_for(options, GROW)
-    return {"kind": "grow", "scene": scene, **asked, "seed": {"q": numbers(q, "q").tolist(), **asked.get("seed", {})}}
+    return {"kind": "grow", "scene": scene, **asked, "seed": {"q": plain(q, "q"), **asked.get("seed", {})}}
 
 
 def asked_for(options: Mapping[str, Any], fields: Fields) -> Document:
@@ -63,13 +63,13 @@ def asked_for(options: Mapping[str, Any], fields: Fields) -> Document:
 def _taken(name: str, value: Any, takes: str | Fields) -> Any:
     match takes:
         case "point":
-            return numbers(value, name).tolist()
+            return plain(value, name)
         case "points":
-            return np.atleast_2d(numbers(value, name)).tolist()
+            return _rows(value, name)
         case "paths":
             if not isinstance(value, Iterable) or isinstance(value, str):
                 raise CirisError("argument", f"{type(value).__name__} is no paths", field=name, hint="give a list of (k, n) arrays")
-            return [numbers(path, f"{name}[{i}]").tolist() for i, path in enumerate(value)]
+            return [_rows(path, f"{name}[{i}]") for i, path in enumerate(value)]
         case str():
             return value
     if not isinstance(value, Mapping):
@@ -80,10 +80,36 @@ def _taken(name: str, value: Any, takes: str | Fields) -> Any:
 def plain(value: ArrayLike | str | None, field: str) -> Any:
     """Returns an array, or what numpy makes one of, as nested lists; a text, such as an id, and None as they are.
 
+    Texts may stand in lists as well, in the place of the joint positions (n,) that they name.
+
     Raises:
         RegionError: points.
     """
-    return value if value is None or isinstance(value, str) else numbers(value, field).tolist()
+    if value is None or isinstance(value, str):
+        return value
+    if _names(value):
+        assert isinstance(value, list | tuple)
+        found = [plain(one, f"{field}[{i}]") for i, one in enumerate(value)]
+        if len({_axes(one) for one in found}) > 1:
+            hint = "names stand in the place of whole configurations"
+            raise RegionError("points", "names and numbers stand in one row", field=field, hint=hint)
+        return found
+    return numbers(value, field).tolist()
+
+
+def _names(value: object) -> bool:
+    """Returns whether there is a text in nested lists."""
+    return isinstance(value, list | tuple) and any(isinstance(one, str) or _names(one) for one in value)
+
+
+def _rows(value: Any, field: str) -> Any:
+    """Returns points, (k, n), as nested lists, also where one was given alone."""
+    return [value] if isinstance(value, str) else plain(value, field) if _names(value) else np.atleast_2d(numbers(value, field)).tolist()
+
+
+def _axes(value: Any) -> int:
+    """Returns the number of axes of nested lists, in which a text stands for (n,)."""
+    return 1 if isinstance(value, str) else 1 + _axes(value[0]) if isinstance(value, list) and value else 0
 
 
 def straight(space: Straight | None, s: ArrayLike | None) -> str:
@@ -97,14 +123,16 @@ def points(axes: int, **values: ArrayLike | None) -> Document:
     Raises:
         RegionError: points.
     """
-    found = {name: numbers(value, name) for name, value in values.items() if value is not None}
+    found = {
+        name: plain(value, name) if name == "q" else numbers(value, name).tolist() for name, value in values.items() if value is not None
+    }
     if len(found) != 1:
         hint = "q are joint positions, s tangent-space coordinates: give one of them"
         raise RegionError("points", "the points must be given either as q or as s", field="q", hint=hint)
-    ((name, array),) = found.items()
-    if array.ndim not in (axes - 1, axes):
+    ((name, nested),) = found.items()
+    if _axes(nested) not in (axes - 1, axes):
         raise RegionError("points", f"it must be finite numbers in {axes - 1} or {axes} axes, joints last", field=name)
-    return {name: (array if array.ndim == axes else array[None]).tolist()}
+    return {name: nested if _axes(nested) == axes else [nested]}
 
 
 def motion_request(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ciris.answers import NotCovered
@@ -29,6 +30,8 @@ class Scene(InSpace):
     """The pairs of geometries that no proof about the scene is about."""
     padding: float
     """Metres added around every geometry of every pair."""
+    configurations: Mapping[str, Mapping[str, float]]
+    """The named configurations: positions of joints by their names, in radians or metres."""
 
     def __eq__(self, other: object) -> bool:
         """Scenes are equal that the service knows by the same id, which is made from their content."""
@@ -47,7 +50,7 @@ class Scene(InSpace):
         q_star, lower, upper = (frozen([joint[name] for joint in joints]) for name in ("q_star", "lower", "upper"))
         revolute = frozen([joint["kind"] == "revolute" for joint in joints], bool)
         space = Space(tuple(joint["name"] for joint in joints), q_star, lower, upper, revolute)
-        names = ("id", "name", "hash", "geometries", "pairs", "warnings", "padding")
+        names = ("id", "name", "hash", "geometries", "pairs", "warnings", "padding", "configurations")
         return cls(space=space, not_covered=read(NotCovered, document["not_covered"]), **{name: document[name] for name in names})
 
 

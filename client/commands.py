@@ -15,7 +15,7 @@ from certifier.verify.uncovered import named
 from ciris.documents import Document
 from client import output, service
 from client.files import ProofFile, check_writable
-from client.inputs import configuration
+from client.inputs import configuration, shown
 from client.options import CERTIFY, GROW
 from client.output import Screen, print_json
 from client.polytopes import polytope_file
@@ -73,6 +73,7 @@ def scene_show(args: Namespace) -> int:
     print(f"{scene['name']} ({scene['id']}), padding {exactly(scene['padding'])} m")
     rows = [(j["name"], j["kind"], f"{j['lower']:.4f}", f"{j['upper']:.4f}", f"{j['q_star']:.4f}") for j in scene["positions"]]
     output.print_table(("joint", "kind", "lower", "upper", "q*"), rows, right="lower upper q*")
+    output.print_configurations(scene["configurations"])
     print()
     rows = [
         (f"{p['a']} - {p['b']}", p["frame"], f"{p['gram_a']}, {p['gram_b']}", f"{p['N_a']}, {p['N_b']}", output.seconds(p["seconds"]))
@@ -140,7 +141,7 @@ def _grow_many(args: Namespace, requests: list[Document], screen: Screen) -> int
     else:
         rows = [
             (
-                ", ".join(f"{x:g}" for x in one["seed"]["q"]),
+                shown(one["seed"]["q"]),
                 job["region"] or "none",
                 _size(grown[job["region"]]) if job["region"] else "",
                 output.share(grown[job["region"]]["share"]) if job["region"] else "",
@@ -279,7 +280,7 @@ def contains(args: Namespace) -> int:
         print_json(answer)
         return OK if inside else NO
     for q, point in zip(points, answer["points"], strict=True):
-        where = ", ".join(f"{value:g}" for value in q)
+        where = shown(q)
         if point["inside"]:
             hits = "; ".join(f"{hit['region']} (margin {hit['margin']:.3g}, {hit['guarantee']})" for hit in point["regions"])
             print(f"inside: {where} in {hits}")

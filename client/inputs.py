@@ -5,12 +5,31 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from certifier.configurations import is_number
 from certifier.errors import CirisError, RegionError
 
 _LIST = "joint positions, separated by commas"
 
+Given = list[float] | str
+"""Joint positions, or names of configurations, which the scene turns into positions."""
 
-def configuration(text: str, field: str = "--q") -> list[float]:
+
+def configuration(text: str, field: str = "--q") -> Given:
+    """Returns the numbers of a text such as ``"0, 0.3, -1.8"``; or the text itself where no part of it begins with a number.
+
+    Raises:
+        RegionError: bad_number, naming the place.
+    """
+    begins = [part.split()[0] for part in text.split(",") if part.strip()]
+    return numbers(text, field) if not begins or any(map(is_number, begins)) else text.strip()
+
+
+def shown(given: Given) -> str:
+    """Returns a configuration for people, as it was given."""
+    return given if isinstance(given, str) else ", ".join(f"{value:g}" for value in given)
+
+
+def numbers(text: str, field: str) -> list[float]:
     """Returns the numbers of a text such as ``"0, 0.3, -1.8"``.
 
     Raises:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from certifier.configurations import positions
 from certifier.errors import CirisError, SceneError
 from certifier.growth.options import CertifyOptions, GrowthOptions, RecertifyOptions
 from certifier.isolation.child import prepare
@@ -17,7 +18,7 @@ from ciris.documents import Document
 from client import verdicts
 from client.cores import cores
 from client.follow import Teller
-from client.inputs import is_scene_file
+from client.inputs import Given, is_scene_file
 from client.output import Screen
 from client.polytopes import PolytopeFile
 from client.service import Grown
@@ -36,6 +37,16 @@ def load(scene: str) -> Scene:
     from certifier.scene import load_scene
 
     return load_scene(scene)
+
+
+def positions_of(scene: Scene, given: Given, field: str) -> list[float]:
+    """Returns joint positions, (n,), that were given or that the names of configurations stand for.
+
+    Raises:
+        RegionError: as :func:`certifier.configurations.positions`.
+    """
+    joints, q_star = [joint.name for joint in scene.moving], scene.q_star.tolist()
+    return positions(given, scene.configurations, joints, q_star, field) if isinstance(given, str) else given
 
 
 def check_is_file(scene: str) -> None:
@@ -60,7 +71,10 @@ def grow(scene: str, asked: Document, screen: Screen, watch: bool, keep: Callabl
     loaded = load(scene)
     from certifier.jobs import local
 
-    options = GrowthOptions.from_document({"kind": "grow", "seed": asked["seed"], **asked["options"]})
+    seed = {**asked["seed"], "q": positions_of(loaded, asked["seed"]["q"], "seed.q")}
+    if "contain" in seed:
+        seed["contain"] = [positions_of(loaded, q, f"seed.contain[{i}]") for i, q in enumerate(seed["contain"])]
+    options = GrowthOptions.from_document({"kind": "grow", "seed": seed, **asked["options"]})
 
     def deliver(region: Region) -> None:
         screen.line(f"its proof: {keep(loaded.name, region.proof)}")
@@ -70,7 +84,7 @@ def grow(scene: str, asked: Document, screen: Screen, watch: bool, keep: Callabl
     return Grown(region.manifest, region.proof, region.manifest["provenance"]["seconds"], remark=region.reason)
 
 
-def recertify(data: bytes, scene: str, keep: list[list[float]] | None, asked: Document, screen: Screen, watch: bool) -> Grown:
+def recertify(data: bytes, scene: str, keep: list[Given] | None, asked: Document, screen: Screen, watch: bool) -> Grown:
     """Certifies a region of the scene before it changed again, in this process and children of it.
 
     Args:
@@ -82,7 +96,8 @@ def recertify(data: bytes, scene: str, keep: list[list[float]] | None, asked: Do
     from certifier.jobs import local
 
     deadline, seed = _read(JobOptions, asked).deadline_seconds, _read(RecertifyOptions, asked).random_seed
-    region = local.recertify(loaded, data, keep, _teller(loaded, screen, watch), deadline, cores(), seed)
+    inside = None if keep is None else [positions_of(loaded, q, "--q") for q in keep]
+    region = local.recertify(loaded, data, inside, _teller(loaded, screen, watch), deadline, cores(), seed)
     screen.clear()
     return Grown(region.manifest, region.proof, region.manifest["provenance"]["seconds"], remark=region.reason)
 

@@ -53,14 +53,17 @@ def certify_path(args: Namespace) -> int:
 
 def _here(args: Namespace, path: GivenPath) -> tuple[dict[str, Any], bytes | None]:
     """Returns the document of the verdict of this process, and the proof where there is one."""
-    from client.local import load
+    from client.local import load, positions_of
 
     scene = load(args.scene)
+    given = path.motion
+    if "q" in given:
+        given = {"q": [positions_of(scene, q, f"q[{i}]") for i, q in enumerate(given["q"])]}
     from certifier.jobs.motion import certify
     from certifier.motion.given import motion_of
     from certifier.proof.motion import Space
 
-    motion = motion_of(scene, path.motion, Space(args.space) if args.space else None)
+    motion = motion_of(scene, given, Space(args.space) if args.space else None)
     verdict = certify(scene, motion, args.tube, padding_of(args.padding), args.clearance)
     return verdict.document(), verdict.proof
 

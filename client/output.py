@@ -6,7 +6,7 @@ import json
 import shutil
 import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from certifier.verify.decimals import at_least_mm
@@ -82,6 +82,12 @@ def print_table(header: Row, rows: Iterable[Row], right: str = "") -> None:
     for line in lines:
         cells = (text.rjust(w) if r else text.ljust(w) for text, w, r in zip(line, widths, flush, strict=True))
         print("  ".join(cells).rstrip())
+
+
+def print_configurations(configurations: Mapping[str, Mapping[str, float]]) -> None:
+    """Prints a line for each named configuration, if there are any."""
+    for name, positions in configurations.items():
+        print(f"configuration {name}: {', '.join(f'{joint} {value:.6g}' for joint, value in positions.items())}")
 
 
 def print_facts(facts: Iterable[tuple[str, str]]) -> None:

@@ -19,8 +19,8 @@ class GivenPath:
     """Holds a motion as nested lists, which need no numpy.
 
     Attributes:
-        motion: waypoints as ``q`` or ``s``, (K, n); ``bezier``, (P, m + 1, n); or ``knots`` and ``control_points``. Whether they fit a
-            scene is not known here.
+        motion: waypoints as ``q`` or ``s``, (K, n), rows of ``q`` perhaps as names of configurations; ``bezier``, (P, m + 1, n);
+            or ``knots`` and ``control_points``. Whether they fit a scene is not known here.
         times: when the robot is at each waypoint, (K,), or where pieces begin and end, (P + 1,), in the file's unit, ascending; None
             where the file does not say.
     """
@@ -44,7 +44,7 @@ def path_of(args: Namespace) -> GivenPath:
 
         return path_file(args.path)
     waypoints = [configuration(text, f"--q {i}") for i, text in enumerate(args.q)]
-    if len({len(waypoint) for waypoint in waypoints}) > 1:
+    if len({len(waypoint) for waypoint in waypoints if not isinstance(waypoint, str)}) > 1:
         raise RegionError(
             "motion_shape", "the waypoints have different numbers of joints", field="--q", hint="give one number for each joint"
         )

@@ -14,7 +14,8 @@ from ciris.documents import Document
 from ciris.synchronous.client import Client
 from client import output, service
 from client.files import ProofFile, check_writable
-from client.inputs import configuration
+from client.inputs import Given, configuration, shown
+from client.inputs import numbers as numbers_of
 from client.options import JOB
 from client.output import Screen, print_json
 from client.paths import named, path_of
@@ -34,8 +35,6 @@ FIELDS = {
     "acceleration": "--acceleration",
 }
 """Maps a field of the request to the argument that gives it."""
-REGION = re.compile(r"[0-9a-f]{4,8}|[0-9a-f]{8}-[0-9a-f-]*")
-"""An id of a region, or its beginning."""
 
 
 def nearest(args: Namespace) -> int:
@@ -47,19 +46,17 @@ def nearest(args: Namespace) -> int:
         print_json(answer)
     else:
         for q, near in zip(points, found, strict=True):
-            print(f"{_place(q)}: {_near(near) if near else _no_region(answer)}")
+            print(f"{shown(q)}: {_near(near) if near else _no_region(answer)}")
     return NO if None in found else OK
 
 
 def plan(args: Namespace) -> int:
-    start, goals = _end(args.start, "--from"), [_end(text, "--to") for text in args.goal]
+    start, goals = configuration(args.start, "--from"), [configuration(text, "--to") for text in args.goal]
     job = request(args, JOB)
     if not args.grow:
         refuse_options(args, JOB, "grow")
     elif not args.regions_only:
         raise CirisError("option", "--grow is about regions", field="--grow", hint="add --regions-only, or leave out --grow")
-    if len(goals) > 1 and any(isinstance(goal, str) for goal in goals):
-        raise CirisError("option", "several goals are configurations, not regions", field="--to", hint="give joint positions")
     proof = None
     if args.out is not None:
         check_writable(args.out)
@@ -105,7 +102,7 @@ def plan(args: Namespace) -> int:
     return OK if answer["found"] else NO
 
 
-def _goal(args: Namespace, goals: list[list[float] | str]) -> Document:
+def _goal(args: Namespace, goals: list[Given]) -> Document:
     """Returns the fields of a request that say where the motion ends."""
     if bool(goals) == (args.to_pose is not None):
         raise CirisError("option", "the motion has to end somewhere", field="--to", hint="give either --to or --to-pose")
@@ -114,7 +111,7 @@ def _goal(args: Namespace, goals: list[list[float] | str]) -> Document:
             if getattr(args, name):
                 raise CirisError("option", "it is about a pose", field=f"--{name}", hint="give --to-pose, or leave it out")
         return {"goal": goals[0]} if len(goals) == 1 else {"goals": goals}
-    numbers = configuration(args.to_pose, "--to-pose")
+    numbers = numbers_of(args.to_pose, "--to-pose")
     if len(numbers) != 6 and not (args.line and len(numbers) == 3):
         hint = "give x, y and z in metres, then roll, pitch and yaw in radians; x, y and z are enough with --line"
         raise CirisError("option", f"a pose has 6 numbers, not {len(numbers)}", field="--to-pose", hint=hint)
@@ -123,7 +120,7 @@ def _goal(args: Namespace, goals: list[list[float] | str]) -> Document:
     asked: Document = {"pose": {"frame": args.frame, "position": numbers[:3], "rpy": numbers[3:] or None}}
     if args.line:
         names = ("metres", "radians")
-        asked["line"] = dict(zip(names, configuration(args.tolerance, "--tolerance"), strict=False)) if args.tolerance else {}
+        asked["line"] = dict(zip(names, numbers_of(args.tolerance, "--tolerance"), strict=False)) if args.tolerance else {}
     elif args.tolerance:
         raise CirisError("option", "it is about a line", field="--tolerance", hint="give --line, or leave it out")
     return asked
@@ -191,9 +188,6 @@ def _grow_between(client: Client, scene: str, ends: Sequence[Any], asked: Docume
     Args:
         asked: what the job is asked for besides.
     """
-    names = [name for name, end in zip(("--from", "--to"), ends, strict=True) if isinstance(end, str)]
-    if names:
-        raise CirisError("option", "regions grow between configurations, not regions", field=names[0], hint="give joint positions")
     try:
         service.run(client, {"kind": "cover", "scene": scene, "options": {"connect": ends}, **asked}, Screen())
     except CirisError as error:
@@ -201,21 +195,11 @@ def _grow_between(client: Client, scene: str, ends: Sequence[Any], asked: Docume
         raise
 
 
-def _end(text: str, field: str) -> list[float] | str:
-    """Returns the configuration that a text is, or the text where it is no number and may be the id of a region."""
-    try:
-        return configuration(text, field)
-    except CirisError:
-        if REGION.fullmatch(text):
-            return text
-        raise
-
-
 def _limit(text: str | None, field: str) -> float | list[float] | None:
     """Returns the limit of all joints, or of each."""
     if text is None:
         return None
-    values = configuration(text, field)
+    values = numbers_of(text, field)
     return values[0] if len(values) == 1 else values
 
 

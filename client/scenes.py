@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
 
+from certifier.configurations import is_number
 from certifier.errors import CirisError
 from certifier.kinematics import Kinematics
 from certifier.model import Scene
 from certifier.pair.forecast import PairCost, forecast
 from certifier.scene.contacts import touching
-from certifier.scene.draft import draft
+from certifier.scene.draft import Part, draft
+from certifier.scene.hollow import CONVEX_PARTS
 from certifier.scene.load import load_scene
 from certifier.seeding.limits import check_limits
 from certifier.verify.uncovered import unlisted
 from client import output
-from client.inputs import configuration
+from client.inputs import numbers
+from client.local import positions_of
 from client.seeds import seed_file, seed_of
 
 COSTLIEST = 5
+Triple = tuple[float, float, float]
 
 
 def scene_init(args: Namespace) -> int:
@@ -34,19 +39,25 @@ def scene_init(args: Namespace) -> int:
         if path.exists():
             raise CirisError("file_exists", f"{path} is there already", field="--out", hint="move it away, or name another file")
     packages = dict(_package(text) for text in args.package)
+    worlds, mounts = [_standing(text) for text in args.world], [_mounted(text) for text in args.mount]
     made = not out.parent.exists()
     out.parent.mkdir(parents=True, exist_ok=True)
     try:
-        drafted = draft(Path(args.robot), [Path(world) for world in args.world], out, packages)
+        drafted = draft(Path(args.robot), worlds, out, packages, mounts, args.srdf and Path(args.srdf), os.environ)
     except CirisError:
         if made:
             out.parent.rmdir()
         raise
     out.write_text(drafted.text, encoding="utf-8")
     scene = drafted.scene
-    print(f"{out}: {scene.n} joints, {len(scene.geometries)} geometries, {len(scene.pairs)} pairs; {len(drafted.ignored)} ignored")
+    print(f"{out}: {scene.n} joints, {len(scene.geometries)} geometries, {len(scene.pairs)} pairs; {len(scene.ignored)} ignored")
+    for note in drafted.notes:
+        print(note)
+    output.print_configurations(scene.configurations)
     for warning in scene.warnings:
         print("warning:", warning, file=sys.stderr)
+    for pair, doubt in drafted.doubtful.items():
+        print(f"warning: {pair.a} and {pair.b} are ignored, but {doubt}: {CONVEX_PARTS}, or take the entry out", file=sys.stderr)
     for pair in drafted.overlapping:
         print(f"warning: {pair.a} and {pair.b} overlap at every configuration that was tried: move the weld of one", file=sys.stderr)
     if drafted.seed is None:
@@ -59,6 +70,32 @@ def scene_init(args: Namespace) -> int:
     print(f"{seed}: a configuration that is free of collision")
     print(f"next: ciris scene check {out}, then ciris grow {out} --local")
     return 0
+
+
+def _standing(text: str) -> Part:
+    """Returns what ``FILE@X,Y,Z,ROLL,PITCH,YAW`` says; the pose, or its angles, may be missing."""
+    file, pose = _split(text, "--world")
+    return Part(Path(file), "", *pose)
+
+
+def _mounted(text: str) -> Part:
+    """Returns what ``FILE@LINK@X,Y,Z,ROLL,PITCH,YAW`` says. The draft asks for a link that is missing."""
+    rest, pose = _split(text, "--mount")
+    file, at, link = rest.rpartition("@")
+    return Part(Path(file), link, *pose) if at and not Path(rest).is_file() else Part(Path(rest), "", *pose)
+
+
+def _split(text: str, option: str) -> tuple[str, tuple[Triple, Triple]]:
+    """Returns what stands before a pose, and the pose: metres and degrees."""
+    before, at, pose = text.rpartition("@")
+    if not at or not is_number(pose.partition(",")[0]):
+        return text, ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    found = numbers(pose, option)
+    if len(found) not in (3, 6):
+        hint = "write X,Y,Z in metres, or X,Y,Z,ROLL,PITCH,YAW with degrees"
+        raise CirisError("bad_option", f"a pose has 3 or 6 numbers, not {len(found)}", field=option, hint=hint)
+    x, y, z, roll, pitch, yaw = [*found, 0.0, 0.0, 0.0][:6]
+    return before, ((x, y, z), (roll, pitch, yaw))
 
 
 def _package(text: str) -> tuple[str, Path]:
@@ -82,6 +119,7 @@ def scene_check(args: Namespace) -> int:
     print(f"{scene.name}: {scene.n} joints, {len(scene.geometries)} geometries, {len(scene.pairs)} pairs, {len(scene.ignored)} ignored")
     print()
     output.print_table(("joint", "kind", "lower", "upper", "q*", "q", ""), _joints(scene, q), right="lower upper q* q")
+    output.print_configurations(scene.configurations)
     print()
     for warning in scene.warnings:
         print(f"warning: {warning}")
@@ -106,7 +144,7 @@ def _configuration(scene: Scene, args: Namespace) -> tuple[np.ndarray, str]:
     if args.q is None and not seed.is_file():
         inside = 1e-3 * (scene.q_upper - scene.q_lower)
         return scene.q_star.clip(scene.q_lower + inside, scene.q_upper - inside), "q*"
-    q = configuration(args.q) if args.q is not None else seed_of(args.path, None)
+    q = positions_of(scene, seed_of(args.path, args.q), "--q" if args.q is not None else seed.name)
     if len(q) != scene.n:
         names = ", ".join(joint.name for joint in scene.moving)
         field = seed.name if args.q is None else "--q"
@@ -133,6 +171,7 @@ def _document(scene: Scene, q: np.ndarray, bad: list[list[str]], costs: list[Pai
             for j, c in zip(scene.moving, scene.q_star, strict=True)
         ],
         "q": q.tolist(),
+        "configurations": {name: dict(positions) for name, positions in scene.configurations.items()},
         "touching": bad,
         "warnings": list(scene.warnings),
         "substitutions": [

@@ -8,7 +8,7 @@ import yaml
 
 from certifier.errors import CirisError
 from certifier.scene.file import existing
-from client.inputs import configuration, is_scene_file
+from client.inputs import Given, configuration, is_scene_file
 
 
 def seed_file(scene: str | Path) -> Path:
@@ -17,8 +17,8 @@ def seed_file(scene: str | Path) -> Path:
     return path.with_name("seed.yaml" if path.stem == "scene" else f"{path.stem}.seed.yaml")
 
 
-def seed_of(scene: str, q: str | None) -> list[float]:
-    """Returns the seed configuration: ``q``, or the ``q`` of the scene file's seed file.
+def seed_of(scene: str, q: str | None) -> Given:
+    """Returns the seed configuration: ``q``, or the ``q`` of the scene file's seed file. Either may name configurations.
 
     Raises:
         CirisError: scene_not_found for a scene file that is not there; seed_missing; seed_file.
@@ -34,7 +34,8 @@ def seed_of(scene: str, q: str | None) -> list[float]:
         raise CirisError("seed_missing", "no seed was given", field="--q", hint=hint)
     try:
         document = yaml.safe_load(path.read_text(encoding="utf-8"))
-        return configuration(" ".join(str(float(value)) for value in document["q"]), field=f"{path}: q")
+        written = document["q"]
+        return configuration(written if isinstance(written, str) else " ".join(str(float(value)) for value in written), f"{path}: q")
     except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError):
         hint = "write q: [0, 0.3] into it, one number for each joint"
         raise CirisError("seed_file", f"{path} holds no list of numbers called q", field="--q", hint=hint) from None

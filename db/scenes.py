@@ -50,16 +50,21 @@ def check_not_staged(name: str, field: str) -> None:
 def stored(session: Session, scene: Scene) -> SceneRow:
     """Returns the row of this scene in the session's project, or in the default one. What its name means stays as it is.
 
-    It makes the row if no scene of the project has the same content.
+    It makes the row if no scene of the project has the same content. The named configurations are no part of the content, and mean what
+    the scene says that was added last.
     """
     project = project_of(session) or DEFAULT_PROJECT
     whole = scene.hash if project == DEFAULT_PROJECT else hashlib.sha256(f"{project}:{scene.hash}".encode()).hexdigest()
-    new = {"project": project, "name": scene.name, "hash": scene.hash, "document": scene.to_document()}
+    document = scene.to_document()
+    new = {"project": project, "name": scene.name, "hash": scene.hash, "document": document}
     for scene_id in (whole[:ID_LENGTH], whole):
         insert_new(session, SceneRow, [{"id": scene_id, **new}])
         row = session.scalar(select(SceneRow).where(SceneRow.project == project, SceneRow.hash == scene.hash))
         if row is not None:
             row.name = scene.name
+            named = document.get("configurations", {})
+            if row.document.get("configurations", {}) != named:
+                row.document = {**row.document, "configurations": named}
             return row
     raise AssertionError("all of a hash can only be taken by the scene that has it")
 

@@ -24,7 +24,7 @@ from db.session import Database, database
 from db.transaction import Afterwards, persistently
 from jobs import obstacles
 from jobs.curves import BEZIER, CONTROL_POINTS, KNOTS, Bezier, ControlPoints, Knots, one_curve
-from jobs.fields import Flag, Real, Request, Vector
+from jobs.fields import Flag, Positions, Real, Request, Vector
 from jobs.kind import Done, Held, Kind, Turn, in_child, report_of
 from jobs.request import JobRequest
 from workers.app import send_work
@@ -34,12 +34,13 @@ MOTION = "motion"
 CERTIFY = "certifier.jobs.motion:certify_in_child"
 MAX_PIECES = 2000
 Waypoints = Annotated[list[Vector], Field(min_length=2, max_length=2000)]
+NamedWaypoints = Annotated[list[Positions], Field(min_length=2, max_length=2000)]
 
 
 class GivenMotion(Request):
     """Gives a motion: straight between waypoints `q` or `s`, or along Bezier pieces or a B-spline."""
 
-    q: Waypoints | None = Field(None, description="(k, n), joint positions in radians or metres, one row for each waypoint.")
+    q: NamedWaypoints | None = Field(None, description="(k, n), joint positions in radians or metres, one row for each waypoint.")
     s: Waypoints | None = Field(None, description="(k, n), tangent-space coordinates s, one row for each waypoint.")
     bezier: Bezier | None = Field(None, max_length=MAX_PIECES, description=BEZIER)
     knots: Knots | None = Field(None, description=KNOTS)

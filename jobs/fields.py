@@ -4,8 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
-from pydantic_core import PydanticKnownError
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidatorFunctionWrapHandler,
+    WithJsonSchema,
+    WrapValidator,
+    create_model,
+)
+from pydantic_core import PydanticCustomError, PydanticKnownError
 
 from certifier.options import Option, Takes, table
 from jobs import patterns
@@ -26,6 +35,42 @@ def whole(least: float | None, greatest: float | None) -> Any:
 Flag = Annotated[bool, Field(strict=True)]
 Real = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Vector = Annotated[list[Real], Field(min_length=1, max_length=64)]
+MAX_NAMES = 2000
+"""Names of configurations have at most this many characters together."""
+
+
+class Named(str):
+    """Stands in a request in the place of joint positions: names of configurations of the scene, with commas between them."""
+
+
+class NamedOrRegion(Named):
+    """Is the id of a region where it names no configuration."""
+
+
+def _or(kind: type[Named]) -> WrapValidator:
+    """Returns what takes a text for names. Other values go to the validator of lists, so errors name the same places as without names."""
+
+    def taken(value: Any, handler: ValidatorFunctionWrapHandler) -> Any:
+        if not isinstance(value, str):
+            return handler(value)
+        if not 0 < len(value) <= MAX_NAMES:
+            raise PydanticCustomError("name", "it must have 1 to 2000 characters")
+        return kind(value)
+
+    return WrapValidator(taken)
+
+
+def _said(besides: str = "") -> WithJsonSchema:
+    """Returns the schema for clients."""
+    numbers = {"type": "array", "items": {"type": "number"}, "minItems": 1, "maxItems": 64}
+    names = f"Names of configurations of the scene, with commas between them, as in `left_home,right_home`{besides}."
+    return WithJsonSchema({"anyOf": [numbers, {"type": "string", "minLength": 1, "maxLength": MAX_NAMES, "description": names}]})
+
+
+Positions = Annotated[Vector, _or(Named), _said()]
+"""Joint positions, (n,) in radians or metres, or a :class:`Named` until api.named has looked it up."""
+End = Annotated[Vector, _or(NamedOrRegion), _said("; or else the id of a region, or its first characters")]
+"""The same, or the id of a region."""
 LabelName = Annotated[str, Field(min_length=1, max_length=64, pattern=patterns.LABEL_NAME)]
 LabelValue = Annotated[str, Field(max_length=200, pattern=patterns.ANY)]
 Labels = Annotated[dict[LabelName, LabelValue], Field(max_length=20)]
@@ -73,8 +118,10 @@ def _type(one: Option) -> Any:
             assert one.cls is not None
             return model_of(one.cls)
         case _:
-            path = Annotated[list[Vector], Field(min_length=2, max_length=one.most)]
-            lists = {Takes.POINT: Vector if one.most is None else list[Real], Takes.POINTS: Rows, Takes.PATHS: list[path]}
+            row = Positions if one.positions else Vector
+            path = Annotated[list[row], Field(min_length=2, max_length=one.most)]  # type: ignore[valid-type]
+            rows = Annotated[list[row], Field(max_length=2000)]  # type: ignore[valid-type]
+            lists = {Takes.POINT: row if one.most is None else list[Real], Takes.POINTS: rows, Takes.PATHS: list[path]}
             numbers = {Takes.WHOLE: whole(one.least, one.greatest), Takes.REAL: Annotated[Real, _bounds(one)]}
             return {**numbers, Takes.FLAG: Flag, Takes.LABELS: Labels, **lists}[one.takes]
 

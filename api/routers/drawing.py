@@ -9,6 +9,7 @@ from api.access import READ, Db
 from api.answers import asked
 from api.children import Children
 from api.libraries import KeptLibraries, Libraries
+from api.named import with_positions
 from api.schemas.drawing import ContactsRequest, ContactsResponse, SliceRequest, SliceResponse
 from db import scenes
 from db.session import Database
@@ -25,6 +26,7 @@ def find_contacts(body: ContactsRequest, db: Db) -> ContactsResponse:
     with db.read() as session:
         scene_id = scenes.find(session, body.scene)
     scene = scenes.load(db, scene_id)
+    body = with_positions(db, scene_id, scene, body)
     return ContactsResponse(scene=scene_id, contacts=drawing.contacts(scene, checks.points(scene, body.q, "q")))
 
 
@@ -40,4 +42,5 @@ async def slice_space(body: SliceRequest, db: Db, libraries: KeptLibraries, chil
 
 def _slice(db: Database, libraries: Libraries, body: SliceRequest) -> SliceResponse:
     scene_id, scene, library = asked(db, libraries, body.scene)
+    body = with_positions(db, scene_id, scene, body)
     return drawing.sliced(scene_id, scene, library, body)

@@ -8,6 +8,7 @@ from fastapi import APIRouter
 
 from api.access import SUBMIT, Db
 from api.children import Children, about_motions
+from api.named import with_positions
 from api.schemas.motions import MotionRequest, MotionResponse
 from db import scenes
 from db.session import Database
@@ -27,4 +28,6 @@ async def certify_path(body: MotionRequest, db: Db, children: Children) -> Motio
 def _certify(db: Database, body: MotionRequest) -> Any:
     with db.read() as session:
         scene_id = scenes.find(session, body.scene)
-    return about_motions("certify_in_child", scenes.load(db, scene_id), body.model_dump(mode="json", exclude={"scene"}))
+    scene = scenes.load(db, scene_id)
+    body = with_positions(db, scene_id, scene, body)
+    return about_motions("certify_in_child", scene, body.model_dump(mode="json", exclude={"scene"}))

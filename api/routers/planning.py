@@ -15,6 +15,7 @@ from api.answers import asked
 from api.children import Children
 from api.libraries import KeptLibraries, Libraries
 from api.motions import KeptMotions
+from api.named import with_positions
 from api.questions import asking
 from api.schemas.planning import (
     Containment,
@@ -49,6 +50,7 @@ router = APIRouter(prefix="/v1/planning", tags=["planning"], dependencies=[READ]
 def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries, motions: KeptMotions) -> ContainsResponse:
     """Returns, for each point, the certified regions that contain it, how deep inside it is, and the motions whose tubes contain it."""
     scene_id, scene, library = asked(db, libraries, body.scene)
+    body = with_positions(db, scene_id, scene, body)
     points = _points(scene, body.q, body.s)
     found = locate(library, points)
     tubes = motions.of(db, scene_id, scene).tubes
@@ -69,6 +71,7 @@ def contains(body: ContainsRequest, db: Db, libraries: KeptLibraries, motions: K
 def find_nearest(body: NearestRequest, db: Db, libraries: KeptLibraries) -> NearestResponse:
     """Returns, for each point, the nearest certified region of the scene, its nearest point and how far that is."""
     scene_id, scene, library = asked(db, libraries, body.scene)
+    body = with_positions(db, scene_id, scene, body)
     points = _points(scene, body.q, body.s)
     found = [nearest(library, s) if np.isfinite(s).all() else None for s in points]
     points_found = [NearestPoint(nearest=answers.near(library, scene, near)) for near in found]
@@ -84,6 +87,7 @@ def cover_segments(body: SegmentRequest, db: Db, libraries: KeptLibraries, motio
     One that is straight in `q` is proved piece by piece, with bounds on what lies between, so one that only touches may not be proved.
     """
     scene_id, scene, library = asked(db, libraries, body.scene)
+    body = with_positions(db, scene_id, scene, body)
     tubes = motions.of(db, scene_id, scene).tubes
     given, name = (body.q, "q") if body.q is not None else (body.s or [], "s")
     segments = [
@@ -101,6 +105,7 @@ def cover_path(body: PathRequest, db: Db, libraries: KeptLibraries, motions: Kep
     With `times` the path is a trajectory, and the answer is in its times. What `covered` means is said at `/v1/planning/segment`.
     """
     scene_id, scene, library = asked(db, libraries, body.scene)
+    body = with_positions(db, scene_id, scene, body)
     found = _curve(scene, body)
     times = body.times or (np.arange(len(found.controls) // found.degree + 1.0) if found.times is None else found.times).tolist()
     tubes = motions.of(db, scene_id, scene).tubes

@@ -8,7 +8,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from api.schemas.planning import REGION, SCENE, Q, RegionId
 from certifier.model import JointKind
-from jobs.fields import Real, Request, SceneName, Vector, integer
+from jobs.fields import Positions, Real, Request, SceneName, integer
 
 MAX_CONTACTS, MAX_SIZE, MAX_REGIONS, MAX_SAMPLES = 100, 200, 200, 500
 
@@ -68,7 +68,7 @@ class ContactsRequest(Request):
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": SCENE, "q": [[0.4, 0.3]]}]})
 
     scene: SceneName
-    q: list[Vector] = Field(
+    q: list[Positions] = Field(
         min_length=1, max_length=MAX_CONTACTS, description="(k, n), joint positions in radians or metres.", examples=[[[0.4, 0.3]]]
     )
 
@@ -102,7 +102,7 @@ class SliceRequest(Request):
     )
 
     scene: SceneName
-    q: Vector = Field(description="(n,), where the other joints stay, in radians or metres.", examples=[[0.4, 0.3]])
+    q: Positions = Field(description="(n,), where the other joints stay, in radians or metres.", examples=[[0.4, 0.3]])
     x: str = Field(max_length=200, description="Name of the joint of the horizontal axis.", examples=["arm/shoulder"])
     y: str = Field(max_length=200, description="Name of the joint of the vertical axis.", examples=["arm/elbow"])
     size: Annotated[int, Field(ge=8, le=MAX_SIZE), BeforeValidator(integer)] = Field(

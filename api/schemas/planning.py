@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from certifier.outcome import Guarantee
 from jobs.curves import BEZIER, CONTROL_POINTS, KNOTS, Bezier, ControlPoints, Knots, one_curve
-from jobs.fields import Real, Request, SceneName, Vector
+from jobs.fields import Positions, Real, Request, SceneName, Vector
 from planner.motion.space import Space
 
 MAX_POINTS, MAX_NEAREST = 10_000, 1000
@@ -23,6 +23,7 @@ POINTS_IN_S = "(k, n), tangent-space coordinates s, one row a point."
 Moment = Annotated[Real, Field(ge=-1e100, le=1e100)]
 """Differences of times do not overflow."""
 Ends = Annotated[list[Vector], Field(min_length=2, max_length=2)]
+NamedEnds = Annotated[list[Positions], Field(min_length=2, max_length=2)]
 Q = Annotated[list[float], Field(description="(n,), joint positions in radians or metres.", examples=[[0.4, 0.3]])]
 S = Annotated[list[float], Field(description="(n,), tangent-space coordinates.", examples=[[0.2027, 0.1511]])]
 RegionId = Annotated[str, Field(description="Id of a region.", examples=[REGION])]
@@ -34,7 +35,7 @@ class _Points(Request):
     """Gives points, either as joint positions `q` or as tangent-space coordinates `s`."""
 
     scene: SceneName
-    q: list[Vector] | None = Field(None, min_length=1, max_length=MAX_POINTS, description=POINTS_IN_Q, examples=[[[0.4, 0.3]]])
+    q: list[Positions] | None = Field(None, min_length=1, max_length=MAX_POINTS, description=POINTS_IN_Q, examples=[[[0.4, 0.3]]])
     s: list[Vector] | None = Field(None, min_length=1, max_length=MAX_POINTS, description=POINTS_IN_S, examples=[[[0.2027, 0.1511]]])
 
     @model_validator(mode="after")
@@ -55,7 +56,7 @@ class NearestRequest(_Points):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"scene": "iiwa-shelf", "q": [[0, 0.3, 0, -1.8, 0, 0.9, 0]]}]})
 
-    q: list[Vector] | None = Field(None, min_length=1, max_length=MAX_NEAREST, description=POINTS_IN_Q, examples=[[[0.4, 0.3]]])
+    q: list[Positions] | None = Field(None, min_length=1, max_length=MAX_NEAREST, description=POINTS_IN_Q, examples=[[[0.4, 0.3]]])
     s: list[Vector] | None = Field(None, min_length=1, max_length=MAX_NEAREST, description=POINTS_IN_S, examples=[[[0.2027, 0.1511]]])
 
 
@@ -84,7 +85,7 @@ class SegmentRequest(_Motion):
         json_schema_extra={"examples": [{"scene": "planar-2dof", "q": [[[0.4, 0.3], [0.6, 0.3]], [[0.4, 0.3], [1.5, -2.0]]]}]}
     )
 
-    q: list[Ends] | None = Field(
+    q: list[NamedEnds] | None = Field(
         None,
         min_length=1,
         max_length=MAX_SEGMENTS,
@@ -114,7 +115,7 @@ class PathRequest(_Motion):
         json_schema_extra={"examples": [{"scene": "planar-2dof", "q": [[0.4, 0.3], [0.6, 0.3], [0.6, 0.5]], "times": [0, 0.5, 1.25]}]}
     )
 
-    q: list[Vector] | None = Field(
+    q: list[Positions] | None = Field(
         None,
         min_length=2,
         max_length=MAX_WAYPOINTS,

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from api.schemas.planning import MOTION, REGION, Answer, Distance, MotionId, Near, Piece, Q, RegionId, Uncovered
 from certifier.outcome import Guarantee
-from jobs.fields import Flag, Real, Request, SceneName, Vector
+from jobs.fields import End, Flag, Positions, Real, Request, SceneName
 from planner.trajectory.plan import ACCELERATION, SPEED
 
 SECONDS, MOST_SECONDS = 5.0, 50.0
@@ -18,11 +18,6 @@ MOST_GOALS = 100
 
 Positive = Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False)]
 Positives = Annotated[list[Positive], Field(min_length=1, max_length=64)]
-Configuration = Annotated[list[Annotated[float, Field(allow_inf_nan=False)]], Field(min_length=1, max_length=64)]
-RegionPrefix = Annotated[str, Field(min_length=4, max_length=64, description="Id of a region, or its first characters.")]
-End = Configuration | RegionPrefix
-
-
 Three = Annotated[list[Real], Field(min_length=3, max_length=3)]
 
 
@@ -58,11 +53,12 @@ class PlanRequest(Request):
 
     scene: SceneName
     start: End = Field(
-        description="Where the motion begins: (n,), joint positions in radians or metres, or the id of a region, for any point of it.",
+        description="Where the motion begins: (n,), joint positions in radians or metres, or names of configurations; or the id "
+        "of a region, for any point of it.",
         examples=[[0.0, 0.0]],
     )
     goal: End | None = Field(None, description="Where the motion ends, like `start`.", examples=[[0.35, -0.2], REGION])
-    goals: list[Vector] | None = Field(
+    goals: list[Positions] | None = Field(
         None,
         min_length=1,
         max_length=MOST_GOALS,
@@ -79,7 +75,7 @@ class PlanRequest(Request):
         description="With `pose`: the frame goes there on a straight line, within these tolerances.",
         examples=[{"metres": 0.001, "radians": 0.01}],
     )
-    via: list[Vector] = Field(
+    via: list[Positions] = Field(
         default_factory=list,
         max_length=MOST_GOALS,
         description="(m, n), configurations that the motion goes through, in this order.",

@@ -91,6 +91,11 @@ class SceneDetail(SceneSummary):
     bodies: list[str] = Field(description="Names of the bodies.")
     padding: float = Field(description="Metres added around every geometry of every pair.")
     not_covered: NotCovered = Field(description="The pairs of geometries that no proof about the scene is about.")
+    configurations: dict[str, dict[str, float]] = Field(
+        description="The named configurations: positions of joints by their names, in radians or metres. A request takes such names in the "
+        "place of joint positions, with commas between them; `q_star` stands for q* of the joints that the others leave open.",
+        examples=[{"arm/manipulator/home": {"arm/shoulder": 0.4, "arm/elbow": 0.3}}],
+    )
     provenance: Document = Field(description="What the scene was read from, and by which versions.")
 
     @classmethod
@@ -106,6 +111,7 @@ class SceneDetail(SceneSummary):
             positions=positions,
             bodies=document["bodies"],
             padding=document["padding"],
+            configurations=document.get("configurations", {}),
             not_covered=NotCovered.model_validate(not_covered),
             provenance=document["provenance"],
         )

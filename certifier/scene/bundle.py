@@ -63,7 +63,7 @@ def pack_bundle(path: str | Path) -> bytes:
     """
     scene_file = read_scene_file(existing(path))
     files = {scene_file.path}
-    waiting = [resolve(model, scene_file.path.parent, scene_file.packages) for model in scene_file.models]
+    waiting = [resolve(model, scene_file.path.parent, scene_file.packages) for model in scene_file.files]
     while waiting:
         file = waiting.pop()
         if file not in files and file.is_file():

@@ -10,6 +10,11 @@ from certifier.scene.drake_model import build_diagram, geometry_name
 
 def touching(scene: Scene, configurations: Iterable[Array]) -> Iterator[set[Pair]]:
     """Yields the pairs that overlap at each of the configurations q, (n,) each."""
+    return (set(depths) for depths in overlaps(scene, configurations))
+
+
+def overlaps(scene: Scene, configurations: Iterable[Array]) -> Iterator[dict[Pair, float]]:
+    """Yields how deep the pairs are in each other that overlap at each of the configurations q, (n,) each, in metres."""
     diagram = build_diagram(scene)
     context = diagram.CreateDefaultContext()
     plant, scene_graph = diagram.plant(), diagram.scene_graph()
@@ -18,4 +23,4 @@ def touching(scene: Scene, configurations: Iterable[Array]) -> Iterator[set[Pair
     for q in configurations:
         plant.SetPositions(plant_context, q)
         found = query_port.Eval(scene_graph.GetMyContextFromRoot(context)).ComputePointPairPenetration()
-        yield {Pair(*sorted((geometry_name(inspector, p.id_A), geometry_name(inspector, p.id_B)))) for p in found}
+        yield {Pair(*sorted((geometry_name(inspector, p.id_A), geometry_name(inspector, p.id_B)))): p.depth for p in found}

@@ -10,24 +10,26 @@ import json
 import os
 import secrets
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
 import numpy as np
 import yaml
+from pydrake.math import RollPitchYaw, RotationMatrix
 
-from certifier.errors import SceneError
+from certifier.errors import SceneError, close_matches
 from certifier.kinematics import Kinematics
 from certifier.model import WORLD, Array, JointKind, Pair, Scene
-from certifier.scene.contacts import touching
+from certifier.scene.contacts import overlaps, touching
+from certifier.scene.hollow import beyond
 from certifier.scene.load import MEMORY_BYTES, TIMEOUT_S, load_scene, read_in_child
 from certifier.scene.mimics import Mimic, at_rest
+from certifier.scene.packages import packages_of
 from certifier.scene.paths import beside
-from certifier.scene.references import references
 from certifier.scene.xml import parse_xml
 
 TRIED = 200
@@ -38,9 +40,24 @@ MANY_PARTS = 4
 """Where a body that moves has more polytopes than this, the draft has their hull stand for them."""
 SLIDE = 1.0
 """A slide without limits is drafted to go so far from its limit, in metres, or to either side of 0 if it has neither."""
-_PACKAGES = ("package://", "model://")
 _NAMED = {"robot": "name", "model": "name", "mujoco": "model"}
 """The elements that are models, and the attribute that is the model's name."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A model of a cell besides the robot, and where it stands.
+
+    Attributes:
+        path: its file, URDF, SDFormat or MJCF.
+        link: the link of the robot, or of a part before it, that carries it; "" for the world.
+        translation, rpy: its pose on the link or in the world, metres and degrees (turns about x, then y, then z of the link).
+    """
+
+    path: Path
+    link: str = ""
+    translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -50,8 +67,10 @@ class Draft:
     Attributes:
         text: the scene file.
         seed: (n,) the free configuration that is nearest to q* of those tried; None where all of them are in collision.
-        ignored: the pairs of the robot with itself that overlap at every configuration tried, which the draft ignores.
+        ignored: the pairs of the robot, and of what it carries, that overlap at every configuration tried, which the draft ignores.
+        doubtful: those of them of which perhaps only the replacements overlap, such as hulls, each with a sentence that says so.
         overlapping: other pairs that do. They are not ignored, because something else stands in the wrong place.
+        notes: sentences about what was found and chosen.
     """
 
     text: str
@@ -59,43 +78,100 @@ class Draft:
     seed: Array | None
     ignored: tuple[Pair, ...]
     overlapping: tuple[Pair, ...]
+    doubtful: Mapping[Pair, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
-def draft(robot: Path, worlds: Sequence[Path], out: Path, packages: Mapping[str, Path]) -> Draft:
-    """Returns a scene file for a robot and what stands around it, which was loaded once.
+def draft(
+    robot: Path,
+    worlds: Sequence[Part],
+    out: Path,
+    packages: Mapping[str, Path],
+    mounts: Sequence[Part] = (),
+    srdf: Path | None = None,
+    environment: Mapping[str, str] | None = None,
+) -> Draft:
+    """Returns a scene file for a robot, what it carries and what stands around it, which was loaded once.
 
     Args:
-        robot, worlds: model files, URDF, SDFormat or MJCF.
+        robot: model file, URDF, SDFormat or MJCF.
+        worlds: what stands around it.
         out: where the scene file will be; the paths in it are relative to its directory.
-        packages: directories of packages, by name; others are looked for in the directories above the model that names them.
+        packages: directories of packages, by name; others are looked for (:mod:`certifier.scene.packages`).
+        mounts: what the robot carries.
+        srdf: SRDF file of the robot; None for one beside the model, if there is one.
+        environment: the variables in which ROS lists places of packages; None for nowhere.
 
     Raises:
-        SceneError: a file cannot be used; ``scene_package`` for a package that was not found.
+        SceneError: a file cannot be used; ``scene_package`` for a package that was not found; ``mount`` for a link that is missing.
     """
-    models: dict[str, Path] = {}
-    for path in (robot, *worlds):
-        models[_unused(_name_in(path), models)] = path
+    parts: dict[str, Part] = {}
+    for part in (Part(robot), *mounts, *worlds):
+        parts[_unused(_name_in(part.path), parts)] = part
+    models = {name: part.path for name, part in parts.items()}
     directory = out.parent.resolve()
-    found = {name: root for path in models.values() for name, root in _packages(path, packages).items()}
+    looked = [packages_of(path, packages, environment or {}) for path in models.values()]
+    found, notes = {name: root for roots, _ in looked for name, root in roots.items()}, [note for _, said in looked for note in said]
     head = _head(out, robot, found, directory)
     add = {name: f"  - add_model: {{name: {_quoted(name)}, file: {_quoted(_relative(path, directory))}}}" for name, path in models.items()}
     held = _inventory("\n".join([head, *add.values()]), models, directory)
-    head = "\n".join([head, *_directives(add, held["roots"]), *_limits(held), *_fix(held)]) + "\n"
+    own = [*parts][: 1 + len(mounts)]
+    head = "\n".join([head, *_directives(add, parts, own, held), *_limits(held), *_fix(held)]) + "\n"
+    head, said = _with_srdf(head, srdf, robot, own[0], directory)
+    notes += said
     scene = _loaded(head, directory)
     if hulls := _hulls(scene):
         head += hulls
         scene = _loaded(head, directory)
     random = np.random.default_rng(0).uniform(scene.q_lower, scene.q_upper, (TRIED + SEEDS, scene.n))
     middle = scene.q_star.clip(scene.q_lower, scene.q_upper)
-    always = set(scene.pairs)
-    for touches in touching(scene, [middle, *random[:TRIED]]):
-        always &= touches
-    own = tuple(f"{next(iter(models))}{mark}" for mark in ("/", "::"))
+    always = _always(scene, [middle, *random[:TRIED]])
+    prefixes = tuple(f"{name}{mark}" for name in own for mark in ("/", "::"))
     overlapping = sorted(always, key=lambda pair: (pair.a, pair.b))
-    ignored = tuple(pair for pair in overlapping if pair.a.startswith(own) and pair.b.startswith(own))
+    ignored = tuple(pair for pair in overlapping if pair.a.startswith(prefixes) and pair.b.startswith(prefixes))
     others = tuple(pair for pair in overlapping if pair not in ignored)
-    text = head + _joints(scene) + _ignore(ignored, scene)
-    return Draft(text, _loaded(text, directory), _free(scene, middle, random[TRIED:], always), ignored, others)
+    doubtful = {pair: doubt for pair in ignored if (doubt := _doubt(scene, pair, always[pair]))}
+    text = head + _joints(scene) + _ignore(ignored, doubtful, scene)
+    seed = _free(scene, middle, random[TRIED:], {*always})
+    return Draft(text, _loaded(text, directory), seed, ignored, others, doubtful, tuple(notes))
+
+
+def _always(scene: Scene, configurations: Iterable[Array]) -> dict[Pair, float]:
+    """Returns the pairs that overlap at each of some configurations, and how deep they are in each other at least, in metres."""
+    least = dict.fromkeys(scene.pairs, np.inf)
+    for depths in overlaps(scene, configurations):
+        least = {pair: min(depth, depths[pair]) for pair, depth in least.items() if pair in depths}
+    return least
+
+
+def _doubt(scene: Scene, pair: Pair, depth: float) -> str | None:
+    """Returns a sentence where perhaps only what stands for two bodies overlaps: it reaches farther beyond them than they overlap."""
+    reach = {name: beyond(scene, name) + scene.geometry(name).inflation for name in (pair.a, pair.b)}
+    if depth > sum(reach.values()):
+        return None
+    said = " and ".join(f"what stands for {name} reaches {1000 * most:.3g} mm beyond it" for name, most in reach.items() if most)
+    return f"perhaps only their hulls overlap, by {1000 * depth:.3g} mm at least: {said}"
+
+
+def _with_srdf(head: str, given: Path | None, robot: Path, name: str, directory: Path) -> tuple[str, list[str]]:
+    """Returns the beginning of a scene file with the robot's SRDF file, if there is one, and sentences that say so.
+
+    A file that was not named, and that does not fit to the model, is left out.
+    """
+    beside_model = [robot.with_suffix(".srdf"), robot.parent.parent / "srdf" / f"{robot.stem}.srdf"]
+    named = given or next(filter(Path.is_file, beside_model), None)
+    if named is None:
+        among = sorted(path.name for path in (robot.absolute().parent.parent / "srdf").glob("*.srdf"))
+        return head, [f"not used: {', '.join(among)} in ../srdf of the model; name one with --srdf"] if among else []
+    text = f"{head}# Pairs that MoveIt does not check, and named configurations:\nsrdf: {{{_quoted(name)}: "
+    text += f"{_quoted(_relative(named, directory))}}}\n"
+    try:
+        _loaded(text, directory)
+    except SceneError as error:
+        if given is not None or not (error.field or "").startswith("srdf"):
+            raise
+        return head, [f"not used: {named}, which is beside the model: {error.message}"]
+    return text, [] if given else [f"{named} is beside the model, and the draft uses it"]
 
 
 def _hulls(scene: Scene) -> str:
@@ -140,22 +216,6 @@ def _unused(name: str, taken: Collection[str]) -> str:
     return name if name not in taken else next(f"{name}_{i}" for i in range(2, 1000) if f"{name}_{i}" not in taken)
 
 
-def _packages(path: Path, given: Mapping[str, Path]) -> dict[str, Path]:
-    """Returns where the packages are that a model names."""
-    found: dict[str, Path] = {}
-    for reference in references(path):
-        if not reference.startswith(_PACKAGES):
-            continue
-        name = reference.partition("://")[2].partition("/")[0]
-        above = [place / name for place in path.absolute().parents] + [place for place in path.absolute().parents if place.name == name]
-        places = [given[name]] if name in given else [place for place in above if place.is_dir()]
-        if not places or not places[0].is_dir():
-            message = f"{path.name} names the package {name}, which is not above it"
-            raise SceneError("scene_package", message, hint=f"say where it is: --package {name}=DIRECTORY")
-        found[name] = places[0].absolute()
-    return found
-
-
 def _head(out: Path, robot: Path, packages: Mapping[str, Path], directory: Path) -> str:
     name = out.stem if out.stem != "scene" else directory.name
     lines = [f"# Drafted by ciris scene init for {robot.name}; docs/scenes.md explains every key.", f"name: {_quoted(name)}"]
@@ -172,22 +232,62 @@ def _inventory(text: str, models: Mapping[str, Path], directory: Path) -> dict[s
         return read_in_child("certifier.scene.inventory:inventory", payload, "the draft", TIMEOUT_S, MEMORY_BYTES)
 
 
-def _directives(add: Mapping[str, str], roots: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Returns the directives that add each model, given by its name, and weld its roots to the world where its file has them."""
+def _directives(add: Mapping[str, str], parts: Mapping[str, Part], own: Sequence[str], held: Mapping[str, Any]) -> list[str]:
+    """Returns the directives that add each model, given by its name, and weld its roots to the world or to the link that carries it."""
     lines = []
     for name, line in add.items():
         lines.append(line)
+        part, carried = parts[name], name in own[1:]
+        parent = _carrier(part, own[: own.index(name)], held) if carried else "world"
+        roots = [root for root in held["roots"] if root["body"].startswith(f"{name}::")]
+        if carried and len(roots) != 1:
+            message = f"{part.path.name} has {len(roots)} bodies that nothing holds: {', '.join(root['body'] for root in roots)}"
+            raise SceneError("mount", message, field="--mount", hint="something that is mounted hangs on one body; join the others to it")
         for root in roots:
-            if root["body"].startswith(f"{name}::"):
-                lines += _weld(root)
+            lines += _weld(_placed(root, part), parent)
     if len(add) > 1:
-        lines.append("# The X_PC of a weld says where its child stands, in metres and degrees. Without one, that is the world's origin.")
+        lines.append("# The X_PC of a weld says where its child stands, in metres and degrees. Without one, that is the parent's origin.")
         lines.append("#   X_PC: {translation: [0.5, 0, 0], rotation: !Rpy {deg: [0, 0, 90]}}")
     return lines
 
 
-def _weld(root: Mapping[str, Any]) -> list[str]:
-    """Returns the directives that hold a body where its file has it. Of a model in a model, Drake welds only a frame of the outer one."""
+def _carrier(part: Part, before: Sequence[str], held: Mapping[str, Any]) -> str:
+    """Returns Drake's name of the link that carries a part: of the robot, or of what was mounted before.
+
+    Raises:
+        SceneError: ``mount``, with the links at the ends of the robot.
+    """
+    links, leaves = ([name for name in held[key] if name.split("::")[0] in before] for key in ("links", "leaves"))
+    ends = f"links at its ends: {', '.join(_short(name) for name in leaves)}"
+    if not part.link:
+        message = f"it is not said where {part.path.name} is mounted"
+        raise SceneError("mount", message, field="--mount", hint=f"write {part.path.name}@LINK; {ends}")
+    wanted = part.link.replace("/", "::")
+    fitting = [name for name in links if name == wanted] or [name for name in links if name.endswith(f"::{wanted}")]
+    if len(fitting) != 1:
+        what = f"may be {' or '.join(fitting)}" if fitting else "is no link of the robot"
+        hint = close_matches(part.link, [_short(name) for name in links]) or ends
+        raise SceneError("mount", f"{part.link[:200]!a} {what}", field="--mount", hint=f"write MODEL::LINK; {ends}" if fitting else hint)
+    return fitting[0]
+
+
+def _short(name: str) -> str:
+    return name.partition("::")[2]
+
+
+def _placed(root: Mapping[str, Any], part: Part) -> dict[str, Any]:
+    """Returns a body that nothing holds with its pose where its model stands elsewhere than at the origin."""
+    turn, own = _rotation(part.rpy), _rotation(root["rpy"])
+    translation = np.array(part.translation) + turn @ np.array(root["translation"])
+    return {**root, "translation": translation.tolist(), "rpy": np.degrees(RollPitchYaw(turn @ own).vector()).tolist()}
+
+
+def _rotation(rpy: Sequence[float]) -> RotationMatrix:
+    return RotationMatrix(RollPitchYaw(np.radians(rpy)))
+
+
+def _weld(root: Mapping[str, Any], parent: str) -> list[str]:
+    """Returns the directives that hold a body on its parent. Of a model in a model, Drake welds only a frame of the outer one."""
     translation, rpy = ([round(x, 9) + 0.0 for x in root[key]] for key in ("translation", "rpy"))
     parts = [f"translation: {translation}"] if any(translation) else []
     parts += [f"rotation: !Rpy {{deg: {rpy}}}"] if any(rpy) else []
@@ -197,7 +297,7 @@ def _weld(root: Mapping[str, Any]) -> list[str]:
     if len(inside) > 1:
         child = f"{model}::{'_'.join(inside)}_stands"
         lines.append(f"  - add_frame: {{name: {_quoted(child)}, X_PF: {{base_frame: {_quoted(root['body'])}}}}}")
-    return [*lines, f"  - add_weld: {{parent: world, child: {_quoted(child)}{pose}}}"]
+    return [*lines, f"  - add_weld: {{parent: {_quoted(parent)}, child: {_quoted(child)}{pose}}}"]
 
 
 def _limits(held: Mapping[str, Any]) -> list[str]:
@@ -259,7 +359,7 @@ def _joints(scene: Scene) -> str:
     return "\n".join([*lines, f"q_star: {[round(float(x), 6) for x in scene.q_star]}"]) + "\n"
 
 
-def _ignore(pairs: Sequence[Pair], scene: Scene) -> str:
+def _ignore(pairs: Sequence[Pair], doubtful: Mapping[Pair, str], scene: Scene) -> str:
     if not pairs:
         return ""
     neighbours = {frozenset((j.parent, j.child)) for j in scene.joints}
@@ -267,7 +367,12 @@ def _ignore(pairs: Sequence[Pair], scene: Scene) -> str:
     for pair in pairs:
         bodies = frozenset(scene.geometry(name).body for name in (pair.a, pair.b))
         why = "neighbours, which overlap" if bodies in neighbours else "they overlap"
-        lines.append(f"  - {{pair: [{_quoted(pair.a)}, {_quoted(pair.b)}], reason: {why} at every configuration that was tried}}")
+        if pair in doubtful:
+            lines.append(f"  # Look at these: {doubtful[pair]}.")
+            why += ", perhaps as hulls only,"
+        lines.append(
+            f"  - {{pair: [{_quoted(pair.a)}, {_quoted(pair.b)}], reason: {_quoted(f'{why} at every configuration that was tried')}}}"
+        )
     return "\n".join(lines) + "\n"
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 import yaml
 
+from certifier.configurations import Q_STAR, is_configuration_name
 from certifier.errors import SceneError, close_matches
 from certifier.names import ALPHABET, MAX_SENTENCE, is_name, is_sentence
 from certifier.positions import MAGNITUDE
@@ -22,7 +23,10 @@ from certifier.scene.directives import added_files, check_directives, replaced, 
 from certifier.scene.nodes import MEND, compose, decoded
 from certifier.scene.paths import beside
 
-KEYS = ("name", "packages", "directives", "q_star", "limits", "fix", "padding", "ignore", "hulls", "mesh", "cylinder_sides")
+KEYS = (
+    *("name", "packages", "directives", "srdf", "q_star", "limits", "fix", "configurations", "padding", "ignore", "hulls", "mesh"),
+    "cylinder_sides",
+)
 """The keys of a scene file."""
 MAX_BYTES = 2**20
 MIN_HULL_VERTICES = 8
@@ -58,6 +62,8 @@ class SceneFile:
         hulls: the bodies that one hull of all their polytopes stands for.
         max_vertices: greatest number of vertices that stand for a mesh or an ellipsoid.
         cylinder_sides: number of sides of the prism that stands for a cylinder.
+        srdf: the SRDF file of a model, as written, by the model's name.
+        configurations: positions by joint, or one for every joint, radians or metres, by the name of the configuration.
     """
 
     path: Path
@@ -74,6 +80,13 @@ class SceneFile:
     hulls: tuple[str, ...] = ()
     max_vertices: int = 32
     cylinder_sides: int = 12
+    srdf: dict[str, str] = field(default_factory=dict)
+    configurations: dict[str, dict[str, float] | tuple[float, ...]] = field(default_factory=dict)
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Returns every file that the scene file itself names, as written."""
+        return (*self.models, *self.srdf.values())
 
 
 def read_scene_file(path: Path) -> SceneFile:
@@ -108,6 +121,8 @@ def read_scene_file(path: Path) -> SceneFile:
         hulls=_hulls(values.get("hulls", [])),
         max_vertices=_integer(mesh.get("max_vertices", 32), "mesh.max_vertices", minimum=MIN_HULL_VERTICES, maximum=MAX_VERTICES),
         cylinder_sides=_integer(values.get("cylinder_sides", 12), "cylinder_sides", minimum=3, maximum=MAX_SIDES),
+        srdf=_srdf(values.get("srdf", {})),
+        configurations=_configurations(values.get("configurations", {})),
     )
 
 
@@ -242,6 +257,37 @@ def _packages(value: Any, directory: Path) -> dict[str, Path]:
             raise _wrong(f"packages.{name}", f"there is no directory {path}", hint=hint)
         roots[_name(name, "packages")] = path
     return roots
+
+
+def _srdf(value: Any) -> dict[str, str]:
+    if not isinstance(value, dict):
+        raise _wrong("srdf", "must map names of models to SRDF files")
+    return {_name(model, "srdf"): _srdf_file(file, f"srdf.{model}") for model, file in value.items()}
+
+
+def _srdf_file(value: Any, where: str) -> str:
+    file = _name(value, where)
+    if not file.endswith(".srdf"):
+        raise _wrong(where, f"must name a file that ends in .srdf, not {file!r}", hint="rename the file")
+    return file
+
+
+def _configurations(value: Any) -> dict[str, dict[str, float] | tuple[float, ...]]:
+    if not isinstance(value, dict):
+        raise _wrong("configurations", "must map names to joint positions")
+    found: dict[str, dict[str, float] | tuple[float, ...]] = {}
+    for name, said in value.items():
+        if not is_configuration_name(name):
+            hint = f"names have {ALPHABET}, but no commas; a number and {Q_STAR} are none"
+            raise _wrong("configurations", f"{name!a} cannot be the name of a configuration", hint=hint)
+        where = f"configurations.{name}"
+        if isinstance(said, list):
+            found[name] = tuple(_number(x, f"{where}[{i}]") for i, x in enumerate(said))
+        elif isinstance(said, dict) and said:
+            found[name] = {joint: _number(x, f"{where}.{joint}") for joint, x in _by_joint(said, where).items()}
+        else:
+            raise _wrong(where, "must be positions by joint, as in {turn: 0.5}, or a list of numbers, one per joint")
+    return found
 
 
 def _q_star(value: Any) -> tuple[float, ...] | None:

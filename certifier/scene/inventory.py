@@ -10,6 +10,7 @@ from xml.parsers import expat
 import numpy as np
 from pydrake.math import RollPitchYaw
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.framework import DiagramBuilder
 
 from certifier.model import Joint
@@ -26,6 +27,7 @@ def inventory(payload: dict[str, Any]) -> dict[str, Any]:
 
     ``roots`` lists the bodies that nothing holds, each with Drake's name of the ``body`` and its pose in the world as the file has it:
     ``translation`` in metres and ``rpy`` in degrees. ``joints`` lists those that move: ``name``, ``kind``, ``lower`` and ``upper``.
+    ``links`` lists Drake's names of all bodies but the world, and ``leaves`` those that no joint leads on from.
     ``mimics`` lists the fields of each :class:`Mimic`. ``unread`` names the followers of which Drake does not read that they follow.
 
     Args:
@@ -49,10 +51,21 @@ def inventory(payload: dict[str, Any]) -> dict[str, Any]:
     unread = [mimic for name, file in payload["models"].items() for mimic in _unread(Path(file), name, joints)]
     return {
         "roots": _roots(plant),
+        "links": [*map(_drake_name, _bodies(plant))],
+        "leaves": [_drake_name(body) for body in _bodies(plant) if body.index() not in {joint.parent_body().index() for joint in every}],
         "joints": [{"name": j.name, "kind": j.kind.value, "lower": j.lower, "upper": j.upper} for j in joints if j.index is not None],
         "mimics": [vars(mimic) for mimic in (*read, *unread)],
         "unread": [mimic.follower for mimic in unread],
     }
+
+
+def _bodies(plant: MultibodyPlant) -> list[RigidBody]:
+    return [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]
+
+
+def _drake_name(body: RigidBody) -> str:
+    name: str = body.scoped_name().get_full()
+    return name
 
 
 def _roots(plant: MultibodyPlant) -> list[dict[str, Any]]:

@@ -44,19 +44,23 @@ def counted(limit: float) -> float:
     return float(np.copysign(np.inf, limit)) if abs(limit) >= UNBOUNDED else limit
 
 
-def held(joints: Sequence[Joint], positions: Mapping[str, float], couplings: Sequence[Coupling]) -> list[Joint]:
-    """Returns the joints, those that are held as welds; the positions of the others are numbered anew, in their order.
-
-    A joint that is coupled to held ones alone is held as well.
+def held_at(joints: Sequence[Joint], positions: Mapping[str, float], couplings: Sequence[Coupling]) -> dict[str, float]:
+    """Returns where joints are held, radians or metres, by their full names. A joint that is coupled to held ones alone is held as well.
 
     Raises:
         SceneError: ``unknown_name``; ``scene_field`` where a joint cannot be there; ``unsupported_joint`` where coupled joints are free.
     """
     by_name = {j.name: j for j in joints if j.index is not None}
-    at = _by_full_name(positions, by_name, "fix")
+    at = by_full_name(positions, by_name, "fix")
     for name, value in at.items():
         _check_within(by_name[name], value)
     _follow(at, by_name, couplings)
+    return at
+
+
+def held(joints: Sequence[Joint], at: Mapping[str, float]) -> list[Joint]:
+    """Returns the joints, those that are held as welds; the positions of the others are numbered anew, in their order."""
+    by_name = {j.name: j for j in joints if j.index is not None}
     free = sorted((j for j in by_name.values() if j.name not in at), key=lambda j: j.index or 0)
     number = {j.name: i for i, j in enumerate(free)}
     return [_welded(j, at[j.name]) if j.name in at else replace(j, index=number.get(j.name)) for j in joints]
@@ -69,7 +73,7 @@ def narrowed(joints: Sequence[Joint], limits: Mapping[str, tuple[float, float]])
         SceneError: ``unknown_name``; ``scene_field`` for limits outside of the joint's own.
     """
     by_name = {j.name: j for j in joints if j.index is not None}
-    given = _by_full_name(limits, by_name, "limits")
+    given = by_full_name(limits, by_name, "limits")
     for name, (lower, upper) in given.items():
         own_lower, own_upper = _range(by_name[name])
         if lower < own_lower - EXACT or upper > own_upper + EXACT:
@@ -134,8 +138,12 @@ def _windowed(joint: Joint, center: float) -> Joint:
     return replace(joint, lower=window[0], upper=window[1], own_limits=(own[0], own[1]))
 
 
-def _by_full_name(said: Mapping[str, T], joints: Mapping[str, Joint], field: str) -> dict[str, T]:
-    """Returns what a scene file says of joints by their full names."""
+def by_full_name(said: Mapping[str, T], joints: Mapping[str, Joint], field: str) -> dict[str, T]:
+    """Returns what a scene file says of joints by their full names.
+
+    Raises:
+        SceneError: ``unknown_name``; ``scene_field`` for a joint that is named twice.
+    """
     found: dict[str, T] = {}
     for name, value in said.items():
         full = _known(name, joints, field)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -18,12 +20,15 @@ _IGNORED_SAMPLES = 200
 _STEEP = 50.0
 
 
-def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn: set[str]) -> list[str]:
+def findings(
+    scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn: set[str], files: Mapping[str, str] | None = None
+) -> list[str]:
     """Returns what a careful colleague would remark on.
 
     Args:
         candidates: the pairs of geometries that the collision filters of the model files leave.
         drawn: bodies that have a visual geometry.
+        files: the SRDF file that a reason for ignoring pairs comes from, by the reason; None without such files.
     """
     return [
         *_substituted(scene),
@@ -35,7 +40,7 @@ def findings(scene: Scene, tree: Tree, candidates: list[tuple[str, str]], drawn:
         *_steep(scene),
         *units(scene, tree),
         *_always_touching(scene),
-        *(_never_touching(scene) if scene.ignored else []),
+        *(_ignored(scene, files or {}) if scene.ignored else []),
         *([] if scene.pairs else ["no pair of geometries can collide: there is nothing to certify"]),
     ]
 
@@ -129,22 +134,45 @@ def _always_touching(scene: Scene) -> list[str]:
     ]
 
 
-def _never_touching(scene: Scene) -> list[str]:
-    """Returns findings about bodies with ignored pairs of which none touches at any configuration tried."""
+def _ignored(scene: Scene, files: Mapping[str, str]) -> list[str]:
+    """Returns a finding about every two bodies that the scene file ignores and that never touch, and one about every SRDF file."""
+    reasons: dict[tuple[str, ...], str] = {}
+    for pair in scene.ignored:
+        bodies = _bodies(scene, pair.a, pair.b)
+        if pair.reason not in files:
+            reasons[bodies] = pair.reason
+        reasons.setdefault(bodies, pair.reason)
+    apart = _apart(scene)
+    found = []
+    for file in dict.fromkeys(files.values()):
+        of_file = {bodies: reason for bodies, reason in reasons.items() if files.get(reason) == file}
+        if of_file:
+            counts = Counter(reason.removeprefix(f"{file}: ") for reason in of_file.values())
+            said = ", ".join(f"{count} {reason}" for reason, count in counts.most_common())
+            never = len(apart & {*of_file})
+            tried = (
+                f"{never} of them touch at none of {_IGNORED_SAMPLES + 1} configurations tried: without the entries, these are certified"
+            )
+            found.append(f"{file}: {len(of_file)} pairs of bodies are ignored: {said}{f'; {tried}' if never else ''}")
+    return found + [
+        f"{a} and {b} are ignored, but touch at none of {_IGNORED_SAMPLES + 1} configurations tried: without the entry, they are certified"
+        for a, b in sorted(bodies for bodies in apart if reasons[bodies] not in files)
+    ]
 
-    def bodies(pair: Pair) -> tuple[str, ...]:
-        return tuple(sorted(scene.geometry(name).body for name in (pair.a, pair.b)))
 
+def _bodies(scene: Scene, a: str, b: str) -> tuple[str, ...]:
+    return tuple(sorted(scene.geometry(name).body for name in (a, b)))
+
+
+def _apart(scene: Scene) -> set[tuple[str, ...]]:
+    """Returns the bodies with ignored pairs of which none touches at any configuration tried."""
     ignored = tuple(Pair(pair.a, pair.b) for pair in scene.ignored)
-    apart = {bodies(pair) for pair in ignored}
+    apart = {_bodies(scene, pair.a, pair.b) for pair in ignored}
     for found in touching(replace(scene, pairs=ignored), _tried(scene, _IGNORED_SAMPLES)):
-        apart -= {bodies(pair) for pair in found}
+        apart -= {_bodies(scene, pair.a, pair.b) for pair in found}
         if not apart:
             break
-    return [
-        f"{a} and {b} are ignored, but touch at none of {_IGNORED_SAMPLES + 1} configurations tried: without the entry, they are certified"
-        for a, b in sorted(apart)
-    ]
+    return apart
 
 
 def _tried(scene: Scene, samples: int) -> list[Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from certifier.errors import SceneError, close_matches
 from certifier.model import WORLD, Geometry, Ignored, Pair
@@ -11,12 +11,20 @@ from certifier.scene.tree import Tree
 
 
 def pairs(
-    candidates: Iterable[tuple[str, str]], geometries: tuple[Geometry, ...], tree: Tree, ignore: tuple[IgnoreEntry, ...]
+    candidates: Iterable[tuple[str, str]],
+    geometries: tuple[Geometry, ...],
+    tree: Tree,
+    ignore: Sequence[IgnoreEntry],
+    described: Sequence[IgnoreEntry] = (),
 ) -> tuple[tuple[Pair, ...], tuple[Ignored, ...], list[str]]:
     """Splits the candidates that have a moving joint between their bodies into those to certify and those ignored.
 
+    Args:
+        ignore: the entries of the scene file, which come first.
+        described: entries of SRDF files. Many of them concern no pair, because a filter hides it or a link has no geometry.
+
     Returns:
-        the pairs to certify and the ignored pairs, each sorted, and a warning for every ignore entry that concerns no pair.
+        the pairs to certify and the ignored pairs, each sorted, and a warning for every entry of the scene file that concerns no pair.
 
     Raises:
         SceneError: an ignore entry names neither a body nor a geometry.
@@ -28,14 +36,17 @@ def pairs(
             if name != WORLD and name not in known:
                 message, hint = f"{name!r} is neither a body nor a geometry of the scene", "`ciris scene show` and `scene check` list them"
                 raise SceneError("unknown_name", message, field=f"{entry.field}[{k}]", hint=close_matches(name, known) or hint)
+    entries = (*ignore, *described)
+    first = {frozenset((entry.a, entry.b)): entry for entry in reversed(entries)}
+    place = {entry: i for i, entry in enumerate(entries)}
     wanted: list[Pair] = []
     ignored: list[Ignored] = []
     used: set[IgnoreEntry] = set()
     for a, b in sorted({(min(candidate), max(candidate)) for candidate in candidates}):
         if tree.group[body[a]] == tree.group[body[b]]:
             continue
-        names_a, names_b = {a, body[a]}, {b, body[b]}
-        match = next((e for e in ignore if (e.a in names_a and e.b in names_b) or (e.a in names_b and e.b in names_a)), None)
+        named = (frozenset((name_a, name_b)) for name_a in (a, body[a]) for name_b in (b, body[b]))
+        match = min((first[names] for names in named if names in first), key=place.__getitem__, default=None)
         if match is None:
             wanted.append(Pair(a, b))
         else:

@@ -12,6 +12,7 @@ import os
 import re
 import sys
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -46,13 +47,15 @@ from certifier.names import MAX_SENTENCE, escaped
 from certifier.positions import MAGNITUDE
 from certifier.scene import shapes
 from certifier.scene.census import check_counts
+from certifier.scene.configurations import own_configurations, srdf_configurations
 from certifier.scene.file import SceneFile, read_scene_file
 from certifier.scene.hollow import recorded
 from certifier.scene.hulls import with_hulls
-from certifier.scene.joints import Coupling, centered, counted, held, narrowed
+from certifier.scene.joints import Coupling, centered, counted, held, held_at, narrowed
 from certifier.scene.lint import findings
 from certifier.scene.names import Names
 from certifier.scene.pairs import pairs
+from certifier.scene.semantics import read_semantics
 from certifier.scene.strict import StrictReader
 from certifier.scene.tree import Tree, floating
 
@@ -87,7 +90,8 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     names = Names(plant, inspector)
     warnings += without_limits(strict, plant, names)
     every = [joint_of(plant.get_joint(index), names) for index in plant.GetJointIndices()]
-    joints, q_star = centered(narrowed(held(every, scene_file.fix, couplings(plant, names)), scene_file.limits), scene_file.q_star)
+    at = held_at(every, scene_file.fix, couplings(plant, names))
+    joints, q_star = centered(narrowed(held(every, at), scene_file.limits), scene_file.q_star)
     tree = Tree(joints, list(names.bodies))
     reached: dict[str, float] = {}
     parts = _geometries(scene_file, strict, plant, inspector, tree, names, reached)
@@ -96,7 +100,9 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     geometries = tuple({id(geometry): geometry for geometry in by_id.values()}.values())
     for geometry in geometries:
         _check_hull(geometry)
-    wanted, ignored, unused = pairs(candidates, geometries, tree, scene_file.ignore)
+    semantics = read_semantics(scene_file, tree.bodies)
+    described = [entry for one in semantics for entry in one.ignore]
+    wanted, ignored, unused = pairs(candidates, geometries, tree, scene_file.ignore, described)
     scene = Scene(
         name=scene_file.name,
         joints=tree.joints,
@@ -115,8 +121,10 @@ def parse(payload: dict[str, Any]) -> dict[str, Any]:
     )
     check_counts(written, inspector.NumGeometriesWithRole(Role.kProximity), scene)
     drawn = {names.body(plant.GetBodyFromFrameId(inspector.GetFrameId(i))) for i in inspector.GetAllGeometryIds(Role.kIllustration)}
-    document = scene.to_document()
-    document["warnings"] = warnings + unused + findings(scene, tree, candidates, drawn)
+    states, left_out = srdf_configurations(scene, semantics, at)
+    files = {entry.reason: one.file for one in semantics for entry in one.ignore}
+    document = replace(scene, configurations=states | own_configurations(scene, scene_file.configurations)).to_document()
+    document["warnings"] = warnings + unused + left_out + findings(scene, tree, candidates, drawn, files)
     return document
 
 

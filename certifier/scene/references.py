@@ -174,5 +174,5 @@ _READERS: dict[str, Callable[[Path], list[str]]] = {
     **dict.fromkeys((".yaml", ".yml"), _yaml),
     ".obj": _obj,
     ".gltf": _gltf,
-    **dict.fromkeys((".vtk", ".bin", ".mtl", ".stl", ".dae", ".glb", ".png", ".jpg", ".jpeg"), _nothing),
+    **dict.fromkeys((".srdf", ".vtk", ".bin", ".mtl", ".stl", ".dae", ".glb", ".png", ".jpg", ".jpeg"), _nothing),
 }

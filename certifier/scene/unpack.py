@@ -41,9 +41,12 @@ def check_bundle(root: Path, scene: Path) -> None:
     Raises:
         SceneError: as :func:`certifier.scene.bundle.load_bundle` says.
     """
-    packages = read_scene_file(scene).packages
+    scene_file = read_scene_file(scene)
+    packages = scene_file.packages
     for name, directory in packages.items():
         _inside(directory, root, f"packages.{name}")
+    for model, srdf in scene_file.srdf.items():
+        _inside(resolve(srdf, scene.parent, packages), root, f"srdf.{model}")
     for file in sorted(f for f in root.rglob("*") if f.is_file() and f.name != INDEX):
         where = file.relative_to(root).as_posix()
         for reference in references(file):

@@ -56,9 +56,12 @@ class SeedOptions:
         None,
         "(m, n), the first polytope {s : C s <= d}, one row a face, in s; for the method `polytope`, which takes no `q`. The joint limits "
         "are added.",
+        positions=False,
     )
-    d: tuple[float, ...] | None = option(None, "(m,), the right-hand sides of these faces.", most=2000)
-    center: tuple[float, ...] | None = option(None, "(n,), a point inside that polytope, in s.", otherwise="the centre of its largest ball")
+    d: tuple[float, ...] | None = option(None, "(m,), the right-hand sides of these faces.", most=2000, positions=False)
+    center: tuple[float, ...] | None = option(
+        None, "(n,), a point inside that polytope, in s.", otherwise="the centre of its largest ball", positions=False
+    )
     half_width: float | None = option(
         None, "Half the edge length of the first polytope, in s; the method `box` needs it. 0.1 is about 11 degrees of a joint.", above=0
     )

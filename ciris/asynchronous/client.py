@@ -21,7 +21,8 @@ from ciris.documents import Document, bundle, document, given, patience
 from ciris.find import api_key
 from ciris.problems import address, content, problem, segment, unreachable
 
-Rows = list[list[float]]
+Rows = Sequence[list[float] | str]
+"""Points, (n,) each, or names of configurations."""
 Limit = float | list[float]
 
 TIMEOUT_S = 120.0

@@ -267,12 +267,12 @@ class Service:
         return region
 
     def contains(self, scene: str | Scene, q: ArrayLike | None = None, *, s: ArrayLike | None = None) -> Containment:
-        """Returns which regions of a scene contain each point, given as q or as s, (n,) or (k, n)."""
+        """Returns which regions of a scene contain each point, given as q, by names of configurations, or as s, (n,) or (k, n)."""
         answer = self.client.contains(scene_name(scene), **points(2, q=q, s=s))
         return Containment([read(Contained, point) for point in answer["points"]], answer["version"], answer["regions"])
 
     def nearest(self, scene: str | Scene, q: ArrayLike | None = None, *, s: ArrayLike | None = None) -> Nearest:
-        """Returns the region of a scene that is nearest to each point, given as q or as s, (n,) or (k, n)."""
+        """Returns the region of a scene that is nearest to each point, given as q, by names of configurations, or as s, (n,) or (k, n)."""
         answer = self.client.nearest(scene_name(scene), **points(2, q=q, s=s))
         found = [point["nearest"] and read(Near, point["nearest"]) for point in answer["points"]]
         return Nearest(found, answer["version"], answer["regions"])
@@ -331,7 +331,7 @@ class Service:
         """Finds a motion from rest to rest that is proved to be free of collision, or says why there is none.
 
         Args:
-            start, goal: joint positions (n,), or the id of a region, for any point of it.
+            start, goal: joint positions (n,), or names of configurations; or the id of a region, for any point of it.
             goals: (k, n) instead of ``goal``; the motion ends in the one to which it is shortest.
             pose: instead of ``goal``, where a frame ends: ``{"frame": ..., "position": (3,) metres, "rpy": (3,) radians}``.
             line: the frame goes to the pose on a straight line, within ``{"metres": ..., "radians": ...}`` of it.

@@ -11,7 +11,9 @@ EPILOG = """exit status: 0 success; 1 a negative answer (not certified, a proof 
 2 bad input or no service; 130 interrupted. An error is one line on standard error. With --json a command prints one
 JSON document on standard output; everything else goes to standard error.
 
-SCENE is the path of a scene file (.yaml), or the name or id of a scene that the service knows."""
+SCENE is the path of a scene file (.yaml), or the name or id of a scene that the service knows.
+
+In the place of joint positions stand names of configurations of the scene as well: --q home, or --q left_home,right_home."""
 
 
 def parser() -> Parser:

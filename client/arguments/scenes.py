@@ -10,11 +10,35 @@ from client.arguments.common import as_json, dependents, group, remote
 def add(verbs: Any) -> None:
     """Adds the commands."""
     scene = group(verbs.add_parser("scene", help="draft, check, add, stage, promote, list, show and delete scenes"))
-    init = scene.add_parser("init", help="write a scene file and a seed for a robot's model", epilog="Nothing is overwritten.")
+    init = scene.add_parser(
+        "init",
+        help="write a scene file and a seed for a robot's model",
+        epilog="Example: ciris scene init arm.urdf --mount gripper.urdf@tool0@0,0,0.02 --world table.sdf@0.5,0,0. Nothing is overwritten.",
+    )
     init.add_argument("robot", metavar="ROBOT", help="model file: URDF, SDFormat or MJCF")
-    init.add_argument("--world", metavar="FILE", action="append", default=[], help="model of an obstacle around it; may be repeated")
     init.add_argument(
-        "--package", metavar="NAME=DIR", action="append", default=[], help="directory of a package that a model names; may be repeated"
+        "--mount",
+        metavar="FILE@LINK[@X,Y,Z[,R,P,Y]]",
+        action="append",
+        default=[],
+        help="model of what the robot carries, such as a gripper, the link that carries it, and its pose there, metres and degrees; may be "
+        "repeated",
+    )
+    init.add_argument(
+        "--world",
+        metavar="FILE[@X,Y,Z[,R,P,Y]]",
+        action="append",
+        default=[],
+        help="model of an obstacle around it, and where it stands, metres and degrees; default: where its file says; may be repeated",
+    )
+    init.add_argument("--srdf", metavar="FILE", help="SRDF file of the robot; default: the one beside the model, or in ../srdf, if any")
+    init.add_argument(
+        "--package",
+        metavar="NAME=DIR",
+        action="append",
+        default=[],
+        help="directory of a package that a model names; default: the nearest in the directories above, in a ROS workspace around them, in "
+        "AMENT_PREFIX_PATH or in ROS_PACKAGE_PATH; may be repeated",
     )
     init.add_argument(
         "--out",

@@ -123,7 +123,7 @@ def test_a_plan_that_is_not_found_says_why(ciris: Ciris, url: str, region: str, 
         f"--to is in no certified region; nearest: 0.5 in s from {region} (exact), whose nearest point is -0.3\n",
     )
     wrong = ciris("plan", "slider", "--from", "0.1,0.2", "--to", "far", CIRIS_URL=url)
-    assert (wrong.status, wrong.error) == (2, "--to[0]: 'far' is not a finite number (joint positions, separated by commas)")
+    assert (wrong.status, wrong.error.partition(" (")[0]) == (2, "--to: the scene has no configuration 'far'")
     longer = ciris("plan", "slider", "--from", "0.1,0.2", "--to", "0.1", CIRIS_URL=url)
     assert (longer.status, longer.error.partition(" (")[0]) == (2, "--from: 2 numbers were given; slider has 1 joints")
 
@@ -166,7 +166,6 @@ def test_what_is_wrong_with_the_ends_is_said_in_words(ciris: Ciris, url: str, sc
         (("--to-pose", "0,0,0", "--frame", "cart"), "--to-pose"),
         (("--to-pose", "0,0,0,0,0,0"), "--frame"),
         (("--to-pose", "0,0,0,0,0,0", "--frame", "cart", "--tolerance", "0.1"), "--tolerance"),
-        (("--to", "0.1", "--to", "0123abcd"), "--to"),
         (("--to", "0.1", "--grow"), "--grow"),
     ],
 )

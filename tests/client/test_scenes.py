@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 
 from certifier.scene import load_scene
-from tests.certifier.scene.workshop import ARM, BOX, EXAMPLES, LIMIT, ROOM
+from tests.certifier.scene.workshop import ARM, BOX, EXAMPLES, LIMIT, ROOM, write
 from tests.client.conftest import Ciris, command, surroundings
 
 GRIPPER = """<link name="left"><collision><geometry><box size="0.02 0.02 0.1"/></geometry></collision></link>
@@ -186,6 +186,40 @@ def test_what_cannot_be_drafted_is_named_and_leaves_nothing(ciris: Ciris, tmp_pa
     assert done.status == 0, done.stderr
 
 
+def test_a_whole_cell_is_drafted_with_one_command(ciris: Ciris, tmp_path: Path) -> None:
+    """A gripper whose file name has the sign before poses, a table that stands turned, and a file that stays at the origin."""
+    for name in ("grip", "grip@2"):
+        (tmp_path / f"{name}.urdf").write_text("<robot name='grip'><link name='palm'/></robot>")
+    one = "<sdf version='1.9'><model name='{0}'><link name='top'/></model></sdf>"
+    for name in ("table", "lamp"):
+        (tmp_path / f"{name}.sdf").write_text(one.format(name))
+    (tmp_path / "s.srdf").write_text("<robot name='arm'/>")
+    where = (f"{tmp_path / 'grip@2.urdf'}@hand@0.1,0,0.2", f"{tmp_path / 'table.sdf'}@1,0,0,0,0,90", tmp_path / "lamp.sdf")
+    arm = write(tmp_path).with_name("arm.urdf")
+    out = tmp_path / "cell" / "scene.yaml"
+    worlds = ("--world", where[1], "--world", where[2])
+    done = ciris("scene", "init", arm, "--mount", where[0], *worlds, "--srdf", tmp_path / "s.srdf", "--out", out)
+    assert done.status == 0, done.stderr
+    welds = [line for line in out.read_text().splitlines() if "add_weld" in line]
+    assert welds == [
+        '  - add_weld: {parent: world, child: "arm::base"}',
+        '  - add_weld: {parent: "arm::hand", child: "grip::palm", X_PC: {translation: [0.1, 0.0, 0.2]}}',
+        '  - add_weld: {parent: world, child: "table::top", X_PC: {translation: [1.0, 0.0, 0.0], rotation: !Rpy {deg: [0.0, 0.0, 90.0]}}}',
+        '  - add_weld: {parent: world, child: "lamp::top"}',
+    ]
+    assert 'srdf: {arm: "../s.srdf"}' in out.read_text()
+    for option, value, words in (
+        ("--mount", str(tmp_path / "grip.urdf"), "write grip.urdf@LINK; links at its ends: hand"),
+        ("--mount", f"{tmp_path / 'grip.urdf'}@0,0,1", "write grip.urdf@LINK"),
+        ("--mount", f"{tmp_path / 'grip.urdf'}@hand@0,0", "3 or 6 numbers, not 2"),
+        ("--world", f"{tmp_path / 'table.sdf'}@0,0,1,x", "'x' is not a finite number"),
+    ):
+        refused = ciris("scene", "init", arm, option, value, "--out", tmp_path / "no" / "scene.yaml")
+        assert (refused.status, refused.error.partition(":")[0].partition("[")[0]) == (2, option)
+        assert words in refused.error
+        assert not (tmp_path / "no").exists()
+
+
 def test_a_check_says_what_touches(ciris: Ciris, tmp_path: Path) -> None:
     done = ciris("scene", "check", EXAMPLES / "planar_2dof" / "scene.yaml", "--json")
     assert done.status == 0
@@ -202,7 +236,12 @@ def test_a_check_says_what_touches(ciris: Ciris, tmp_path: Path) -> None:
     done = ciris("scene", "check", tmp_path / "scene.yaml", "--q", "0")
     assert done.status == 1
     assert "touching at --q: arm/hand/palm and room/walls/wall" in done.stdout
-    for q, words in (("0,0", "2 numbers for 1 joints"), ("5", "not between its limits"), ("x", "not a finite number")):
+    for q, words in (
+        ("0,0", "2 numbers for 1 joints"),
+        ("5", "not between its limits"),
+        ("x", "no configuration 'x'"),
+        ("0,x", "not a finite number"),
+    ):
         done = ciris("scene", "check", tmp_path / "scene.yaml", "--q", q)
         assert done.status == 2
         assert words in done.error

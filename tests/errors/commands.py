@@ -86,6 +86,7 @@ COMMANDS: Table = {
     ("points", "q"): [
         lambda t: connect("http://127.0.0.1:9").contains("cell"),
         lambda t: connect("http://127.0.0.1:9").contains("cell", 0.5),
+        lambda t: connect("http://127.0.0.1:9").contains("cell", [0.5, "home"]),
     ],
     ("wrong_length", "q"): [lambda t: one_joint().to_s([0.1, 0.2])],
     ("unreachable", ""): [lambda t: t.ciris("scene", "ls", CIRIS_URL="http://127.0.0.1:9")],
@@ -94,7 +95,7 @@ COMMANDS: Table = {
     ("bad_number", "--q[1]"): [lambda t: grow(t, "--q", "0,x")],
     ("bad_number", "--q"): [lambda t: grow(t, "--q", ",")],
     ("seed_missing", "--q"): [lambda t: t.ciris("grow", t.write(alone__yaml="").name, "--local")],
-    ("seed_file", "--q"): [lambda t: beside_a_seed(t, "q: here")],
+    ("seed_file", "--q"): [lambda t: beside_a_seed(t, "q: [here]")],
     ("polytope_joints", "--polytope"): [lambda t: good(t, "--local", space={"joints": ["other/a", "other/b"]})],
     ("polytope_q_star", "--polytope"): [bound],
     ("polytope_file", "--polytope"): [

@@ -51,7 +51,7 @@ COVERS: Table = {
     ("seed_in_collision", "options.seeds[0]"): [lambda t: looked(seeds=((0.0, 0.0),))],
     ("path_in_collision", "options.paths[0]"): [lambda t: looked(paths=(((-1.5, 0.0), (0.0, 0.0)),))],
     ("cover_not_found", "job"): [not_a_cover],
-    ("option", "--from"): [from_a_region],
+    ("unknown_configuration", "--from"): [from_a_region],
     ("option", "--path"): [in_s],
     ("option_value", "--deadline"): [lambda t: t.ciris("cover", "slider", "--deadline", "-1")],
 }

@@ -19,6 +19,7 @@ from tests.errors.covers import COVERS
 from tests.errors.elsewhere import PROOF_FILES, TESTED, UNTESTED
 from tests.errors.models import MODELS
 from tests.errors.motions import MOTIONS
+from tests.errors.named import NAMED
 from tests.errors.python import PYTHON
 from tests.errors.regions import REGIONS
 from tests.errors.scene_files import SCENE_FILES
@@ -28,7 +29,7 @@ from tests.errors.sites import HOLE, ROOT, Site, sites
 from tests.errors.teams import TEAMS
 from tests.errors.trial import Provocation, Trial
 
-TABLES = (SCENE_FILES, SCENES, MODELS, BUNDLES, REGIONS, MOTIONS, COVERS, SERVICE, COMMANDS, PYTHON, TEAMS)
+TABLES = (SCENE_FILES, SCENES, MODELS, BUNDLES, REGIONS, NAMED, MOTIONS, COVERS, SERVICE, COMMANDS, PYTHON, TEAMS)
 PROVOCATIONS = [Provocation(code, field, act) for table in TABLES for (code, field), acts in table.items() for act in acts]
 PROVOKED: dict[Provocation, list[Site]] = {}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 import yaml
 
 from certifier.errors import SceneError
-from certifier.scene.draft import Draft, draft
+from certifier.model import Scene
+from certifier.scene.draft import Draft, Part, draft
+from certifier.scene.drake_model import build_diagram, drake_name
 from certifier.scene.tree import Tree
 from tests.certifier.scene.workshop import ARM, BOX, LIMIT
 
@@ -20,7 +23,7 @@ def drafted(directory: Path, world: str, suffix: str = "sdf") -> Draft:
     """A draft of the small arm, far from a world of this text."""
     (directory / "arm.urdf").write_text(ARM.format(kind="revolute", limit=LIMIT, shape=BOX, more=""))
     (directory / f"world.{suffix}").write_text(world)
-    return draft(directory / "arm.urdf", [directory / f"world.{suffix}"], directory / "scene.yaml", {})
+    return draft(directory / "arm.urdf", [Part(directory / f"world.{suffix}")], directory / "scene.yaml", {})
 
 
 def said(made: Draft, key: str) -> dict[str, object]:
@@ -170,3 +173,122 @@ def test_a_mimic_joint_follows_the_joint_of_the_whole_name(tmp_path: Path) -> No
     assert "  arm/lead: 0.25\n" in made.text
     assert "  arm/follow: 0.25\n" in made.text
     assert [joint.name for joint in made.scene.moving] == ["arm/x/lead"]
+
+
+GRIPPER = (
+    '<robot name="grip"><link name="palm"><collision><geometry><box size="0.04 0.04 0.04"/></geometry></collision></link>'
+    '<joint name="slide" type="prismatic"><parent link="palm"/><child link="finger"/><origin xyz="0 0 0.1"/><axis xyz="1 0 0"/>'
+    '<limit lower="0" upper="0.03" effort="1" velocity="1"/></joint>'
+    '<link name="finger"><collision><geometry><box size="0.02 0.02 0.02"/></geometry></collision></link></robot>'
+)
+
+
+def cell(directory: Path, mount: Part | None = None, world: Part | None = None, srdf: Path | None = None) -> Draft:
+    """A draft of the small arm with what it carries and what stands around it."""
+    (directory / "arm.urdf").write_text(ARM.format(kind="revolute", limit=LIMIT, shape=BOX, more=""))
+    return draft(directory / "arm.urdf", [world] if world else [], directory / "scene.yaml", {}, [mount] if mount else [], srdf)
+
+
+def pose(scene: Scene, body: str, frame: str) -> np.ndarray:
+    """Drake's pose of a body in the frame of another one at the middle of all limits, (4, 4)."""
+    diagram = build_diagram(scene)
+    plant, context = diagram.plant(), diagram.CreateDefaultContext()
+    plant.SetPositions(plant.GetMyContextFromRoot(context), scene.q_star)
+    at = {name: plant.GetBodyByName(drake_name(name)).body_frame() for name in (body, frame)}
+    return plant.CalcRelativeTransform(plant.GetMyContextFromRoot(context), at[frame], at[body]).GetAsMatrix4()
+
+
+def test_a_gripper_hangs_on_the_link_that_is_named_where_it_is_said(tmp_path: Path) -> None:
+    (tmp_path / "grip.urdf").write_text(GRIPPER)
+    made = cell(tmp_path, Part(tmp_path / "grip.urdf", "hand", (0.1, 0.2, 0.3), (90.0, 0.0, 90.0)))
+    X = pose(made.scene, "grip/palm", "arm/hand")
+    # Roll by 90 degrees takes y to z and z to -y; yaw by 90 degrees then takes x to y and y to -x.
+    np.testing.assert_allclose(X, [[0, 0, 1, 0.1], [1, 0, 0, 0.2], [0, 1, 0, 0.3], [0, 0, 0, 1]], atol=1e-9)
+    assert [joint.name for joint in made.scene.moving] == ["arm/turn", "grip/slide"]
+    assert cell(tmp_path, Part(tmp_path / "grip.urdf", "arm::hand")).scene.bodies == made.scene.bodies
+
+
+@pytest.mark.parametrize(
+    ("link", "words"),
+    [("", r"grip\.urdf@LINK; links at its ends: hand"), ("hend", "did you mean hand"), ("palm", "links at its ends: hand")],
+)
+def test_a_link_that_is_missing_is_asked_for_by_name(tmp_path: Path, link: str, words: str) -> None:
+    (tmp_path / "grip.urdf").write_text(GRIPPER)
+    with pytest.raises(SceneError) as refused:
+        cell(tmp_path, Part(tmp_path / "grip.urdf", link))
+    assert (refused.value.code, refused.value.field) == ("mount", "--mount")
+    assert re.search(words, f"{refused.value.message} {refused.value.hint}")
+
+
+def test_what_is_mounted_hangs_on_one_body(tmp_path: Path) -> None:
+    (tmp_path / "two.sdf").write_text(sdf(f'<model name="two"><link name="a">{BALL}</link><link name="b">{BALL}</link></model>'))
+    with pytest.raises(SceneError, match="has 2 bodies that nothing holds: two::a, two::b"):
+        cell(tmp_path, Part(tmp_path / "two.sdf", "hand"))
+
+
+def test_a_pose_of_a_world_moves_all_of_it_with_its_own_poses(tmp_path: Path) -> None:
+    (tmp_path / "w.sdf").write_text(
+        sdf(f'<model name="m"><link name="a"><pose>1 0 0 0 0 0</pose>{BALL}</link><link name="b">{BALL}</link></model>')
+    )
+    made = cell(tmp_path, world=Part(tmp_path / "w.sdf", "", (5.0, 0.0, 1.0), (0.0, 0.0, 90.0)))
+    assert positions(made) == {"m/a": [5, 1, 1], "m/b": [5, 0, 1]}
+    assert cell(tmp_path, world=Part(tmp_path / "w.sdf")).text.count("X_PC: {translation: [1.0, 0.0, 0.0]}") == 1
+
+
+SRDF = '<robot name="arm"><group_state name="home" group="all"><joint name="{0}" value="0.5"/></group_state>{1}</robot>'
+DISABLED = '<disable_collisions link1="base" link2="{0}" reason="Never"/>'
+
+
+def test_an_srdf_file_beside_the_model_is_used_and_said(tmp_path: Path) -> None:
+    assert cell(tmp_path).notes == ()
+    for place in (tmp_path / "srdf" / "arm.srdf", tmp_path / "urdf" / "arm.srdf"):
+        (tmp_path / "urdf").mkdir(exist_ok=True)
+        place.parent.mkdir(exist_ok=True)
+        place.write_text(SRDF.format("turn", DISABLED.format("hand")))
+        made = cell(tmp_path / "urdf")
+        assert made.scene.configurations == {"arm/all/home": {"arm/turn": 0.5}}
+        assert made.notes == (f"{place} is beside the model, and the draft uses it",)
+        place.write_text(SRDF.format("turn", DISABLED.format("tool")))
+        made = cell(tmp_path / "urdf")
+        assert made.scene.configurations == {}
+        assert "not used" in made.notes[0]
+        assert "'tool' is no link of arm" in made.notes[0]
+        place.unlink()
+    (tmp_path / "srdf" / "other.srdf").write_text(SRDF.format("turn", ""))
+    assert cell(tmp_path / "urdf").notes == ("not used: other.srdf in ../srdf of the model; name one with --srdf",)
+    named = cell(tmp_path / "urdf", srdf=tmp_path / "srdf" / "other.srdf")
+    assert (named.scene.configurations, named.notes) == ({"arm/all/home": {"arm/turn": 0.5}}, ())
+    (tmp_path / "srdf" / "other.srdf").write_text(SRDF.format("turn", DISABLED.format("tool")))
+    with pytest.raises(SceneError, match="'tool' is no link of arm"):
+        cell(tmp_path / "urdf", srdf=tmp_path / "srdf" / "other.srdf")
+
+
+U = """v -0.2 -0.2 0\nv 0.2 -0.2 0\nv 0.2 0.2 0\nv -0.2 0.2 0\nv -0.2 -0.2 0.2\nv 0.2 -0.2 0.2\nv 0.2 0.2 0.2\nv -0.2 0.2 0.2
+f 1 4 3 2\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"""
+"""A box of 0.4 m and 0.2 m in height without a lid."""
+CARRIED = """<robot name="arm"><link name="base"><collision name="tub"><geometry><mesh filename="tub.obj"/></geometry></collision></link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="mid"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint><link name="mid"/>
+<joint name="nod" type="revolute"><parent link="mid"/><child link="ball"/><origin xyz="0 0 {z}"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<link name="ball"><collision name="ball"><geometry><sphere radius="0.03"/></geometry></collision></link></robot>"""
+
+
+@pytest.mark.parametrize("z", [0.15, 0.0])
+def test_pairs_of_which_perhaps_only_hulls_overlap_are_marked(tmp_path: Path, z: float) -> None:
+    """The ball is inside of the open tub, whose hull is full. A ball in the floor overlaps by less than the hull reaches beyond."""
+    (tmp_path / "tub.obj").write_text(U)
+    (tmp_path / "arm.urdf").write_text(CARRIED.format(z=z))
+    made = draft(tmp_path / "arm.urdf", [], tmp_path / "scene.yaml", {})
+    assert [(pair.a, pair.b) for pair in made.ignored] == [("arm/ball/ball", "arm/base/tub")]
+    assert made.doubtful.keys() == {*made.ignored}
+    assert "# Look at these: perhaps only their hulls overlap" in made.text
+    assert "perhaps as hulls only" in made.scene.ignored[0].reason
+
+
+def test_boxes_that_overlap_are_not_doubtful(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(CARRIED.format(z=0.0).replace('<mesh filename="tub.obj"/>', '<box size="0.4 0.4 0.4"/>'))
+    made = draft(tmp_path / "arm.urdf", [], tmp_path / "scene.yaml", {})
+    assert len(made.ignored) == 1
+    assert not made.doubtful
+    assert "perhaps" not in made.text

@@ -166,6 +166,7 @@ def test_the_documents_example_is_read_and_its_table_has_every_key(tmp_path):
     assert set(yaml.safe_load(example)) == set(KEYS)
     (tmp_path / "cell").mkdir()
     (tmp_path / "my_robot_description").mkdir()
+    (tmp_path / "cell" / "arm.srdf").write_text('<robot name="arm"/>')
     path = write(tmp_path / "cell", example, limit=WIDE, more=FINGERS + RING)
     scene = parsed(path)
     assert [j.name for j in scene.moving] == ["arm/turn"]

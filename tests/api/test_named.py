@@ -1,0 +1,123 @@
+"""Names of configurations stand in every request in the place of joint positions, and mean what was added last."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from certifier.model import Scene
+from db import scenes
+from db.session import Database
+
+HOME, AWAY = -0.1, 0.15
+
+
+@pytest.fixture
+def named(database: Database, region: str, scene: Scene) -> Callable[..., None]:
+    """Adds the scene of the region again, with configurations."""
+
+    def add(**configurations: float) -> None:
+        (joint,) = (joint.name for joint in scene.moving)
+        with database.write() as session:
+            scenes.add(session, replace(scene, configurations={name: {joint: value} for name, value in configurations.items()}))
+
+    add(home=HOME, away=AWAY)
+    return add
+
+
+def ask(client: TestClient, path: str, **body: Any) -> Any:
+    answer = client.post(path, json={"scene": "slider", **body})
+    own = ("id", "seconds", "verify_seconds", "motion", "proof", "pieces")
+    return {name: value for name, value in answer.json().items() if name not in own} | {"status": answer.status_code}
+
+
+@pytest.mark.parametrize(
+    ("path", "with_names", "with_numbers"),
+    [
+        ("contains", {"q": ["home", [0.0], "away"]}, {"q": [[HOME], [0.0], [AWAY]]}),
+        ("nearest", {"q": ["home"]}, {"q": [[HOME]]}),
+        ("segment", {"q": [["home", "away"], ["away", [0.1]]]}, {"q": [[[HOME], [AWAY]], [[AWAY], [0.1]]]}),
+        ("path", {"q": ["home", [0.0], "away"]}, {"q": [[HOME], [0.0], [AWAY]]}),
+        ("contacts", {"q": ["home", "away"]}, {"q": [[HOME], [AWAY]]}),
+        ("plan", {"start": "home", "goal": "away", "regions_only": True}, {"start": [HOME], "goal": [AWAY], "regions_only": True}),
+        ("plan", {"start": "home", "goals": ["home"], "via": ["away"]}, {"start": [HOME], "goals": [[HOME]], "via": [[AWAY]]}),
+        ("certify-path", {"q": ["home", "away"]}, {"q": [[HOME], [AWAY]]}),
+    ],
+)
+def test_a_name_means_its_positions(
+    client: TestClient, named: object, path: str, with_names: dict[str, Any], with_numbers: dict[str, Any]
+) -> None:
+    answer = ask(client, f"/v1/planning/{path}", **with_names)
+    assert answer["status"] == 200
+    assert answer == ask(client, f"/v1/planning/{path}", **with_numbers)
+    other = {name: [*value] if isinstance(value, list) else value for name, value in with_names.items()}
+    first = next(name for name in ("q", "start") if name in other)
+    other[first] = "nowhere" if first == "start" else ["nowhere", *other[first][1:]] if path != "segment" else [["nowhere", "home"]]
+    refused = ask(client, f"/v1/planning/{path}", **other)
+    assert (refused["status"], refused["code"]) == (422, "unknown_configuration")
+    assert refused["field"] == {"start": "start", "q": "q[0][0]" if path == "segment" else "q[0]"}[first]
+
+
+@pytest.mark.parametrize(
+    ("body", "place", "expected"),
+    [
+        ({"kind": "grow", "seed": {"q": "home", "contain": ["away", [0.0]]}}, ("seed", "q"), [HOME]),
+        ({"kind": "grow", "seed": {"q": [0.0], "contain": ["away", [0.0]]}}, ("seed", "contain"), [[AWAY], [0.0]]),
+        ({"kind": "cover", "options": {"seeds": ["away"]}}, ("seeds",), [[AWAY]]),
+        ({"kind": "cover", "options": {"connect": ["home", "away"]}}, ("connect",), [[HOME], [AWAY]]),
+        ({"kind": "cover", "options": {"paths": [["home", "away"]]}}, ("paths",), [[[HOME], [AWAY]]]),
+        ({"kind": "certify-path", "q": ["home", "away"]}, ("q",), [[HOME], [AWAY]]),
+    ],
+)
+def test_jobs_keep_the_positions_that_a_name_meant(
+    client: TestClient, named: Callable[..., None], body: dict[str, Any], place: tuple[str, ...], expected: object
+) -> None:
+    def asked(job: dict[str, Any]) -> object:
+        found: Any = job["options"]
+        for name in place:
+            found = found[name]
+        return found
+
+    job = client.post("/v1/jobs", json={"scene": "slider", **body}).json()
+    assert asked(job) == expected
+    named(home=0.05, away=0.06)
+    assert asked(client.get(f"/v1/jobs/{job['id']}").json()) == expected
+    assert asked(client.post("/v1/jobs", json={"scene": "slider", **body}).json()) != expected
+
+
+def test_a_region_may_still_be_named_and_a_configuration_comes_first(client: TestClient, named: Callable[..., None], region: str) -> None:
+    def goal(text: str) -> Any:
+        return ask(client, "/v1/planning/plan", start="home", goal=text, regions_only=True)
+
+    assert goal(region)["found"]
+    assert goal(region[:8])["q"][-1] != [AWAY]
+    assert goal("0123abcd")["code"] == "region_not_found"
+    named(home=HOME, **{region[:8]: AWAY})
+    assert goal(region[:8])["q"][-1] == pytest.approx([AWAY], abs=1e-9)
+
+
+@pytest.mark.parametrize("wrong", ["", "x" * 2001, 3, None, {"home": 1}])
+def test_what_is_neither_positions_nor_a_name_is_refused_at_its_place(client: TestClient, named: object, wrong: object) -> None:
+    refused = ask(client, "/v1/planning/contains", q=[[0.0], wrong])
+    assert (refused["status"], refused["code"]) == (422, "invalid_request")
+    assert [error["field"] for error in refused["errors"]] == ["q[1]"]
+    assert ask(client, "/v1/planning/contains", s=["home"])["status"] == 422, "s has no names"
+
+
+def test_the_scene_lists_its_configurations_and_the_last_ones_hold(client: TestClient, named: Callable[..., None]) -> None:
+    def listed() -> Any:
+        return client.get("/v1/scenes/slider").json()["configurations"]
+
+    (joint,) = (position["name"] for position in client.get("/v1/scenes/slider").json()["positions"])
+    assert listed() == {"home": {joint: HOME}, "away": {joint: AWAY}}
+    before = client.get("/v1/scenes/slider").json()["id"]
+    named(rest=0.0)
+    assert listed() == {"rest": {joint: 0.0}}
+    assert client.get("/v1/scenes/slider").json()["id"] == before
+    assert ask(client, "/v1/planning/contains", q=["home"])["code"] == "unknown_configuration"
+    named()
+    assert listed() == {}
