@@ -28,7 +28,21 @@ WAITING = ("workers", "client", "docs", "benchmarks")
 """Rooms whose tests wait for processes."""
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Prepares what was collected, before anything is left out by its marker."""
+    repeat_lengthy_ones_in_the_slow_suite(items)
+    mix_waiting_and_computing(items)
+
+
+def repeat_lengthy_ones_in_the_slow_suite(items: list[pytest.Item]) -> None:
+    """What is marked ``lengthy`` is repeated on PostgreSQL by the slow suite only."""
+    for item in items:
+        if item.get_closest_marker("lengthy") and "postgresql" in item.nodeid:
+            item.add_marker(pytest.mark.slow)
+
+
+def mix_waiting_and_computing(items: list[pytest.Item]) -> None:
     """Spreads the files that wait among those that compute, so that a run in parallel does some of both at any time."""
     files: dict[Path, list[pytest.Item]] = {}
     for item in items:
