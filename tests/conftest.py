@@ -1,6 +1,7 @@
 """What every test runs under: one numerical thread a process, Ctrl-C that works, Hypothesis examples that may take their time."""
 
 import os
+import re
 import signal
 from pathlib import Path
 
@@ -11,6 +12,8 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUM
 
 import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402
+from xdist.remote import Producer  # noqa: E402
+from xdist.scheduler import LoadFileScheduling  # noqa: E402
 
 settings.register_profile("ciris", deadline=None, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("ciris")
@@ -21,6 +24,22 @@ pytest_plugins = ["tests.services", "tests.skips"]
 def pytest_xdist_auto_num_workers() -> int:
     """Many tests wait for processes, so there is one more of pytest than there are cores."""
     return len(os.sched_getaffinity(0)) + 1
+
+
+SHARING = re.compile(r"tests/workers/test_(service|faults|motions|presence|covers|recertify)\.py::")
+"""Tests whose fixture ``service`` starts workers, on either database, and shares them."""
+
+
+class Together(LoadFileScheduling):
+    """Gives each process whole files, and all that shares one service to one process, so that few services are started."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return "tests/workers" if SHARING.match(nodeid) else super()._split_scope(nodeid)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFileScheduling | None:
+    return Together(config, log) if config.getvalue("dist") == "loadfile" else None
 
 
 ROOMS = Path(__file__).parent
